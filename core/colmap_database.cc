@@ -1,0 +1,1 @@
+#include "core/colmap_database.h"

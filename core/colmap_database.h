@@ -1,0 +1,71 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera.h"
+#include "core/database.h"
+#include "core/features.h"
+#include "core/ids.h"
+
+namespace cairn {
+
+// COLMAP's database, schema of version 3.8 (src/base/database.cc there).  features.db and matches.db are such files,
+// with tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
+
+struct DatabaseImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+};
+
+// COLMAP's TwoViewGeometry::ConfigurationType.
+enum class TwoViewConfig : int {
+  kUndefined = 0,
+  kDegenerate = 1,
+  kCalibrated = 2,    // essential matrix
+  kUncalibrated = 3,  // fundamental matrix
+  kPlanar = 4,
+  kPanoramic = 5,
+  kPlanarOrPanoramic = 6,
+};
+
+// The verified matches of two images, image_id1 < image_id2.
+struct TwoViewGeometry {
+  ImageId image_id1 = 0;
+  ImageId image_id2 = 0;
+  TwoViewConfig config = TwoViewConfig::kUndefined;
+  std::vector<Match> inliers;  // ascending
+  Eigen::Matrix3d F = Eigen::Matrix3d::Zero();  // x2' F x1 = 0, pixels
+  Eigen::Matrix3d E = Eigen::Matrix3d::Zero();  // normalised coordinates
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+};
+
+// COLMAP's pair_id of two images (order does not matter) and back, smaller id first.
+int64_t PairIdFromImageIds(ImageId image_id1, ImageId image_id2);
+std::pair<ImageId, ImageId> ImageIdsFromPairId(int64_t pair_id);
+
+// CREATE TABLE statements of COLMAP 3.8's schema (user_version 3800 set).
+extern const char* const kColmapSchema;
+
+// Readers.  Each checks lengths, counts and references; errors are Corrupt and name the file, table and row.
+// They throw SQLite::Exception: call them inside WithDatabaseErrors.
+Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& database);
+Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database);  // ascending image_id
+Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
+Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id);
+// All pairs with at least `min_num_inliers` inliers, ascending pair_id.
+Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database, int min_num_inliers);
+
+// Writers.
+void WriteDatabaseCamera(SQLite::Database& database, const Camera& camera);
+void WriteDatabaseImage(SQLite::Database& database, const DatabaseImage& image);
+void WriteDatabaseFeatures(SQLite::Database& database, ImageId image_id, const Features& features);
+void WriteDatabaseTwoViewGeometry(SQLite::Database& database, const TwoViewGeometry& geometry);
+
+}  // namespace cairn

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "core/error.h"
+#include "core/options.h"
+#include "core/progress.h"
+
+namespace cairn {
+
+// What every subcommand gets from the program: --threads, --seed, --progress, and where results go.
+struct CommandEnvironment {
+  int num_threads = 0;  // 0 = all cores
+  uint64_t seed = 0;
+  Progress* progress = nullptr;  // never null when a command runs
+  std::ostream* out = nullptr;   // results; messages go to spdlog (stderr)
+};
+
+// A subcommand of `cairn`: argv and files only; the work is a library call.
+struct Command {
+  std::string name;     // "filter-visibility"
+  std::string summary;  // one line for --help
+  // Adds positionals and options to the subcommand's parser; called once, before parsing.
+  std::function<void(CLI::App&)> add_arguments;
+  // Runs after parsing.  An error's code is the program's exit code.
+  std::function<Status(const CommandEnvironment&)> run;
+};
+
+// Gives a subcommand one `--name-with-dashes VALUE` per option of the table (help with default and range), and
+// `--options FILE.toml`.  Apply() reads the file first, then the command line's values, then checks ranges.
+class OptionArguments {
+ public:
+  // `table` points into an options struct that outlives this object.
+  void Add(CLI::App& app, OptionTable table);
+  Status Apply() const;
+
+ private:
+  OptionTable table_;
+  std::string options_file_;
+  std::vector<std::string> texts_;
+  std::vector<const CLI::Option*> arguments_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstring>
+#include <functional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+
+#include "core/error.h"
+#include "core/file.h"
+
+namespace cairn {
+
+// Runs `body` (returning Status or Result<T>) and turns SQLite's exceptions into errors that name the file.
+template <typename Body>
+auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_result_t<Body> {
+  try {
+    return body();
+  } catch (const SQLite::Exception& exception) {
+    const int code = exception.getErrorCode();
+    const ErrorCode error = code == SQLITE_BUSY || code == SQLITE_LOCKED ? ErrorCode::kBusy
+                            : code == SQLITE_FULL || code == SQLITE_IOERR || code == SQLITE_READONLY ||
+                                    code == SQLITE_CANTOPEN || code == SQLITE_PERM
+                                ? ErrorCode::kIo
+                                : ErrorCode::kCorrupt;
+    return MakeError(error, "{}: SQLite says: {}", path, exception.what());
+  }
+}
+
+// Opens an existing database read-only and immutable (no locks, no -wal or -shm beside it).
+// Errors: NotFound, Corrupt (empty, truncated, or not SQLite).
+Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path);
+
+// Writes a new database file: page size 4096, no journal (the file is not visible before it is whole),
+// `schema` executed, `fill` run in one transaction, then as WriteFileAtomically.  Same calls, same bytes.
+Status WriteDatabase(const std::string& path, const std::string& schema,
+                     const std::function<Status(SQLite::Database&)>& fill);
+
+// Whether the file starts with SQLite's magic bytes.
+bool IsSqliteFile(const std::string& path);
+
+bool HasTable(SQLite::Database& database, const std::string& table);
+
+// A blob as a vector of T.  Errors: Corrupt when its length is not a multiple of sizeof(T).  `what` names it.
+template <typename T>
+Result<std::vector<T>> BlobToVector(const SQLite::Column& column, const std::string& what) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  const size_t num_bytes = column.getBytes();
+  if (num_bytes % sizeof(T) != 0) {
+    return MakeError(ErrorCode::kCorrupt, "{}: a blob of {} bytes is not a multiple of {}", what, num_bytes, sizeof(T));
+  }
+  std::vector<T> values(num_bytes / sizeof(T));
+  if (num_bytes > 0) std::memcpy(values.data(), column.getBlob(), num_bytes);
+  return values;
+}
+
+}  // namespace cairn

@@ -1,0 +1,1 @@
+#include "core/descriptor_matcher.h"

@@ -1,0 +1,110 @@
+#include "core/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status SyncPath(const std::string& path, int flags) {
+  const int fd = open(path.c_str(), flags | O_CLOEXEC);
+  if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened for syncing: {}", path, std::strerror(errno));
+  const int rc = fsync(fd);
+  const int error = errno;
+  close(fd);
+  if (rc != 0) return MakeError(ErrorCode::kIo, "{}: cannot be synced: {}", path, std::strerror(error));
+  return Ok();
+}
+
+bool SameBytes(const std::string& path1, const std::string& path2) {
+  std::error_code error;
+  const auto size1 = fs::file_size(path1, error);
+  if (error) return false;
+  const auto size2 = fs::file_size(path2, error);
+  if (error || size1 != size2) return false;
+  std::ifstream file1(path1, std::ios::binary), file2(path2, std::ios::binary);
+  std::string block1(1 << 16, '\0'), block2(1 << 16, '\0');
+  while (file1 && file2) {
+    file1.read(block1.data(), block1.size());
+    file2.read(block2.data(), block2.size());
+    if (file1.gcount() != file2.gcount()) return false;
+    if (std::memcmp(block1.data(), block2.data(), file1.gcount()) != 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::string> ReadFile(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+  if (fs::is_directory(path, error)) return MakeError(ErrorCode::kNotFound, "{}: is a folder, expected a file", path);
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
+  std::ostringstream contents;
+  contents << file.rdbuf();
+  if (file.bad()) return MakeError(ErrorCode::kIo, "{}: reading failed: {}", path, std::strerror(errno));
+  return std::move(contents).str();
+}
+
+Status ReplaceFileAtomically(const std::string& path, const std::function<Status(const std::string&)>& write) {
+  const fs::path target(path);
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path, folder.string());
+  }
+  if (fs::is_directory(target, error)) return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
+  const std::string temporary = fmt::format("{}.tmp-{}", path, getpid());
+  fs::remove(temporary, error);
+  Status status = write(temporary);
+  if (status.ok() && SameBytes(temporary, path)) {
+    fs::remove(temporary, error);
+    return Ok();
+  }
+  if (status.ok()) status = SyncPath(temporary, O_RDONLY);
+  if (status.ok() && std::rename(temporary.c_str(), path.c_str()) != 0) {
+    status = MakeError(ErrorCode::kIo, "{}: cannot be replaced: {}", path, std::strerror(errno));
+  }
+  if (!status.ok()) {
+    fs::remove(temporary, error);
+    return status;
+  }
+  return SyncPath(folder.string(), O_RDONLY | O_DIRECTORY);
+}
+
+Status WriteFileAtomically(const std::string& path, std::string_view contents) {
+  return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
+    std::ofstream file(temporary, std::ios::binary);
+    file.write(contents.data(), static_cast<std::streamsize>(contents.size()));
+    file.close();
+    if (!file) {
+      return MakeError(ErrorCode::kIo, "{}: cannot be written: {}; is the disk full or the folder read-only?", path,
+                       std::strerror(errno));
+    }
+    return Ok();
+  });
+}
+
+std::string HashBytes(std::string_view bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+Result<std::string> HashFile(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
+  return HashBytes(contents);
+}
+
+}  // namespace cairn

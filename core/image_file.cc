@@ -1,0 +1,1 @@
+#include "core/image_file.h"

@@ -1,0 +1,175 @@
+#include "core/options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+
+#include <toml++/toml.h>
+
+#include "core/file.h"
+
+namespace cairn {
+namespace {
+
+template <typename T>
+bool ParseNumber(const std::string& text, T* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::string RangeText(const Option& option) {
+  if (std::isinf(option.max)) return fmt::format("at least {:g}", option.min);
+  if (std::isinf(option.min)) return fmt::format("at most {:g}", option.max);
+  return fmt::format("in [{:g}, {:g}]", option.min, option.max);
+}
+
+Status CheckRange(const Option& option, double value) {
+  if (value >= option.min && value <= option.max) return Ok();  // false for NaN
+  return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}", option.name, value, RangeText(option));
+}
+
+Error WrongType(const Option& option, const std::string& found) {
+  static constexpr const char* kTypes[] = {"true or false", "an integer", "a number", "a text", "a list of numbers"};
+  return MakeError(ErrorCode::kInvalidArgument, "option {}: expected {}, found '{}'", option.name,
+                   kTypes[option.value.index()], found);
+}
+
+// A TOML value in the form that SetOption reads.
+std::string TextFromToml(const toml::node& node) {
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* list = node.as_array()) {
+    std::string joined;
+    for (const toml::node& item : *list) joined += (joined.empty() ? "" : ",") + TextFromToml(item);
+    return joined;
+  }
+  std::ostringstream text;
+  if (const auto* boolean = node.as_boolean()) {
+    text << (boolean->get() ? "true" : "false");
+  } else if (const auto* integer = node.as_integer()) {
+    text << integer->get();
+  } else if (const auto* number = node.as_floating_point()) {
+    text << fmt::format("{}", number->get());
+  } else {
+    text << "a table or date";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+Status SetOption(const Option& option, const std::string& text) {
+  if (auto* const* flag = std::get_if<bool*>(&option.value)) {
+    if (text != "true" && text != "false") return WrongType(option, text);
+    **flag = text == "true";
+  } else if (auto* const* integer = std::get_if<int*>(&option.value)) {
+    if (!ParseNumber(text, *integer)) return WrongType(option, text);
+  } else if (auto* const* number = std::get_if<double*>(&option.value)) {
+    if (!ParseNumber(text, *number)) return WrongType(option, text);
+  } else if (auto* const* string = std::get_if<std::string*>(&option.value)) {
+    **string = text;
+  } else {
+    auto* list = std::get<std::vector<double>*>(option.value);
+    list->clear();
+    for (size_t begin = 0; begin < text.size();) {
+      const size_t end = std::min(text.find(',', begin), text.size());
+      double value = 0;
+      std::string item = text.substr(begin, end - begin);
+      item.erase(0, item.find_first_not_of(' '));
+      if (!ParseNumber(item, &value)) return WrongType(option, text);
+      list->push_back(value);
+      begin = end + 1;
+    }
+  }
+  return CheckOptions({option});
+}
+
+std::string OptionValueText(const Option& option) {
+  if (auto* const* flag = std::get_if<bool*>(&option.value)) return **flag ? "true" : "false";
+  if (auto* const* integer = std::get_if<int*>(&option.value)) return fmt::format("{}", **integer);
+  if (auto* const* number = std::get_if<double*>(&option.value)) return fmt::format("{}", **number);
+  if (auto* const* text = std::get_if<std::string*>(&option.value)) return **text;
+  return fmt::format("{}", fmt::join(*std::get<std::vector<double>*>(option.value), ","));
+}
+
+Status CheckOptions(const OptionTable& table) {
+  for (const Option& option : table) {
+    if (auto* const* integer = std::get_if<int*>(&option.value)) CAIRN_RETURN_IF_ERROR(CheckRange(option, **integer));
+    if (auto* const* number = std::get_if<double*>(&option.value)) CAIRN_RETURN_IF_ERROR(CheckRange(option, **number));
+    auto* const* text = std::get_if<std::string*>(&option.value);
+    if (text && !option.choices.empty() &&
+        std::find(option.choices.begin(), option.choices.end(), **text) == option.choices.end()) {
+      return MakeError(ErrorCode::kInvalidArgument, "option {} = '{}': must be one of {}", option.name, **text,
+                       fmt::join(option.choices, ", "));
+    }
+  }
+  return Ok();
+}
+
+Status ReadOptionsFile(const std::string& path, const OptionTable& table) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
+  toml::table document;
+  try {
+    document = toml::parse(contents, path);
+  } catch (const toml::parse_error& error) {
+    return MakeError(ErrorCode::kCorrupt, "{}:{}: not TOML: {}", path, error.source().begin.line, error.description());
+  }
+  std::vector<std::string> names;
+  for (const Option& option : table) names.push_back(option.name);
+  for (const auto& [key, node] : document) {
+    const std::string name(key.str());
+    const auto option = std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
+    if (option == table.end()) {
+      const std::string nearest = NearestWord(name, names);
+      return MakeError(ErrorCode::kInvalidArgument, "{}:{}: unknown option '{}'{}", path, node.source().begin.line, name,
+                       nearest.empty() ? "; valid are " + fmt::format("{}", fmt::join(names, ", "))
+                                       : "; did you mean '" + nearest + "'?");
+    }
+    if (Status status = SetOption(*option, TextFromToml(node)); !status.ok()) {
+      return MakeError(status.error().code, "{}:{}: {}", path, node.source().begin.line, status.error().message);
+    }
+  }
+  return Ok();
+}
+
+std::string OptionsToml(const OptionTable& table) {
+  std::string document;
+  for (const Option& option : table) {
+    std::string value = OptionValueText(option);
+    if (std::holds_alternative<std::string*>(option.value)) {
+      std::ostringstream quoted;
+      quoted << toml::value<std::string>(value);
+      value = quoted.str();
+    } else if (std::holds_alternative<std::vector<double>*>(option.value)) {
+      value = "[" + value + "]";
+    }
+    document += option.name + " = " + value + "\n";
+  }
+  return document;
+}
+
+std::string NearestWord(const std::string& word, const std::vector<std::string>& candidates) {
+  std::string nearest;
+  size_t least = std::max<size_t>(2, word.size() / 3) + 1;  // farther than a third of the word is no suggestion
+  for (const std::string& candidate : candidates) {
+    std::vector<size_t> row(candidate.size() + 1);  // Levenshtein distance, one row at a time
+    std::iota(row.begin(), row.end(), size_t{0});
+    for (size_t i = 1; i <= word.size(); ++i) {
+      size_t diagonal = row[0];
+      row[0] = i;
+      for (size_t j = 1; j <= candidate.size(); ++j) {
+        const size_t substitute = diagonal + (word[i - 1] != candidate[j - 1]);
+        diagonal = row[j];
+        row[j] = std::min({substitute, row[j] + 1, row[j - 1] + 1});
+      }
+    }
+    if (row.back() < least) {
+      least = row.back();
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace cairn

@@ -1,0 +1,1 @@
+#include "core/vocabulary_tree.h"

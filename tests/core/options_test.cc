@@ -1,0 +1,70 @@
+#include "core/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+
+namespace cairn {
+namespace {
+
+struct Fields {
+  bool flag = true;
+  int count = 16;
+  double ratio = 0.8;
+  std::string pairs = "auto";
+  std::vector<double> up = {0, 0, 1};
+};
+
+OptionTable Describe(Fields* f) {
+  return {{.name = "flag", .value = &f->flag, .help = "a flag"},
+          {.name = "min_count", .value = &f->count, .help = "a count", .min = 1, .max = 100},
+          {.name = "max_ratio", .value = &f->ratio, .help = "a ratio", .min = 0, .max = 1},
+          {.name = "pairs", .value = &f->pairs, .help = "which", .choices = {"auto", "frustum"}},
+          {.name = "up", .value = &f->up, .help = "direction"}};
+}
+
+std::string WriteToml(const std::string& text) {
+  const std::string path = testing::TempDir() + "/options.toml";
+  EXPECT_TRUE(WriteFileAtomically(path, text).ok());
+  return path;
+}
+
+TEST(Options, TomlRoundTripKeepsEveryValue) {
+  Fields written{.flag = false, .count = 7, .ratio = 0.1, .pairs = "frustum", .up = {1, 0, 0.5}};
+  Fields read;
+  ASSERT_TRUE(ReadOptionsFile(WriteToml(OptionsToml(Describe(&written))), Describe(&read)).ok());
+  EXPECT_EQ(OptionsToml(Describe(&read)), OptionsToml(Describe(&written)));
+  EXPECT_EQ(read.ratio, 0.1);
+  EXPECT_THAT(read.up, testing::ElementsAre(1, 0, 0.5));
+}
+
+TEST(Options, UnknownKeyNamesTheNearestOne) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("flag = true\nmin_cuont = 3\n"), Describe(&fields));
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, testing::HasSubstr(":2: unknown option 'min_cuont'; did you mean 'min_count'?"));
+}
+
+TEST(Options, ValueOutsideItsRangeIsAnError) {
+  Fields fields;
+  EXPECT_THAT(SetOption(Describe(&fields)[1], "0").error().message, testing::HasSubstr("must be in [1, 100]"));
+  EXPECT_FALSE(SetOption(Describe(&fields)[2], "nan").ok());
+  EXPECT_THAT(SetOption(Describe(&fields)[3], "all").error().message, testing::HasSubstr("auto, frustum"));
+}
+
+TEST(Options, WrongTypeSaysWhatWasExpected) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("min_count = \"many\"\n"), Describe(&fields));
+  EXPECT_THAT(status.error().message, testing::HasSubstr("expected an integer, found 'many'"));
+}
+
+TEST(Options, BrokenTomlNamesTheLine) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("flag = true\nup = [1,\n"), Describe(&fields));
+  EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
+}
+
+}  // namespace
+}  // namespace cairn
