@@ -41,9 +41,12 @@ Eigen::Vector2d Distort(const Camera& camera, const Eigen::Vector2d& u) {
   const double r2 = u.squaredNorm();
   switch (camera.model) {
     case CameraModel::kSimplePinhole:
-    case CameraModel::kPinhole: return u;
-    case CameraModel::kSimpleRadial: return u * (1 + p[3] * r2);
-    case CameraModel::kRadial: return u * (1 + p[3] * r2 + p[4] * r2 * r2);
+    case CameraModel::kPinhole:
+      return u;
+    case CameraModel::kSimpleRadial:
+      return u * (1 + p[3] * r2);
+    case CameraModel::kRadial:
+      return u * (1 + p[3] * r2 + p[4] * r2 * r2);
     case CameraModel::kOpenCv: {
       const double radial = p[4] * r2 + p[5] * r2 * r2;
       const double uv = u.x() * u.y();
@@ -58,7 +61,8 @@ Eigen::Vector2d Distort(const Camera& camera, const Eigen::Vector2d& u) {
     }
     case CameraModel::kFullOpenCv: {
       const double r4 = r2 * r2, r6 = r4 * r2, uv = u.x() * u.y();
-      const double radial = (1 + p[4] * r2 + p[5] * r4 + p[8] * r6) / (1 + p[9] * r2 + p[10] * r4 + p[11] * r6);
+      const double radial =
+          (1 + p[4] * r2 + p[5] * r4 + p[8] * r6) / (1 + p[9] * r2 + p[10] * r4 + p[11] * r6);
       return {u.x() * radial + 2 * p[6] * uv + p[7] * (r2 + 2 * u.x() * u.x()),
               u.y() * radial + 2 * p[7] * uv + p[6] * (r2 + 2 * u.y() * u.y())};
     }
@@ -82,7 +86,8 @@ Result<CameraModel> CameraModelFromId(int id) {
   for (const ModelRow& row : kModels) {
     if (id == static_cast<int>(row.model)) return row.model;
   }
-  return MakeError(ErrorCode::kUnsupported, "unknown camera model number {}; known are 0 to 6: {}", id, KnownModels());
+  return MakeError(ErrorCode::kUnsupported, "unknown camera model number {}; known are 0 to 6: {}", id,
+                   KnownModels());
 }
 
 double Camera::FocalY() const { return RowOf(model).num_focals == 2 ? params[1] : params[0]; }
@@ -94,12 +99,14 @@ Eigen::Vector2d Camera::PrincipalPoint() const {
 
 Status CheckCamera(const Camera& camera) {
   if (static_cast<int>(camera.params.size()) != NumCameraParams(camera.model)) {
-    return MakeError(ErrorCode::kInvalidArgument, "camera {}: {} takes {} parameters, found {}", camera.camera_id,
-                     CameraModelName(camera.model), NumCameraParams(camera.model), camera.params.size());
+    return MakeError(ErrorCode::kInvalidArgument, "camera {}: {} takes {} parameters, found {}",
+                     camera.camera_id, CameraModelName(camera.model), NumCameraParams(camera.model),
+                     camera.params.size());
   }
   for (const double param : camera.params) {
     if (!std::isfinite(param)) {
-      return MakeError(ErrorCode::kInvalidArgument, "camera {}: a parameter is not a finite number", camera.camera_id);
+      return MakeError(ErrorCode::kInvalidArgument, "camera {}: a parameter is not a finite number",
+                       camera.camera_id);
     }
   }
   if (camera.width <= 0 || camera.height <= 0 || camera.width > 65536 || camera.height > 65536) {
@@ -147,8 +154,10 @@ std::optional<Eigen::Vector2d> CameraFromImage(const Camera& camera, const Eigen
     const Eigen::Vector2d residual = Distort(camera, u) - target;
     if (residual.squaredNorm() < 1e-20) return u;
     Eigen::Matrix2d jacobian;
-    jacobian.col(0) = (Distort(camera, u + Eigen::Vector2d(kStep, 0)) - Distort(camera, u - Eigen::Vector2d(kStep, 0)));
-    jacobian.col(1) = (Distort(camera, u + Eigen::Vector2d(0, kStep)) - Distort(camera, u - Eigen::Vector2d(0, kStep)));
+    jacobian.col(0) =
+        (Distort(camera, u + Eigen::Vector2d(kStep, 0)) - Distort(camera, u - Eigen::Vector2d(kStep, 0)));
+    jacobian.col(1) =
+        (Distort(camera, u + Eigen::Vector2d(0, kStep)) - Distort(camera, u - Eigen::Vector2d(0, kStep)));
     jacobian /= 2 * kStep;
     u -= jacobian.inverse() * residual;
     if (!u.allFinite() || u.squaredNorm() > 1e6) return std::nullopt;

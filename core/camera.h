@@ -48,14 +48,15 @@ struct Camera {
 // Errors: InvalidArgument for a wrong number of parameters, a size or focal length that is not positive, NaN.
 Status CheckCamera(const Camera& camera);
 
-// A pinhole camera that nobody calibrated: f = 1.2 max(w, h), principal point in the middle, has_focal_prior false.
+// A pinhole camera that nobody calibrated: f = 1.2 max(w, h), principal point in the middle, has_focal_prior
+// false.
 Camera GuessCamera(CameraId camera_id, int width, int height);
 
 // Pixel at which a point of the camera frame is seen; nothing when it lies behind the camera (z <= 0).
 std::optional<Eigen::Vector2d> ImageFromCamera(const Camera& camera, const Eigen::Vector3d& point_in_cam);
 
-// Normalised coordinates (x/z, y/z) of the ray through a pixel: distortion is inverted by Gauss-Newton to 1e-10.
-// Nothing when the iteration does not converge or the ray does not point forward.
+// Normalised coordinates (x/z, y/z) of the ray through a pixel: distortion is inverted by Gauss-Newton to
+// 1e-10. Nothing when the iteration does not converge or the ray does not point forward.
 std::optional<Eigen::Vector2d> CameraFromImage(const Camera& camera, const Eigen::Vector2d& pixel);
 
 }  // namespace cairn

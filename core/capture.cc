@@ -1,1 +1,333 @@
 #include "core/capture.h"
+
+#include <libexif/exif-data.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <sstream>
+#include <tuple>
+
+#include "core/file.h"
+#include "core/image_file.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxQuaternionNormError = 0.01;
+
+bool HasImageSuffix(const fs::path& path) {
+  static const std::set<std::string> kSuffixes = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
+                                                  ".bmp", ".pgm",  ".ppm", ".pnm", ".webp"};
+  std::string suffix = path.extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return kSuffixes.count(suffix) > 0;
+}
+
+// Relative names of all image files below a folder, ascending.
+std::vector<std::string> ListImages(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (it->is_regular_file(error) && HasImageSuffix(it->path())) {
+      names.push_back(fs::relative(it->path(), folder, error).generic_string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+bool ParseDouble(const std::string& text, double* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+bool ParseUnsigned(const std::string& text, uint32_t* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::vector<std::string> SplitWords(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+bool IsPointsLine(const std::vector<std::string>& words) {
+  double value = 0;
+  return words.size() % 3 == 0 && std::all_of(words.begin(), words.end(), [&](const std::string& word) {
+           return ParseDouble(word, &value);
+         });
+}
+
+std::string StripCarriageReturn(std::string line) {
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  return line;
+}
+
+// Fields MODEL WIDTH HEIGHT PARAMS... from words[first] on.
+Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t first) {
+  if (words.size() < first + 4) {
+    return MakeError(ErrorCode::kCorrupt, "expected MODEL WIDTH HEIGHT PARAMS, found {} fields",
+                     words.size() - first);
+  }
+  Camera camera;
+  CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromName(words[first]));
+  uint32_t width = 0, height = 0;
+  if (!ParseUnsigned(words[first + 1], &width) || !ParseUnsigned(words[first + 2], &height)) {
+    return MakeError(ErrorCode::kCorrupt, "image size '{} x {}' is not two positive integers",
+                     words[first + 1], words[first + 2]);
+  }
+  camera.width = static_cast<int>(std::min(width, 1u << 30));
+  camera.height = static_cast<int>(std::min(height, 1u << 30));
+  for (size_t i = first + 3; i < words.size(); ++i) {
+    double param = 0;
+    if (!ParseDouble(words[i], &param)) {
+      return MakeError(ErrorCode::kCorrupt, "camera parameter '{}' is not a number", words[i]);
+    }
+    camera.params.push_back(param);
+  }
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  return camera;
+}
+
+// 35 mm equivalent focal length from EXIF, mm; 0 where there is none.
+double FocalLength35mm(const std::string& path) {
+  ExifData* exif = exif_data_new_from_file(path.c_str());
+  if (exif == nullptr) return 0;
+  double focal_mm = 0;
+  const ExifEntry* entry =
+      exif_content_get_entry(exif->ifd[EXIF_IFD_EXIF], EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  if (entry != nullptr && entry->format == EXIF_FORMAT_SHORT && entry->size >= 2) {
+    focal_mm = exif_get_short(entry->data, exif_data_get_byte_order(exif));
+  }
+  exif_data_unref(exif);
+  return focal_mm;
+}
+
+// A folder of images without lists: one camera for each image size and focal length.
+Status ReadFlatFolder(Capture* capture) {
+  capture->images_folder =
+      fs::is_directory(capture->root + "/images") ? capture->root + "/images" : capture->root;
+  std::map<std::tuple<int, int, double>, CameraId> camera_ids;
+  for (const std::string& name : ListImages(capture->images_folder)) {
+    const std::string path = capture->images_folder + "/" + name;
+    const Result<cv::Mat> image = ReadGreyImage(path);
+    if (!image.ok()) {
+      capture->rejects.push_back({name, image.error().message});
+      continue;
+    }
+    const double focal_mm = FocalLength35mm(path);
+    const auto [entry, is_new] = camera_ids.emplace(std::tuple(image->cols, image->rows, focal_mm),
+                                                    static_cast<CameraId>(camera_ids.size() + 1));
+    if (is_new) {
+      Camera camera = GuessCamera(entry->second, image->cols, image->rows);
+      if (focal_mm > 0) {
+        camera.params[0] = focal_mm / 36.0 * std::max(image->cols, image->rows);  // 36 mm: width of the film
+        camera.has_focal_prior = true;
+      } else {
+        capture->warnings.push_back(
+            fmt::format("{}: no cameras.txt and no focal length in EXIF: f = 1.2 max(w, h) = {:g} px "
+                        "assumed for {} x {} images",
+                        capture->root, camera.params[0], camera.width, camera.height));
+      }
+      capture->cameras.emplace(camera.camera_id, camera);
+    }
+    capture->images.push_back({name, entry->second, std::nullopt});
+  }
+  return Ok();
+}
+
+// Moves images without a file, or with a camera that cameras.txt lacks, to the rejects.
+void RejectUnusable(Capture* capture, const std::set<std::string>& files, std::vector<CaptureImage>* images) {
+  std::erase_if(*images, [&](const CaptureImage& image) {
+    std::string reason;
+    if (files.count(image.name) == 0) {
+      reason = fmt::format("{}: no such file, but the image list names it", capture->ImagePath(image));
+    } else if (capture->cameras.count(image.camera_id) == 0) {
+      reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
+    }
+    if (reason.empty()) return false;
+    capture->rejects.push_back({image.name, reason});
+    return true;
+  });
+}
+
+// Sorts by name and moves all but the first of equal names to the rejects.
+void SortByName(std::vector<CaptureImage>* images, std::vector<Reject>* rejects) {
+  std::stable_sort(images->begin(), images->end(),
+                   [](const auto& a, const auto& b) { return a.name < b.name; });
+  const auto end =
+      std::unique(images->begin(), images->end(), [&](const CaptureImage& a, const CaptureImage& b) {
+        if (a.name != b.name) return false;
+        rejects->push_back({b.name, "listed twice; the first entry is used"});
+        return true;
+      });
+  images->erase(end, images->end());
+}
+
+}  // namespace
+
+Result<Camera> ParseCamera(const std::string& text) {
+  std::string spaced = text;
+  std::replace(spaced.begin(), spaced.end(), ',', ' ');
+  Result<Camera> camera = CameraFromWords(SplitWords(spaced), 0);
+  if (camera.ok()) return camera;
+  return MakeError(camera.error().code, "camera '{}': {}; the form is MODEL,WIDTH,HEIGHT,PARAM,...", text,
+                   camera.error().message);
+}
+
+Result<std::map<CameraId, Camera>> ReadCamerasText(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
+  std::map<CameraId, Camera> cameras;
+  std::istringstream stream(contents);
+  int line_number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++line_number;
+    const std::vector<std::string> words = SplitWords(line);
+    if (words.empty() || words[0][0] == '#') continue;
+    CameraId camera_id = 0;
+    if (!ParseUnsigned(words[0], &camera_id)) {
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: camera id '{}' is not a number", path, line_number,
+                       words[0]);
+    }
+    Result<Camera> camera = CameraFromWords(words, 1);
+    if (!camera.ok()) {
+      return MakeError(camera.error().code, "{}:{}: {}", path, line_number, camera.error().message);
+    }
+    camera->camera_id = camera_id;
+    if (!cameras.emplace(camera_id, *camera).second) {
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: camera {} is listed twice", path, line_number, camera_id);
+    }
+  }
+  if (cameras.empty()) return MakeError(ErrorCode::kNoData, "{}: lists no camera", path);
+  return cameras;
+}
+
+Status WriteCamerasText(const std::string& path, const std::map<CameraId, Camera>& cameras) {
+  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
+  for (const auto& [camera_id, camera] : cameras) {
+    text += fmt::format("{} {} {} {} {}\n", camera_id, CameraModelName(camera.model), camera.width,
+                        camera.height, fmt::join(camera.params, " "));
+  }
+  return WriteFileAtomically(path, text);
+}
+
+Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
+  std::vector<CaptureImage> images;
+  std::istringstream stream(contents);
+  int line_number = 0;
+  bool follows_image = false;
+  for (std::string line; std::getline(stream, line);) {
+    ++line_number;
+    line = StripCarriageReturn(line);
+    const std::vector<std::string> words = SplitWords(line);
+    // The line after an image's holds POINTS2D[] (triples of numbers) or nothing; files without it are read
+    // too.
+    const bool is_points_line = follows_image && IsPointsLine(words);
+    follows_image = false;
+    if (words.empty() || words[0][0] == '#' || is_points_line) continue;
+    if (words.size() < 10) {
+      return MakeError(
+          ErrorCode::kCorrupt,
+          "{}:{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, found {} fields; is the file "
+          "truncated?",
+          path, line_number, words.size());
+    }
+    std::array<double, 7> numbers{};
+    bool are_numbers = true;
+    for (int i = 0; i < 7; ++i) are_numbers &= ParseDouble(words[1 + i], &numbers[i]);
+    CaptureImage image;
+    if (!are_numbers || !ParseUnsigned(words[8], &image.camera_id)) {
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: a pose or camera id is not a number: '{}'", path,
+                       line_number, line);
+    }
+    image.name = line.substr(
+        line.find(words[9], line.find(words[8], line.find(words[7]) + words[7].size()) + words[8].size()));
+    image.name.erase(image.name.find_last_not_of(" \t") + 1);
+    Pose pose;
+    pose.rotation = Eigen::Quaterniond(numbers[0], numbers[1], numbers[2], numbers[3]);
+    pose.translation = Eigen::Vector3d(numbers[4], numbers[5], numbers[6]);
+    const double norm = pose.rotation.norm();
+    const bool is_finite = pose.translation.allFinite() && std::isfinite(norm);
+    if (!is_finite || std::abs(norm - 1) > kMaxQuaternionNormError) {
+      rejects->push_back(
+          {image.name,
+           is_finite ? fmt::format("{}:{}: quaternion of norm {:g}, expected 1", path, line_number, norm)
+                     : fmt::format("{}:{}: pose is not finite", path, line_number)});
+    } else {
+      pose.rotation.normalize();
+      image.cam_from_world = pose;
+      images.push_back(std::move(image));
+    }
+    follows_image = true;
+  }
+  SortByName(&images, rejects);
+  return images;
+}
+
+Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>& images) {
+  std::string text =
+      "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME (cam_from_world, metres); second line empty\n";
+  for (size_t i = 0; i < images.size(); ++i) {
+    const Pose& pose = *images[i].cam_from_world;
+    text +=
+        fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.6f} {:.6f} {:.6f} {} {}\n\n", i + 1, pose.rotation.w(),
+                    pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.translation.x(),
+                    pose.translation.y(), pose.translation.z(), images[i].camera_id, images[i].name);
+  }
+  return WriteFileAtomically(path, text);
+}
+
+Result<Capture> ReadCapture(const std::string& root) {
+  std::error_code error;
+  if (!fs::is_directory(root, error)) {
+    return MakeError(ErrorCode::kNotFound,
+                     "{}: no such folder; a capture is a folder with images/, cameras.txt and "
+                     "images.txt, or a flat folder of images",
+                     root);
+  }
+  Capture capture;
+  capture.root = root;
+  if (!fs::exists(root + "/images.txt", error)) {
+    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(&capture));
+  } else {
+    capture.has_poses = true;
+    capture.images_folder = root + "/images";
+    CAIRN_ASSIGN_OR_RETURN(capture.cameras, ReadCamerasText(root + "/cameras.txt"));
+    CAIRN_ASSIGN_OR_RETURN(capture.images, ReadImagesText(root + "/images.txt", &capture.rejects));
+    if (fs::exists(root + "/queries.txt", error)) {
+      CAIRN_ASSIGN_OR_RETURN(capture.queries, ReadImagesText(root + "/queries.txt", &capture.rejects));
+    }
+    const std::vector<std::string> names = ListImages(capture.images_folder);
+    std::set<std::string> unlisted(names.begin(), names.end());
+    const std::set<std::string> files = unlisted;
+    for (const CaptureImage& image : capture.images) unlisted.erase(image.name);
+    for (const CaptureImage& image : capture.queries) unlisted.erase(image.name);
+    for (const Reject& reject : capture.rejects) unlisted.erase(reject.name);
+    for (const std::string& name : unlisted) {
+      capture.warnings.push_back(
+          fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture.images_folder, name));
+    }
+    RejectUnusable(&capture, files, &capture.images);
+    RejectUnusable(&capture, files, &capture.queries);
+  }
+  if (capture.images.empty()) {
+    const std::string first = capture.rejects.empty()
+                                  ? ""
+                                  : "; the first of " + std::to_string(capture.rejects.size()) +
+                                        " rejected: " + capture.rejects[0].reason;
+    return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);
+  }
+  return capture;
+}
+
+}  // namespace cairn

@@ -38,15 +38,15 @@ struct Capture {
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
 };
 
-// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt) or a flat folder of images:
-// then cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.  Image files are looked for, not decoded.
-// Errors: NotFound (no such folder), NoData (no image), Corrupt (a list that cannot be parsed; file and line),
-// Unsupported (camera model).
+// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt) or a flat folder of
+// images: then cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.  Image files are looked
+// for, not decoded. Errors: NotFound (no such folder), NoData (no image), Corrupt (a list that cannot be
+// parsed; file and line), Unsupported (camera model).
 Result<Capture> ReadCapture(const std::string& root);
 
-// One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that may be
-// empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`; smaller
-// differences are normalised away.
+// One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
+// may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;
+// smaller differences are normalised away.
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects);
 // REQUIRES: every image has a pose.  Ids are 1, 2, ... in the given order.
 Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>& images);

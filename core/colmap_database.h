@@ -15,8 +15,8 @@
 
 namespace cairn {
 
-// COLMAP's database, schema of version 3.8 (src/base/database.cc there).  features.db and matches.db are such files,
-// with tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
+// COLMAP's database, schema of version 3.8 (src/base/database.cc there).  features.db and matches.db are such
+// files, with tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
 
 struct DatabaseImage {
   ImageId image_id = 0;
@@ -40,7 +40,7 @@ struct TwoViewGeometry {
   ImageId image_id1 = 0;
   ImageId image_id2 = 0;
   TwoViewConfig config = TwoViewConfig::kUndefined;
-  std::vector<Match> inliers;  // ascending
+  std::vector<Match> inliers;                   // ascending
   Eigen::Matrix3d F = Eigen::Matrix3d::Zero();  // x2' F x1 = 0, pixels
   Eigen::Matrix3d E = Eigen::Matrix3d::Zero();  // normalised coordinates
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -60,7 +60,8 @@ Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database
 Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, ImageId image_id);
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id);
 // All pairs with at least `min_num_inliers` inliers, ascending pair_id.
-Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database, int min_num_inliers);
+Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
+                                                                   int min_num_inliers);
 
 // Writers.
 void WriteDatabaseCamera(SQLite::Database& database, const Camera& camera);

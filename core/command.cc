@@ -33,7 +33,8 @@ std::string HelpText(const Option& option) {
 void OptionArguments::Add(CLI::App& app, OptionTable table) {
   table_ = std::move(table);
   texts_.resize(table_.size());
-  app.add_option("--options", options_file_, "TOML file with this stage's options; the command line goes before it")
+  app.add_option("--options", options_file_,
+                 "TOML file with this stage's options; the command line goes before it")
       ->type_name("FILE.toml");
   for (size_t i = 0; i < table_.size(); ++i) {
     arguments_.push_back(app.add_option("--" + Dashed(table_[i].name), texts_[i], HelpText(table_[i]))

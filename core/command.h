@@ -33,7 +33,8 @@ struct Command {
   std::function<Status(const CommandEnvironment&)> run;
 };
 
-// Gives a subcommand one `--name-with-dashes VALUE` per option of the table (help with default and range), and
+// Gives a subcommand one `--name-with-dashes VALUE` per option of the table (help with default and range),
+// and
 // `--options FILE.toml`.  Apply() reads the file first, then the command line's values, then checks ranges.
 class OptionArguments {
  public:

@@ -33,14 +33,16 @@ Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
   if (!IsSqliteFile(path)) {
-    return MakeError(ErrorCode::kCorrupt,
-                     "{}: not a SQLite database ({} bytes, expected the magic bytes 'SQLite format 3'); is it truncated "
-                     "or another kind of file?",
-                     path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
+    return MakeError(
+        ErrorCode::kCorrupt,
+        "{}: not a SQLite database ({} bytes, expected the magic bytes 'SQLite format 3'); is it truncated "
+        "or another kind of file?",
+        path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
   }
   return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
     SQLite::Database database(UriFromPath(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
-    database.execAndGet("SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
+    database.execAndGet(
+        "SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
     return database;
   });
 }

@@ -50,7 +50,8 @@ Result<std::vector<T>> BlobToVector(const SQLite::Column& column, const std::str
   static_assert(std::is_trivially_copyable_v<T>);
   const size_t num_bytes = column.getBytes();
   if (num_bytes % sizeof(T) != 0) {
-    return MakeError(ErrorCode::kCorrupt, "{}: a blob of {} bytes is not a multiple of {}", what, num_bytes, sizeof(T));
+    return MakeError(ErrorCode::kCorrupt, "{}: a blob of {} bytes is not a multiple of {}", what, num_bytes,
+                     sizeof(T));
   }
   std::vector<T> values(num_bytes / sizeof(T));
   if (num_bytes > 0) std::memcpy(values.data(), column.getBlob(), num_bytes);

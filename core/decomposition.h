@@ -12,8 +12,8 @@ namespace cairn {
 
 // A region [Sala06 §III]: connected stations that all see each of `features`.
 struct Region {
-  std::vector<FeatureIdx> features;   // ascending; at least k
-  std::vector<StationIdx> stations;   // ascending; the tau-grown region
+  std::vector<FeatureIdx> features;  // ascending; at least k
+  std::vector<StationIdx> stations;  // ascending; the tau-grown region
 };
 
 // The result of decompose_regions.  Regions may overlap; ids are indices into the world it was made from.
@@ -23,8 +23,8 @@ struct Decomposition {
   int tau = 0;
   int rho = 0;
   uint64_t seed = 0;
-  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable stations
-  // uncovered; nothing where no bound was computed.
+  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable
+  // stations uncovered; nothing where no bound was computed.
   std::optional<int> lower_bound;
   int uncovered_limit = 0;
   std::vector<Region> regions;
@@ -37,7 +37,8 @@ Status WriteDecompositionJson(const Decomposition& decomposition, const std::str
 // regions.db (schemas/regions.sql).
 Result<Decomposition> ReadDecompositionDatabase(const std::string& path);
 Status WriteDecompositionDatabase(const Decomposition& decomposition, const std::string& path);
-Result<Decomposition> ReadDecomposition(const std::string& path);   // by its first bytes
-Status WriteDecomposition(const Decomposition& decomposition, const std::string& path);  // .json or database by suffix
+Result<Decomposition> ReadDecomposition(const std::string& path);  // by its first bytes
+Status WriteDecomposition(const Decomposition& decomposition,
+                          const std::string& path);  // .json or database by suffix
 
 }  // namespace cairn

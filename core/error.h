@@ -42,7 +42,7 @@ Error MakeError(ErrorCode code, fmt::format_string<Args...> format, Args&&... ar
 template <typename T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}  // NOLINT: implicit on purpose
+  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}      // NOLINT: implicit on purpose
   Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT
 
   bool ok() const { return state_.index() == 0; }
@@ -82,8 +82,8 @@ inline Status Ok() { return Status(); }
 }  // namespace cairn
 
 // Returns the error of `expression` (a Status or a Result) from the enclosing function, if it has one.
-#define CAIRN_RETURN_IF_ERROR(expression)               \
-  do {                                                  \
+#define CAIRN_RETURN_IF_ERROR(expression)                                                  \
+  do {                                                                                     \
     if (auto cairn_status = (expression); !cairn_status.ok()) return cairn_status.error(); \
   } while (false)
 

@@ -24,11 +24,11 @@ struct Observation {
 // Equivalence class of keypoints = one scene feature [Sala06 §VI-B], triangulated.
 struct FeatureClass {
   ClassId class_id = 0;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();        // world frame, metres
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();      // of the position, m^2
-  double reprojection_error_px = 0;                          // root mean square over the observations
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
+  double reprojection_error_px = 0;                      // root mean square over the observations
   Eigen::Matrix<uint8_t, 1, kDescriptorDim> descriptor = Eigen::Matrix<uint8_t, 1, kDescriptorDim>::Zero();
-  std::vector<Observation> observations;                     // ascending image_id, one per image
+  std::vector<Observation> observations;  // ascending image_id, one per image
 };
 
 struct SurveyImage {
@@ -44,8 +44,9 @@ using DropCounts = std::map<std::string, int64_t>;
 
 // What group_classes knows of a capture: images in their refined poses, cameras, and the feature classes.
 struct Classes {
-  std::vector<Camera> cameras;      // ascending camera_id; intrinsics as refined
-  std::vector<SurveyImage> images;  // ascending image_id; all posed images of the capture, with classes or without
+  std::vector<Camera> cameras;  // ascending camera_id; intrinsics as refined
+  std::vector<SurveyImage>
+      images;  // ascending image_id; all posed images of the capture, with classes or without
   std::vector<FeatureClass> classes;  // ascending class_id
   // Constant offset between the pose that the capture states and its camera, if refined, else identity:
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.

@@ -7,8 +7,8 @@
 
 namespace cairn {
 
-// A SIFT keypoint.  Position in COLMAP's pixels (first pixel's centre at (0.5, 0.5)); scale = sigma in pixels of the
-// image; orientation in radians, as COLMAP stores it.
+// A SIFT keypoint.  Position in COLMAP's pixels (first pixel's centre at (0.5, 0.5)); scale = sigma in pixels
+// of the image; orientation in radians, as COLMAP stores it.
 struct Keypoint {
   float x = 0;
   float y = 0;
@@ -17,8 +17,8 @@ struct Keypoint {
 };
 
 inline constexpr int kDescriptorDim = 128;
-// One RootSIFT descriptor per row, quantised like COLMAP's: round(512 sqrt(v / |v|_1)), at most 255.  Squared norm
-// near 512^2.
+// One RootSIFT descriptor per row, quantised like COLMAP's: round(512 sqrt(v / |v|_1)), at most 255.  Squared
+// norm near 512^2.
 using DescriptorMatrix = Eigen::Matrix<uint8_t, Eigen::Dynamic, kDescriptorDim, Eigen::RowMajor>;
 
 // The features of one image, row i of `descriptors` belonging to keypoint i.

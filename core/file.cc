@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 
 Status SyncPath(const std::string& path, int flags) {
   const int fd = open(path.c_str(), flags | O_CLOEXEC);
-  if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened for syncing: {}", path, std::strerror(errno));
+  if (fd < 0)
+    return MakeError(ErrorCode::kIo, "{}: cannot be opened for syncing: {}", path, std::strerror(errno));
   const int rc = fsync(fd);
   const int error = errno;
   close(fd);
@@ -49,7 +50,8 @@ bool SameBytes(const std::string& path1, const std::string& path2) {
 Result<std::string> ReadFile(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
-  if (fs::is_directory(path, error)) return MakeError(ErrorCode::kNotFound, "{}: is a folder, expected a file", path);
+  if (fs::is_directory(path, error))
+    return MakeError(ErrorCode::kNotFound, "{}: is a folder, expected a file", path);
   std::ifstream file(path, std::ios::binary);
   if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
   std::ostringstream contents;
@@ -58,14 +60,17 @@ Result<std::string> ReadFile(const std::string& path) {
   return std::move(contents).str();
 }
 
-Status ReplaceFileAtomically(const std::string& path, const std::function<Status(const std::string&)>& write) {
+Status ReplaceFileAtomically(const std::string& path,
+                             const std::function<Status(const std::string&)>& write) {
   const fs::path target(path);
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path, folder.string());
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path,
+                     folder.string());
   }
-  if (fs::is_directory(target, error)) return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
+  if (fs::is_directory(target, error))
+    return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
   const std::string temporary = fmt::format("{}.tmp-{}", path, getpid());
   fs::remove(temporary, error);
   Status status = write(temporary);
@@ -90,8 +95,8 @@ Status WriteFileAtomically(const std::string& path, std::string_view contents) {
     file.write(contents.data(), static_cast<std::streamsize>(contents.size()));
     file.close();
     if (!file) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be written: {}; is the disk full or the folder read-only?", path,
-                       std::strerror(errno));
+      return MakeError(ErrorCode::kIo, "{}: cannot be written: {}; is the disk full or the folder read-only?",
+                       path, std::strerror(errno));
     }
     return Ok();
   });

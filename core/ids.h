@@ -7,11 +7,11 @@ namespace cairn {
 
 // `*_id`: opaque, from a database.  `*_idx`: contiguous from 0.
 using CameraId = uint32_t;
-using ImageId = uint32_t;     // COLMAP's image_id: 1 .. 2^31 - 2
-using ClassId = uint32_t;     // feature class = one scene feature
-using KeypointIdx = uint32_t; // index of a keypoint in its image
+using ImageId = uint32_t;      // COLMAP's image_id: 1 .. 2^31 - 2
+using ClassId = uint32_t;      // feature class = one scene feature
+using KeypointIdx = uint32_t;  // index of a keypoint in its image
 using StationIdx = int32_t;
-using FeatureIdx = int32_t;   // feature of a world instance
+using FeatureIdx = int32_t;  // feature of a world instance
 using RegionIdx = int32_t;
 
 inline constexpr ImageId kInvalidImageId = std::numeric_limits<ImageId>::max();

@@ -1,1 +1,71 @@
 #include "core/image_file.h"
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/file.h"
+
+namespace cairn {
+namespace {
+
+// Whether a JPEG's end-of-image marker follows its compressed data.  Walks the markers [ITU T.81 §B.1.1]: a
+// thumbnail's own end marker lies inside of an APP1 segment and does not count.
+bool JpegIsComplete(std::string_view bytes) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(bytes[i]); };
+  size_t i = 2;  // after SOI
+  bool in_scan = false;
+  while (i + 1 < bytes.size()) {
+    if (byte(i) != 0xFF) {
+      if (!in_scan) return false;
+      ++i;
+      continue;
+    }
+    const unsigned char marker = byte(i + 1);
+    if (marker == 0xD9) return true;
+    if (marker == 0xFF) {  // fill byte
+      ++i;
+    } else if (marker == 0x00 || marker == 0x01 ||
+               (marker >= 0xD0 && marker <= 0xD7)) {  // stuffed byte, TEM, RSTn
+      i += 2;
+    } else {
+      if (i + 3 >= bytes.size()) return false;
+      in_scan = marker == 0xDA;
+      i += 2 + (size_t{byte(i + 2)} << 8 | byte(i + 3));
+    }
+  }
+  return false;
+}
+
+bool PngIsComplete(std::string_view bytes) { return bytes.rfind("IEND") != std::string_view::npos; }
+
+}  // namespace
+
+Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path) {
+  if (bytes.empty()) return MakeError(ErrorCode::kCorrupt, "{}: zero bytes, expected an image", path);
+  if (bytes.starts_with("\xFF\xD8") && !JpegIsComplete(bytes)) {
+    return MakeError(ErrorCode::kCorrupt,
+                     "{}: truncated JPEG: {} bytes without an end-of-image marker; copy it again", path,
+                     bytes.size());
+  }
+  if (bytes.starts_with("\x89PNG") && !PngIsComplete(bytes)) {
+    return MakeError(ErrorCode::kCorrupt, "{}: truncated PNG: {} bytes without an IEND chunk; copy it again",
+                     path, bytes.size());
+  }
+  try {
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+    cv::Mat grey = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    if (!grey.empty()) return grey;
+  } catch (const cv::Exception& exception) {
+    return MakeError(ErrorCode::kCorrupt, "{}: cannot be decoded: {}", path, exception.err);
+  }
+  return MakeError(ErrorCode::kCorrupt,
+                   "{}: not an image that can be decoded ({} bytes; JPEG, PNG, TIFF, BMP, PNM and "
+                   "WebP are read)",
+                   path, bytes.size());
+}
+
+Result<cv::Mat> ReadGreyImage(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  return DecodeGreyImage(bytes, path);
+}
+
+}  // namespace cairn

@@ -27,11 +27,13 @@ std::string RangeText(const Option& option) {
 
 Status CheckRange(const Option& option, double value) {
   if (value >= option.min && value <= option.max) return Ok();  // false for NaN
-  return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}", option.name, value, RangeText(option));
+  return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}", option.name, value,
+                   RangeText(option));
 }
 
 Error WrongType(const Option& option, const std::string& found) {
-  static constexpr const char* kTypes[] = {"true or false", "an integer", "a number", "a text", "a list of numbers"};
+  static constexpr const char* kTypes[] = {"true or false", "an integer", "a number", "a text",
+                                           "a list of numbers"};
   return MakeError(ErrorCode::kInvalidArgument, "option {}: expected {}, found '{}'", option.name,
                    kTypes[option.value.index()], found);
 }
@@ -95,13 +97,15 @@ std::string OptionValueText(const Option& option) {
 
 Status CheckOptions(const OptionTable& table) {
   for (const Option& option : table) {
-    if (auto* const* integer = std::get_if<int*>(&option.value)) CAIRN_RETURN_IF_ERROR(CheckRange(option, **integer));
-    if (auto* const* number = std::get_if<double*>(&option.value)) CAIRN_RETURN_IF_ERROR(CheckRange(option, **number));
+    if (auto* const* integer = std::get_if<int*>(&option.value))
+      CAIRN_RETURN_IF_ERROR(CheckRange(option, **integer));
+    if (auto* const* number = std::get_if<double*>(&option.value))
+      CAIRN_RETURN_IF_ERROR(CheckRange(option, **number));
     auto* const* text = std::get_if<std::string*>(&option.value);
     if (text && !option.choices.empty() &&
         std::find(option.choices.begin(), option.choices.end(), **text) == option.choices.end()) {
-      return MakeError(ErrorCode::kInvalidArgument, "option {} = '{}': must be one of {}", option.name, **text,
-                       fmt::join(option.choices, ", "));
+      return MakeError(ErrorCode::kInvalidArgument, "option {} = '{}': must be one of {}", option.name,
+                       **text, fmt::join(option.choices, ", "));
     }
   }
   return Ok();
@@ -113,21 +117,25 @@ Status ReadOptionsFile(const std::string& path, const OptionTable& table) {
   try {
     document = toml::parse(contents, path);
   } catch (const toml::parse_error& error) {
-    return MakeError(ErrorCode::kCorrupt, "{}:{}: not TOML: {}", path, error.source().begin.line, error.description());
+    return MakeError(ErrorCode::kCorrupt, "{}:{}: not TOML: {}", path, error.source().begin.line,
+                     error.description());
   }
   std::vector<std::string> names;
   for (const Option& option : table) names.push_back(option.name);
   for (const auto& [key, node] : document) {
     const std::string name(key.str());
-    const auto option = std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
+    const auto option =
+        std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
     if (option == table.end()) {
       const std::string nearest = NearestWord(name, names);
-      return MakeError(ErrorCode::kInvalidArgument, "{}:{}: unknown option '{}'{}", path, node.source().begin.line, name,
+      return MakeError(ErrorCode::kInvalidArgument, "{}:{}: unknown option '{}'{}", path,
+                       node.source().begin.line, name,
                        nearest.empty() ? "; valid are " + fmt::format("{}", fmt::join(names, ", "))
                                        : "; did you mean '" + nearest + "'?");
     }
     if (Status status = SetOption(*option, TextFromToml(node)); !status.ok()) {
-      return MakeError(status.error().code, "{}:{}: {}", path, node.source().begin.line, status.error().message);
+      return MakeError(status.error().code, "{}:{}: {}", path, node.source().begin.line,
+                       status.error().message);
     }
   }
   return Ok();
@@ -151,7 +159,8 @@ std::string OptionsToml(const OptionTable& table) {
 
 std::string NearestWord(const std::string& word, const std::vector<std::string>& candidates) {
   std::string nearest;
-  size_t least = std::max<size_t>(2, word.size() / 3) + 1;  // farther than a third of the word is no suggestion
+  size_t least =
+      std::max<size_t>(2, word.size() / 3) + 1;  // farther than a third of the word is no suggestion
   for (const std::string& candidate : candidates) {
     std::vector<size_t> row(candidate.size() + 1);  // Levenshtein distance, one row at a time
     std::iota(row.begin(), row.end(), size_t{0});

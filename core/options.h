@@ -10,15 +10,15 @@
 
 namespace cairn {
 
-// One field of a stage's options struct, described once: --help, the recipe's table, its reference page and the
-// range check are all made from this.
+// One field of a stage's options struct, described once: --help, the recipe's table, its reference page and
+// the range check are all made from this.
 struct Option {
   std::string name;  // the field's name, snake_case, unit as suffix
   std::variant<bool*, int*, double*, std::string*, std::vector<double>*> value;
-  std::string help;                                         // one sentence, with the unit and the source's value
-  double min = -std::numeric_limits<double>::infinity();    // numbers: inclusive range
+  std::string help;  // one sentence, with the unit and the source's value
+  double min = -std::numeric_limits<double>::infinity();  // numbers: inclusive range
   double max = std::numeric_limits<double>::infinity();
-  std::vector<std::string> choices;                         // strings: the allowed values; empty = any
+  std::vector<std::string> choices;  // strings: the allowed values; empty = any
 };
 using OptionTable = std::vector<Option>;
 
@@ -31,9 +31,11 @@ std::string OptionValueText(const Option& option);
 Status CheckOptions(const OptionTable& table);
 
 // Sets options from the keys of a TOML file (a stage's options file: one table, no headers).
-// Errors: NotFound, Corrupt (not TOML; line), InvalidArgument (unknown key, with the nearest valid one; wrong type).
+// Errors: NotFound, Corrupt (not TOML; line), InvalidArgument (unknown key, with the nearest valid one; wrong
+// type).
 Status ReadOptionsFile(const std::string& path, const OptionTable& table);
-// The table as a TOML document, every key with its value in the table's order: canonical, equal options give equal bytes.
+// The table as a TOML document, every key with its value in the table's order: canonical, equal options give
+// equal bytes.
 std::string OptionsToml(const OptionTable& table);
 
 // Of `candidates`, the one with the least edit distance to `word`; empty when none is near.

@@ -7,7 +7,8 @@
 
 namespace cairn {
 
-// Mixes two numbers into a seed (splitmix64's finaliser), for an independent stream per item: Random(MixSeed(seed, i)).
+// Mixes two numbers into a seed (splitmix64's finaliser), for an independent stream per item:
+// Random(MixSeed(seed, i)).
 inline uint64_t MixSeed(uint64_t seed, uint64_t stream) {
   uint64_t z = seed + 0x9e3779b97f4a7c15ull * (stream + 1);
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;

@@ -19,13 +19,13 @@ struct SiftOptions {
 };
 OptionTable DescribeOptions(SiftOptions* options);
 
-// Features of an 8-bit grey image, ordered by (y, x, scale, orientation): deterministic.  `mask`, if not empty, has the
-// image's size; features at zero pixels are dropped.  A blank image gives no features, not an error.
-// Errors: InvalidArgument for an image or mask of another type or size.
+// Features of an 8-bit grey image, ordered by (y, x, scale, orientation): deterministic.  `mask`, if not
+// empty, has the image's size; features at zero pixels are dropped.  A blank image gives no features, not an
+// error. Errors: InvalidArgument for an image or mask of another type or size.
 Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask = {});
 
-// OpenCV's keypoint position in COLMAP's pixels: half a pixel for the pixel's centre, minus the quarter that OpenCV
-// 4.6's SIFT adds when it starts from the doubled image.
+// OpenCV's keypoint position in COLMAP's pixels: half a pixel for the pixel's centre, minus the quarter that
+// OpenCV 4.6's SIFT adds when it starts from the doubled image.
 Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg);
 
 }  // namespace cairn

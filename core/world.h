@@ -13,8 +13,8 @@
 
 namespace cairn {
 
-// A world instance <G, F, {F_v}> [Sala06 §III]: stations, their adjacency, and the visibility area of every feature.
-// Memory is proportional to the number of incidences (station sees feature).
+// A world instance <G, F, {F_v}> [Sala06 §III]: stations, their adjacency, and the visibility area of every
+// feature. Memory is proportional to the number of incidences (station sees feature).
 struct World {
   // Station's place on the floor, metres.
   std::vector<Eigen::Vector2d> positions;
@@ -25,11 +25,12 @@ struct World {
   // Per feature: the stations that see it, ascending.
   std::vector<std::vector<StationIdx>> areas;
 
-  // For worlds made by filter_visibility, else empty: the feature class behind each feature, and the images taken at
-  // each station.
+  // For worlds made by filter_visibility, else empty: the feature class behind each feature, and the images
+  // taken at each station.
   std::vector<ClassId> class_ids;
   std::vector<std::vector<ImageId>> station_images;
-  // Edge length of a lattice survey, metres; 0 where stations are cells of a driven survey or the world is synthetic.
+  // Edge length of a lattice survey, metres; 0 where stations are cells of a driven survey or the world is
+  // synthetic.
   double lattice_spacing_m = 0;
   // Floor frame (z up; x, y and heading of stations, plans and pictures) from the capture's world frame.
   Pose floor_from_world;
@@ -43,8 +44,9 @@ std::vector<std::vector<FeatureIdx>> VisibilitySets(const World& world);
 // Neighbours of every station, ascending.
 std::vector<std::vector<StationIdx>> AdjacencyLists(const World& world);
 
-// Errors: InvalidArgument, naming the element: an index out of range, a self-edge or duplicate edge, an area that is
-// not strictly ascending, two stations at one place with one heading, sizes of the optional members that differ.
+// Errors: InvalidArgument, naming the element: an index out of range, a self-edge or duplicate edge, an area
+// that is not strictly ascending, two stations at one place with one heading, sizes of the optional members
+// that differ.
 Status CheckWorld(const World& world);
 
 // World JSON (docs: schemas/world.md).  Read accepts any order and sorts.
