@@ -1,0 +1,169 @@
+#include "pipeline/program.h"
+
+#include <unistd.h>
+#include <csignal>
+#include <cstdlib>
+
+#include <atomic>
+#include <chrono>
+#include <iostream>
+#include <new>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "pipeline/progress.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kUsageExitCode = 2;
+
+std::atomic<bool> stop_requested = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "the signal handler must not lock");
+
+void RequestStop(int) { stop_requested = true; }
+
+// The first signal asks for a stop; it also restores the default, so that the second one ends the process.
+void CatchStopSignals() {
+  stop_requested = false;
+  struct sigaction action = {};
+  action.sa_handler = RequestStop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+struct CommonArguments {
+  int num_threads = 0;
+  uint64_t seed = 0;
+  std::string progress = "auto";
+  std::string log_level = "info";
+};
+
+void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
+  app.add_option("--threads", arguments->num_threads, "Threads to use; 0 = all cores [0]")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N")
+      ->group("Common options");
+  app.add_option("--seed", arguments->seed, "Seed of everything random; same seed, same bytes [0]")
+      ->type_name("S")
+      ->group("Common options");
+  app.add_option("--progress", arguments->progress,
+                 "auto|bar|lines|json|none; auto: a bar on a terminal [auto]")
+      ->check(CLI::IsMember({"auto", "bar", "lines", "json", "none"}))
+      ->type_name("STYLE")
+      ->group("Common options");
+  app.add_option("--log-level", arguments->log_level, "trace|debug|info|warning|error|off [info]")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
+      ->type_name("LEVEL")
+      ->group("Common options");
+  app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
+}
+
+std::unique_ptr<Progress> MakeTerminalProgress(ProgressStyle style) {
+  return MakeProgress(
+      style, {.write = [](const std::string& text) { std::cerr << text << std::flush; },
+              .seconds =
+                  [] {
+                    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+                        .count();
+                  },
+              .cancelled = [] { return stop_requested.load(); }});
+}
+
+// Messages go to stderr, as does the bar: a message first clears the bar's line.
+void ConfigureLog(const std::string& level, ProgressStyle style) {
+  auto logger =
+      std::make_shared<spdlog::logger>("cairn", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  logger->set_level(spdlog::level::from_str(level));
+  logger->set_pattern(style == ProgressStyle::kBar ? "\r\x1b[K%^%l%$: %v" : "%^%l%$: %v");
+  spdlog::set_default_logger(logger);
+}
+
+Status RunCaught(const Command& command, const CommandEnvironment& environment) {
+  try {
+    Status status = command.run(environment);
+    if (!status.ok() && stop_requested) return MakeError(ErrorCode::kCancelled, "stopped on request");
+    return status;
+  } catch (const std::bad_alloc&) {
+    return MakeError(ErrorCode::kFailed, "out of memory; use fewer --threads, or a machine with more memory");
+  } catch (const std::exception& exception) {
+    return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
+                     exception.what());
+  }
+}
+
+void WriteErrorFile(const std::string& stage, const Error& error) {
+  const char* path = std::getenv(kErrorFileVariable);
+  if (path == nullptr || *path == '\0') return;
+  const nlohmann::ordered_json document = {{"code", static_cast<int>(error.code)},
+                                           {"name", ErrorCodeName(error.code)},
+                                           {"stage", stage},
+                                           {"message", error.message}};
+  const Status status = WriteFileAtomically(
+      path, document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  if (!status.ok()) spdlog::warn("{}", status.error().message);
+}
+
+int Report(const std::string& stage, const Error& error, std::ostream& err) {
+  err << "cairn " << stage << ": " << error.message << std::endl;
+  WriteErrorFile(stage, error);
+  return static_cast<int>(error.code);
+}
+
+// Usage errors as one line that says where help is.
+int ReportUsage(const CLI::App& app, const CLI::ParseError& error, std::ostream& err) {
+  std::string name = "cairn";
+  for (const CLI::App* subcommand : app.get_subcommands()) name += " " + subcommand->get_name();
+  err << name << ": " << error.what() << "; see " << name << " --help" << std::endl;
+  return kUsageExitCode;
+}
+
+}  // namespace
+
+const char* ProgramVersion() { return CAIRN_VERSION; }
+
+int RunProgram(const std::vector<Command>& commands, int argc, const char* const* argv, std::ostream& out,
+               std::ostream& err) {
+  CLI::App app("cairn compiles survey captures into landmark maps: survey images in, one small map file out.",
+               "cairn");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
+  CommonArguments arguments;
+  for (const Command& command : commands) {
+    CLI::App* subcommand = app.add_subcommand(command.name, command.summary);
+    command.add_arguments(*subcommand);
+    AddCommonArguments(*subcommand, &arguments);
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    app.exit(success, out, err);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return ReportUsage(app, error, err);
+  }
+
+  const std::string name = app.get_subcommands().front()->get_name();
+  const auto style = ParseProgressStyle(arguments.progress, isatty(STDERR_FILENO) != 0);
+  if (!style.ok()) return Report(name, style.error(), err);
+  ConfigureLog(arguments.log_level, *style);
+  CatchStopSignals();
+  const std::unique_ptr<Progress> progress = MakeTerminalProgress(*style);
+  const CommandEnvironment environment = {
+      .num_threads = arguments.num_threads, .seed = arguments.seed, .progress = progress.get(), .out = &out};
+  for (const Command& command : commands) {
+    if (command.name != name) continue;
+    const Status status = RunCaught(command, environment);
+    out.flush();
+    if (!status.ok()) return Report(name, status.error(), err);
+    if (!out)
+      return Report(name, MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?"), err);
+  }
+  return 0;
+}
+
+}  // namespace cairn
