@@ -25,3 +25,29 @@ function(cairn_benchmark name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} benchmark::benchmark)
 endfunction()
+
+# cairn_embed_sql(TARGET file...): compiles SQL files of schemas/ into a library.  schemas/world.sql becomes the header
+# "schemas/world_sql.h" with the text `cairn::kWorldSql`.
+function(cairn_embed_sql target)
+  foreach(file ${ARGN})
+    cmake_path(ABSOLUTE_PATH file OUTPUT_VARIABLE path)
+    get_filename_component(stem ${file} NAME_WE)
+    file(READ ${path} SQL)
+    set(SYMBOL "k")
+    string(REPLACE "_" ";" words ${stem})
+    foreach(word ${words})
+      string(SUBSTRING ${word} 0 1 initial)
+      string(SUBSTRING ${word} 1 -1 rest)
+      string(TOUPPER ${initial} initial)
+      string(APPEND SYMBOL ${initial} ${rest})
+    endforeach()
+    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/embedded/schemas/${stem}_sql.h @ONLY CONTENT
+"#pragma once
+namespace cairn {
+inline constexpr char @SYMBOL@Sql[] = R\"sql(@SQL@)sql\";
+}  // namespace cairn
+")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${path})
+  endforeach()
+  target_include_directories(${target} PRIVATE ${CMAKE_BINARY_DIR}/embedded)
+endfunction()
