@@ -19,6 +19,9 @@ namespace cairn {
 struct CommandEnvironment {
   int num_threads = 0;  // 0 = all cores
   uint64_t seed = 0;
+  bool seed_given = false;              // --seed is on the command line
+  std::string progress_style = "auto";  // --progress and --log-level as given, for commands that start others
+  std::string log_level = "info";
   Progress* progress = nullptr;  // never null when a command runs
   std::ostream* out = nullptr;   // results; messages go to spdlog (stderr)
 };

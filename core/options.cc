@@ -6,9 +6,8 @@
 #include <numeric>
 #include <sstream>
 
-#include <toml++/toml.h>
-
 #include "core/file.h"
+#include "core/toml_options.h"
 
 namespace cairn {
 namespace {
@@ -111,34 +110,44 @@ Status CheckOptions(const OptionTable& table) {
   return Ok();
 }
 
-Status ReadOptionsFile(const std::string& path, const OptionTable& table) {
+Result<toml::table> ReadTomlFile(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
-  toml::table document;
   try {
-    document = toml::parse(contents, path);
+    return toml::table(toml::parse(contents, path));
   } catch (const toml::parse_error& error) {
     return MakeError(ErrorCode::kCorrupt, "{}:{}: not TOML: {}", path, error.source().begin.line,
                      error.description());
   }
+}
+
+std::string TomlPlace(const std::string& path, const toml::node& node) {
+  return fmt::format("{}:{}", path, node.source().begin.line);
+}
+
+Status SetOptionsFromToml(const toml::table& keys, const std::string& path, const OptionTable& table) {
   std::vector<std::string> names;
   for (const Option& option : table) names.push_back(option.name);
-  for (const auto& [key, node] : document) {
+  for (const auto& [key, node] : keys) {
     const std::string name(key.str());
+    const std::string place = fmt::format("{}:{}", path, key.source().begin.line);
     const auto option =
         std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
     if (option == table.end()) {
       const std::string nearest = NearestWord(name, names);
-      return MakeError(ErrorCode::kInvalidArgument, "{}:{}: unknown option '{}'{}", path,
-                       node.source().begin.line, name,
+      return MakeError(ErrorCode::kInvalidArgument, "{}: unknown option '{}'{}", place, name,
                        nearest.empty() ? "; valid are " + fmt::format("{}", fmt::join(names, ", "))
                                        : "; did you mean '" + nearest + "'?");
     }
     if (Status status = SetOption(*option, TextFromToml(node)); !status.ok()) {
-      return MakeError(status.error().code, "{}:{}: {}", path, node.source().begin.line,
-                       status.error().message);
+      return MakeError(status.error().code, "{}: {}", place, status.error().message);
     }
   }
   return Ok();
+}
+
+Status ReadOptionsFile(const std::string& path, const OptionTable& table) {
+  CAIRN_ASSIGN_OR_RETURN(const toml::table document, ReadTomlFile(path));
+  return SetOptionsFromToml(document, path, table);
 }
 
 std::string OptionsToml(const OptionTable& table) {

@@ -153,8 +153,13 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
   ConfigureLog(arguments.log_level, *style);
   CatchStopSignals();
   const std::unique_ptr<Progress> progress = MakeTerminalProgress(*style);
-  const CommandEnvironment environment = {
-      .num_threads = arguments.num_threads, .seed = arguments.seed, .progress = progress.get(), .out = &out};
+  const CommandEnvironment environment = {.num_threads = arguments.num_threads,
+                                          .seed = arguments.seed,
+                                          .seed_given = app.get_subcommands().front()->count("--seed") > 0,
+                                          .progress_style = arguments.progress,
+                                          .log_level = arguments.log_level,
+                                          .progress = progress.get(),
+                                          .out = &out};
   for (const Command& command : commands) {
     if (command.name != name) continue;
     const Status status = RunCaught(command, environment);
