@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
+#include <vector>
 
 #include <opencv2/features2d.hpp>
 
@@ -65,31 +67,34 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   cv::Mat descriptors;
   try {
     // nfeatures = 0: OpenCV's own cap keeps ties in an order that is not ours to rely on.
-    const cv::Ptr<cv::SIFT> sift =
-        cv::SIFT::create(0, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F);
-    sift->detect(grey, keypoints, mask);
-    const auto max_num = static_cast<size_t>(options.max_num_features);
-    const auto place = [](const cv::KeyPoint& k) { return std::tuple(k.pt.y, k.pt.x, k.size, k.angle); };
-    if (keypoints.size() > max_num) {
-      std::sort(keypoints.begin(), keypoints.end(), [&](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-        return a.response != b.response ? a.response > b.response : place(a) < place(b);
-      });
-      keypoints.resize(max_num);
-    }
-    std::sort(keypoints.begin(), keypoints.end(),
-              [&](const cv::KeyPoint& a, const cv::KeyPoint& b) { return place(a) < place(b); });
-    if (!keypoints.empty()) sift->compute(grey, keypoints, descriptors);
+    cv::SIFT::create(0, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
+        ->detectAndCompute(grey, mask, keypoints, descriptors);
   } catch (const cv::Exception& exception) {
     return MakeError(ErrorCode::kFailed, "SIFT failed on an image of {} x {} px: {}", grey.cols, grey.rows,
                      exception.err);
   }
-  features.descriptors.resize(static_cast<Eigen::Index>(keypoints.size()), kDescriptorDim);
-  features.keypoints.reserve(keypoints.size());
-  for (size_t i = 0; i < keypoints.size(); ++i) {
+  const auto place = [&](int i) {
     const cv::KeyPoint& k = keypoints[i];
+    return std::tuple(k.pt.y, k.pt.x, k.size, k.angle, i);
+  };
+  std::vector<int> order(keypoints.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (order.size() > static_cast<size_t>(options.max_num_features)) {
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+      const float response_a = keypoints[a].response, response_b = keypoints[b].response;
+      return response_a != response_b ? response_a > response_b : place(a) < place(b);
+    });
+    order.resize(options.max_num_features);
+  }
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
+
+  features.descriptors.resize(static_cast<Eigen::Index>(order.size()), kDescriptorDim);
+  features.keypoints.reserve(order.size());
+  for (const int i : order) {
+    const cv::KeyPoint& k = keypoints[i];
+    RootSiftRow(descriptors.ptr<float>(i),
+                features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
     features.keypoints.push_back(KeypointFromOpenCv(k.pt.x, k.pt.y, k.size, k.angle));
-    RootSiftRow(descriptors.ptr<float>(static_cast<int>(i)),
-                features.descriptors.row(static_cast<Eigen::Index>(i)).data());
   }
   return features;
 }

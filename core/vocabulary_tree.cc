@@ -1,1 +1,128 @@
 #include "core/vocabulary_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace cairn {
+namespace {
+
+int32_t Dot(const uint8_t* a, const uint8_t* b) {
+  int32_t sum = 0;
+  for (int i = 0; i < kDescriptorDim; ++i) sum += static_cast<int32_t>(a[i]) * static_cast<int32_t>(b[i]);
+  return sum;
+}
+
+}  // namespace
+
+Status NumberVocabularyNodes(Vocabulary* vocabulary) {
+  const int64_t num_nodes = static_cast<int64_t>(vocabulary->nodes.size());
+  int64_t next_child = 1;
+  WordIdx next_word = 0;
+  for (int64_t i = 0; i < num_nodes; ++i) {
+    VocabularyNode& node = vocabulary->nodes[i];
+    if (node.num_children == 0) {
+      node.first_child = -1;
+      node.word = next_word++;
+      continue;
+    }
+    if (node.num_children < 0 || next_child <= i || next_child + node.num_children > num_nodes) {
+      return MakeError(ErrorCode::kCorrupt, "vocabulary node {}: {} children do not fit {} nodes", i,
+                       node.num_children, num_nodes);
+    }
+    node.first_child = static_cast<int32_t>(next_child);
+    node.word = -1;
+    next_child += node.num_children;
+  }
+  if (num_nodes > 0 && next_child != num_nodes) {
+    return MakeError(ErrorCode::kCorrupt, "vocabulary: {} nodes, but children for {}", num_nodes, next_child);
+  }
+  vocabulary->inverted_files.resize(next_word);
+  return Ok();
+}
+
+void WeightVocabulary(Vocabulary* vocabulary) {
+  const double num_documents = static_cast<double>(vocabulary->document_ids.size());
+  vocabulary->idf.assign(vocabulary->num_words(), 0.f);
+  std::vector<double> squared_norms(vocabulary->document_ids.size(), 0.0);
+  for (int word = 0; word < vocabulary->num_words(); ++word) {
+    const std::vector<Posting>& postings = vocabulary->inverted_files[word];
+    if (postings.empty()) continue;
+    vocabulary->idf[word] =
+        static_cast<float>(std::log(num_documents / static_cast<double>(postings.size())));
+    for (const Posting& posting : postings) {
+      const double weight = static_cast<double>(posting.count) * vocabulary->idf[word];
+      squared_norms[posting.document] += weight * weight;
+    }
+  }
+  vocabulary->document_norms.resize(squared_norms.size());
+  for (size_t i = 0; i < squared_norms.size(); ++i) {
+    vocabulary->document_norms[i] = static_cast<float>(std::sqrt(squared_norms[i]));
+  }
+}
+
+int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor) {
+  int nearest = 0;
+  int32_t largest = -1;
+  for (int i = 0; i < num_centres; ++i) {
+    const int32_t dot = Dot(centres + static_cast<size_t>(i) * kDescriptorDim, descriptor);
+    if (dot > largest) {
+      largest = dot;
+      nearest = i;
+    }
+  }
+  return nearest;
+}
+
+WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descriptor) {
+  if (vocabulary.nodes.empty()) return -1;
+  const VocabularyNode* node = &vocabulary.nodes[0];
+  while (node->num_children > 0) {
+    const uint8_t* centres =
+        vocabulary.centres.data() + static_cast<size_t>(node->first_child) * kDescriptorDim;
+    node = &vocabulary.nodes[node->first_child + NearestCentre(centres, node->num_children, descriptor)];
+  }
+  return node->word;
+}
+
+std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors,
+                                            int max_num_documents) {
+  if (vocabulary.nodes.empty()) return {};
+  std::vector<WordIdx> words(descriptors.rows());
+  for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
+    words[i] = QuantizeDescriptor(vocabulary, descriptors.row(i).data());
+  }
+  std::sort(words.begin(), words.end());
+
+  // Sums over the words in ascending order: the same for any order of the descriptors.
+  std::vector<double> dots(vocabulary.document_ids.size(), 0.0);
+  double squared_norm = 0;
+  for (size_t begin = 0; begin < words.size();) {
+    const WordIdx word = words[begin];
+    size_t end = begin;
+    while (end < words.size() && words[end] == word) ++end;
+    const double idf = vocabulary.idf[word];
+    const double query_weight = static_cast<double>(end - begin) * idf;
+    squared_norm += query_weight * query_weight;
+    for (const Posting& posting : vocabulary.inverted_files[word]) {
+      dots[posting.document] += query_weight * idf * posting.count;
+    }
+    begin = end;
+  }
+
+  std::vector<ScoredDocument> scored;
+  for (size_t i = 0; i < dots.size(); ++i) {
+    if (dots[i] <= 0) continue;
+    const double score = dots[i] / (std::sqrt(squared_norm) * vocabulary.document_norms[i]);
+    scored.push_back({static_cast<int32_t>(i), static_cast<float>(std::min(score, 1.0))});
+  }
+  const size_t num_kept = std::min<size_t>(scored.size(), std::max(0, max_num_documents));
+  std::partial_sort(scored.begin(), scored.begin() + num_kept, scored.end(),
+                    [](const ScoredDocument& a, const ScoredDocument& b) {
+                      return std::pair(-a.score, a.document) < std::pair(-b.score, b.document);
+                    });
+  scored.resize(num_kept);
+  return scored;
+}
+
+}  // namespace cairn

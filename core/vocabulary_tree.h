@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/database.h"
 #include "core/error.h"
 #include "core/features.h"
 #include "core/ids.h"
@@ -20,10 +21,11 @@ struct VocabularyNode {
   WordIdx word = -1;  // 0 .. num_words - 1 at a leaf, else -1
 };
 
-// One entry of a word's inverted file.
+// One entry of a word's inverted file: how often the word occurs in a document.
 struct Posting {
   int32_t document = 0;  // index into `document_ids`
-  float weight = 0;      // tf-idf, normalised so that a document's vector has L2 norm 1
+  int32_t count = 0;     // at least 1
+  friend bool operator==(const Posting&, const Posting&) = default;
 };
 
 // A tree with TF-IDF inverted files over the documents (survey images) that it was filled with.
@@ -31,29 +33,49 @@ struct Vocabulary {
   int branching = 0;
   int depth = 0;
   std::vector<VocabularyNode> nodes;
-  DescriptorMatrix centres;  // row i: centre of node i (row 0 unused)
-  std::vector<float> idf;    // per word: ln(documents / documents with the word); 0 for unused or stopped
-  std::vector<std::vector<Posting>> inverted_files;  // per word, ascending document
+  DescriptorMatrix centres;  // row i: centre of node i, squared norm near 512^2 (row 0 unused)
+  std::vector<std::vector<Posting>> inverted_files;  // per word, ascending document; empty for a stopped word
   std::vector<ImageId> document_ids;                 // ascending
 
-  int num_words() const { return static_cast<int>(idf.size()); }
+  // Made from the inverted files by WeightVocabulary.
+  std::vector<float> idf;  // per word: ln(documents / documents with the word); 0 for an empty file
+  std::vector<float> document_norms;  // per document: L2 norm of its vector (count * idf)
+
+  int num_words() const { return static_cast<int>(inverted_files.size()); }
 };
 
-// The leaf that a descriptor falls to: at each node the child with the largest dot product of normalised
-// centres, ties to the smaller index.  -1 for an empty tree.
+// Numbers the nodes: sets `first_child` and `word` of every node and sizes `inverted_files`, from the nodes'
+// `num_children` alone, breadth first.
+// Errors: Corrupt when the counts do not add up to the number of nodes.
+Status NumberVocabularyNodes(Vocabulary* vocabulary);
+// Sets `idf` and `document_norms` from the inverted files.
+void WeightVocabulary(Vocabulary* vocabulary);
+
+// The leaf that a descriptor falls to: at each node the child whose centre has the largest dot product with
+// it, ties to the smaller index.  -1 for an empty tree.
 WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descriptor);
+
+// Index of the row of `centres` (128 bytes each) with the largest dot product, ties to the smaller. REQUIRES:
+// >= 1 row
+int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor);
 
 struct ScoredDocument {
   int32_t document = 0;
-  float score = 0;  // 1 - |q - d|^2 / 2 of the L2-normalised vectors, in [0, 1]
+  float score = 0;  // 1 - |q - d|^2 / 2 = q . d of the L2-normalised vectors, in [0, 1]
 };
-// Documents that share at least one word with the query, best first; ties by document.  Touches shared words
-// only.
+// Documents with a positive score, best first, ties by document, at most `max_num_documents`.  Touches shared
+// words only.
 std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors,
                                             int max_num_documents);
 
 // vocabulary.db (schemas/vocabulary.sql).
 Result<Vocabulary> ReadVocabulary(const std::string& path);
 Status WriteVocabulary(const Vocabulary& vocabulary, const std::string& path);
+// The same tables in an open database, which a map has too.  They throw SQLite::Exception: call them inside
+// WithDatabaseErrors.  Every count, length and index is checked.
+Result<Vocabulary> ReadVocabularyTables(SQLite::Database& database, const std::string& path);
+void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabulary);
+// CREATE TABLE statements of these tables.
+extern const char* const kVocabularySchema;
 
 }  // namespace cairn

@@ -44,12 +44,14 @@ TEST(Options, UnknownKeyNamesTheNearestOne) {
   const Status status = ReadOptionsFile(WriteToml("flag = true\nmin_cuont = 3\n"), Describe(&fields));
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(status.error().message, testing::HasSubstr(":2: unknown option 'min_cuont'; did you mean 'min_count'?"));
+  EXPECT_THAT(status.error().message,
+              testing::HasSubstr(":2: unknown option 'min_cuont'; did you mean 'min_count'?"));
 }
 
 TEST(Options, ValueOutsideItsRangeIsAnError) {
   Fields fields;
-  EXPECT_THAT(SetOption(Describe(&fields)[1], "0").error().message, testing::HasSubstr("must be in [1, 100]"));
+  EXPECT_THAT(SetOption(Describe(&fields)[1], "0").error().message,
+              testing::HasSubstr("must be in [1, 100]"));
   EXPECT_FALSE(SetOption(Describe(&fields)[2], "nan").ok());
   EXPECT_THAT(SetOption(Describe(&fields)[3], "all").error().message, testing::HasSubstr("auto, frustum"));
 }

@@ -1,0 +1,78 @@
+#include "core/blob.h"
+
+#include <bit>
+
+namespace cairn {
+
+void BlobWriter::Varint(uint64_t value) {
+  for (; value >= 0x80; value >>= 7) bytes_.push_back(static_cast<char>(value | 0x80));
+  bytes_.push_back(static_cast<char>(value));
+}
+
+void BlobWriter::Float32(float value) {
+  const uint32_t bits = std::bit_cast<uint32_t>(value);
+  for (int shift = 0; shift < 32; shift += 8) bytes_.push_back(static_cast<char>(bits >> shift));
+}
+
+void BlobWriter::Bytes(const uint8_t* bytes, size_t num_bytes) {
+  bytes_.append(reinterpret_cast<const char*>(bytes), num_bytes);
+}
+
+uint64_t BlobReader::Varint() {
+  uint64_t value = 0;
+  for (int shift = 0; ok_ && shift < 63; shift += 7) {
+    if (position_ == bytes_.size()) break;
+    const uint8_t byte = static_cast<uint8_t>(bytes_[position_++]);
+    value |= static_cast<uint64_t>(byte & 0x7f) << shift;
+    if (byte < 0x80) return value;
+  }
+  ok_ = false;
+  return 0;
+}
+
+float BlobReader::Float32() {
+  if (!ok_ || bytes_.size() - position_ < 4) {
+    ok_ = false;
+    return 0;
+  }
+  uint32_t bits = 0;
+  for (int shift = 0; shift < 32; shift += 8) {
+    bits |= static_cast<uint32_t>(static_cast<uint8_t>(bytes_[position_++])) << shift;
+  }
+  return std::bit_cast<float>(bits);
+}
+
+std::string EncodeAscending(const std::vector<int32_t>& values) {
+  BlobWriter writer;
+  int32_t previous = -1;
+  for (const int32_t value : values) {
+    writer.Varint(static_cast<uint64_t>(static_cast<int64_t>(value) - previous));
+    previous = value;
+  }
+  return writer.Take();
+}
+
+Result<std::vector<int32_t>> DecodeAscending(std::string_view bytes, int64_t num_values, int64_t limit,
+                                             const std::string& what) {
+  if (num_values < 0 ||
+      num_values > static_cast<int64_t>(bytes.size())) {  // a varint takes at least one byte
+    return MakeError(ErrorCode::kCorrupt, "{}: {} values in a blob of {} bytes", what, num_values,
+                     bytes.size());
+  }
+  BlobReader reader(bytes);
+  std::vector<int32_t> values(num_values);
+  int64_t previous = -1;
+  for (int32_t& value : values) {
+    const uint64_t step = reader.Varint();
+    if (step == 0 || step > static_cast<uint64_t>(limit) || previous + static_cast<int64_t>(step) >= limit) {
+      return MakeError(ErrorCode::kCorrupt, "{}: not ascending numbers below {}", what, limit);
+    }
+    previous += static_cast<int64_t>(step);
+    value = static_cast<int32_t>(previous);
+  }
+  if (!reader.Finished())
+    return MakeError(ErrorCode::kCorrupt, "{}: bytes are left after {} values", what, num_values);
+  return values;
+}
+
+}  // namespace cairn

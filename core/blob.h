@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace cairn {
+
+// Byte layouts of our own for the blobs in our files: little-endian numbers and varints (7 bits a byte,
+// lowest first, the top bit says that more follow).  schemas/FORMAT.md draws each blob.
+class BlobWriter {
+ public:
+  void Varint(uint64_t value);
+  void Float32(float value);
+  void Bytes(const uint8_t* bytes, size_t num_bytes);
+  std::string Take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+// Reads what BlobWriter wrote.  After a read past the end or of a varint that is too long, ok() is false and
+// every value is 0: check once, at the end.
+class BlobReader {
+ public:
+  explicit BlobReader(std::string_view bytes) : bytes_(bytes) {}
+
+  uint64_t Varint();
+  float Float32();
+  bool ok() const { return ok_; }
+  // Whether everything was read, without a failure.
+  bool Finished() const { return ok_ && position_ == bytes_.size(); }
+
+ private:
+  std::string_view bytes_;
+  size_t position_ = 0;
+  bool ok_ = true;
+};
+
+// Strictly ascending numbers >= 0 as varints: the first plus 1, then each step from the one before (so a 0
+// never occurs).
+std::string EncodeAscending(const std::vector<int32_t>& values);
+// Errors: Corrupt when the blob does not hold exactly `num_values` strictly ascending numbers in [0, limit).
+Result<std::vector<int32_t>> DecodeAscending(std::string_view bytes, int64_t num_values, int64_t limit,
+                                             const std::string& what);
+
+}  // namespace cairn

@@ -1,0 +1,39 @@
+-- classes.db: the feature classes of a capture with refined poses, output of group_classes.
+-- Blobs are little-endian; class and image ids are the opaque ids of the capture's COLMAP database.
+PRAGMA application_id = 0x6372636c;  -- 'crcl'
+PRAGMA user_version = 1;
+
+CREATE TABLE cameras (
+  camera_id INTEGER PRIMARY KEY,
+  model     INTEGER NOT NULL,  -- COLMAP's number
+  width     INTEGER NOT NULL,  -- px
+  height    INTEGER NOT NULL,  -- px
+  params    BLOB    NOT NULL,  -- float64[]; as refined
+  has_focal_prior INTEGER NOT NULL
+);
+
+CREATE TABLE images (
+  image_id  INTEGER PRIMARY KEY,
+  name      TEXT    NOT NULL,
+  camera_id INTEGER NOT NULL REFERENCES cameras,
+  refined   BLOB    NOT NULL,  -- cam_from_world: float64[7] = qw qx qy qz tx ty tz, metres
+  given     BLOB    NOT NULL   -- the same as the capture states it
+);
+
+CREATE TABLE classes (
+  class_id     INTEGER PRIMARY KEY,
+  position     BLOB NOT NULL,  -- float64[3], world frame, metres
+  covariance   BLOB NOT NULL,  -- float64[6]: xx xy xz yy yz zz, m^2
+  reprojection_error_px REAL NOT NULL,  -- root mean square
+  descriptor   BLOB NOT NULL,  -- uint8[128]
+  observations BLOB NOT NULL   -- n x 24 bytes: image_id u32, keypoint_idx u32, x f32, y f32, scale f32, orientation f32
+);
+
+CREATE TABLE alignment (
+  camera_from_given BLOB NOT NULL  -- float64[7], as images.refined
+);
+
+CREATE TABLE dropped (
+  reason TEXT PRIMARY KEY,
+  num_classes INTEGER NOT NULL
+);
