@@ -1,0 +1,194 @@
+#include "stages/build_vocabulary/build_vocabulary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "core/parallel.h"
+#include "core/random.h"
+#include "stages/build_vocabulary/split_node.h"
+
+namespace cairn {
+namespace {
+
+// Streams of the seed.
+constexpr uint64_t kSampleStream = 0;
+constexpr uint64_t kFirstNodeStream = 1;
+
+// `count` of the numbers below `total`, drawn without repetition, ascending.
+std::vector<int64_t> Draw(int64_t total, int64_t count, uint64_t seed) {
+  std::vector<int64_t> numbers(total);
+  std::iota(numbers.begin(), numbers.end(), int64_t{0});
+  if (count >= total) return numbers;
+  Random random(seed);
+  for (int64_t i = 0; i < count; ++i) std::swap(numbers[i], numbers[random.UniformInt(i, total - 1)]);
+  numbers.resize(count);
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+DescriptorMatrix TrainingDescriptors(const std::vector<ImageDescriptors>& images, int64_t num_descriptors,
+                                     int max_num_training_descriptors, uint64_t seed) {
+  const std::vector<int64_t> drawn =
+      Draw(num_descriptors, max_num_training_descriptors, MixSeed(seed, kSampleStream));
+  DescriptorMatrix training(static_cast<Eigen::Index>(drawn.size()), kDescriptorDim);
+  size_t image = 0;
+  int64_t first = 0;  // number of the image's first descriptor
+  for (size_t i = 0; i < drawn.size(); ++i) {
+    while (drawn[i] >= first + images[image].descriptors.rows()) first += images[image++].descriptors.rows();
+    training.row(i) = images[image].descriptors.row(drawn[i] - first);
+  }
+  return training;
+}
+
+// Depth at which branching^depth words hold nearest to `descriptors_per_word` descriptors.
+int DepthFromCount(int64_t num_descriptors, const BuildVocabularyOptions& options) {
+  const double num_words = static_cast<double>(num_descriptors) / options.descriptors_per_word;
+  const double levels = std::log(std::max(1.0, num_words)) / std::log(static_cast<double>(options.branching));
+  return std::clamp(static_cast<int>(std::lround(levels)), 1, 8);
+}
+
+// Grows the tree level by level; nodes of a level in parallel, or the descriptors of a node where there are
+// few nodes.
+Status GrowTree(const DescriptorMatrix& training, const BuildVocabularyOptions& options, uint64_t seed,
+                int num_threads, Progress& progress, Vocabulary* vocabulary) {
+  std::vector<std::vector<int32_t>> level(1);  // members of the nodes of the current level
+  level[0].resize(training.rows());
+  std::iota(level[0].begin(), level[0].end(), 0);
+  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> centres(1);
+  centres[0].setZero();
+  vocabulary->nodes.resize(1);
+  size_t first_node = 0;  // of the level
+  progress.Begin("training vocabulary", training.rows() * vocabulary->depth, "descriptors");
+  for (int depth = 0; depth < vocabulary->depth; ++depth) {
+    std::vector<std::vector<NodeChild>> children(level.size());
+    const bool parallel_nodes = static_cast<int>(level.size()) >= 4 * NumThreads(num_threads);
+    ParallelFor(static_cast<int64_t>(level.size()), parallel_nodes ? num_threads : 1, [&](int64_t i) {
+      const int64_t num_members = static_cast<int64_t>(level[i].size());
+      if (!progress.Cancelled() && (depth == 0 || num_members >= options.min_num_descriptors_to_split)) {
+        children[i] = SplitNode(training, level[i], options.branching, options.max_num_iterations,
+                                MixSeed(seed, kFirstNodeStream + first_node + static_cast<uint64_t>(i)),
+                                parallel_nodes ? 1 : num_threads);
+      }
+      progress.Advance(num_members);
+    });
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "training the vocabulary was stopped");
+    std::vector<std::vector<int32_t>> next_level;
+    for (size_t i = 0; i < level.size(); ++i) {
+      vocabulary->nodes[first_node + i].num_children = static_cast<int32_t>(children[i].size());
+      for (NodeChild& child : children[i]) {
+        centres.push_back(child.centre);
+        next_level.push_back(std::move(child.members));
+      }
+    }
+    first_node += level.size();
+    level = std::move(next_level);
+    vocabulary->nodes.resize(centres.size());
+  }
+  progress.End();
+  vocabulary->centres.resize(static_cast<Eigen::Index>(centres.size()), kDescriptorDim);
+  for (size_t i = 0; i < centres.size(); ++i) vocabulary->centres.row(i) = centres[i];
+  return NumberVocabularyNodes(vocabulary);
+}
+
+void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_document_ratio,
+                       int num_threads, Progress& progress, Vocabulary* vocabulary) {
+  std::vector<std::vector<WordIdx>> words(images.size());  // ascending
+  progress.Begin("filling inverted files", static_cast<int64_t>(images.size()), "images");
+  ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
+    const DescriptorMatrix& descriptors = images[i].descriptors;
+    words[i].resize(descriptors.rows());
+    for (Eigen::Index row = 0; row < descriptors.rows(); ++row) {
+      words[i][row] = QuantizeDescriptor(*vocabulary, descriptors.row(row).data());
+    }
+    std::sort(words[i].begin(), words[i].end());
+    progress.Advance();
+  });
+  progress.End();
+  for (size_t i = 0; i < images.size(); ++i) {
+    vocabulary->document_ids.push_back(images[i].image_id);
+    for (const WordIdx word : words[i]) {
+      std::vector<Posting>& postings = vocabulary->inverted_files[word];
+      if (postings.empty() || postings.back().document != static_cast<int32_t>(i)) {
+        postings.push_back({static_cast<int32_t>(i), 0});
+      }
+      ++postings.back().count;
+    }
+  }
+  const double max_length = max_document_ratio * static_cast<double>(images.size());
+  for (std::vector<Posting>& postings : vocabulary->inverted_files) {
+    if (static_cast<double>(postings.size()) > max_length) postings = {};  // [Mariottini11 §VII-A] stop list
+  }
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(BuildVocabularyOptions* o) {
+  return {
+      {.name = "branching",
+       .value = &o->branching,
+       .help = "most children of a node [Mariottini11: 10]",
+       .min = 2,
+       .max = 256},
+      {.name = "depth",
+       .value = &o->depth,
+       .help = "levels below the root [Mariottini11: 4]; 0: from the data",
+       .min = 0,
+       .max = 8},
+      {.name = "descriptors_per_word",
+       .value = &o->descriptors_per_word,
+       .help = "descriptors a word should hold on average when the depth comes from the data",
+       .min = 1},
+      {.name = "min_num_descriptors_to_split",
+       .value = &o->min_num_descriptors_to_split,
+       .help = "a node with fewer training descriptors is not split",
+       .min = 2},
+      {.name = "max_num_training_descriptors",
+       .value = &o->max_num_training_descriptors,
+       .help = "most descriptors that train the tree",
+       .min = 1},
+      {.name = "max_num_iterations",
+       .value = &o->max_num_iterations,
+       .help = "most rounds of k-means per node",
+       .min = 1},
+      {.name = "max_document_ratio",
+       .value = &o->max_document_ratio,
+       .help = "words in more than this part of the images do not score (stop list); 1: all score",
+       .min = 1e-9,
+       .max = 1},
+  };
+}
+
+Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
+                                   const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
+                                   Progress& progress) {
+  BuildVocabularyOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  int64_t num_descriptors = 0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (i > 0 && images[i].image_id <= images[i - 1].image_id) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "build_vocabulary: image {} after image {}; expected ascending ids",
+                       images[i].image_id, images[i - 1].image_id);
+    }
+    num_descriptors += images[i].descriptors.rows();
+  }
+  if (num_descriptors == 0) {
+    return MakeError(ErrorCode::kNoData,
+                     "build_vocabulary: no descriptors in {} images; are the images blank?", images.size());
+  }
+  Vocabulary vocabulary;
+  vocabulary.branching = options.branching;
+  vocabulary.depth = options.depth > 0 ? options.depth : DepthFromCount(num_descriptors, options);
+  {
+    const DescriptorMatrix training =
+        TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed);
+    CAIRN_RETURN_IF_ERROR(GrowTree(training, options, seed, num_threads, progress, &vocabulary));
+  }
+  FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary);
+  WeightVocabulary(&vocabulary);
+  return vocabulary;
+}
+
+}  // namespace cairn

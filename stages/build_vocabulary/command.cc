@@ -1,0 +1,65 @@
+#include "stages/build_vocabulary/command.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+
+#include "core/colmap_database.h"
+#include "stages/build_vocabulary/build_vocabulary.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string features_path;
+  std::string output_path;
+  BuildVocabularyOptions options;
+  OptionArguments option_arguments;
+};
+
+Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  return WithDatabaseErrors(path, [&]() -> Result<std::vector<ImageDescriptors>> {
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> database_images, ReadDatabaseImages(database));
+    std::vector<ImageDescriptors> images;
+    for (const DatabaseImage& image : database_images) {
+      CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors, ReadDatabaseDescriptors(database, image.image_id));
+      images.push_back({image.image_id, std::move(descriptors)});
+    }
+    return images;
+  });
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
+                         ReadDescriptors(arguments.features_path));
+  CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
+                         BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
+                                         *environment.progress));
+  CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
+  spdlog::info("{}: {} words of depth {} over {} images", arguments.output_path, vocabulary.num_words(),
+               vocabulary.depth, vocabulary.document_ids.size());
+  return Ok();
+}
+
+}  // namespace
+
+Command BuildVocabularyCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "build-vocabulary",
+      .summary = "Learns the visual words of a survey and which image shows which of them",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("features", arguments->features_path, "features.db")->required();
+            app.add_option("-o,--output", arguments->output_path, "vocabulary.db to write")->required();
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

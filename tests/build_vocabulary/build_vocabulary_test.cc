@@ -1,0 +1,162 @@
+#include "stages/build_vocabulary/build_vocabulary.h"
+
+#include <filesystem>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "core/random.h"
+
+namespace cairn {
+namespace {
+
+// A random descriptor with squared norm near 512^2.
+Eigen::Matrix<uint8_t, 1, kDescriptorDim> RandomDescriptor(Random& random) {
+  Eigen::Matrix<double, 1, kDescriptorDim> direction;
+  for (int i = 0; i < kDescriptorDim; ++i) direction[i] = std::pow(random.Uniform(), 3);
+  direction *= 512 / direction.norm();
+  return direction.array().min(255).round().cast<uint8_t>();
+}
+
+// `num_images` images of `num_descriptors` random descriptors each.
+std::vector<ImageDescriptors> RandomImages(int num_images, int num_descriptors, uint64_t seed) {
+  Random random(seed);
+  std::vector<ImageDescriptors> images(num_images);
+  for (int i = 0; i < num_images; ++i) {
+    images[i].image_id = 10 * (i + 1);
+    images[i].descriptors.resize(num_descriptors, kDescriptorDim);
+    for (int row = 0; row < num_descriptors; ++row) images[i].descriptors.row(row) = RandomDescriptor(random);
+  }
+  return images;
+}
+
+Result<Vocabulary> Build(const std::vector<ImageDescriptors>& images, const BuildVocabularyOptions& options,
+                         int num_threads = 2, uint64_t seed = 7) {
+  NoProgress progress;
+  return BuildVocabulary(images, options, seed, num_threads, progress);
+}
+
+std::string FileBytes(const Vocabulary& vocabulary, const std::string& name) {
+  const std::string path = testing::TempDir() + "/" + name;
+  std::filesystem::remove(path);
+  EXPECT_TRUE(WriteVocabulary(vocabulary, path).ok());
+  return *ReadFile(path);
+}
+
+TEST(BuildVocabulary, SameBytesForAnyNumberOfThreads) {
+  const auto images = RandomImages(12, 900, 1);
+  const std::string one = FileBytes(*Build(images, {}, 1), "vocabulary_1.db");
+  EXPECT_EQ(FileBytes(*Build(images, {}, 2), "vocabulary_2.db"), one);
+  EXPECT_EQ(FileBytes(*Build(images, {}, 7), "vocabulary_7.db"), one);
+}
+
+TEST(BuildVocabulary, SeedChangesTheTree) {
+  const auto images = RandomImages(4, 300, 1);
+  EXPECT_NE(Build(images, {}, 1, 1)->centres, Build(images, {}, 1, 2)->centres);
+}
+
+TEST(BuildVocabulary, DepthFollowsTheNumberOfDescriptors) {
+  // Words wanted: 100 / 40 = 2.5 (nearest power of ten: 10^0, at least one level), 4000 / 40 = 100 = 10^2.
+  EXPECT_EQ(Build(RandomImages(2, 50, 1), {})->depth, 1);
+  EXPECT_EQ(Build(RandomImages(4, 1000, 1), {})->depth, 2);
+}
+
+TEST(BuildVocabulary, EveryDescriptorIsInTheFileOfItsWord) {
+  const auto images = RandomImages(5, 200, 3);
+  const Vocabulary vocabulary = *Build(images, {});
+  int64_t total = 0;
+  for (const auto& postings : vocabulary.inverted_files) {
+    for (size_t i = 0; i < postings.size(); ++i) {
+      total += postings[i].count;
+      if (i > 0) EXPECT_LT(postings[i - 1].document, postings[i].document);
+    }
+  }
+  EXPECT_EQ(total, 5 * 200);
+  for (size_t i = 0; i < images.size(); ++i) {
+    const WordIdx word = QuantizeDescriptor(vocabulary, images[i].descriptors.row(17).data());
+    EXPECT_THAT(vocabulary.inverted_files[word], testing::Contains(testing::Field(&Posting::document, i)));
+  }
+}
+
+TEST(BuildVocabulary, NodeWithFewDescriptorsIsNotSplit) {
+  BuildVocabularyOptions options;
+  options.depth = 6;
+  options.min_num_descriptors_to_split = 50;
+  const Vocabulary vocabulary = *Build(RandomImages(1, 400, 3), options);
+  EXPECT_LT(vocabulary.num_words(), 400);
+  EXPECT_GT(vocabulary.num_words(), 10);
+}
+
+TEST(BuildVocabulary, FewerDescriptorsThanBranchesMakeAWordEach) {
+  const auto images = RandomImages(1, 4, 5);
+  const Vocabulary vocabulary = *Build(images, {});
+  EXPECT_EQ(vocabulary.num_words(), 4);
+  std::set<WordIdx> words;
+  for (int i = 0; i < 4; ++i)
+    words.insert(QuantizeDescriptor(vocabulary, images[0].descriptors.row(i).data()));
+  EXPECT_EQ(words.size(), 4u);
+}
+
+TEST(BuildVocabulary, EqualDescriptorsMakeOneWord) {
+  std::vector<ImageDescriptors> images = RandomImages(2, 30, 5);
+  for (ImageDescriptors& image : images) {
+    for (int row = 0; row < 30; ++row) image.descriptors.row(row).setConstant(45);
+  }
+  const Vocabulary vocabulary = *Build(images, {});
+  ASSERT_EQ(vocabulary.num_words(), 1);
+  EXPECT_THAT(vocabulary.inverted_files[0], testing::ElementsAre(Posting{0, 30}, Posting{1, 30}));
+  EXPECT_EQ(QuantizeDescriptor(vocabulary, images[0].descriptors.row(0).data()), 0);
+  EXPECT_EQ(vocabulary.idf[0], 0.f);  // ln(2 / 2): tells nothing apart
+  EXPECT_TRUE(QueryVocabulary(vocabulary, images[0].descriptors, 10).empty());
+}
+
+TEST(BuildVocabulary, StopListSilencesWordsOfManyImages) {
+  std::vector<ImageDescriptors> images = RandomImages(4, 40, 8);
+  Random random(1);
+  const auto common = RandomDescriptor(random);
+  for (ImageDescriptors& image : images) image.descriptors.row(0) = common;
+  BuildVocabularyOptions options;
+  options.depth = 3;
+  options.min_num_descriptors_to_split = 2;
+  options.max_document_ratio = 0.5;
+  const Vocabulary vocabulary = *Build(images, options);
+  const WordIdx word = QuantizeDescriptor(vocabulary, common.data());
+  EXPECT_TRUE(vocabulary.inverted_files[word].empty());
+  EXPECT_EQ(vocabulary.idf[word], 0.f);
+  for (const auto& postings : vocabulary.inverted_files) EXPECT_LE(postings.size(), 2u);
+}
+
+TEST(BuildVocabulary, ImageWithoutDescriptorsIsADocumentWithoutWords) {
+  std::vector<ImageDescriptors> images = RandomImages(3, 50, 8);
+  images[1].descriptors.resize(0, kDescriptorDim);
+  const Vocabulary vocabulary = *Build(images, {});
+  EXPECT_EQ(vocabulary.document_ids.size(), 3u);
+  EXPECT_EQ(vocabulary.document_norms[1], 0.f);
+}
+
+TEST(BuildVocabulary, NoDescriptorsIsAnError) {
+  EXPECT_EQ(Build({}, {}).error().code, ErrorCode::kNoData);
+  EXPECT_EQ(Build(RandomImages(3, 0, 1), {}).error().code, ErrorCode::kNoData);
+}
+
+TEST(BuildVocabulary, OptionOutsideItsRangeIsAnError) {
+  BuildVocabularyOptions options;
+  options.branching = 1;
+  EXPECT_EQ(Build(RandomImages(1, 10, 1), options).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(BuildVocabulary, SubsampledTrainingStillFilesEveryDescriptor) {
+  BuildVocabularyOptions options;
+  options.max_num_training_descriptors = 100;
+  const Vocabulary vocabulary = *Build(RandomImages(5, 200, 3), options);
+  int64_t total = 0;
+  for (const auto& postings : vocabulary.inverted_files) {
+    for (const Posting& posting : postings) total += posting.count;
+  }
+  EXPECT_EQ(total, 1000);
+}
+
+}  // namespace
+}  // namespace cairn

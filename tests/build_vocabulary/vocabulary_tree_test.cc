@@ -1,0 +1,177 @@
+#include "core/vocabulary_tree.h"
+
+#include <cmath>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "core/random.h"
+#include "stages/build_vocabulary/build_vocabulary.h"
+
+namespace cairn {
+namespace {
+
+DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
+  Random random(seed);
+  DescriptorMatrix descriptors(count, kDescriptorDim);
+  for (int row = 0; row < count; ++row) {
+    for (int i = 0; i < kDescriptorDim; ++i)
+      descriptors(row, i) = static_cast<uint8_t>(random.UniformInt(0, 90));
+  }
+  return descriptors;
+}
+
+// Two levels, two words on the left and one on the right, told apart by dimensions 0, 1 and 2:
+//          root
+//        1      2 (word 0)
+//      3   4              (words 1, 2)
+Vocabulary HandMadeTree() {
+  Vocabulary tree;
+  tree.branching = 2;
+  tree.depth = 2;
+  tree.nodes.resize(5);
+  tree.nodes[0].num_children = 2;
+  tree.nodes[1].num_children = 2;
+  tree.centres = DescriptorMatrix::Zero(5, kDescriptorDim);
+  tree.centres(1, 0) = 200;
+  tree.centres(1, 1) = 200;
+  tree.centres(2, 2) = 255;
+  tree.centres(3, 0) = 255;
+  tree.centres(4, 1) = 255;
+  EXPECT_TRUE(NumberVocabularyNodes(&tree).ok());
+  tree.document_ids = {5, 9};
+  tree.inverted_files[0] = {{0, 1}, {1, 1}};
+  tree.inverted_files[1] = {{0, 2}};
+  tree.inverted_files[2] = {{1, 3}};
+  WeightVocabulary(&tree);
+  return tree;
+}
+
+DescriptorMatrix Unit(int dimension) {
+  DescriptorMatrix descriptor = DescriptorMatrix::Zero(1, kDescriptorDim);
+  descriptor(0, dimension) = 255;
+  return descriptor;
+}
+
+TEST(VocabularyTree, DescriptorFallsToTheNearestLeaf) {
+  const Vocabulary tree = HandMadeTree();
+  EXPECT_EQ(QuantizeDescriptor(tree, Unit(0).data()), 1);
+  EXPECT_EQ(QuantizeDescriptor(tree, Unit(1).data()), 2);
+  EXPECT_EQ(QuantizeDescriptor(tree, Unit(2).data()), 0);
+  EXPECT_EQ(QuantizeDescriptor(tree, Unit(9).data()), 1);  // ties go to the first child
+  EXPECT_EQ(QuantizeDescriptor(Vocabulary(), Unit(0).data()), -1);
+}
+
+TEST(VocabularyTree, ScoresByHand) {
+  // idf: word 0 is in both documents, ln 1 = 0; words 1 and 2 have ln 2.  Documents are (2 ln 2) e1 and (3 ln
+  // 2) e2, so a query of one word 1 and one word 2 makes 45 degrees with both.
+  const Vocabulary tree = HandMadeTree();
+  DescriptorMatrix query(2, kDescriptorDim);
+  query << Unit(0), Unit(1);
+  const auto scored = QueryVocabulary(tree, query, 10);
+  ASSERT_EQ(scored.size(), 2u);
+  EXPECT_EQ(scored[0].document, 0);  // tie: the smaller document first
+  EXPECT_NEAR(scored[0].score, std::sqrt(0.5), 1e-6);
+  EXPECT_NEAR(scored[1].score, std::sqrt(0.5), 1e-6);
+  EXPECT_EQ(QueryVocabulary(tree, query, 1).size(), 1u);
+  EXPECT_NEAR(QueryVocabulary(tree, Unit(1), 10)[0].score, 1, 1e-6);
+  EXPECT_TRUE(QueryVocabulary(tree, Unit(2), 10).empty());  // only word 0, which weighs nothing
+}
+
+TEST(VocabularyTree, ScoresEqualBruteForceOverDenseVectors) {
+  std::vector<ImageDescriptors> images;
+  for (int i = 0; i < 9; ++i)
+    images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(60 + 5 * i, i)});
+  NoProgress progress;
+  BuildVocabularyOptions options;
+  options.depth = 2;
+  const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
+  const int num_words = vocabulary.num_words();
+
+  // Oracle: dense, L2-normalised tf-idf vectors; score 1 - |q - d|^2 / 2.
+  const auto counts = [&](const DescriptorMatrix& descriptors) {
+    Eigen::VectorXd vector = Eigen::VectorXd::Zero(num_words);
+    for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
+      vector[QuantizeDescriptor(vocabulary, descriptors.row(i).data())] += 1;
+    }
+    return vector;
+  };
+  Eigen::VectorXd documents_with_word = Eigen::VectorXd::Zero(num_words);
+  for (const ImageDescriptors& image : images) {
+    documents_with_word += (counts(image.descriptors).array() > 0).cast<double>().matrix();
+  }
+  const Eigen::VectorXd idf =
+      documents_with_word.unaryExpr([](double n) { return n > 0 ? std::log(9 / n) : 0; });
+  const auto weighted = [&](const DescriptorMatrix& descriptors) {
+    return Eigen::VectorXd(counts(descriptors).cwiseProduct(idf).normalized());
+  };
+
+  const DescriptorMatrix query = RandomDescriptors(80, 99);
+  std::map<int, double> expected;
+  for (int i = 0; i < 9; ++i) {
+    expected[i] = 1 - 0.5 * (weighted(query) - weighted(images[i].descriptors)).squaredNorm();
+  }
+  const auto scored = QueryVocabulary(vocabulary, query, 100);
+  ASSERT_EQ(scored.size(), 9u);
+  for (size_t i = 0; i < scored.size(); ++i) {
+    EXPECT_NEAR(scored[i].score, expected[scored[i].document], 1e-5);
+    if (i > 0) EXPECT_GE(scored[i - 1].score, scored[i].score);
+  }
+}
+
+TEST(VocabularyTree, ImageOfTheSurveyFindsItself) {
+  std::vector<ImageDescriptors> images;
+  for (int i = 0; i < 20; ++i) images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(50, i)});
+  NoProgress progress;
+  BuildVocabularyOptions options;
+  options.depth = 3;
+  const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
+  for (int i = 0; i < 20; ++i) {
+    const auto scored = QueryVocabulary(vocabulary, images[i].descriptors, 1);
+    ASSERT_EQ(scored.size(), 1u);
+    EXPECT_EQ(scored[0].document, i);
+    EXPECT_NEAR(scored[0].score, 1, 1e-5);
+  }
+}
+
+TEST(VocabularyTree, FileRoundTripKeepsEverything) {
+  const std::string path = testing::TempDir() + "/round_trip.db";
+  const Vocabulary written = HandMadeTree();
+  ASSERT_TRUE(WriteVocabulary(written, path).ok());
+  const Result<Vocabulary> read = ReadVocabulary(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->centres, written.centres);
+  EXPECT_EQ(read->inverted_files, written.inverted_files);
+  EXPECT_EQ(read->document_ids, written.document_ids);
+  EXPECT_EQ(read->idf, written.idf);
+  EXPECT_EQ(read->depth, 2);
+}
+
+TEST(VocabularyTree, DamagedTablesAreRefused) {
+  const std::string path = testing::TempDir() + "/damaged.db";
+  const auto damage = [&](const std::string& sql) {
+    EXPECT_TRUE(WriteVocabulary(HandMadeTree(), path).ok());
+    SQLite::Database(path, SQLite::OPEN_READWRITE).exec(sql);
+    const Result<Vocabulary> read = ReadVocabulary(path);
+    ASSERT_FALSE(read.ok()) << sql;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
+    EXPECT_THAT(read.error().message, testing::HasSubstr(path)) << sql;
+  };
+  damage("UPDATE vocabulary SET num_nodes = 1000000000000");
+  damage("UPDATE vocabulary SET num_nodes = 4");
+  damage("UPDATE vocabulary_node SET num_children = 3 WHERE node_id = 0");
+  damage("UPDATE vocabulary_node SET centres = x'00' WHERE node_id = 1");
+  damage("UPDATE vocabulary_node SET node_id = 4 WHERE node_id = 1");
+  damage("UPDATE vocabulary_word SET postings = x'0505' WHERE word_id = 1");
+  damage("UPDATE vocabulary_word SET postings = x'ffffffffffffffffffffff' WHERE word_id = 1");
+  damage("UPDATE vocabulary_word SET num_postings = 1000000000 WHERE word_id = 1");
+  damage("UPDATE vocabulary_word SET word_id = 77 WHERE word_id = 1");
+  damage("UPDATE vocabulary_document SET image_id = 1 WHERE document_idx = 1");
+  damage("DELETE FROM vocabulary");
+  damage("DROP TABLE vocabulary");
+}
+
+}  // namespace
+}  // namespace cairn
