@@ -1,0 +1,49 @@
+#include "stages/filter_visibility/command.h"
+
+#include <spdlog/spdlog.h>
+
+#include "stages/filter_visibility/filter_visibility.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string classes;
+  std::string output;
+  FilterVisibilityOptions options;
+  OptionArguments option_arguments;
+};
+
+Status Run(const Arguments& arguments) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
+  CAIRN_ASSIGN_OR_RETURN(const FilterVisibilityResult result, FilterVisibility(classes, arguments.options));
+  const World& world = result.world;
+  spdlog::info("{} survey: {} stations, {} of {} classes kept", result.is_lattice ? "lattice" : "driven",
+               world.num_stations(), world.num_features(), classes.classes.size());
+  for (const auto& [reason, count] : result.dropped) spdlog::info("dropped {} classes: {}", count, reason);
+  const bool json = arguments.output.ends_with(".json");
+  return json ? WriteWorldJson(world, arguments.output) : WriteWorldDatabase(world, arguments.output);
+}
+
+}  // namespace
+
+Command FilterVisibilityCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  Command command;
+  command.name = "filter-visibility";
+  command.summary = "Find a survey's stations and keep the feature classes that are widely visible from them";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("classes", arguments->classes, "feature classes (classes.db)")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("-o,--output", arguments->output, "world to write: .json, or else a database")
+        ->required()
+        ->type_name("FILE");
+    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  };
+  command.run = [arguments](const CommandEnvironment&) { return Run(*arguments); };
+  return command;
+}
+
+}  // namespace cairn
