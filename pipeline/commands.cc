@@ -1,5 +1,7 @@
 #include "pipeline/commands.h"
 
+#include "pipeline/compile_command.h"
+
 #if defined(CAIRN_HAS_simulate)
 #include "stages/simulate/command.h"
 #endif
@@ -71,6 +73,7 @@ std::vector<Command> AllCommands() {
 #if defined(CAIRN_HAS_inspect_command)
         InspectCommand(),
 #endif
+        CompileCommand(), ConfigureCommand(), RecipeReferenceCommand(),
   };
 }
 

@@ -1,0 +1,245 @@
+#include "pipeline/compile_command.h"
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "pipeline/build_folder.h"
+#include "pipeline/program.h"
+#include "pipeline/recipe.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string recipe;
+  std::string output;
+  std::string build_dir;
+  std::string until;
+  int num_jobs = 1;
+};
+
+// Stage -> the file that it writes.
+struct StageFile {
+  const char* stage;
+  const char* file;
+};
+constexpr StageFile kStageFiles[] = {
+    {"simulate", "capture.stamp"},         {"extract_features", "features.db"},
+    {"match_features", "matches.db"},      {"group_classes", "classes.db"},
+    {"filter_visibility", "world.db"},     {"decompose_regions", "regions.db"},
+    {"build_vocabulary", "vocabulary.db"}, {"emit_map", "unsealed.cairn"}};
+
+Result<std::string> ProgramPath() {
+  std::error_code error;
+  const fs::path path = fs::read_symlink("/proc/self/exe", error);
+  if (error) return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
+  return path.string();
+}
+
+// map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
+Result<std::string> RulesPath(const std::string& program) {
+  const fs::path folder = fs::path(program).parent_path();
+  for (const char* place : {"share/cairn/map.mk", "../share/cairn/map.mk"}) {
+    const fs::path path = (folder / place).lexically_normal();
+    if (fs::exists(path)) return path.string();
+  }
+  return MakeError(ErrorCode::kNotFound,
+                   "share/cairn/map.mk is neither beside {} nor one folder up; install the program again",
+                   program);
+}
+
+Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
+  const fs::path map = fs::absolute(arguments.output).lexically_normal();
+  if (map.extension() != ".cairn") {
+    return MakeError(ErrorCode::kInvalidArgument, "-o {}: a map's name ends in .cairn", arguments.output);
+  }
+  std::error_code error;
+  if (!fs::is_directory(map.parent_path(), error)) {
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", arguments.output,
+                     map.parent_path().string());
+  }
+  fs::path build_dir = fs::path(map).replace_extension(".build");
+  if (!arguments.build_dir.empty()) build_dir = fs::absolute(arguments.build_dir).lexically_normal();
+  if (!build_dir.has_filename()) build_dir = build_dir.parent_path();  // a trailing '/'
+  CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
+  return BuildPaths{.build_dir = build_dir.string(), .map = map.string(), .program = program};
+}
+
+Result<Recipe> ReadRecipeWithSeed(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(Recipe recipe, ReadRecipe(arguments.recipe, AllStageOptions()));
+  if (environment.seed_given) recipe.seed = environment.seed;
+  return recipe;
+}
+
+Result<std::string> MakeGoal(const std::string& until, const BuildPaths& paths) {
+  if (until.empty() || until == "check_map" || until == "check-map") return paths.map;
+  std::string stage = until;
+  std::replace(stage.begin(), stage.end(), '-', '_');
+  std::vector<std::string> stages;
+  for (const StageFile& file : kStageFiles) {
+    if (stage == file.stage) return paths.build_dir + "/" + file.file;
+    stages.emplace_back(file.stage);
+  }
+  stages.emplace_back("check_map");
+  const std::string nearest = NearestWord(stage, stages);
+  return MakeError(
+      ErrorCode::kInvalidArgument, "--until {}: no such stage; {}", until,
+      nearest.empty() ? fmt::format("one of {}", fmt::join(stages, ", ")) : "did you mean " + nearest + "?");
+}
+
+// Dates of all stamps: a rule that ran has touched its own.
+std::map<std::string, fs::file_time_type> StampDates(const std::string& build_dir) {
+  std::map<std::string, fs::file_time_type> dates;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(build_dir, error)) {
+    if (entry.path().extension() == ".stamp") dates[entry.path()] = entry.last_write_time(error);
+  }
+  return dates;
+}
+
+// Runs a program with this one's terminal and `variable` added to its environment; returns its wait status.
+// Asked to stop, it asks the program to stop and waits for it.
+Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
+                              const Progress& progress) {
+  std::vector<char*> argv, envp;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    // An outer make's flags are not meant for this one.
+    if (std::strncmp(*entry, "MAKEFLAGS=", 10) != 0 && std::strncmp(*entry, "MAKELEVEL=", 10) != 0 &&
+        std::strncmp(*entry, kErrorFileVariable, std::strlen(kErrorFileVariable)) != 0) {
+      envp.push_back(*entry);
+    }
+  }
+  envp.push_back(const_cast<char*>(variable.c_str()));
+  envp.push_back(nullptr);
+  pid_t pid = 0;
+  const int reason = posix_spawnp(&pid, argv[0], nullptr, nullptr, argv.data(), envp.data());
+  if (reason != 0) {
+    return MakeError(ErrorCode::kNotFound, "{}: cannot be started: {}; install GNU Make", words[0],
+                     std::strerror(reason));
+  }
+  int wait_status = 0;
+  while (waitpid(pid, &wait_status, 0) < 0) {
+    if (errno != EINTR)
+      return MakeError(ErrorCode::kFailed, "waiting for {}: {}", words[0], std::strerror(errno));
+    if (progress.Cancelled()) kill(pid, SIGTERM);
+  }
+  return wait_status;
+}
+
+// What the failed stage left in error.json; the stage has printed its message already.
+Error StageError(const std::string& error_file, const BuildPaths& paths) {
+  const auto text = ReadFile(error_file);
+  const auto document = nlohmann::json::parse(text.ok() ? text.value() : "", nullptr, false);
+  if (document.is_discarded() || !document.contains("code") || !document.contains("stage")) {
+    return MakeError(ErrorCode::kFailed, "a stage ended without saying why; {} was not written", paths.map);
+  }
+  return MakeError(static_cast<ErrorCode>(document["code"].get<int>()), "{} failed; {} was not written",
+                   document["stage"].get<std::string>(), paths.map);
+}
+
+Status Compile(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
+  CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
+  CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, paths));
+  CAIRN_ASSIGN_OR_RETURN(const std::string rules, RulesPath(paths.program));
+  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir));
+  RemoveStaleTemporaries(paths.build_dir);
+  CAIRN_RETURN_IF_ERROR(WriteBuildFolder(recipe, paths));
+
+  const std::string error_file = paths.build_dir + "/error.json";
+  std::error_code ignored;
+  fs::remove(error_file, ignored);
+  const auto dates_before = StampDates(paths.build_dir);
+  // Bars of stages that run side by side would overwrite each other.
+  const bool collides = arguments.num_jobs > 1 && environment.progress_style == "auto";
+  const std::vector<std::string> words = {"make",
+                                          "--silent",
+                                          "--no-print-directory",
+                                          "--no-builtin-rules",
+                                          "--jobs=" + std::to_string(arguments.num_jobs),
+                                          "--file=" + rules,
+                                          "BUILD=" + paths.build_dir,
+                                          "CAIRN=" + paths.program,
+                                          "THREADS=" + std::to_string(environment.num_threads),
+                                          "PROGRESS=" + (collides ? "lines" : environment.progress_style),
+                                          "LOG_LEVEL=" + environment.log_level,
+                                          goal};
+  CAIRN_ASSIGN_OR_RETURN(
+      const int wait_status,
+      RunProgramAndWait(words, std::string(kErrorFileVariable) + "=" + error_file, *environment.progress));
+  if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) return StageError(error_file, paths);
+  const bool nothing_ran = StampDates(paths.build_dir) == dates_before;
+  *environment.out << fmt::format("{}: {}\n", goal == paths.map ? arguments.output : goal,
+                                  nothing_ran ? "up to date" : "compiled");
+  return Ok();
+}
+
+Status Configure(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
+  CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
+  return WriteBuildFolder(recipe, paths);
+}
+
+void AddRecipeArguments(CLI::App& app, Arguments* arguments) {
+  app.add_option("recipe", arguments->recipe, "Recipe of the map (docs/recipe.md)")
+      ->required()
+      ->type_name("RECIPE.toml");
+  app.add_option("-o,--output", arguments->output, "Map to write")->required()->type_name("NAME.cairn");
+  app.add_option("--build-dir", arguments->build_dir,
+                 "Folder for the stages' files [NAME.build beside the map]")
+      ->type_name("DIR");
+}
+
+}  // namespace
+
+Command CompileCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "compile",
+      .summary = "Compile a recipe's capture into a map; what is up to date is not redone",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            AddRecipeArguments(app, arguments.get());
+            app.add_option("--until", arguments->until, "Stop after this stage")->type_name("STAGE");
+            app.add_option("-j,--jobs", arguments->num_jobs, "Stages to run side by side [1]")
+                ->check(CLI::Range(1, 10000))
+                ->type_name("N");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Compile(*arguments, environment); }};
+}
+
+Command ConfigureCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {.name = "configure",
+          .summary = "Split a recipe into a build folder, for Makefiles that include map.mk",
+          .add_arguments = [arguments](CLI::App& app) { AddRecipeArguments(app, arguments.get()); },
+          .run = [arguments](
+                     const CommandEnvironment& environment) { return Configure(*arguments, environment); }};
+}
+
+Command RecipeReferenceCommand() {
+  return {.name = "recipe-reference",
+          .summary = "Print every key that a recipe can have (docs/recipe.md)",
+          .add_arguments = [](CLI::App&) {},
+          .run =
+              [](const CommandEnvironment& environment) {
+                *environment.out << RecipeReference(AllStageOptions());
+                return Ok();
+              }};
+}
+
+}  // namespace cairn

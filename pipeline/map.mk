@@ -1,0 +1,117 @@
+# From a capture to a landmark map: one rule per file, GNU Make as the scheduler.
+#
+# `cairn compile` runs this file with BUILD and CAIRN set.  A project of many maps includes it once per map; each
+# include needs BUILD, RECIPE and MAP, and a later one leaves the rules of the earlier ones alone:
+#
+#   CAIRN := /usr/bin/cairn
+#   BUILD := kitchen.build
+#   RECIPE := kitchen/recipe.toml
+#   MAP := kitchen.cairn
+#   include /usr/share/cairn/map.mk
+#
+# Every output X has a stamp X.stamp, touched whenever its rule has run.  The rule's prerequisites are compared with the
+# stamp, what is downstream compares itself with X; a run that gives the same bytes leaves X's date alone, so that
+# nothing downstream runs.  Recipes only use variables that are set for the build folder of their target.
+
+CAIRN ?= $(shell command -v cairn)
+# Put before every command, for example a cluster's `srun`.
+LAUNCH ?=
+THREADS ?= 0
+PROGRESS ?= auto
+LOG_LEVEL ?= info
+
+ifdef RECIPE
+$(BUILD)/config.mk: $(RECIPE) $(CAIRN)
+	$(CAIRN) configure $(filter %.toml,$^) -o $(MAP) --build-dir $(@D)
+	touch $@
+$(BUILD)/config.mk: MAP := $(MAP)
+endif
+
+# Sets MAP, CAPTURE, SIMULATED, QUERIES, NAME and SEED; `cairn configure` writes it beside the options.
+include $(BUILD)/config.mk
+
+$(BUILD)/%: MAP := $(MAP)
+$(BUILD)/%: CAPTURE := $(CAPTURE)
+$(BUILD)/%: QUERIES := $(QUERIES)
+$(BUILD)/%: NAME := $(NAME)
+$(BUILD)/%: SEED := $(SEED)
+
+CAIRN_OUTPUTS := $(addprefix $(BUILD)/,features.db matches.db classes.db world.db regions.db vocabulary.db unsealed.cairn)
+# Poses and cameras, read by the stages that know the capture.
+CAPTURE_LISTS := $(wildcard $(CAPTURE)/cameras.txt $(CAPTURE)/images.txt)
+# The images of the last run, from the dependency file that extract-features writes, and their folders: a new or a
+# removed image changes its folder's date.  One that is gone is no prerequisite any more.
+CAPTURE_IMAGES := $(wildcard $(filter-out \ %:,$(file <$(BUILD)/features.d)))
+CAPTURE_FOLDERS := $(wildcard $(sort $(dir $(CAPTURE_IMAGES)) $(CAPTURE)/images))
+QUERY_LIST := $(firstword $(wildcard $(QUERIES) $(CAPTURE)/queries.txt))
+QUERY_IMAGES := $(if $(QUERY_LIST),$(wildcard $(addprefix $(CAPTURE)/images/,$(shell awk 'NF == 10 && !/^#/ {print $$10}' $(QUERY_LIST)))))
+
+.DELETE_ON_ERROR:
+.PHONY: cairn-missing
+
+# The default goal of `make -f map.mk`.
+$(MAP): $(BUILD)/map.stamp ;
+
+# Whether an output's date changed is seen after its stamp's rule has run.
+$(CAIRN_OUTPUTS): %: %.stamp ;
+# A stamp without its output says nothing.
+$(foreach output,$(CAIRN_OUTPUTS),$(if $(wildcard $(output)),,$(eval $(output).stamp: cairn-missing)))
+$(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
+
+CAIRN_FLAGS = --seed $(SEED) --threads $(THREADS) --progress $(PROGRESS) --log-level $(LOG_LEVEL)
+
+ifeq ($(SIMULATED),yes)
+CAPTURE_STAMP := $(BUILD)/capture.stamp
+$(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
+$(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(CAIRN)
+	$(LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
+	touch $@
+else
+CAPTURE_STAMP :=
+endif
+
+$(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(CAIRN) \
+    $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_FOLDERS) $(CAPTURE_IMAGES)
+	$(LAUNCH) $(CAIRN) extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml \
+	    --depfile $(@D)/features.d -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(CAIRN) \
+    $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) \
+	    --options $(@D)/options/match_features.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \
+    $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(CAPTURE) \
+	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(CAIRN)
+	$(LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
+	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/options/decompose_regions.toml $(BUILD)/options/seed $(CAIRN)
+	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db \
+	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(CAIRN)
+	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
+	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
+    $(BUILD)/options/emit_map.toml $(BUILD)/options/name $(CAIRN)
+	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
+	    --vocabulary $(@D)/vocabulary.db --name $(NAME) \
+	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	touch $@
+
+$(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
+    $(BUILD)/options/seed $(CAIRN) $(CAPTURE_STAMP) $(QUERY_LIST) $(QUERY_IMAGES)
+	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(CAPTURE)) \
+	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
+	touch $@

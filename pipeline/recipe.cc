@@ -1,0 +1,244 @@
+#include "pipeline/recipe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "core/toml_options.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Keys outside of the stages' tables, each with its line of the reference page.
+struct Key {
+  const char* name;
+  const char* type;
+  const char* help;
+};
+constexpr Key kTopKeys[] = {
+    {"name", "text", "Name of the map: letters, digits, '-', '_' and '.'. Required."},
+    {"seed", "integer", "Seed of everything random in the compile; at least 0. Default 0."},
+};
+constexpr Key kCaptureKeys[] = {
+    {"path", "text",
+     "Folder of the capture (images/, cameras.txt, images.txt), relative to the recipe. Required."},
+    {"queries", "text",
+     "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
+     "capture's "
+     "queries.txt, if there is one."},
+    {"floor_plan", "text", "Floor plan of the place, relative to the recipe. Default: none."},
+    {"up", "text or list",
+     "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]. "
+     "Default "
+     "\"auto\"."},
+};
+
+Error UnknownKey(const std::string& path, const toml::key& key, const std::string& what,
+                 const std::vector<std::string>& valid) {
+  const std::string name(key.str());
+  const std::string nearest = NearestWord(name, valid);
+  return MakeError(ErrorCode::kInvalidArgument, "{}:{}: unknown {} '{}'; {}", path, key.source().begin.line,
+                   what, name,
+                   nearest.empty() ? fmt::format("valid are {}", fmt::join(valid, ", "))
+                                   : "did you mean '" + nearest + "'?");
+}
+
+Error WrongType(const std::string& path, const toml::node& node, const std::string& key,
+                const char* expected) {
+  return MakeError(ErrorCode::kInvalidArgument, "{}: {}: expected {}", TomlPlace(path, node), key, expected);
+}
+
+Status CheckName(const std::string& path, const toml::node& node, const std::string& name) {
+  const bool valid = !name.empty() && name.size() <= 100 && name.front() != '.' && name.front() != '-' &&
+                     std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                       return std::isalnum(c) || c == '-' || c == '_' || c == '.';
+                     });
+  if (valid) return Ok();
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{}: name = '{}': must be 1 to 100 letters, digits, '-', '_' and '.', and begin with none of '-.'",
+      TomlPlace(path, node), name);
+}
+
+// Reads the keys of one recipe file; a class only to keep the path and the recipe at hand.
+class RecipeReader {
+ public:
+  RecipeReader(std::string path, std::vector<StageOptions> stages) : path_(std::move(path)) {
+    recipe_.stages = std::move(stages);
+  }
+
+  Result<Recipe> Read() {
+    CAIRN_ASSIGN_OR_RETURN(const toml::table document, ReadTomlFile(path_));
+    for (const auto& [key, node] : document) CAIRN_RETURN_IF_ERROR(ReadTopKey(key, node));
+    if (recipe_.name.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: no name; add a line such as name = \"kitchen\"",
+                       path_);
+    }
+    if (recipe_.capture_path.empty() && !recipe_.simulated) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: no capture; add [[capture]] with path = \"FOLDER\", or [simulate] to render one",
+                       path_);
+    }
+    if (!recipe_.capture_path.empty() && recipe_.simulated) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: has both [[capture]] and [simulate]; keep one of them", path_);
+    }
+    return recipe_;
+  }
+
+ private:
+  Status ReadTopKey(const toml::key& key, const toml::node& node) {
+    const std::string name(key.str());
+    if (name == "name") {
+      CAIRN_ASSIGN_OR_RETURN(recipe_.name, Text(name, node));
+      return CheckName(path_, node, recipe_.name);
+    }
+    if (name == "seed") return ReadSeed(node);
+    if (name == "capture") return ReadCaptures(node);
+    const auto stage = std::find_if(recipe_.stages.begin(), recipe_.stages.end(),
+                                    [&](const StageOptions& s) { return s.stage == name; });
+    if (stage == recipe_.stages.end()) {
+      std::vector<std::string> valid = {"name", "seed", "capture"};
+      for (const StageOptions& s : recipe_.stages) valid.push_back(s.stage);
+      return UnknownKey(path_, key, node.is_table() ? "table" : "key", valid);
+    }
+    if (!node.is_table()) return WrongType(path_, node, name, "a table of the stage's options");
+    if (name == "simulate") recipe_.simulated = true;
+    return SetOptionsFromToml(*node.as_table(), path_, stage->table);
+  }
+
+  Status ReadSeed(const toml::node& node) {
+    const auto* seed = node.as_integer();
+    if (seed == nullptr || seed->get() < 0) return WrongType(path_, node, "seed", "an integer of at least 0");
+    recipe_.seed = static_cast<uint64_t>(seed->get());
+    return Ok();
+  }
+
+  Status ReadCaptures(const toml::node& node) {
+    if (const toml::table* capture = node.as_table()) return ReadCaptureTable(*capture);
+    const toml::array* captures = node.as_array();
+    if (captures == nullptr || captures->empty() || !captures->is_homogeneous<toml::table>()) {
+      return WrongType(path_, node, "capture", "a table: [[capture]] with path = \"FOLDER\"");
+    }
+    if (captures->size() > 1) {
+      return MakeError(ErrorCode::kUnsupported, "{}: one capture per recipe in this version, found {}",
+                       TomlPlace(path_, (*captures)[1]), captures->size());
+    }
+    return ReadCaptureTable(*captures->front().as_table());
+  }
+
+  Status ReadCaptureTable(const toml::table& capture) {
+    for (const auto& [key, node] : capture) {
+      const std::string name(key.str());
+      if (name == "path") {
+        CAIRN_ASSIGN_OR_RETURN(recipe_.capture_path, ExistingPath(name, node));
+      } else if (name == "queries") {
+        CAIRN_ASSIGN_OR_RETURN(recipe_.queries_path, ExistingPath(name, node));
+      } else if (name == "floor_plan") {
+        CAIRN_ASSIGN_OR_RETURN(recipe_.floor_plan_path, ExistingPath(name, node));
+      } else if (name == "up") {
+        CAIRN_ASSIGN_OR_RETURN(recipe_.up, UpDirection(node));
+      } else {
+        std::vector<std::string> valid;
+        for (const Key& k : kCaptureKeys) valid.emplace_back(k.name);
+        return UnknownKey(path_, key, "key of [[capture]]", valid);
+      }
+    }
+    if (recipe_.capture_path.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: [[capture]] has no path; add path = \"FOLDER\"",
+                       TomlPlace(path_, capture));
+    }
+    return Ok();
+  }
+
+  Result<std::string> Text(const std::string& key, const toml::node& node) const {
+    if (const auto* text = node.as_string()) return text->get();
+    return WrongType(path_, node, key, "a text in quotes");
+  }
+
+  Result<std::string> ExistingPath(const std::string& key, const toml::node& node) const {
+    CAIRN_ASSIGN_OR_RETURN(const std::string text, Text(key, node));
+    const fs::path path = (fs::path(path_).parent_path() / text).lexically_normal();
+    std::error_code error;
+    if (!text.empty() && fs::exists(path, error)) return path.string();
+    return MakeError(ErrorCode::kNotFound, "{}: {} = '{}': there is no {} (paths are relative to the recipe)",
+                     TomlPlace(path_, node), key, text, path.string());
+  }
+
+  Result<std::string> UpDirection(const toml::node& node) const {
+    if (const auto* text = node.as_string(); text != nullptr && text->get() == "auto") return text->get();
+    const toml::array* list = node.as_array();
+    std::vector<double> up;
+    for (size_t i = 0; list != nullptr && i < list->size(); ++i) {
+      if (const auto value = (*list)[i].value<double>(); value && std::isfinite(*value)) up.push_back(*value);
+    }
+    const bool valid = up.size() == 3 && list->size() == 3 && (up[0] != 0 || up[1] != 0 || up[2] != 0);
+    if (!valid) return WrongType(path_, node, "up", "\"auto\" or three numbers [x, y, z] that are not all 0");
+    return fmt::format("{}", fmt::join(up, ","));
+  }
+
+  std::string path_;
+  Recipe recipe_;
+};
+
+void AppendKeys(std::string* page, const auto& keys) {
+  *page += "\n| key | type | meaning |\n|---|---|---|\n";
+  for (const Key& key : keys) *page += fmt::format("| `{}` | {} | {} |\n", key.name, key.type, key.help);
+}
+
+std::string RangeText(const Option& option) {
+  if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
+  if (std::isfinite(option.min) && std::isfinite(option.max))
+    return fmt::format("{:g} to {:g}", option.min, option.max);
+  if (std::isfinite(option.min)) return fmt::format("at least {:g}", option.min);
+  if (std::isfinite(option.max)) return fmt::format("at most {:g}", option.max);
+  return std::holds_alternative<bool*>(option.value) ? "true, false" : "";
+}
+
+std::string EscapePipes(std::string text) {
+  for (size_t at = text.find('|'); at != std::string::npos; at = text.find('|', at + 2))
+    text.insert(at, 1, '\\');
+  return text;
+}
+
+}  // namespace
+
+Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages) {
+  return RecipeReader(path, std::move(stages)).Read();
+}
+
+std::string RecipeReference(const std::vector<StageOptions>& stages) {
+  std::string page =
+      "# Recipes\n\n"
+      "A recipe says what a map is compiled from and how. It is a TOML file; a name and a capture are "
+      "enough:\n\n"
+      "```toml\nname = \"kitchen\"\n[[capture]]\npath = \"captures/kitchen\"\n```\n\n"
+      "Everything else has a default. A key that is not below is an error that names the nearest valid one.\n"
+      "This page is printed by `cairn recipe-reference`, from the options that the stages declare.\n\n"
+      "## Top of the file\n";
+  AppendKeys(&page, kTopKeys);
+  page += "\n## `[[capture]]`\n\nOne survey. A recipe has either this or `[simulate]`.\n";
+  AppendKeys(&page, kCaptureKeys);
+  for (const StageOptions& stage : stages) {
+    page += fmt::format("\n## `[{}]`\n", stage.stage);
+    if (stage.stage == "simulate")
+      page += "\nThe capture is rendered first; an empty table takes all defaults.\n";
+    if (stage.table.empty()) {
+      page += "\nNo options.\n";
+      continue;
+    }
+    page += "\n| key | default | range | meaning |\n|---|---|---|---|\n";
+    for (const Option& option : stage.table) {
+      const std::string line = OptionsToml({option});  // "key = value\n"
+      const std::string value = line.substr(option.name.size() + 3, line.size() - option.name.size() - 4);
+      page += fmt::format("| `{}` | `{}` | {} | {} |\n", option.name, value, EscapePipes(RangeText(option)),
+                          EscapePipes(option.help));
+    }
+  }
+  return page;
+}
+
+}  // namespace cairn
