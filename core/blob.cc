@@ -9,10 +9,13 @@ void BlobWriter::Varint(uint64_t value) {
   bytes_.push_back(static_cast<char>(value));
 }
 
-void BlobWriter::Float32(float value) {
-  const uint32_t bits = std::bit_cast<uint32_t>(value);
-  for (int shift = 0; shift < 32; shift += 8) bytes_.push_back(static_cast<char>(bits >> shift));
+void BlobWriter::LittleEndian(uint64_t bits, int num_bytes) {
+  for (int i = 0; i < num_bytes; ++i) bytes_.push_back(static_cast<char>(bits >> (8 * i)));
 }
+
+void BlobWriter::Float32(float value) { LittleEndian(std::bit_cast<uint32_t>(value), 4); }
+
+void BlobWriter::Float64(double value) { LittleEndian(std::bit_cast<uint64_t>(value), 8); }
 
 void BlobWriter::Bytes(const uint8_t* bytes, size_t num_bytes) {
   bytes_.append(reinterpret_cast<const char*>(bytes), num_bytes);
@@ -30,17 +33,21 @@ uint64_t BlobReader::Varint() {
   return 0;
 }
 
-float BlobReader::Float32() {
-  if (!ok_ || bytes_.size() - position_ < 4) {
+uint64_t BlobReader::LittleEndian(int num_bytes) {
+  if (!ok_ || bytes_.size() - position_ < static_cast<size_t>(num_bytes)) {
     ok_ = false;
     return 0;
   }
-  uint32_t bits = 0;
-  for (int shift = 0; shift < 32; shift += 8) {
-    bits |= static_cast<uint32_t>(static_cast<uint8_t>(bytes_[position_++])) << shift;
+  uint64_t bits = 0;
+  for (int i = 0; i < num_bytes; ++i) {
+    bits |= static_cast<uint64_t>(static_cast<uint8_t>(bytes_[position_++])) << (8 * i);
   }
-  return std::bit_cast<float>(bits);
+  return bits;
 }
+
+float BlobReader::Float32() { return std::bit_cast<float>(static_cast<uint32_t>(LittleEndian(4))); }
+
+double BlobReader::Float64() { return std::bit_cast<double>(LittleEndian(8)); }
 
 std::string EncodeAscending(const std::vector<int32_t>& values) {
   BlobWriter writer;

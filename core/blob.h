@@ -15,10 +15,13 @@ class BlobWriter {
  public:
   void Varint(uint64_t value);
   void Float32(float value);
+  void Float64(double value);
   void Bytes(const uint8_t* bytes, size_t num_bytes);
   std::string Take() { return std::move(bytes_); }
 
  private:
+  void LittleEndian(uint64_t bits, int num_bytes);
+
   std::string bytes_;
 };
 
@@ -30,11 +33,14 @@ class BlobReader {
 
   uint64_t Varint();
   float Float32();
+  double Float64();
   bool ok() const { return ok_; }
   // Whether everything was read, without a failure.
   bool Finished() const { return ok_ && position_ == bytes_.size(); }
 
  private:
+  uint64_t LittleEndian(int num_bytes);
+
   std::string_view bytes_;
   size_t position_ = 0;
   bool ok_ = true;

@@ -19,14 +19,14 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
   std::vector<std::pair<int64_t, std::string>> rows;
   vocabulary->nodes.resize(num_nodes);
   SQLite::Statement query(database,
-                          "SELECT node_id, num_children, centres FROM vocabulary_node ORDER BY node_id");
+                          "SELECT node_id, num_children, centres FROM vocabulary_nodes ORDER BY node_id");
   while (query.executeStep()) {
     const int64_t node_id = query.getColumn(0).getInt64();
     const int64_t num_children = query.getColumn(1).getInt64();
     const std::string_view centres = BlobView(query.getColumn(2));
     if (node_id < 0 || node_id >= num_nodes || num_children < 1 || num_children > num_nodes ||
         static_cast<int64_t>(centres.size()) != num_children * kDescriptorDim) {
-      return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_node {}: {} children with {} bytes of centres",
+      return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_nodes {}: {} children with {} bytes of centres",
                        path, node_id, num_children, centres.size());
     }
     vocabulary->nodes[node_id].num_children = static_cast<int32_t>(num_children);
@@ -46,13 +46,13 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
 Status ReadWords(SQLite::Database& database, const std::string& path, int64_t num_documents,
                  Vocabulary* vocabulary) {
   SQLite::Statement query(database,
-                          "SELECT word_id, num_postings, postings FROM vocabulary_word ORDER BY word_id");
+                          "SELECT word_id, num_postings, postings FROM vocabulary_words ORDER BY word_id");
   while (query.executeStep()) {
     const int64_t word = query.getColumn(0).getInt64();
     const int64_t num_postings = query.getColumn(1).getInt64();
     const std::string_view bytes = BlobView(query.getColumn(2));
     const Error corrupt = MakeError(ErrorCode::kCorrupt,
-                                    "{}: vocabulary_word {}: {} postings in {} bytes are not "
+                                    "{}: vocabulary_words {}: {} postings in {} bytes are not "
                                     "ascending documents below {} with counts",
                                     path, word, num_postings, bytes.size(), num_documents);
     if (word < 0 || word >= vocabulary->num_words() || num_postings < 1 ||
@@ -78,13 +78,13 @@ Status ReadWords(SQLite::Database& database, const std::string& path, int64_t nu
 
 Status ReadDocuments(SQLite::Database& database, const std::string& path, Vocabulary* vocabulary) {
   SQLite::Statement query(database,
-                          "SELECT document_idx, image_id FROM vocabulary_document ORDER BY document_idx");
+                          "SELECT document_idx, image_id FROM vocabulary_documents ORDER BY document_idx");
   while (query.executeStep()) {
     const int64_t document = query.getColumn(0).getInt64();
     const int64_t image_id = query.getColumn(1).getInt64();
     if (document != static_cast<int64_t>(vocabulary->document_ids.size()) || image_id < 0 ||
         image_id >= kInvalidImageId || (document > 0 && image_id <= vocabulary->document_ids.back())) {
-      return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_document {}: image {} is out of order", path,
+      return MakeError(ErrorCode::kCorrupt, "{}: vocabulary_documents {}: image {} is out of order", path,
                        document, image_id);
     }
     vocabulary->document_ids.push_back(static_cast<ImageId>(image_id));
@@ -134,7 +134,7 @@ void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabul
   head.bind(5, static_cast<int64_t>(vocabulary.document_ids.size()));
   head.exec();
 
-  SQLite::Statement insert_node(database, "INSERT INTO vocabulary_node VALUES (?, ?, ?)");
+  SQLite::Statement insert_node(database, "INSERT INTO vocabulary_nodes VALUES (?, ?, ?)");
   for (size_t i = 0; i < vocabulary.nodes.size(); ++i) {
     const VocabularyNode& node = vocabulary.nodes[i];
     if (node.num_children == 0) continue;
@@ -145,7 +145,7 @@ void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabul
     insert_node.reset();
   }
 
-  SQLite::Statement insert_word(database, "INSERT INTO vocabulary_word VALUES (?, ?, ?)");
+  SQLite::Statement insert_word(database, "INSERT INTO vocabulary_words VALUES (?, ?, ?)");
   for (int word = 0; word < vocabulary.num_words(); ++word) {
     const std::vector<Posting>& postings = vocabulary.inverted_files[word];
     if (postings.empty()) continue;
@@ -164,7 +164,7 @@ void WriteVocabularyTables(SQLite::Database& database, const Vocabulary& vocabul
     insert_word.reset();
   }
 
-  SQLite::Statement insert_document(database, "INSERT INTO vocabulary_document VALUES (?, ?)");
+  SQLite::Statement insert_document(database, "INSERT INTO vocabulary_documents VALUES (?, ?)");
   for (size_t i = 0; i < vocabulary.document_ids.size(); ++i) {
     insert_document.bind(1, static_cast<int64_t>(i));
     insert_document.bind(2, static_cast<int64_t>(vocabulary.document_ids[i]));

@@ -161,14 +161,14 @@ TEST(VocabularyTree, DamagedTablesAreRefused) {
   };
   damage("UPDATE vocabulary SET num_nodes = 1000000000000");
   damage("UPDATE vocabulary SET num_nodes = 4");
-  damage("UPDATE vocabulary_node SET num_children = 3 WHERE node_id = 0");
-  damage("UPDATE vocabulary_node SET centres = x'00' WHERE node_id = 1");
-  damage("UPDATE vocabulary_node SET node_id = 4 WHERE node_id = 1");
-  damage("UPDATE vocabulary_word SET postings = x'0505' WHERE word_id = 1");
-  damage("UPDATE vocabulary_word SET postings = x'ffffffffffffffffffffff' WHERE word_id = 1");
-  damage("UPDATE vocabulary_word SET num_postings = 1000000000 WHERE word_id = 1");
-  damage("UPDATE vocabulary_word SET word_id = 77 WHERE word_id = 1");
-  damage("UPDATE vocabulary_document SET image_id = 1 WHERE document_idx = 1");
+  damage("UPDATE vocabulary_nodes SET num_children = 3 WHERE node_id = 0");
+  damage("UPDATE vocabulary_nodes SET centres = x'00' WHERE node_id = 1");
+  damage("UPDATE vocabulary_nodes SET node_id = 4 WHERE node_id = 1");
+  damage("UPDATE vocabulary_words SET postings = x'0505' WHERE word_id = 1");
+  damage("UPDATE vocabulary_words SET postings = x'ffffffffffffffffffffff' WHERE word_id = 1");
+  damage("UPDATE vocabulary_words SET num_postings = 1000000000 WHERE word_id = 1");
+  damage("UPDATE vocabulary_words SET word_id = 77 WHERE word_id = 1");
+  damage("UPDATE vocabulary_documents SET image_id = 1 WHERE document_idx = 1");
   damage("DELETE FROM vocabulary");
   damage("DROP TABLE vocabulary");
 }

@@ -1,0 +1,413 @@
+// Maps in SQLite: the tables of schemas/0001_map.sql, and those of schemas/vocabulary.sql beside them.
+#include <charconv>
+#include <cmath>
+
+#include "core/blob.h"
+#include "core/database.h"
+#include "core/map_rows.h"
+#include "schemas/0001_map_sql.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kApplicationId = 0x63726d70;  // 'crmp'
+
+std::string_view BlobView(const SQLite::Column& column) {
+  return {static_cast<const char*>(column.getBlob()), static_cast<size_t>(column.getBytes())};
+}
+
+void BindBlob(SQLite::Statement& statement, int index, const std::string& blob) {
+  statement.bind(index, blob.data(), static_cast<int>(blob.size()));
+}
+
+void BindPose(SQLite::Statement& statement, int first, const Pose& pose) {
+  statement.bind(first, pose.rotation.w());
+  statement.bind(first + 1, pose.rotation.x());
+  statement.bind(first + 2, pose.rotation.y());
+  statement.bind(first + 3, pose.rotation.z());
+  for (int i = 0; i < 3; ++i) statement.bind(first + 4 + i, pose.translation[i]);
+}
+
+Pose PoseFromColumns(SQLite::Statement& statement, int first) {
+  const auto value = [&](int i) { return statement.getColumn(first + i).getDouble(); };
+  return {Eigen::Quaterniond(value(0), value(1), value(2), value(3)), {value(4), value(5), value(6)}};
+}
+
+void Step(SQLite::Statement& statement) {
+  statement.exec();
+  statement.reset();
+}
+
+// ---- writing
+
+void WriteTexts(SQLite::Database& database, const char* sql,
+                const std::map<std::string, std::string>& texts) {
+  SQLite::Statement insert(database, sql);
+  for (const auto& [key, value] : texts) {
+    insert.bind(1, key);
+    insert.bind(2, value);
+    Step(insert);
+  }
+}
+
+void WriteHead(SQLite::Database& database, const MapRows& rows) {
+  WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+             {{"name", rows.name},
+              {"writer", rows.writer},
+              {"seed", std::to_string(rows.seed)},
+              {"sealed", rows.sealed ? "1" : "0"},
+              {"landmarks", rows.landmark_choice},
+              {"algorithm", rows.algorithm},
+              {"k", std::to_string(rows.k)},
+              {"tau", std::to_string(rows.tau)},
+              {"rho", std::to_string(rows.rho)}});
+  WriteTexts(database, "INSERT INTO stage_options VALUES (?, ?)", rows.stage_options);
+  WriteTexts(database, "INSERT INTO inputs VALUES (?, ?)", rows.input_hashes);
+  SQLite::Statement frame(database, "INSERT INTO frames VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const auto& [name, pose] : {std::pair("camera_from_given", rows.camera_from_given),
+                                   std::pair("floor_from_world", rows.floor_from_world)}) {
+    frame.bind(1, name);
+    BindPose(frame, 2, pose);
+    Step(frame);
+  }
+  SQLite::Statement figure(database, "INSERT INTO self_test VALUES (?, ?)");
+  for (const auto& [name, value] : rows.self_test) {
+    figure.bind(1, name);
+    figure.bind(2, value);
+    Step(figure);
+  }
+}
+
+void WriteImages(SQLite::Database& database, const MapRows& rows) {
+  SQLite::Statement insert_camera(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, ?)");
+  for (const Camera& camera : rows.cameras) {
+    BlobWriter params;
+    for (const double param : camera.params) params.Float64(param);
+    insert_camera.bind(1, static_cast<int64_t>(camera.camera_id));
+    insert_camera.bind(2, static_cast<int>(camera.model));
+    insert_camera.bind(3, camera.width);
+    insert_camera.bind(4, camera.height);
+    insert_camera.bind(5, camera.has_focal_prior ? 1 : 0);
+    BindBlob(insert_camera, 6, params.Take());
+    Step(insert_camera);
+  }
+  SQLite::Statement insert_image(database,
+                                 "INSERT INTO images VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const MapImage& image : rows.images) {
+    insert_image.bind(1, static_cast<int64_t>(image.image_id));
+    insert_image.bind(2, image.name);
+    insert_image.bind(3, static_cast<int64_t>(image.camera_id));
+    if (image.station >= 0) {
+      insert_image.bind(4, image.station);
+    } else {
+      insert_image.bind(4);  // NULL
+    }
+    BindPose(insert_image, 5, image.cam_from_world);
+    insert_image.bind(12, static_cast<int64_t>(image.landmarks.size()));
+    BindBlob(insert_image, 13, EncodeAscending(image.landmarks));
+    Step(insert_image);
+  }
+}
+
+void WriteRegions(SQLite::Database& database, const MapRows& rows) {
+  SQLite::Statement insert_station(database, "INSERT INTO stations VALUES (?, ?, ?, ?, ?, ?, ?)");
+  size_t edge = 0;
+  for (size_t i = 0; i < rows.stations.size(); ++i) {
+    const MapStation& station = rows.stations[i];
+    std::vector<int32_t> neighbours;
+    for (; edge < rows.station_edges.size() && rows.station_edges[edge].first == static_cast<StationIdx>(i);
+         ++edge) {
+      neighbours.push_back(rows.station_edges[edge].second);
+    }
+    insert_station.bind(1, static_cast<int64_t>(i));
+    insert_station.bind(2, station.position.x());
+    insert_station.bind(3, station.position.y());
+    if (station.heading_deg) {
+      insert_station.bind(4, *station.heading_deg);
+    } else {
+      insert_station.bind(4);  // NULL
+    }
+    insert_station.bind(5, station.is_covered ? 1 : 0);
+    insert_station.bind(6, static_cast<int64_t>(neighbours.size()));
+    BindBlob(insert_station, 7, EncodeAscending(neighbours));
+    Step(insert_station);
+  }
+  SQLite::Statement insert_region(database, "INSERT INTO regions VALUES (?, ?, ?, ?, ?)");
+  for (size_t i = 0; i < rows.regions.size(); ++i) {
+    insert_region.bind(1, static_cast<int64_t>(i));
+    insert_region.bind(2, static_cast<int64_t>(rows.regions[i].stations.size()));
+    insert_region.bind(3, static_cast<int64_t>(rows.regions[i].landmarks.size()));
+    BindBlob(insert_region, 4, EncodeAscending(rows.regions[i].stations));
+    BindBlob(insert_region, 5, EncodeAscending(rows.regions[i].landmarks));
+    Step(insert_region);
+  }
+}
+
+void WriteLandmarks(SQLite::Database& database, const MapRows& rows) {
+  SQLite::Statement insert(database, "INSERT INTO landmarks VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  for (size_t i = 0; i < rows.landmarks.size(); ++i) {
+    const MapLandmark& landmark = rows.landmarks[i];
+    BlobWriter covariance;
+    for (int row = 0; row < 3; ++row) {
+      for (int col = row; col < 3; ++col)
+        covariance.Float32(static_cast<float>(landmark.covariance(row, col)));
+    }
+    insert.bind(1, static_cast<int64_t>(i));
+    insert.bind(2, static_cast<int64_t>(landmark.class_id));
+    for (int axis = 0; axis < 3; ++axis) {
+      insert.bind(3 + axis, static_cast<int64_t>(std::llround(landmark.position[axis] / kMapLengthUnitM)));
+    }
+    insert.bind(6, static_cast<int64_t>(std::llround(landmark.scale_m / kMapLengthUnitM)));
+    insert.bind(7, landmark.num_observations);
+    BindBlob(insert, 8, covariance.Take());
+    insert.bind(9, rows.descriptors.row(i).data(), kDescriptorDim);
+    Step(insert);
+  }
+}
+
+// ---- reading
+
+template <typename... Args>
+Error Corrupt(const std::string& path, fmt::format_string<Args...> format, Args&&... args) {
+  return MakeError(ErrorCode::kCorrupt, "{}: {}", path, fmt::format(format, std::forward<Args>(args)...));
+}
+
+std::map<std::string, std::string> ReadTexts(SQLite::Database& database, const char* sql) {
+  std::map<std::string, std::string> texts;
+  SQLite::Statement query(database, sql);
+  while (query.executeStep()) texts[query.getColumn(0).getString()] = query.getColumn(1).getString();
+  return texts;
+}
+
+template <typename T>
+bool ParseNumber(const std::string& text, T* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+Status CheckVersion(SQLite::Database& database, const std::string& path) {
+  const int application_id = database.execAndGet("PRAGMA application_id").getInt();
+  if (application_id != kApplicationId) {
+    return Corrupt(path, "a SQLite file, but not a cairn map (application_id {:#x}, expected {:#x})",
+                   application_id, kApplicationId);
+  }
+  const int version = database.execAndGet("PRAGMA user_version").getInt();
+  const int major = version / 1000;
+  if (major == kMapVersionMajor) return Ok();
+  const auto meta = HasTable(database, "meta") ? ReadTexts(database, "SELECT key, value FROM meta")
+                                               : std::map<std::string, std::string>();
+  const auto writer = meta.find("writer");
+  return MakeError(
+      ErrorCode::kUnsupported, "{}: map version {}.{}, written by {}; this program reads {}.x. {}", path,
+      major, version % 1000, writer == meta.end() ? "an unknown program" : writer->second, kMapVersionMajor,
+      major > kMapVersionMajor ? "Update the program, or compile the map with this one."
+                               : "Compile the map again.");
+}
+
+Status ReadHead(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  auto meta = ReadTexts(database, "SELECT key, value FROM meta");
+  rows->name = meta["name"];
+  rows->writer = meta["writer"];
+  rows->sealed = meta["sealed"] == "1";
+  rows->landmark_choice = meta["landmarks"];
+  rows->algorithm = meta["algorithm"];
+  if (!ParseNumber(meta["seed"], &rows->seed) || !ParseNumber(meta["k"], &rows->k) ||
+      !ParseNumber(meta["tau"], &rows->tau) || !ParseNumber(meta["rho"], &rows->rho)) {
+    return Corrupt(path, "table meta: seed '{}', k '{}', tau '{}' or rho '{}' is not an integer",
+                   meta["seed"], meta["k"], meta["tau"], meta["rho"]);
+  }
+  rows->stage_options = ReadTexts(database, "SELECT stage, options FROM stage_options");
+  rows->input_hashes = ReadTexts(database, "SELECT name, hash FROM inputs");
+  SQLite::Statement frames(database, "SELECT name, qw, qx, qy, qz, tx, ty, tz FROM frames");
+  int num_frames = 0;
+  while (frames.executeStep()) {
+    const std::string name = frames.getColumn(0).getString();
+    if (name != "floor_from_world" && name != "camera_from_given") continue;  // of a later minor version
+    (name == "floor_from_world" ? rows->floor_from_world : rows->camera_from_given) =
+        PoseFromColumns(frames, 1);
+    ++num_frames;
+  }
+  if (num_frames != 2) return Corrupt(path, "table frames lacks floor_from_world or camera_from_given");
+  SQLite::Statement figures(database, "SELECT name, value FROM self_test");
+  while (figures.executeStep())
+    rows->self_test[figures.getColumn(0).getString()] = figures.getColumn(1).getDouble();
+  return Ok();
+}
+
+Status ReadCameras(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  SQLite::Statement query(
+      database,
+      "SELECT camera_id, model, width, height, has_focal_prior, params FROM cameras ORDER BY camera_id");
+  while (query.executeStep()) {
+    Camera camera;
+    const int64_t camera_id = query.getColumn(0).getInt64();
+    if (camera_id < 0 || camera_id > UINT32_MAX)
+      return Corrupt(path, "camera {}: id out of range", camera_id);
+    camera.camera_id = static_cast<CameraId>(camera_id);
+    const Result<CameraModel> model = CameraModelFromId(query.getColumn(1).getInt());
+    if (!model.ok()) return Corrupt(path, "camera {}: {}", camera_id, model.error().message);
+    camera.model = *model;
+    camera.width = query.getColumn(2).getInt();
+    camera.height = query.getColumn(3).getInt();
+    camera.has_focal_prior = query.getColumn(4).getInt() != 0;
+    const std::string_view params = BlobView(query.getColumn(5));
+    BlobReader reader(params);
+    for (int i = 0; i < NumCameraParams(camera.model); ++i) camera.params.push_back(reader.Float64());
+    if (!reader.Finished())
+      return Corrupt(path, "camera {}: {} bytes of parameters", camera_id, params.size());
+    rows->cameras.push_back(std::move(camera));
+  }
+  return Ok();
+}
+
+Status ReadImages(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  SQLite::Statement query(
+      database,
+      "SELECT image_id, name, camera_id, station_idx, num_landmarks, landmarks, qw, qx, qy, qz, tx, "
+      "ty, tz FROM images ORDER BY image_id");
+  while (query.executeStep()) {
+    MapImage image;
+    const int64_t image_id = query.getColumn(0).getInt64();
+    const int64_t camera_id = query.getColumn(2).getInt64();
+    const int64_t station = query.getColumn(3).isNull() ? -1 : query.getColumn(3).getInt64();
+    if (image_id < 0 || image_id >= kInvalidImageId || camera_id < 0 || camera_id > UINT32_MAX ||
+        station < -1 || station > INT32_MAX) {
+      return Corrupt(path, "image {}: camera {} or station {} out of range", image_id, camera_id, station);
+    }
+    image.image_id = static_cast<ImageId>(image_id);
+    image.name = query.getColumn(1).getString();
+    image.camera_id = static_cast<CameraId>(camera_id);
+    image.station = static_cast<StationIdx>(station);
+    CAIRN_ASSIGN_OR_RETURN(image.landmarks,
+                           DecodeAscending(BlobView(query.getColumn(5)), query.getColumn(4).getInt64(),
+                                           static_cast<int64_t>(rows->landmarks.size()),
+                                           fmt::format("{}: landmarks of image {}", path, image_id)));
+    image.cam_from_world = PoseFromColumns(query, 6);
+    rows->images.push_back(std::move(image));
+  }
+  return Ok();
+}
+
+Status ReadStations(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  const int64_t num_stations = database.execAndGet("SELECT count(*) FROM stations").getInt64();
+  SQLite::Statement query(
+      database,
+      "SELECT station_idx, x, y, heading_deg, is_covered, num_neighbours, neighbours FROM stations "
+      "ORDER BY station_idx");
+  while (query.executeStep()) {
+    const int64_t station_idx = query.getColumn(0).getInt64();
+    if (station_idx != static_cast<int64_t>(rows->stations.size())) {
+      return Corrupt(path, "station {} where {} was expected", station_idx, rows->stations.size());
+    }
+    MapStation station;
+    station.position = {query.getColumn(1).getDouble(), query.getColumn(2).getDouble()};
+    if (!query.getColumn(3).isNull()) station.heading_deg = query.getColumn(3).getDouble();
+    station.is_covered = query.getColumn(4).getInt() != 0;
+    CAIRN_ASSIGN_OR_RETURN(
+        const std::vector<int32_t> neighbours,
+        DecodeAscending(BlobView(query.getColumn(6)), query.getColumn(5).getInt64(), num_stations,
+                        fmt::format("{}: neighbours of station {}", path, station_idx)));
+    for (const int32_t neighbour : neighbours) {
+      rows->station_edges.emplace_back(static_cast<StationIdx>(station_idx), neighbour);
+    }
+    rows->stations.push_back(station);
+  }
+  return Ok();
+}
+
+Status ReadRegions(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  SQLite::Statement query(
+      database,
+      "SELECT region_idx, num_stations, stations, num_landmarks, landmarks FROM regions ORDER BY region_idx");
+  while (query.executeStep()) {
+    const int64_t region_idx = query.getColumn(0).getInt64();
+    if (region_idx != static_cast<int64_t>(rows->regions.size())) {
+      return Corrupt(path, "region {} where {} was expected", region_idx, rows->regions.size());
+    }
+    MapRegion region;
+    CAIRN_ASSIGN_OR_RETURN(region.stations,
+                           DecodeAscending(BlobView(query.getColumn(2)), query.getColumn(1).getInt64(),
+                                           static_cast<int64_t>(rows->stations.size()),
+                                           fmt::format("{}: stations of region {}", path, region_idx)));
+    CAIRN_ASSIGN_OR_RETURN(region.landmarks,
+                           DecodeAscending(BlobView(query.getColumn(4)), query.getColumn(3).getInt64(),
+                                           static_cast<int64_t>(rows->landmarks.size()),
+                                           fmt::format("{}: landmarks of region {}", path, region_idx)));
+    rows->regions.push_back(std::move(region));
+  }
+  return Ok();
+}
+
+Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRows* rows) {
+  const int64_t num_landmarks = database.execAndGet("SELECT count(*) FROM landmarks").getInt64();
+  if (num_landmarks > INT32_MAX) return Corrupt(path, "{} landmarks", num_landmarks);
+  rows->landmarks.reserve(num_landmarks);
+  rows->descriptors.resize(num_landmarks, kDescriptorDim);
+  SQLite::Statement query(
+      database,
+      "SELECT landmark_idx, class_id, x, y, z, scale, num_observations, covariance, descriptor FROM "
+      "landmarks ORDER BY landmark_idx");
+  while (query.executeStep()) {
+    const int64_t landmark_idx = query.getColumn(0).getInt64();
+    if (landmark_idx != static_cast<int64_t>(rows->landmarks.size()) || landmark_idx >= num_landmarks) {
+      return Corrupt(path, "landmark {} where {} was expected", landmark_idx, rows->landmarks.size());
+    }
+    MapLandmark landmark;
+    landmark.class_id = static_cast<ClassId>(query.getColumn(1).getInt64());
+    for (int axis = 0; axis < 3; ++axis) {
+      landmark.position[axis] = static_cast<double>(query.getColumn(2 + axis).getInt64()) * kMapLengthUnitM;
+    }
+    landmark.scale_m = static_cast<double>(query.getColumn(5).getInt64()) * kMapLengthUnitM;
+    landmark.num_observations = query.getColumn(6).getInt();
+    BlobReader reader(BlobView(query.getColumn(7)));
+    for (int row = 0; row < 3; ++row) {
+      for (int col = row; col < 3; ++col)
+        landmark.covariance(row, col) = landmark.covariance(col, row) = reader.Float32();
+    }
+    const std::string_view descriptor = BlobView(query.getColumn(8));
+    if (!reader.Finished() || descriptor.size() != kDescriptorDim) {
+      return Corrupt(path,
+                     "landmark {}: a covariance of {} and a descriptor of {} bytes, expected 24 and 128",
+                     landmark_idx, query.getColumn(7).getBytes(), descriptor.size());
+    }
+    std::memcpy(rows->descriptors.row(landmark_idx).data(), descriptor.data(), descriptor.size());
+    rows->landmarks.push_back(landmark);
+  }
+  return Ok();
+}
+
+Result<MapRows> ReadTables(SQLite::Database& database, const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckVersion(database, path));
+  MapRows rows;
+  CAIRN_RETURN_IF_ERROR(ReadHead(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadCameras(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadLandmarks(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadStations(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadRegions(database, path, &rows));
+  CAIRN_RETURN_IF_ERROR(ReadImages(database, path, &rows));
+  CAIRN_ASSIGN_OR_RETURN(rows.vocabulary, ReadVocabularyTables(database, path));
+  if (Status status = CheckMapRows(rows); !status.ok()) return Corrupt(path, "{}", status.error().message);
+  return rows;
+}
+
+}  // namespace
+
+Status WriteMapRows(const MapRows& rows, const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
+  const std::string schema = std::string(k0001MapSql) + kVocabularySchema;
+  return WriteDatabase(path, schema, [&](SQLite::Database& database) -> Status {
+    WriteHead(database, rows);
+    WriteImages(database, rows);
+    WriteRegions(database, rows);
+    WriteLandmarks(database, rows);
+    WriteVocabularyTables(database, rows.vocabulary);
+    return Ok();
+  });
+}
+
+Result<MapRows> ReadMapRows(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  return WithDatabaseErrors(path, [&] { return ReadTables(database, path); });
+}
+
+}  // namespace cairn

@@ -1,0 +1,110 @@
+#include "core/map_rows.h"
+
+#include <cmath>
+
+namespace cairn {
+namespace {
+
+template <typename... Args>
+Error Invalid(fmt::format_string<Args...> format, Args&&... args) {
+  return MakeError(ErrorCode::kInvalidArgument, "map: {}", fmt::format(format, std::forward<Args>(args)...));
+}
+
+bool IsPose(const Pose& pose) {
+  return pose.translation.allFinite() && std::abs(pose.rotation.norm() - 1) < 1e-6;  // false for NaN
+}
+
+// Strictly ascending, in [0, limit).
+bool IsAscending(const std::vector<int32_t>& values, size_t limit) {
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (values[i] < 0 || static_cast<size_t>(values[i]) >= limit || (i > 0 && values[i] <= values[i - 1]))
+      return false;
+  }
+  return true;
+}
+
+Status CheckImages(const MapRows& rows) {
+  for (size_t i = 0; i < rows.cameras.size(); ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckCamera(rows.cameras[i]));
+    if (i > 0 && rows.cameras[i].camera_id <= rows.cameras[i - 1].camera_id) {
+      return Invalid("camera {} is out of order", rows.cameras[i].camera_id);
+    }
+  }
+  for (size_t i = 0; i < rows.images.size(); ++i) {
+    const MapImage& image = rows.images[i];
+    if (i > 0 && image.image_id <= rows.images[i - 1].image_id)
+      return Invalid("image {} is out of order", image.image_id);
+    bool has_camera = false;
+    for (const Camera& camera : rows.cameras) has_camera |= camera.camera_id == image.camera_id;
+    if (!has_camera)
+      return Invalid("image {} has camera {}, which the map lacks", image.image_id, image.camera_id);
+    if (!IsPose(image.cam_from_world)) return Invalid("image {}: its pose is none", image.image_id);
+    if (image.station < -1 || image.station >= static_cast<StationIdx>(rows.stations.size())) {
+      return Invalid("image {}: station {} of {}", image.image_id, image.station, rows.stations.size());
+    }
+    if (!IsAscending(image.landmarks, rows.landmarks.size())) {
+      return Invalid("image {}: its landmarks are not ascending below {}", image.image_id,
+                     rows.landmarks.size());
+    }
+  }
+  return Ok();
+}
+
+Status CheckRegions(const MapRows& rows) {
+  for (size_t i = 0; i < rows.stations.size(); ++i) {
+    if (!rows.stations[i].position.allFinite() || !std::isfinite(rows.stations[i].heading_deg.value_or(0))) {
+      return Invalid("station {}: its place is not finite", i);
+    }
+  }
+  for (size_t i = 0; i < rows.station_edges.size(); ++i) {
+    const auto& [u, v] = rows.station_edges[i];
+    if (u < 0 || u >= v || v >= static_cast<StationIdx>(rows.stations.size()) ||
+        (i > 0 && rows.station_edges[i] <= rows.station_edges[i - 1])) {
+      return Invalid("edge {}: stations {} and {} of {}", i, u, v, rows.stations.size());
+    }
+  }
+  for (size_t i = 0; i < rows.regions.size(); ++i) {
+    if (!IsAscending(rows.regions[i].stations, rows.stations.size()) ||
+        !IsAscending(rows.regions[i].landmarks, rows.landmarks.size())) {
+      return Invalid("region {}: its stations or landmarks are not ascending below {} and {}", i,
+                     rows.stations.size(), rows.landmarks.size());
+    }
+  }
+  return Ok();
+}
+
+}  // namespace
+
+Status CheckMapRows(const MapRows& rows) {
+  CAIRN_RETURN_IF_ERROR(CheckImages(rows));
+  CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
+  if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
+    return Invalid("{} landmarks, but {} descriptors", rows.landmarks.size(), rows.descriptors.rows());
+  }
+  for (size_t i = 0; i < rows.landmarks.size(); ++i) {
+    const MapLandmark& landmark = rows.landmarks[i];
+    if (!landmark.position.allFinite() || !landmark.covariance.allFinite() || !(landmark.scale_m >= 0) ||
+        (landmark.covariance.diagonal().array() < 0).any()) {
+      return Invalid("landmark {}: its position, covariance or scale is no valid number", i);
+    }
+    // Stored in 32 bits of the unit: farther than 200 km is a mistake, not a map.
+    if (landmark.position.cwiseAbs().maxCoeff() > 2e5 || landmark.scale_m > 2e5) {
+      return Invalid("landmark {} lies more than 200 km from the origin of its frame", i);
+    }
+  }
+  if (!IsPose(rows.floor_from_world) || !IsPose(rows.camera_from_given))
+    return Invalid("a frame's rotation is none");
+  size_t image = 0;
+  for (const ImageId image_id : rows.vocabulary.document_ids) {
+    while (image < rows.images.size() && rows.images[image].image_id < image_id) ++image;
+    if (image == rows.images.size() || rows.images[image].image_id != image_id) {
+      return Invalid("the vocabulary knows image {}, which the map lacks", image_id);
+    }
+  }
+  for (const auto& [name, value] : rows.self_test) {
+    if (!std::isfinite(value)) return Invalid("self-test figure '{}' is not finite", name);
+  }
+  return Ok();
+}
+
+}  // namespace cairn

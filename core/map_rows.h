@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera.h"
+#include "core/error.h"
+#include "core/features.h"
+#include "core/ids.h"
+#include "core/pose.h"
+#include "core/vocabulary_tree.h"
+
+namespace cairn {
+
+using LandmarkIdx = int32_t;
+
+// The contents of a map file as plain values, the same for who writes and who reads it: schemas/FORMAT.md
+// says what each means on disk.
+
+struct MapLandmark {
+  ClassId class_id = 0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
+  double scale_m = 0;                                    // size (sigma) of the feature in space; 0: not known
+  int num_observations = 0;                              // survey images that see it
+};
+
+struct MapImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+  Pose cam_from_world;
+  StationIdx station = -1;             // -1: at no station
+  std::vector<LandmarkIdx> landmarks;  // seen in it, ascending
+};
+
+struct MapStation {
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  // floor frame, metres
+  std::optional<double> heading_deg;                   // counter-clockwise from +x; none: sees all around
+  bool is_covered = true;                              // false: its neighbourhood lies in no region
+};
+
+struct MapRegion {
+  std::vector<StationIdx> stations;    // ascending
+  std::vector<LandmarkIdx> landmarks;  // ascending
+};
+
+struct MapRows {
+  std::string name;
+  std::string writer;   // program and version, "cairn 0.1.0"
+  uint64_t seed = 0;    // of the compilation
+  bool sealed = false;  // checked, with its self-test figures
+  // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
+  std::string landmark_choice = "regions";
+  // How the regions were made.
+  std::string algorithm;
+  int k = 0;
+  int tau = 0;
+  int rho = 0;
+  std::map<std::string, std::string> stage_options;  // stage -> TOML
+  std::map<std::string, std::string> input_hashes;   // file -> XXH3
+  std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map
+
+  Pose floor_from_world;
+  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
+  // noise.
+  Pose camera_from_given;
+
+  std::vector<Camera> cameras;   // ascending camera_id
+  std::vector<MapImage> images;  // ascending image_id
+  std::vector<MapStation> stations;
+  std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
+  std::vector<MapRegion> regions;
+  std::vector<MapLandmark> landmarks;
+  DescriptorMatrix descriptors;  // row i: landmark i
+  Vocabulary vocabulary;         // documents are among `images`
+};
+
+inline constexpr int kMapVersionMajor = 1;
+inline constexpr int kMapVersionMinor = 0;
+// Unit of stored positions and scales: 0.1 mm, so a coordinate is off by at most 0.05 mm.
+inline constexpr double kMapLengthUnitM = 1e-4;
+
+// Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
+// strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.
+Status CheckMapRows(const MapRows& rows);
+
+// Writes a map file.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io.
+Status WriteMapRows(const MapRows& rows, const std::string& path);
+
+// Reads a map file; every length, index and number is checked, and nothing larger than the file states is
+// allocated. Errors: NotFound; Corrupt (not SQLite, truncated, a SQLite file of another kind, damaged rows);
+// Unsupported (a newer major version; names the writer).
+Result<MapRows> ReadMapRows(const std::string& path);
+
+}  // namespace cairn
