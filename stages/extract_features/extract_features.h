@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/capture.h"
+#include "core/error.h"
+#include "core/options.h"
+#include "core/progress.h"
+#include "core/sift.h"
+
+namespace cairn {
+
+// Finds the SIFT features of every survey image and writes them as a COLMAP database.  First stage of the
+// line; after it: match_features and build_vocabulary.
+//
+// Images get ids 1, 2, ... in the order of their names.  An image that cannot be read, or whose size is not
+// its camera's, is a listed reject; the rest goes on.  A mask MASKS/NAME.png (or MASKS/NAME with its suffix
+// replaced) of the image's size switches pixels off where it is zero.
+struct ExtractFeaturesOptions {
+  SiftOptions sift;
+  // Folder of masks, absolute or relative to the capture; empty: none.
+  std::string masks;
+};
+OptionTable DescribeOptions(ExtractFeaturesOptions* options);
+
+struct ExtractFeaturesSummary {
+  int num_images = 0;
+  int64_t num_keypoints = 0;
+  std::vector<Reject> rejects;  // those of the capture and those found here, ascending by name
+  // Every file that was read, for a dependency file: images, masks, lists.
+  std::vector<std::string> inputs;
+};
+
+// Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
+// cairn_rejects. Memory: features of all images of one batch (64 images).  Same bytes for any number of
+// threads. Errors: NoData when no image is left; Io; Cancelled.
+Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
+                                               const std::string& features_path, int num_threads,
+                                               Progress& progress);
+
+}  // namespace cairn

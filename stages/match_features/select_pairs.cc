@@ -1,0 +1,96 @@
+#include "stages/match_features/select_pairs.h"
+
+#include <array>
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kGridColumns = 6;
+constexpr int kGridRows = 5;
+constexpr int kNumDepths = 5;
+
+using FrustumSamples = std::vector<Eigen::Vector3d>;  // world frame
+
+// Points on rays through a grid of pixels, at depths in geometric progression from near to far.
+FrustumSamples SampleFrustum(const PosedCamera& image, const FrustumOverlapOptions& options) {
+  FrustumSamples samples;
+  const Pose world_from_cam = image.cam_from_world.Inverse();
+  for (int row = 0; row < kGridRows; ++row) {
+    for (int column = 0; column < kGridColumns; ++column) {
+      const Eigen::Vector2d pixel((column + 0.5) / kGridColumns * image.camera.width,
+                                  (row + 0.5) / kGridRows * image.camera.height);
+      const auto ray = CameraFromImage(image.camera, pixel);
+      if (!ray) continue;
+      for (int d = 0; d < kNumDepths; ++d) {
+        const double depth =
+            options.near_m * std::pow(options.far_m / options.near_m, d / (kNumDepths - 1.0));
+        samples.push_back(world_from_cam * Eigen::Vector3d(ray->x() * depth, ray->y() * depth, depth));
+      }
+    }
+  }
+  return samples;
+}
+
+double Overlap(const FrustumSamples& samples, const PosedCamera& image1, const PosedCamera& image2,
+               const FrustumOverlapOptions& options) {
+  if (samples.empty()) return 0;
+  const Eigen::Vector3d center1 = image1.cam_from_world.Center(), center2 = image2.cam_from_world.Center();
+  const double min_cosine = std::cos(RadFromDeg(options.max_view_angle_deg));
+  int num_seen = 0;
+  for (const Eigen::Vector3d& sample : samples) {
+    const auto pixel = ImageFromCamera(image2.camera, image2.cam_from_world * sample);
+    if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > image2.camera.width ||
+        pixel->y() > image2.camera.height) {
+      continue;
+    }
+    const Eigen::Vector3d ray1 = sample - center1, ray2 = sample - center2;
+    const double distance1 = ray1.norm(), distance2 = ray2.norm();
+    if (ray1.dot(ray2) < min_cosine * distance1 * distance2) continue;
+    if (std::max(distance1, distance2) > options.max_scale_ratio * std::min(distance1, distance2)) continue;
+    ++num_seen;
+  }
+  return static_cast<double>(num_seen) / static_cast<double>(samples.size());
+}
+
+}  // namespace
+
+double FrustumOverlap(const PosedCamera& image1, const PosedCamera& image2,
+                      const FrustumOverlapOptions& options) {
+  return Overlap(SampleFrustum(image1, options), image1, image2, options);
+}
+
+IndexPairs ExhaustivePairs(int num_images) { return SequencePairs(num_images, num_images); }
+
+IndexPairs SequencePairs(int num_images, int window) {
+  IndexPairs pairs;
+  for (int i = 0; i < num_images; ++i) {
+    for (int j = i + 1; j < num_images && j - i <= window; ++j) pairs.emplace_back(i, j);
+  }
+  return pairs;
+}
+
+IndexPairs FrustumPairs(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,
+                        int num_threads) {
+  const int num_images = static_cast<int>(images.size());
+  std::vector<FrustumSamples> samples(num_images);
+  ParallelFor(num_images, num_threads, [&](int64_t i) { samples[i] = SampleFrustum(images[i], options); });
+  std::vector<std::vector<int>> partners(num_images);
+  ParallelFor(num_images, num_threads, [&](int64_t i) {
+    for (int j = static_cast<int>(i) + 1; j < num_images; ++j) {
+      if (Overlap(samples[i], images[i], images[j], options) >= options.min_overlap_ratio ||
+          Overlap(samples[j], images[j], images[i], options) >= options.min_overlap_ratio) {
+        partners[i].push_back(j);
+      }
+    }
+  });
+  IndexPairs pairs;
+  for (int i = 0; i < num_images; ++i) {
+    for (const int j : partners[i]) pairs.emplace_back(i, j);
+  }
+  return pairs;
+}
+
+}  // namespace cairn
