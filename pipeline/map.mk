@@ -9,9 +9,10 @@
 #   MAP := kitchen.cairn
 #   include /usr/share/cairn/map.mk
 #
-# Every output X has a stamp X.stamp, touched whenever its rule has run.  The rule's prerequisites are compared with the
-# stamp, what is downstream compares itself with X; a run that gives the same bytes leaves X's date alone, so that
-# nothing downstream runs.  Recipes only use variables that are set for the build folder of their target.
+# Every output X has a stamp X.stamp with the time at which its rule last began and then succeeded.  The rule's
+# prerequisites are compared with the stamp: an input that changes during the run is seen by the next one.  What is
+# downstream compares itself with X, whose date a run that gives the same bytes leaves alone: then nothing downstream
+# runs.  Recipes only use variables that are set for the build folder of their target.
 
 CAIRN ?= $(shell command -v cairn)
 # Put before every command, for example a cluster's `srun`.
@@ -21,15 +22,20 @@ PROGRESS ?= auto
 LOG_LEVEL ?= info
 
 ifdef RECIPE
-$(BUILD)/config.mk: $(RECIPE) $(CAIRN)
-	$(CAIRN) configure $(filter %.toml,$^) -o $(MAP) --build-dir $(@D)
-	touch $@
+CAIRN_MAP := $(MAP)
 $(BUILD)/config.mk: MAP := $(MAP)
+$(BUILD)/config.mk: $(RECIPE) $(CAIRN)
+	$(CAIRN) configure $< -o $(MAP) --build-dir $(@D)
+	touch $@
 endif
 
 # Sets MAP, CAPTURE, SIMULATED, QUERIES, NAME and SEED; `cairn configure` writes it beside the options.
 include $(BUILD)/config.mk
 
+ifdef RECIPE
+# As the including Makefile spells it.
+MAP := $(CAIRN_MAP)
+endif
 $(BUILD)/%: MAP := $(MAP)
 $(BUILD)/%: CAPTURE := $(CAPTURE)
 $(BUILD)/%: QUERIES := $(QUERIES)
@@ -52,66 +58,81 @@ QUERY_IMAGES := $(if $(QUERY_LIST),$(wildcard $(addprefix $(CAPTURE)/images/,$(s
 # The default goal of `make -f map.mk`.
 $(MAP): $(BUILD)/map.stamp ;
 
-# Whether an output's date changed is seen after its stamp's rule has run.
-$(CAIRN_OUTPUTS): %: %.stamp ;
+# Whether an output's date changed is seen after its stamp's rule has run.  Outputs whose last run gave the same bytes
+# are older than their stamps: for them Make has to look even with -n and -q (the '+').
+UNCHANGED := $(shell for output in $(CAIRN_OUTPUTS); do [ $$output.stamp -nt $$output ] && echo $$output; done)
+$(filter-out $(UNCHANGED),$(CAIRN_OUTPUTS)): %: %.stamp ;
+$(UNCHANGED): %: %.stamp
+	+@: # the same bytes as before
 # A stamp without its output says nothing.
 $(foreach output,$(CAIRN_OUTPUTS),$(if $(wildcard $(output)),,$(eval $(output).stamp: cairn-missing)))
 $(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
 
-CAIRN_FLAGS = --seed $(SEED) --threads $(THREADS) --progress $(PROGRESS) --log-level $(LOG_LEVEL)
+# X.txt keeps what the stage printed about X, for summaries of runs that had nothing to do.
+CAIRN_FLAGS = --results $(@:.stamp=.txt) --seed $(SEED) --threads $(THREADS) --progress $(PROGRESS) \
+    --log-level $(LOG_LEVEL)
 
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
 $(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(CAIRN)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 else
 CAPTURE_STAMP :=
 endif
 
 $(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(CAIRN) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_FOLDERS) $(CAPTURE_IMAGES)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml \
 	    --depfile $(@D)/features.d -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(CAIRN) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) \
 	    --options $(@D)/options/match_features.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(CAPTURE) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(CAIRN)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
 	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/options/decompose_regions.toml $(BUILD)/options/seed $(CAIRN)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db \
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(CAIRN)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
     $(BUILD)/options/emit_map.toml $(BUILD)/options/name $(CAIRN)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(BUILD)/options/seed $(CAIRN) $(CAPTURE_STAMP) $(QUERY_LIST) $(QUERY_IMAGES)
+	touch $@.begun
 	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(CAPTURE)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
-	touch $@
+	mv $@.begun $@

@@ -4,10 +4,12 @@
 #include <csignal>
 #include <cstdlib>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <iostream>
 #include <new>
+#include <sstream>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -41,6 +43,7 @@ struct CommonArguments {
   uint64_t seed = 0;
   std::string progress = "auto";
   std::string log_level = "info";
+  std::string results_file;
 };
 
 void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
@@ -59,6 +62,10 @@ void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
   app.add_option("--log-level", arguments->log_level, "trace|debug|info|warning|error|off [info]")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
       ->type_name("LEVEL")
+      ->group("Common options");
+  app.add_option("--results", arguments->results_file,
+                 "Also write what is printed on standard output to this file")
+      ->type_name("FILE")
       ->group("Common options");
   app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
 }
@@ -153,21 +160,25 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
   ConfigureLog(arguments.log_level, *style);
   CatchStopSignals();
   const std::unique_ptr<Progress> progress = MakeTerminalProgress(*style);
+  std::ostringstream results;  // where --results asks for them
   const CommandEnvironment environment = {.num_threads = arguments.num_threads,
                                           .seed = arguments.seed,
                                           .seed_given = app.get_subcommands().front()->count("--seed") > 0,
                                           .progress_style = arguments.progress,
                                           .log_level = arguments.log_level,
                                           .progress = progress.get(),
-                                          .out = &out};
-  for (const Command& command : commands) {
-    if (command.name != name) continue;
-    const Status status = RunCaught(command, environment);
-    out.flush();
-    if (!status.ok()) return Report(name, status.error(), err);
-    if (!out)
-      return Report(name, MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?"), err);
+                                          .out = arguments.results_file.empty() ? &out : &results};
+  const auto command =
+      std::find_if(commands.begin(), commands.end(), [&](const Command& c) { return c.name == name; });
+  Status status = RunCaught(*command, environment);
+  if (!arguments.results_file.empty()) {
+    out << results.str();
+    if (status.ok()) status = WriteFileAtomically(arguments.results_file, results.str());
   }
+  out.flush();
+  if (status.ok() && !out)
+    status = MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?");
+  if (!status.ok()) return Report(name, status.error(), err);
   return 0;
 }
 

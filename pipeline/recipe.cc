@@ -86,10 +86,23 @@ class RecipeReader {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: has both [[capture]] and [simulate]; keep one of them", path_);
     }
+    CAIRN_RETURN_IF_ERROR(PassUpOn());
     return recipe_;
   }
 
  private:
+  // The capture's up direction is an option of the stage that lays out the floor.
+  Status PassUpOn() {
+    if (recipe_.up == "auto") return Ok();
+    for (const StageOptions& stage : recipe_.stages) {
+      if (stage.stage != "filter_visibility") continue;
+      for (const Option& option : stage.table) {
+        if (option.name == "up") return SetOption(option, recipe_.up);
+      }
+    }
+    return Ok();
+  }
+
   Status ReadTopKey(const toml::key& key, const toml::node& node) {
     const std::string name(key.str());
     if (name == "name") {
