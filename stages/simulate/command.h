@@ -1,0 +1,10 @@
+#pragma once
+
+#include "core/command.h"
+
+namespace cairn {
+
+// `cairn simulate RECIPE.toml -o CAPTURE`
+Command SimulateCommand();
+
+}  // namespace cairn

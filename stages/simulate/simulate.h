@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "stages/simulate/options.h"
+
+namespace cairn {
+
+struct SimulateResult {
+  int num_stations = 0;
+  int num_images = 0;
+  int num_queries = 0;
+};
+
+// Renders a survey of a synthetic building and writes it as a capture: images/, cameras.txt, images.txt,
+// queries.txt and floor_plan.geojson.  For tests, benchmarks and a first look at the line; a stand-in for a
+// robot with a camera and exact poses [Sala06 §VI-B surveys a real room in the same way: a lattice of
+// stations, four headings each]. The folder is written beside its place and then exchanged with it: who looks
+// sees the old capture or the whole new one.  Same options, seed and program: same bytes, for any number of
+// threads. Errors: InvalidArgument or NoData (PlanSurvey), Io (names the path), Cancelled.
+Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std::string& path, uint64_t seed,
+                                       int num_threads, Progress& progress);
+
+}  // namespace cairn
