@@ -1,0 +1,90 @@
+#include "stages/emit_map/command.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+
+#include "core/file.h"
+#include "stages/emit_map/emit_map.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string classes_path;
+  std::string world_path;
+  std::string regions_path;
+  std::string vocabulary_path;
+  std::string name;
+  std::vector<std::string> stage_options;  // "STAGE=FILE.toml"
+  std::string output_path;
+  EmitMapOptions options;
+  OptionArguments option_arguments;
+};
+
+Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
+  rows->name = arguments.name;
+  rows->writer = "cairn " CAIRN_VERSION;
+  rows->seed = seed;
+  for (const auto& [name, path] :
+       {std::pair("classes.db", arguments.classes_path), std::pair("world.db", arguments.world_path),
+        std::pair("regions.db", arguments.regions_path),
+        std::pair("vocabulary.db", arguments.vocabulary_path)}) {
+    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes[name], HashFile(path));
+  }
+  for (const std::string& text : arguments.stage_options) {
+    const size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos) {
+      return MakeError(ErrorCode::kInvalidArgument, "--stage-options {}: expected STAGE=FILE.toml", text);
+    }
+    CAIRN_ASSIGN_OR_RETURN(rows->stage_options[text.substr(0, equals)], ReadFile(text.substr(equals + 1)));
+  }
+  EmitMapOptions options = arguments.options;
+  rows->stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
+  return Ok();
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes_path));
+  CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world_path));
+  CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions_path));
+  CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary_path));
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options));
+  CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
+  CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
+  spdlog::info("{}: {} landmarks of {} classes in {} regions, {} images, {} words, {:.2f} MB",
+               arguments.output_path, rows.landmarks.size(), classes.classes.size(), rows.regions.size(),
+               rows.images.size(), rows.vocabulary.num_words(),
+               static_cast<double>(std::filesystem::file_size(arguments.output_path)) / 1e6);
+  return Ok();
+}
+
+}  // namespace
+
+Command EmitMapCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "emit-map",
+      .summary = "Puts landmarks, regions and vocabulary together into a map",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("--classes", arguments->classes_path, "classes.db")->required();
+            app.add_option("--world", arguments->world_path, "world.db")->required();
+            app.add_option("--regions", arguments->regions_path, "regions.db")->required();
+            app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
+            app.add_option("--name", arguments->name, "name of the map")->required();
+            app.add_option("--stage-options", arguments->stage_options,
+                           "STAGE=FILE.toml, once per stage: options to note in the map");
+            app.add_option("-o,--output", arguments->output_path, "map to write, not yet sealed")->required();
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

@@ -1,0 +1,236 @@
+#include "stages/emit_map/emit_map.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <tuple>
+
+namespace cairn {
+namespace {
+
+constexpr RegionIdx kNoRegion = std::numeric_limits<RegionIdx>::max();
+
+// Position in `classes.classes` of every class id.
+std::map<ClassId, size_t> IndexClasses(const Classes& classes) {
+  std::map<ClassId, size_t> index;
+  for (size_t i = 0; i < classes.classes.size(); ++i) index[classes.classes[i].class_id] = i;
+  return index;
+}
+
+// Per region, the classes (positions in `classes.classes`) that it keeps.
+Result<std::vector<std::vector<size_t>>> ClassesOfRegions(const Classes& classes, const World& world,
+                                                          const Decomposition& decomposition) {
+  const std::map<ClassId, size_t> class_index = IndexClasses(classes);
+  std::vector<std::vector<size_t>> classes_of_regions(decomposition.regions.size());
+  for (size_t region = 0; region < decomposition.regions.size(); ++region) {
+    for (const FeatureIdx feature : decomposition.regions[region].features) {
+      if (feature < 0 || feature >= static_cast<FeatureIdx>(world.class_ids.size())) {
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "emit_map: region {} keeps feature {}, but the world knows the classes of {} features; were the "
+            "regions made from another world?",
+            region, feature, world.class_ids.size());
+      }
+      const auto found = class_index.find(world.class_ids[feature]);
+      if (found == class_index.end()) {
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "emit_map: feature {} of the world is class {}, which the classes lack; was the world made from "
+            "other classes?",
+            feature, world.class_ids[feature]);
+      }
+      classes_of_regions[region].push_back(found->second);
+    }
+    for (const StationIdx station : decomposition.regions[region].stations) {
+      if (station < 0 || station >= world.num_stations()) {
+        return MakeError(ErrorCode::kInvalidArgument, "emit_map: region {} has station {} of {}", region,
+                         station, world.num_stations());
+      }
+    }
+  }
+  return classes_of_regions;
+}
+
+// Kept classes in the order in which the map stores them.
+std::vector<size_t> OrderLandmarks(const Classes& classes,
+                                   const std::vector<std::vector<size_t>>& classes_of_regions,
+                                   bool keep_all) {
+  std::vector<RegionIdx> first_region(classes.classes.size(), kNoRegion);
+  for (size_t region = 0; region < classes_of_regions.size(); ++region) {
+    for (const size_t i : classes_of_regions[region]) {
+      first_region[i] = std::min(first_region[i], static_cast<RegionIdx>(region));
+    }
+  }
+  std::vector<size_t> order;
+  for (size_t i = 0; i < classes.classes.size(); ++i) {
+    if (keep_all || first_region[i] != kNoRegion) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    const auto key = [&](size_t i) {
+      const FeatureClass& feature_class = classes.classes[i];
+      return std::tuple(first_region[i],
+                        feature_class.observations.empty() ? 0u : feature_class.observations[0].image_id,
+                        feature_class.class_id);
+    };
+    return key(a) < key(b);
+  });
+  return order;
+}
+
+// Mean size of the feature in space: keypoint scale times depth over focal length.
+double MeanScaleM(const FeatureClass& feature_class, const std::map<ImageId, const SurveyImage*>& images,
+                  const std::map<CameraId, const Camera*>& cameras) {
+  double sum = 0;
+  int count = 0;
+  for (const Observation& observation : feature_class.observations) {
+    const auto image = images.find(observation.image_id);
+    if (image == images.end()) continue;
+    const auto camera = cameras.find(image->second->camera_id);
+    const double depth = (image->second->cam_from_world * feature_class.position).z();
+    if (camera == cameras.end() || depth <= 0) continue;
+    sum += static_cast<double>(observation.keypoint.scale) * depth / camera->second->MeanFocal();
+    ++count;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order, MapRows* rows) {
+  std::map<ImageId, const SurveyImage*> images;
+  std::map<CameraId, const Camera*> cameras;
+  std::map<ImageId, size_t> image_index;
+  for (const SurveyImage& image : classes.images) {
+    images[image.image_id] = &image;
+    image_index[image.image_id] = rows->images.size();
+    rows->images.push_back({.image_id = image.image_id,
+                            .name = image.name,
+                            .camera_id = image.camera_id,
+                            .cam_from_world = image.cam_from_world});
+  }
+  for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
+
+  rows->descriptors.resize(static_cast<Eigen::Index>(order.size()), kDescriptorDim);
+  for (size_t landmark_idx = 0; landmark_idx < order.size(); ++landmark_idx) {
+    const FeatureClass& feature_class = classes.classes[order[landmark_idx]];
+    rows->landmarks.push_back({.class_id = feature_class.class_id,
+                               .position = feature_class.position,
+                               .covariance = feature_class.covariance,
+                               .scale_m = MeanScaleM(feature_class, images, cameras),
+                               .num_observations = static_cast<int>(feature_class.observations.size())});
+    rows->descriptors.row(landmark_idx) = feature_class.descriptor;
+    for (const Observation& observation : feature_class.observations) {
+      const auto image = image_index.find(observation.image_id);
+      if (image == image_index.end()) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "emit_map: class {} is seen in image {}, which has no pose", feature_class.class_id,
+                         observation.image_id);
+      }
+      rows->images[image->second].landmarks.push_back(static_cast<LandmarkIdx>(landmark_idx));
+    }
+  }
+  return Ok();
+}
+
+Status AddStations(const World& world, const Decomposition& decomposition, MapRows* rows) {
+  for (StationIdx i = 0; i < world.num_stations(); ++i) {
+    MapStation station{.position = world.positions[i]};
+    if (!world.headings_deg.empty()) station.heading_deg = world.headings_deg[i];
+    rows->stations.push_back(station);
+  }
+  for (const StationIdx station : decomposition.uncovered) {
+    if (station < 0 || station >= world.num_stations()) {
+      return MakeError(ErrorCode::kInvalidArgument, "emit_map: uncovered station {} of {}", station,
+                       world.num_stations());
+    }
+    rows->stations[station].is_covered = false;
+  }
+  rows->station_edges = world.edges;
+  for (size_t station = 0; station < world.station_images.size(); ++station) {
+    for (const ImageId image_id : world.station_images[station]) {
+      const auto image =
+          std::lower_bound(rows->images.begin(), rows->images.end(), image_id,
+                           [](const MapImage& map_image, ImageId id) { return map_image.image_id < id; });
+      if (image == rows->images.end() || image->image_id != image_id) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "emit_map: station {} has image {}, which the classes lack", station, image_id);
+      }
+      image->station = static_cast<StationIdx>(station);
+    }
+  }
+  return Ok();
+}
+
+// The vocabulary with only those documents that are images of the map.
+Vocabulary RestrictDocuments(const Vocabulary& vocabulary, const std::vector<MapImage>& images) {
+  Vocabulary restricted = vocabulary;
+  restricted.document_ids.clear();
+  std::vector<int32_t> new_document(vocabulary.document_ids.size(), -1);
+  for (size_t document = 0; document < vocabulary.document_ids.size(); ++document) {
+    const ImageId image_id = vocabulary.document_ids[document];
+    const bool has_image =
+        std::binary_search(images.begin(), images.end(), MapImage{.image_id = image_id},
+                           [](const MapImage& a, const MapImage& b) { return a.image_id < b.image_id; });
+    if (!has_image) continue;
+    new_document[document] = static_cast<int32_t>(restricted.document_ids.size());
+    restricted.document_ids.push_back(image_id);
+  }
+  for (size_t word = 0; word < vocabulary.inverted_files.size(); ++word) {
+    restricted.inverted_files[word].clear();
+    for (const Posting& posting : vocabulary.inverted_files[word]) {
+      if (new_document[posting.document] < 0) continue;
+      restricted.inverted_files[word].push_back({new_document[posting.document], posting.count});
+    }
+  }
+  WeightVocabulary(&restricted);
+  return restricted;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(EmitMapOptions* options) {
+  return {{.name = "landmarks",
+           .value = &options->landmarks,
+           .help = "classes that become landmarks: those that regions keep, or all",
+           .choices = {"regions", "all"}}};
+}
+
+Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
+                        const Vocabulary& vocabulary, const EmitMapOptions& options) {
+  EmitMapOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
+  const std::vector<size_t> order = OrderLandmarks(classes, classes_of_regions, options.landmarks == "all");
+  if (order.empty()) {
+    return MakeError(
+        ErrorCode::kNoData,
+        "emit_map: no landmark: {} regions keep none of {} classes; a smaller k or landmarks = \"all\" keeps "
+        "more",
+        decomposition.regions.size(), classes.classes.size());
+  }
+  MapRows rows;
+  rows.landmark_choice = options.landmarks;
+  rows.algorithm = decomposition.algorithm;
+  rows.k = decomposition.k;
+  rows.tau = decomposition.tau;
+  rows.rho = decomposition.rho;
+  rows.floor_from_world = world.floor_from_world;
+  rows.camera_from_given = classes.camera_from_given;
+  rows.cameras = classes.cameras;
+  CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
+  CAIRN_RETURN_IF_ERROR(AddStations(world, decomposition, &rows));
+
+  std::vector<LandmarkIdx> landmark_of_class(classes.classes.size(), -1);
+  for (size_t i = 0; i < order.size(); ++i) landmark_of_class[order[i]] = static_cast<LandmarkIdx>(i);
+  for (size_t region = 0; region < decomposition.regions.size(); ++region) {
+    MapRegion row{.stations = decomposition.regions[region].stations};
+    for (const size_t i : classes_of_regions[region]) row.landmarks.push_back(landmark_of_class[i]);
+    std::sort(row.landmarks.begin(), row.landmarks.end());
+    // Two features of a world may be parts of one class.
+    row.landmarks.erase(std::unique(row.landmarks.begin(), row.landmarks.end()), row.landmarks.end());
+    rows.regions.push_back(std::move(row));
+  }
+  rows.vocabulary = RestrictDocuments(vocabulary, rows.images);
+  CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
+  return rows;
+}
+
+}  // namespace cairn

@@ -1,0 +1,99 @@
+#include "stages/emit_map/emit_map.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/emit_map/example.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Result<MapRows> Emit(const EmitExample& example, const std::string& landmarks = "regions") {
+  return EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {landmarks});
+}
+
+std::vector<ClassId> ClassIds(const MapRows& rows) {
+  std::vector<ClassId> ids;
+  for (const MapLandmark& landmark : rows.landmarks) ids.push_back(landmark.class_id);
+  return ids;
+}
+
+TEST(EmitMap, KeepsTheClassesOfRegionsOrderedByFirstRegion) {
+  const Result<MapRows> rows = Emit(MakeEmitExample());
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_THAT(ClassIds(*rows),
+              ElementsAre(12, 13, 10));  // region 0: 12 and 13; region 1 adds 10; 11 is in none
+  EXPECT_THAT(rows->regions[0].landmarks, ElementsAre(0, 1));
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_THAT(rows->regions[1].stations, ElementsAre(0, 1));
+  EXPECT_EQ(rows->descriptors(2, 0), 0);
+  EXPECT_EQ(rows->descriptors(1, 0), 30);
+}
+
+TEST(EmitMap, AllKeepsEveryClassAndTheSameRegions) {
+  const Result<MapRows> rows = Emit(MakeEmitExample(), "all");
+  ASSERT_TRUE(rows.ok());
+  EXPECT_THAT(ClassIds(*rows), ElementsAre(12, 13, 10, 11));
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_THAT(rows->images[0].landmarks, ElementsAre(2, 3));
+}
+
+TEST(EmitMap, ImagesKnowTheirStationAndLandmarks) {
+  const MapRows rows = *Emit(MakeEmitExample());
+  ASSERT_EQ(rows.images.size(), 3u);
+  EXPECT_THAT(rows.images[0].landmarks, ElementsAre(2));
+  EXPECT_THAT(rows.images[1].landmarks, ElementsAre(0, 1, 2));
+  EXPECT_EQ(rows.images[2].image_id, 4u);
+  EXPECT_EQ(rows.images[2].station, 2);
+  EXPECT_FALSE(rows.stations[2].is_covered);
+  EXPECT_TRUE(rows.stations[1].is_covered);
+}
+
+TEST(EmitMap, ScaleIsTheKeypointsSizeInSpace) {
+  // Keypoints of 3 px, seen from 2 m with a focal length of 100 px: 6 cm.
+  EXPECT_NEAR(Emit(MakeEmitExample())->landmarks[0].scale_m, 0.06, 1e-9);
+}
+
+TEST(EmitMap, VocabularyLosesImagesWithoutPose) {
+  const MapRows rows = *Emit(MakeEmitExample());
+  EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(1, 2, 4));
+  EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 2}));
+  EXPECT_THAT(rows.vocabulary.inverted_files[1], ElementsAre(Posting{2, 1}));
+}
+
+TEST(EmitMap, ImageInTheWorldWithoutClassesIsAnError) {
+  EmitExample example = MakeEmitExample();
+  example.world.station_images[2] = {9};
+  EXPECT_THAT(Emit(example).error().message, HasSubstr("image 9"));
+}
+
+TEST(EmitMap, RegionsOfAnotherWorldAreAnError) {
+  EmitExample example = MakeEmitExample();
+  example.decomposition.regions[0].features = {7};
+  EXPECT_EQ(Emit(example).error().code, ErrorCode::kInvalidArgument);
+  example = MakeEmitExample();
+  example.decomposition.regions[0].stations = {8};
+  EXPECT_EQ(Emit(example).error().code, ErrorCode::kInvalidArgument);
+  example = MakeEmitExample();
+  example.world.class_ids[1] = 99;
+  EXPECT_THAT(Emit(example).error().message, HasSubstr("class 99"));
+}
+
+TEST(EmitMap, NoRegionsMeansNoMapUnlessAllAreKept) {
+  EmitExample example = MakeEmitExample();
+  example.decomposition.regions.clear();
+  EXPECT_EQ(Emit(example).error().code, ErrorCode::kNoData);
+  EXPECT_TRUE(Emit(example, "all").ok());
+}
+
+TEST(EmitMap, PartsOfOneClassAreOneLandmark) {
+  EmitExample example = MakeEmitExample();
+  example.world.class_ids = {10, 12, 12};
+  EXPECT_THAT(Emit(example)->regions[0].landmarks, ElementsAre(0));
+}
+
+}  // namespace
+}  // namespace cairn

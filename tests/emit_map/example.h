@@ -1,0 +1,80 @@
+#pragma once
+
+#include "core/decomposition.h"
+#include "core/feature_class.h"
+#include "core/vocabulary_tree.h"
+#include "core/world.h"
+
+namespace cairn {
+
+// Three stations in a row, an image at each, four classes (ids 10 to 13) on the wall ahead; images 1, 2 and 4
+// have poses, image 3 is a document of the vocabulary without one.
+//
+//   class     10 11 12 13
+//   image 1    x  x             station 0
+//   image 2    x  x  x  x       station 1      regions: 0 = {stations 1, 2; classes 12, 13}
+//   image 4          x  x       station 2               1 = {stations 0, 1; classes 10, 12}
+struct EmitExample {
+  Classes classes;
+  World world;
+  Decomposition decomposition;
+  Vocabulary vocabulary;
+};
+
+inline EmitExample MakeEmitExample() {
+  EmitExample example;
+  Camera camera;
+  camera.camera_id = 3;
+  camera.model = CameraModel::kSimplePinhole;
+  camera.width = 200;
+  camera.height = 100;
+  camera.params = {100, 100, 50};
+  example.classes.cameras = {camera};
+  for (const ImageId image_id : {1u, 2u, 4u}) {
+    SurveyImage image;
+    image.image_id = image_id;
+    image.name = "image" + std::to_string(image_id) + ".png";
+    image.camera_id = 3;
+    image.cam_from_world.translation = {-1.0 * image_id, 0, 0};
+    example.classes.images.push_back(image);
+  }
+  const std::vector<std::vector<ImageId>> seen_in = {{1, 2}, {1, 2}, {2, 4}, {2, 4}};
+  for (int i = 0; i < 4; ++i) {
+    FeatureClass feature_class;
+    feature_class.class_id = 10 + i;
+    feature_class.position = {i + 0.12344, 0.5, 2};
+    feature_class.covariance = Eigen::Vector3d(1e-4, 2e-4, 3e-4).asDiagonal();
+    feature_class.descriptor.setConstant(static_cast<uint8_t>(10 * i));
+    for (const ImageId image_id : seen_in[i]) {
+      feature_class.observations.push_back({image_id, 0, Keypoint{50, 50, 3, 0}});
+    }
+    example.classes.classes.push_back(feature_class);
+  }
+  example.world.positions = {{1, 0}, {2, 0}, {4, 0}};
+  example.world.headings_deg = {90, 90, 90};
+  example.world.edges = {{0, 1}, {1, 2}};
+  example.world.areas = {{0, 1}, {1, 2}, {1, 2}};
+  example.world.class_ids = {10, 12, 13};
+  example.world.station_images = {{1}, {2}, {4}};
+  example.decomposition.algorithm = "b2";
+  example.decomposition.k = 2;
+  example.decomposition.regions = {{.features = {1, 2}, .stations = {1, 2}},
+                                   {.features = {0, 1}, .stations = {0, 1}}};
+  example.decomposition.uncovered = {2};
+
+  Vocabulary& vocabulary = example.vocabulary;
+  vocabulary.branching = 2;
+  vocabulary.depth = 1;
+  vocabulary.nodes.resize(3);
+  vocabulary.nodes[0].num_children = 2;
+  vocabulary.centres = DescriptorMatrix::Zero(3, kDescriptorDim);
+  vocabulary.centres(1, 0) = 255;
+  vocabulary.centres(2, 1) = 255;
+  (void)NumberVocabularyNodes(&vocabulary);
+  vocabulary.document_ids = {1, 2, 3, 4};
+  vocabulary.inverted_files = {{{0, 2}, {2, 5}}, {{2, 1}, {3, 1}}};
+  WeightVocabulary(&vocabulary);
+  return example;
+}
+
+}  // namespace cairn
