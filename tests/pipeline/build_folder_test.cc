@@ -1,0 +1,127 @@
+#include "pipeline/build_folder.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "tests/pipeline/test_stages.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class BuildFolderTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / fmt::format("build_folder_test_{}", getpid());
+    fs::create_directories(folder_ / "survey");
+    recipe_.name = "kitchen";
+    recipe_.capture_path = (folder_ / "survey").string();
+    recipe_.stages = TestStages();
+    paths_ = {.build_dir = (folder_ / "kitchen.build").string(),
+              .map = (folder_ / "kitchen.cairn").string(),
+              .program = "/usr/bin/cairn"};
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string Text(const std::string& name) const { return ReadFile(paths_.build_dir + "/" + name).value(); }
+  fs::file_time_type Date(const std::string& name) const {
+    return fs::last_write_time(paths_.build_dir + "/" + name);
+  }
+
+  fs::path folder_;
+  Recipe recipe_;
+  BuildPaths paths_;
+};
+
+TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/extract_features.toml"), "max_num_features = 2000\ncontrast_threshold = 0.02\n");
+  EXPECT_EQ(Text("options/name"), "kitchen\n");
+  const std::vector<std::string> files = {"options/extract_features.toml",
+                                          "options/filter_visibility.toml",
+                                          "options/seed",
+                                          "options/name",
+                                          "options/capture",
+                                          "config.mk"};
+  std::vector<fs::file_time_type> dates;
+  for (const std::string& file : files) dates.push_back(Date(file));
+
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_TRUE(SetOption(recipe_.stages[1].table[0], "500").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/extract_features.toml"), "max_num_features = 500\ncontrast_threshold = 0.02\n");
+  EXPECT_NE(Date(files[0]), dates[0]);
+  for (size_t i = 1; i < files.size(); ++i) EXPECT_EQ(Date(files[i]), dates[i]) << files[i];
+}
+
+TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.capture_path + "\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \n"));
+  ASSERT_TRUE(WriteFileAtomically(recipe_.capture_path + "/queries.txt", "").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + recipe_.capture_path + "/queries.txt\n"));
+}
+
+TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {
+  recipe_.capture_path.clear();
+  recipe_.simulated = true;
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"),
+              HasSubstr("CAPTURE := " + paths_.build_dir + "/capture\nSIMULATED := yes\n"));
+}
+
+TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
+  paths_.build_dir = (folder_ / "my maps/kitchen.build").string();
+  const Status status = WriteBuildFolder(recipe_, paths_);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("has a space in its path, which Make cannot carry; rename"));
+  EXPECT_FALSE(CheckMakePath("the map", "/maps/50%.cairn").ok());
+  EXPECT_FALSE(CheckMakePath("the map", "/maps/$HOME.cairn").ok());
+  EXPECT_TRUE(CheckMakePath("the map", "/maps/Küche+Flur_2,b-1~@.cairn").ok());
+}
+
+TEST_F(BuildFolderTest, StaleTemporariesAreRemovedAndNothingElse) {
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  for (const char* name : {"/features.db.tmp-123", "/features.db"}) {
+    ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + name, "x").ok());
+  }
+  RemoveStaleTemporaries(paths_.build_dir);
+  EXPECT_FALSE(fs::exists(paths_.build_dir + "/features.db.tmp-123"));
+  EXPECT_TRUE(fs::exists(paths_.build_dir + "/features.db"));
+}
+
+TEST_F(BuildFolderTest, SecondCompileInAFolderIsRefusedAndNamesTheFirst) {
+  {
+    const auto lock = FolderLock::Acquire(paths_.build_dir);
+    ASSERT_TRUE(lock.ok()) << lock.error().message;
+    const auto second = FolderLock::Acquire(paths_.build_dir);
+    ASSERT_FALSE(second.ok());
+    EXPECT_EQ(second.error().code, ErrorCode::kBusy);
+    EXPECT_THAT(second.error().message, HasSubstr(fmt::format("(process {})", getpid())));
+  }
+  EXPECT_TRUE(FolderLock::Acquire(paths_.build_dir).ok());
+}
+
+TEST_F(BuildFolderTest, LockOfADeadProcessIsNone) {
+  const pid_t child = fork();
+  if (child == 0) _exit(FolderLock::Acquire(paths_.build_dir).ok() ? 0 : 1);  // dies with the file in place
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  EXPECT_TRUE(FolderLock::Acquire(paths_.build_dir).ok());
+}
+
+}  // namespace
+}  // namespace cairn
