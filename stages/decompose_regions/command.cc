@@ -1,0 +1,75 @@
+#include "stages/decompose_regions/command.h"
+
+#include <spdlog/spdlog.h>
+
+#include "core/file.h"
+#include "stages/decompose_regions/decompose_regions.h"
+#include "stages/decompose_regions/picture.h"
+#include "stages/decompose_regions/reduced_world.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string world;
+  std::string output;
+  std::string svg;
+  DecomposeRegionsOptions options;
+  OptionArguments option_arguments;
+};
+
+void WarnIfDisconnected(const World& world) {
+  std::vector<StationIdx> all(world.num_stations());
+  for (StationIdx station = 0; station < world.num_stations(); ++station) all[station] = station;
+  const IndexLists neighbours = NeighbourLists(world);
+  const auto components = ComponentFinder(neighbours).Components(all);
+  if (components.size() < 2) return;
+  spdlog::warn(
+      "the graph of stations has {} unconnected parts; no region spans two (station {} is not joined to {})",
+      components.size(), components[1][0], components[0][0]);
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
+  WarnIfDisconnected(world);
+  Result<Decomposition> result = DecomposeRegions(world, arguments.options, environment.seed);
+  if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
+  const Decomposition& decomposition = *result;
+  spdlog::info(
+      "{} stations, {} features: {} regions{}", world.num_stations(), world.num_features(),
+      decomposition.regions.size(),
+      decomposition.lower_bound ? fmt::format(", at least {} needed", *decomposition.lower_bound) : "");
+  if (!decomposition.uncovered.empty()) {
+    spdlog::warn(
+        "{} coverable stations are in no region (rho = {} lets small remainders go); first: station {}",
+        decomposition.uncovered.size(), decomposition.rho, decomposition.uncovered[0]);
+  }
+  if (!arguments.svg.empty()) {
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawDecomposition(world, decomposition)));
+  }
+  return WriteDecomposition(decomposition, arguments.output);
+}
+
+}  // namespace
+
+Command DecomposeRegionsCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  Command command;
+  command.name = "decompose-regions";
+  command.summary = "Divide a world into few regions in each of which the same k features are visible";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("world", arguments->world, "world: database (world.db) or JSON")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("-o,--output", arguments->output, "regions to write: .json, or else a database")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("--svg", arguments->svg, "also draw the regions as SVG")->type_name("FILE.svg");
+    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  };
+  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
+  return command;
+}
+
+}  // namespace cairn

@@ -1,0 +1,144 @@
+#include "stages/decompose_regions/decompose_regions.h"
+
+#include <algorithm>
+
+#include "stages/decompose_regions/algorithms.h"
+#include "stages/decompose_regions/cover.h"
+#include "stages/decompose_regions/reduced_world.h"
+
+namespace cairn {
+namespace {
+
+Error NothingCoverable(const World& world, const ReducedWorld& reduced,
+                       const DecomposeRegionsOptions& options) {
+  if (reduced.max_set_size == 0) {
+    return MakeError(
+        ErrorCode::kNoData,
+        "no station is coverable: no feature is visible from all stations within tau = {} hops of any of "
+        "the {} stations; choose a smaller tau or survey more densely",
+        options.tau, world.num_stations());
+  }
+  const Eigen::Vector2d position = world.positions[reduced.max_set_station];
+  return MakeError(
+      ErrorCode::kNoData,
+      "no station is coverable: k = {} features must be visible within tau = {} hops, the best station "
+      "({} at {:.2f}, {:.2f}) has {}; choose k <= {}",
+      options.k, options.tau, reduced.max_set_station, position.x(), position.y(), reduced.max_set_size,
+      reduced.max_set_size);
+}
+
+void RunAlgorithm(const DecomposeRegionsOptions& options, uint64_t seed, Cover* cover) {
+  if (options.algorithm == "a1") AlgorithmA1(seed, cover);
+  if (options.algorithm == "a2") AlgorithmA2(seed, cover);
+  if (options.algorithm == "a3") AlgorithmA3(seed, cover);
+  if (options.algorithm == "b1") AlgorithmB1(cover);
+  if (options.algorithm == "b2") AlgorithmB2(cover);
+  if (options.algorithm == "c") AlgorithmC(options.alpha, seed, cover);
+  // [Sala06 §V-D] B.2 leaves no redundant region.
+  if (options.algorithm != "b2") DropRedundantRegions(cover);
+}
+
+// [Theorem 4.2] Grows the regions back and names their features as the world does.
+Region GrownRegion(const CoreRegion& core, const ReducedWorld& reduced, int tau) {
+  Region region;
+  for (const int32_t feature : core.features) region.features.push_back(reduced.original[feature]);
+  std::sort(region.features.begin(), region.features.end());
+  region.stations = GrowStations(reduced.neighbours, core.stations, tau);
+  return region;
+}
+
+// A region grown by two or more hops can contain the whole neighbourhood of stations that its core does not
+// have.  Takes the cores of the grown regions, and drops regions that have become redundant.
+std::vector<CoreRegion> RegionsAfterGrowth(const Cover& cover, int tau) {
+  const ReducedWorld& reduced = cover.world();
+  std::vector<CoreRegion> kept;
+  if (tau < 2) {
+    for (const CoreRegion& region : cover.regions()) {
+      if (!region.stations.empty()) kept.push_back(region);
+    }
+    return kept;
+  }
+  Cover closed(reduced, 0);
+  std::vector<const CoreRegion*> cores;
+  for (const CoreRegion& region : cover.regions()) {
+    if (region.stations.empty()) continue;
+    CoreRegion core{region.features, {}};
+    for (const StationIdx station :
+         ShrinkStations(reduced.neighbours, GrowStations(reduced.neighbours, region.stations, tau), tau)) {
+      if (reduced.coverable[station]) core.stations.push_back(station);
+    }
+    if (closed.Add(core) > 0) cores.push_back(&region);
+  }
+  DropRedundantRegions(&closed);
+  for (size_t i = 0; i < cores.size(); ++i) {
+    if (!closed.IsDropped(static_cast<int>(i))) kept.push_back(*cores[i]);
+  }
+  return kept;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
+  return {
+      {.name = "algorithm",
+       .value = &o->algorithm,
+       .help = "algorithm of Sala06 §V",
+       .choices = {"a1", "a2", "a3", "b1", "b2", "c"}},
+      {.name = "k",
+       .value = &o->k,
+       .help = "number of features visible everywhere in a region (Sala06: 4, 10)",
+       .min = 1},
+      {.name = "tau",
+       .value = &o->tau,
+       .help = "every station's neighbourhood of this many hops lies in some region (Sala06: 0, 1)",
+       .min = 0},
+      {.name = "rho",
+       .value = &o->rho,
+       .help = "a region must cover more than this many stations that nothing else covers (Sala06: 9, 3)",
+       .min = 0},
+      {.name = "alpha",
+       .value = &o->alpha,
+       .help = "algorithm c: least share of a disc's stations that are open (Sala06: 0.85)",
+       .min = 0,
+       .max = 1},
+  };
+}
+
+Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
+                                       uint64_t seed) {
+  DecomposeRegionsOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  if (world.num_stations() == 0) return MakeError(ErrorCode::kNoData, "the world has no station");
+  const ReducedWorld reduced = ReduceWorld(world, options.k, options.tau, seed);
+  if (reduced.num_coverable == 0) return NothingCoverable(world, reduced, options);
+
+  Cover cover(reduced, options.rho);
+  RunAlgorithm(options, seed, &cover);
+
+  Decomposition decomposition{
+      .algorithm = options.algorithm, .k = options.k, .tau = options.tau, .rho = options.rho, .seed = seed};
+  std::vector<char> covered(world.num_stations(), 0);
+  for (const CoreRegion& core : RegionsAfterGrowth(cover, options.tau)) {
+    Region region = GrownRegion(core, reduced, options.tau);
+    const std::vector<StationIdx> inner =
+        options.tau < 2 ? core.stations : ShrinkStations(reduced.neighbours, region.stations, options.tau);
+    for (const StationIdx station : inner) covered[station] = 1;
+    decomposition.regions.push_back(std::move(region));
+  }
+  for (StationIdx station = 0; station < world.num_stations(); ++station) {
+    if (reduced.coverable[station] && !covered[station]) decomposition.uncovered.push_back(station);
+  }
+  decomposition.uncovered_limit = static_cast<int>(decomposition.uncovered.size());
+  return decomposition;
+}
+
+std::vector<StationIdx> CoverableStations(const World& world, int k, int tau) {
+  const ReducedWorld reduced = ReduceWorld(world, k, tau, 0);
+  std::vector<StationIdx> stations;
+  for (StationIdx station = 0; station < world.num_stations(); ++station) {
+    if (reduced.coverable[station]) stations.push_back(station);
+  }
+  return stations;
+}
+
+}  // namespace cairn

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/decomposition.h"
+#include "core/error.h"
+#include "core/options.h"
+#include "core/world.h"
+
+namespace cairn {
+
+// Divides a world into few large regions of stations, such that everywhere in a region the same k features
+// are visible: they are the landmarks that a robot needs there.  Before: filter_visibility.  After: emit_map.
+// Implements [Sala06 §III-V].  Problem (tau-MORDP, 3.8): the smallest set D of connected regions R with
+//   |intersection of F_v over v in R| >= k           for every R in D, and
+//   N_tau(v) inside of some R in D                   for every station v
+// where N_tau(v) are the stations within tau hops of v.  NP-complete; the algorithms are approximations.
+// Differs from the source: ties are broken by a seed everywhere; features and regions whose stations are not
+// connected are split into their components; stations of a rejected region leave U.
+//
+// | paper | here                                                                                        |
+// | F_v   | a station's features, ReducedWorld::sets                                                    |
+// | U     | open stations: not yet assigned to a region, Cover::IsOpen                                  |
+// | D     | Cover::regions                                                                              |
+// | L     | CoreRegion::features                                                                        |
+// | rho   | a region must cover more than rho stations that nothing else covers                         |
+struct DecomposeRegionsOptions {
+  // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, V-C].
+  std::string algorithm = "b2";
+  // Number of features that are visible everywhere in a region [Sala06: 4 and 10].  REQUIRES: >= 1
+  int k = 4;
+  // Overlap: the tau-neighbourhood of every station lies in some region, hops [Sala06: 0 and 1].  REQUIRES:
+  // >= 0
+  int tau = 1;
+  // A region is kept only if it covers more than this many stations that nothing else covers [Sala06: 9 in
+  // simulated worlds, 3 in the real one].  REQUIRES: >= 0
+  int rho = 9;
+  // Algorithm C: least share of a disc's stations that are open [Sala06: 0.85].  REQUIRES: in [0, 1]
+  double alpha = 0.85;
+};
+OptionTable DescribeOptions(DecomposeRegionsOptions* options);
+
+// Pure: same world, options and seed, same result.  B.2 costs O(incidences) per reading of the world plus,
+// for each region, O(k) passes over the incidences of the region's stations; memory is proportional to the
+// incidences. REQUIRES: CheckWorld(world) is ok. Errors: InvalidArgument for a bad option, NoData when no
+// station is coverable (says what k the best one allows).
+Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
+                                       uint64_t seed);
+
+// Stations that a decomposition has to cover [Sala06 §V-A]: at least k features are visible from all of
+// N_tau(v). Ascending.
+std::vector<StationIdx> CoverableStations(const World& world, int k, int tau);
+
+}  // namespace cairn

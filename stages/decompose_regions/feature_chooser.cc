@@ -1,0 +1,92 @@
+// [Sala06 Fig. 4, lines 3-9] Shrinking a region until k features are visible all over it; B.1, B.2 and C do
+// it.
+#include <algorithm>
+
+#include "stages/decompose_regions/algorithms.h"
+
+namespace cairn {
+
+FeatureChooser::FeatureChooser(Cover* cover) : cover_(*cover), counts_(cover->world().areas.size(), 0) {}
+
+void FeatureChooser::Count(const std::vector<StationIdx>& stations) {
+  for (const StationIdx station : stations) {
+    for (const int32_t feature : cover_.world().sets[station]) {
+      if (counts_[feature]++ == 0) counted_.push_back(feature);
+    }
+  }
+}
+
+void FeatureChooser::Uncount(const std::vector<StationIdx>& stations) {
+  for (const StationIdx station : stations) {
+    for (const int32_t feature : cover_.world().sets[station]) --counts_[feature];
+  }
+}
+
+// [line 5] f = argmax over f in F \ L of |{v in R : f in F_v}|
+int32_t FeatureChooser::MostVisible(const std::vector<int32_t>* allowed,
+                                    const std::vector<int32_t>& chosen) const {
+  int32_t best = -1;
+  for (const int32_t feature : allowed ? *allowed : counted_) {
+    const int32_t count = counts_[feature];
+    if (best >= 0 && (count < counts_[best] || (count == counts_[best] && feature > best))) continue;
+    if (std::find(chosen.begin(), chosen.end(), feature) == chosen.end()) best = feature;
+  }
+  return best;
+}
+
+CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
+  const ReducedWorld& world = cover_.world();
+  // [line 3] R = U, L = {}; the first feature of [line 5] is known from the counts over U
+  CoreRegion region;
+  if (allowed) {
+    region.features.push_back(*std::max_element(allowed->begin(), allowed->end(), [&](int32_t a, int32_t b) {
+      return std::pair(cover_.OpenCount(a), -a) < std::pair(cover_.OpenCount(b), -b);
+    }));
+  } else {
+    region.features.push_back(cover_.MostVisibleFeature());
+  }
+  std::vector<StationIdx> stations, removed;
+  for (const StationIdx station : world.areas[region.features[0]]) {
+    if (cover_.IsOpen(station)) stations.push_back(station);
+  }
+  if (world.k > 1) Count(stations);
+  // [lines 4-8]
+  while (static_cast<int>(region.features.size()) < world.k) {
+    const int32_t feature = MostVisible(allowed, region.features);
+    region.features.push_back(feature);
+    if (counts_[feature] == static_cast<int32_t>(stations.size())) continue;  // R stays
+    // [line 6] R = {v in R : f in F_v}
+    removed.clear();
+    const auto area = world.areas[feature];
+    auto seen = area.begin();
+    std::erase_if(stations, [&](StationIdx station) {
+      while (seen != area.end() && *seen < station) ++seen;
+      if (seen != area.end() && *seen == station) return false;
+      removed.push_back(station);
+      return true;
+    });
+    if (removed.size() <= stations.size()) {
+      Uncount(removed);
+    } else {
+      for (const int32_t f : counted_) counts_[f] = 0;
+      counted_.clear();
+      Count(stations);
+    }
+  }
+  for (const int32_t feature : counted_) counts_[feature] = 0;
+  counted_.clear();
+
+  // [line 9] R = {v in V : L is a subset of F_v}
+  region.stations.assign(world.areas[region.features[0]].begin(), world.areas[region.features[0]].end());
+  for (size_t i = 1; i < region.features.size(); ++i) {
+    const auto area = world.areas[region.features[i]];
+    auto seen = area.begin();
+    std::erase_if(region.stations, [&](StationIdx station) {
+      while (seen != area.end() && *seen < station) ++seen;
+      return seen == area.end() || *seen != station;
+    });
+  }
+  return region;
+}
+
+}  // namespace cairn

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/world.h"
+
+namespace cairn {
+
+// Lists of indices, one after the other in one array.
+class IndexLists {
+ public:
+  int size() const { return static_cast<int>(begins_.size()) - 1; }
+  int64_t num_values() const { return static_cast<int64_t>(values_.size()); }
+  std::span<const int32_t> operator[](int list) const {
+    return {values_.data() + begins_[list], values_.data() + begins_[list + 1]};
+  }
+  void Reserve(int64_t num_values) { values_.reserve(num_values); }
+  void Append(std::span<const int32_t> list) {
+    values_.insert(values_.end(), list.begin(), list.end());
+    begins_.push_back(static_cast<int64_t>(values_.size()));
+  }
+  // For each value v in [0, num_values): the lists that contain it, ascending.
+  IndexLists Transposed(int num_lists) const;
+
+ private:
+  std::vector<int64_t> begins_ = {0};
+  std::vector<int32_t> values_;
+};
+
+// The 0-overlapping problem that a world is reduced to [Sala06 §IV, Theorem 4.1]:
+//   F'_v = intersection of F_w over w in N_tau(v),
+// which shrinks every feature's area by tau hops; then only coverable stations (|F'_v| >= k, §V-A) stay, and
+// each connected component of an area becomes a feature of its own [§V-C].  Features are in an order drawn
+// from the seed, so that "the first of several equal ones" is a random choice.
+struct ReducedWorld {
+  int k = 0;
+  IndexLists neighbours;             // G
+  IndexLists areas;                  // per reduced feature: its stations, ascending
+  IndexLists sets;                   // F'_v: per station its reduced features, ascending
+  std::vector<FeatureIdx> original;  // per reduced feature: the world's feature; several may share one
+  std::vector<char> coverable;       // per station
+  int num_coverable = 0;
+  int max_set_size = 0;             // largest |F'_v|, before uncoverable stations were removed,
+  StationIdx max_set_station = -1;  // and the station that has it
+  int num_stations() const { return neighbours.size(); }
+};
+// O(incidences * degree * tau).
+ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed);
+
+IndexLists NeighbourLists(const World& world);
+
+// Finds connected parts of station sets; keeps scratch memory of the graph's size between calls.
+class ComponentFinder {
+ public:
+  explicit ComponentFinder(const IndexLists& neighbours)
+      : neighbours_(neighbours), mark_(neighbours.size(), 0) {}
+  // Components of a set of stations, each ascending, ordered by their first station.  The set is ascending.
+  std::vector<std::vector<StationIdx>> Components(std::span<const StationIdx> stations);
+
+ private:
+  const IndexLists& neighbours_;
+  std::vector<char> mark_;
+};
+
+// Stations within tau hops of a set, ascending: the inverse of the reduction, R' = union of N_tau(v)
+// [Theorem 4.2].
+std::vector<StationIdx> GrowStations(const IndexLists& neighbours, std::vector<StationIdx> stations, int tau);
+// Stations whose N_tau lies in a set, ascending.
+std::vector<StationIdx> ShrinkStations(const IndexLists& neighbours, std::vector<StationIdx> stations,
+                                       int tau);
+
+}  // namespace cairn
