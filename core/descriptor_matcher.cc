@@ -23,13 +23,6 @@ KernelRow RowOf(MatchKernel kernel) {
   return {MatchKernel::kPortable, SweepPortable, 4, false};
 }
 
-MatchKernel FastestKernel() {
-  static const MatchKernel kernel = IsKernelSupported(MatchKernel::kAvx512Vnni) ? MatchKernel::kAvx512Vnni
-                                    : IsKernelSupported(MatchKernel::kAvx2)     ? MatchKernel::kAvx2
-                                                                                : MatchKernel::kPortable;
-  return kernel;
-}
-
 uint32_t Chunk8(const uint8_t* bytes, uint8_t flip) {
   uint32_t chunk = 0;
   for (int i = 0; i < 4; ++i)
@@ -64,6 +57,13 @@ bool IsKernelSupported(MatchKernel kernel) {
   if (kernel == MatchKernel::kAvx2) return __builtin_cpu_supports("avx2");
 #endif
   return kernel == MatchKernel::kPortable;
+}
+
+MatchKernel FastestKernel() {
+  static const MatchKernel kernel = IsKernelSupported(MatchKernel::kAvx512Vnni) ? MatchKernel::kAvx512Vnni
+                                    : IsKernelSupported(MatchKernel::kAvx2)     ? MatchKernel::kAvx2
+                                                                                : MatchKernel::kPortable;
+  return kernel;
 }
 
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,

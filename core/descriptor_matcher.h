@@ -33,6 +33,8 @@ struct BestTwo {
 };
 enum class MatchKernel { kPortable, kAvx2, kAvx512Vnni };
 bool IsKernelSupported(MatchKernel kernel);
+// The fastest one that this processor supports.
+MatchKernel FastestKernel();
 // Best two columns for every row of 1, and best two rows for every column of 2, in one sweep.
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
                  MatchKernel kernel, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns);

@@ -1,0 +1,68 @@
+#include "stages/group_classes/command.h"
+
+#include "stages/group_classes/group_classes.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string matches;
+  std::string capture;
+  std::string output;
+  GroupClassesOptions options;
+  OptionArguments option_arguments;
+};
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
+  CAIRN_ASSIGN_OR_RETURN(const MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
+  CAIRN_ASSIGN_OR_RETURN(
+      const GroupClassesResult result,
+      GroupClasses(matched, capture, arguments.options, environment.num_threads, *environment.progress));
+  CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output));
+  const Classes& classes = result.classes;
+  std::string dropped;
+  for (const auto& [reason, count] : classes.dropped)
+    dropped += fmt::format("{}{} {}", dropped.empty() ? "" : ", ", count, reason);
+  *environment.out << fmt::format("group_classes: {} tracks, {} classes kept, dropped: {}\n",
+                                  result.num_tracks, classes.classes.size(),
+                                  dropped.empty() ? "none" : dropped);
+  if (result.poses_refined) {
+    const Pose& offset = classes.camera_from_given;
+    *environment.out << fmt::format(
+        "group_classes: poses refined, reprojection error {:.2f} -> {:.2f} px, offset {:.1f} cm / {:.2f} "
+        "deg, focal length "
+        "x {:.4f}\n",
+        result.initial_rms_px, result.final_rms_px, 100 * offset.translation.norm(),
+        RotationErrorDeg(offset, Pose()),
+        classes.cameras.front().FocalX() / matched.cameras.begin()->second.FocalX());
+  } else {
+    *environment.out << fmt::format("group_classes: poses as stated, reprojection error {:.2f} px\n",
+                                    result.final_rms_px);
+  }
+  return Ok();
+}
+
+}  // namespace
+
+Command GroupClassesCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {.name = "group-classes",
+          .summary = "Group matching keypoints into triangulated feature classes (stage 3)",
+          .add_arguments =
+              [arguments](CLI::App& app) {
+                app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
+                    ->required()
+                    ->type_name("matches.db");
+                app.add_option("--capture", arguments->capture, "Capture folder with the survey's poses")
+                    ->required();
+                app.add_option("-o,--output", arguments->output, "File to write")
+                    ->required()
+                    ->type_name("classes.db");
+                arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+              },
+          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+}
+
+}  // namespace cairn

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/error.h"
+#include "core/pose.h"
+
+namespace cairn {
+
+struct RefinePosesOptions {
+  // Standard deviation of the stated survey poses, metres and degrees: how far the images may move them.
+  // REQUIRES: > 0
+  double pose_sigma_m = 0.02;
+  double pose_sigma_deg = 0.5;
+  // Standard deviation of a keypoint's position, pixels.  REQUIRES: > 0
+  double keypoint_sigma_px = 1.0;
+  // Refine one rigid offset between all stated poses and their cameras (the poses may be a depth camera's or
+  // a body's).
+  bool refine_camera_offset = true;
+  // Standard deviations of that offset about none, metres and degrees.  REQUIRES: > 0
+  double offset_sigma_m = 0.05;
+  double offset_sigma_deg = 3.0;
+  // Refine one factor on the focal length of each pinhole camera, and its standard deviation about 1.
+  // REQUIRES: > 0
+  bool refine_focal = true;
+  double focal_sigma_ratio = 0.03;
+  // Most iterations of the solver.  REQUIRES: >= 1
+  int max_num_iterations = 30;
+};
+
+// Bundle adjustment problem with contiguous indices; refined in place.
+struct PoseProblem {
+  struct Observation {
+    int image_idx = 0;
+    int point_idx = 0;
+    Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // normalised coordinates, by the unrefined focal length
+    double focal_px = 1;                            // unrefined
+  };
+  std::vector<Pose> stated_poses;      // cam_from_world as the capture states them
+  std::vector<int> camera_idx;         // per image
+  std::vector<bool> is_focal_refined;  // per camera: false for models with distortion
+  std::vector<Observation> observations;
+  // Refined:
+  std::vector<Pose> poses;  // cam_from_world
+  std::vector<Eigen::Vector3d> points;
+  std::vector<double> focal_ratios;  // per camera, refined over unrefined
+  Pose camera_from_given;
+};
+
+struct RefinePosesSummary {
+  double initial_rms_px = 0;
+  double final_rms_px = 0;
+  int num_iterations = 0;
+  bool converged = false;
+};
+
+// Minimises over poses T_i, points X_j, offset O and focal ratios s_c
+//   sum_ij rho( |s f pi(T_i X_j) - f x_ij|^2 / sigma_px^2 )             reprojection, Cauchy loss
+//   + sum_i |log(T_i (O G_i)^-1)|^2 weighted by the pose sigmas          stated poses G_i, trusted as far as
+//   they go
+//   + |log O|^2 weighted by the offset sigmas + ((s - 1) / sigma_s)^2.
+// One thread: bit-stable.  Ceres with a sparse Schur complement (Eigen's Cholesky).
+RefinePosesSummary RefinePoses(const RefinePosesOptions& options, PoseProblem* problem);
+
+}  // namespace cairn

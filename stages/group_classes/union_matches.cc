@@ -1,0 +1,88 @@
+#include "stages/group_classes/union_matches.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+namespace cairn {
+namespace {
+
+// Union-find whose sets know the images that their keypoints come from.
+class TrackSets {
+ public:
+  explicit TrackSets(const std::vector<int>& num_keypoints) {
+    for (size_t image = 0; image < num_keypoints.size(); ++image) {
+      first_node_.push_back(static_cast<int>(elements_.size()));
+      for (int k = 0; k < num_keypoints[image]; ++k) {
+        elements_.push_back({static_cast<int32_t>(image), static_cast<KeypointIdx>(k)});
+      }
+    }
+    parents_.resize(elements_.size());
+    std::iota(parents_.begin(), parents_.end(), 0);
+    members_.resize(elements_.size());
+  }
+
+  int NodeOf(const TrackElement& element) const {
+    return first_node_[element.image_idx] + static_cast<int>(element.keypoint_idx);
+  }
+
+  int Find(int node) {
+    while (parents_[node] != node) node = parents_[node] = parents_[parents_[node]];
+    return node;
+  }
+
+  // False when the two sets hold different keypoints of one image.
+  bool Union(int node1, int node2) {
+    int root1 = Find(node1), root2 = Find(node2);
+    if (root1 == root2) return true;
+    Track merged;
+    const Track track1 = TrackOf(root1), track2 = TrackOf(root2);
+    merged.reserve(track1.size() + track2.size());
+    std::merge(track1.begin(), track1.end(), track2.begin(), track2.end(), std::back_inserter(merged));
+    const auto same_image = [](const TrackElement& a, const TrackElement& b) {
+      return a.image_idx == b.image_idx;
+    };
+    if (std::adjacent_find(merged.begin(), merged.end(), same_image) != merged.end()) return false;
+    if (root2 < root1) std::swap(root1, root2);
+    parents_[root2] = root1;
+    members_[root1] = std::move(merged);
+    Track().swap(members_[root2]);
+    return true;
+  }
+
+  std::vector<Track> Tracks() {
+    std::vector<Track> tracks;
+    for (size_t node = 0; node < parents_.size(); ++node) {
+      if (parents_[node] == static_cast<int>(node) && members_[node].size() >= 2)
+        tracks.push_back(std::move(members_[node]));
+    }
+    std::sort(tracks.begin(), tracks.end());
+    return tracks;
+  }
+
+ private:
+  // A set that was never joined has no member list.
+  Track TrackOf(int root) const { return members_[root].empty() ? Track{elements_[root]} : members_[root]; }
+
+  std::vector<int> first_node_;
+  std::vector<TrackElement> elements_;
+  std::vector<int> parents_;
+  std::vector<Track> members_;
+};
+
+}  // namespace
+
+std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
+                                int64_t* num_conflicts) {
+  std::sort(matches.begin(), matches.end(), [](const ScoredMatch& a, const ScoredMatch& b) {
+    return std::tie(b.dot_product, a.element1, a.element2) < std::tie(a.dot_product, b.element1, b.element2);
+  });
+  TrackSets sets(num_keypoints);
+  *num_conflicts = 0;
+  for (const ScoredMatch& match : matches) {
+    if (!sets.Union(sets.NodeOf(match.element1), sets.NodeOf(match.element2))) ++*num_conflicts;
+  }
+  return sets.Tracks();
+}
+
+}  // namespace cairn
