@@ -1,0 +1,292 @@
+#include "stages/filter_visibility/filter_visibility.h"
+
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+#include "stages/filter_visibility/lattice_area.h"
+#include "stages/filter_visibility/stations.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// A level camera (z up) at (x, y, 1) that looks along `heading_deg`.
+Pose CameraAt(double x, double y, double heading_deg) {
+  const double a = RadFromDeg(heading_deg);
+  Eigen::Matrix3d world_from_cam;  // columns: right, down, forward
+  world_from_cam.col(0) = Eigen::Vector3d(std::sin(a), -std::cos(a), 0);
+  world_from_cam.col(1) = Eigen::Vector3d(0, 0, -1);
+  world_from_cam.col(2) = Eigen::Vector3d(std::cos(a), std::sin(a), 0);
+  return Pose{Eigen::Quaterniond(world_from_cam), Eigen::Vector3d(x, y, 1)}.Inverse();
+}
+
+// A lattice survey with four headings at every 'o', half a metre apart; row 0 is y = 0.  Image ids count from
+// 1, four a station; noise_m moves every image.
+Classes LatticeSurvey(const std::vector<std::string>& drawing, double noise_m = 0) {
+  Classes classes;
+  Random random(5);
+  for (size_t row = 0; row < drawing.size(); ++row) {
+    for (size_t column = 0; column < drawing[row].size(); ++column) {
+      if (drawing[row][column] != 'o') continue;
+      for (const double heading_deg : {0, 90, 180, 270}) {
+        SurveyImage image;
+        image.image_id = static_cast<ImageId>(classes.images.size() + 1);
+        image.cam_from_world = CameraAt(0.5 * column + random.Uniform(-noise_m, noise_m),
+                                        0.5 * row + random.Uniform(-noise_m, noise_m), heading_deg);
+        classes.images.push_back(image);
+      }
+    }
+  }
+  return classes;
+}
+
+// Adds a class that is seen from the '#' of a drawing, in the first image of each station.
+void AddClass(const std::vector<std::string>& drawing, Classes* classes) {
+  FeatureClass& feature_class = classes->classes.emplace_back();
+  feature_class.class_id = static_cast<ClassId>(10 * classes->classes.size());
+  ImageId first_image = 1;
+  for (const std::string& row : drawing) {
+    for (const char station : row) {
+      if (station == ' ') continue;
+      if (station == '#') feature_class.observations.push_back({.image_id = first_image});
+      first_image += 4;
+    }
+  }
+}
+
+const std::vector<std::string> kFullLattice(6, "oooooooo");
+
+Stations LatticeStations(const std::vector<std::string>& drawing) {
+  const Result<Stations> stations = FindStations(LatticeSurvey(drawing).images, {});
+  EXPECT_TRUE(stations.ok());
+  return *stations;
+}
+
+// Stations of the '#' of a drawing of the full lattice.
+std::vector<StationIdx> Area(const std::vector<std::string>& drawing) {
+  std::vector<StationIdx> area;
+  StationIdx station = 0;
+  for (const std::string& row : drawing) {
+    for (const char c : row) {
+      if (c == '#') area.push_back(station);
+      ++station;
+    }
+  }
+  return area;
+}
+
+TEST(FindStations, RecognisesALatticeWithFourHeadings) {
+  const Result<Stations> stations = FindStations(LatticeSurvey(kFullLattice, 0.01).images, {});
+  ASSERT_TRUE(stations.ok());
+  EXPECT_TRUE(stations->is_lattice);
+  const World& world = stations->world;
+  EXPECT_NEAR(world.lattice_spacing_m, 0.5, 0.005);
+  ASSERT_EQ(world.num_stations(), 48);
+  EXPECT_EQ(world.edges.size(), 6 * 7 + 5 * 8);  // 4-neighbours
+  EXPECT_THAT(world.station_images[0], ElementsAre(1, 2, 3, 4));
+  EXPECT_NEAR(world.positions[9].x(), 0.5, 0.01);  // second of the second row
+  EXPECT_NEAR(world.positions[9].y(), 0.5, 0.01);
+  EXPECT_THAT(world.headings_deg, IsEmpty());
+  EXPECT_EQ(world.floor_from_world.Matrix(), Pose().Matrix());
+  EXPECT_TRUE(CheckWorld(world).ok());
+}
+
+TEST(FindStations, RecognisesALatticeThatIsTurnedAgainstTheAxes) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  const Pose turn{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())), {3.3, -7.1, 0}};
+  for (SurveyImage& image : classes.images) image.cam_from_world = image.cam_from_world * turn.Inverse();
+  const Result<Stations> stations = FindStations(classes.images, {});
+  ASSERT_TRUE(stations.ok());
+  EXPECT_TRUE(stations->is_lattice);
+  EXPECT_EQ(stations->world.num_stations(), 48);
+  EXPECT_EQ(stations->world.edges.size(), 6 * 7 + 5 * 8);
+}
+
+TEST(FindStations, DrivenSurveyHasCellsWithHeadings) {
+  //  cells of 0.5 m:  | 0 | 1 |
+  //  Three images in cell 0 (headings 0, 10 and 90), one in cell 1 (heading 359).
+  std::vector<SurveyImage> images(4);
+  images[0] = {.image_id = 7, .cam_from_world = CameraAt(0.1, 0.1, 0)};
+  images[1] = {.image_id = 8, .cam_from_world = CameraAt(0.3, 0.2, 10)};
+  images[2] = {.image_id = 9, .cam_from_world = CameraAt(0.2, 0.2, 90)};
+  images[3] = {.image_id = 4, .cam_from_world = CameraAt(0.7, 0.2, 359)};
+  const Result<Stations> stations = FindStations(images, {});
+  ASSERT_TRUE(stations.ok());
+  EXPECT_FALSE(stations->is_lattice);
+  const World& world = stations->world;
+  // Ordered by row, column, heading; 90 degrees is two bins from 0 and so not a neighbour.
+  EXPECT_THAT(world.headings_deg, ElementsAre(0, 90, 0));
+  EXPECT_THAT(world.edges, ElementsAre(std::pair(0, 2)));
+  EXPECT_THAT(world.station_images[0], ElementsAre(7, 8));
+  EXPECT_EQ(world.positions[0], Eigen::Vector2d(0.25, 0.25));
+  EXPECT_EQ(world.lattice_spacing_m, 0);
+}
+
+TEST(FindStations, NeighbouringHeadingsOfACellAreAdjacentAroundTheCircle) {
+  std::vector<SurveyImage> images;
+  for (int i = 0; i < 8; ++i) {
+    images.push_back({.image_id = static_cast<ImageId>(i + 1), .cam_from_world = CameraAt(0.1, 0.1, 45 * i)});
+  }
+  const Result<Stations> stations = FindStations(images, {});
+  ASSERT_TRUE(stations.ok());
+  EXPECT_EQ(stations->world.edges.size(), 8);
+}
+
+TEST(FindStations, UpIsTheMeanOfTheCamerasUnlessGiven) {
+  // A world whose y axis points down, as a camera's does.
+  Classes classes = LatticeSurvey(kFullLattice);
+  const Pose y_down{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX())),
+                    {0, 0, 0}};
+  for (SurveyImage& image : classes.images) image.cam_from_world = image.cam_from_world * y_down;
+  Result<Stations> stations = FindStations(classes.images, {});
+  ASSERT_TRUE(stations.ok());
+  const Eigen::Vector3d up_in_world = y_down.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  EXPECT_NEAR((stations->world.floor_from_world.rotation * up_in_world - Eigen::Vector3d::UnitZ()).norm(), 0,
+              1e-9);
+  EXPECT_TRUE(stations->is_lattice);
+
+  FilterVisibilityOptions options;
+  options.up = "0,0,2";
+  stations = FindStations(classes.images, options);
+  ASSERT_TRUE(stations.ok());
+  EXPECT_EQ(stations->world.floor_from_world.Matrix(), Pose().Matrix());
+  options.up = "upwards";
+  EXPECT_EQ(FindStations(classes.images, options).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(FindStations, ForcedLatticeOfATrajectoryIsAnError) {
+  Random random(1);
+  std::vector<SurveyImage> images;
+  for (ImageId i = 1; i < 50; ++i) {
+    images.push_back(
+        {.image_id = i, .cam_from_world = CameraAt(random.Uniform(0, 9), random.Uniform(0, 9), 0)});
+  }
+  FilterVisibilityOptions options;
+  options.survey = "lattice";
+  EXPECT_THAT(FindStations(images, options).error().message, HasSubstr("lie on no square grid"));
+}
+
+TEST(HoleSizes, CountsStationsEnclosedByTheArea) {
+  // The two stations in the middle are a hole; the one at the right is not: it is left over a diagonal.
+  // clang-format off
+  const std::vector<StationIdx> area = Area({"........",
+                                             ".#######",
+                                             ".#..##.#",
+                                             ".######.",
+                                             "..#.##..",
+                                             "...###.."});
+  // clang-format on
+  EXPECT_THAT(HoleSizes(area, LatticeStations(kFullLattice)), ElementsAre(2));
+}
+
+TEST(HoleSizes, PillarsAreNoHoles) {
+  //   o o o
+  //   o   o      the lattice has no station in the middle
+  //   o o o
+  const Stations stations = LatticeStations({"ooo", "o o", "ooo"});
+  EXPECT_THAT(HoleSizes({0, 1, 2, 3, 4, 5, 6, 7}, stations), IsEmpty());
+}
+
+TEST(TrimArea, KeepsNeighboursOfStationsWithSevenNeighbours) {
+  // The tail to the right has no station with 7 of 8 neighbours; (2, 2) and (3, 2) have 8, the rest are their
+  // neighbours.
+  const Stations stations = LatticeStations(kFullLattice);
+  // clang-format off
+  const std::vector<StationIdx> area = Area({"........",
+                                             ".####...",
+                                             ".#######",
+                                             ".####...",
+                                             "........",
+                                             "........"});
+  const std::vector<StationIdx> expected = Area({"........",
+                                                 ".####...",
+                                                 ".####...",
+                                                 ".####...",
+                                                 "........",
+                                                 "........"});
+  // clang-format on
+  EXPECT_EQ(TrimArea(area, stations, 7), expected);
+  EXPECT_EQ(TrimArea(expected, stations, 7), expected);  // a fixed point
+  EXPECT_EQ(TrimArea(area, stations, 0), area);
+}
+
+TEST(HasBlock, NeedsAFullSquare) {
+  const Stations stations = LatticeStations(kFullLattice);
+  const std::vector<StationIdx> area =
+      Area({"###.....", "#.#.....", "###.....", "#.##....", "########", "........"});
+  EXPECT_TRUE(HasBlock(area, stations, 2));
+  EXPECT_FALSE(HasBlock(area, stations, 3));
+}
+
+TEST(FilterVisibility, CountsWhatItDropsByReason) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  AddClass({"#####...", "#####...", "#####...", "#####...", "........", "........"}, &classes);  // kept
+  AddClass({"###.....", "###.....", "###.....", "........", "........", "........"}, &classes);  // 9 stations
+  AddClass({"########", "#......#", "########", "........", "........", "........"},
+           &classes);  // a hole of 6
+  AddClass({"##......", "##......", "##......", "########", "########", "........"}, &classes);  // no 3 x 3
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->world.class_ids, ElementsAre(10));
+  EXPECT_EQ(result->world.areas[0].size(), 20);
+  EXPECT_THAT(result->dropped,
+              testing::UnorderedElementsAre(testing::Pair("few_stations", 1), testing::Pair("holes", 1),
+                                            testing::Pair("no_block", 1)));
+}
+
+TEST(FilterVisibility, KeepsTheLargestComponent) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  AddClass({"###..###", "###..###", "###..###", "......##", "........", "........"}, &classes);
+  FilterVisibilityOptions options;
+  options.min_num_stations = 9;
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, options);
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  // The right one has 11 stations; the station below its middle stays (its neighbour (6, 1) has all 8), as
+  // does the last one: (6, 2) has 7 of 8 neighbours inside.
+  EXPECT_EQ(result->world.areas[0],
+            Area({".....###", ".....###", ".....###", "......##", "........", "........"}));
+}
+
+TEST(FilterVisibility, DrivenSurveysNeedConnectedStations) {
+  Classes classes;
+  for (ImageId i = 1; i <= 8; ++i) {
+    classes.images.push_back({.image_id = i, .cam_from_world = CameraAt(0.25 + 0.5 * i, 0.25, 0)});
+  }
+  for (const std::vector<ImageId>& seen_in :
+       {std::vector<ImageId>{1, 2, 3}, {1, 3, 5}, {1, 2}, {1, 2, 4, 5, 6}}) {
+    FeatureClass& feature_class = classes.classes.emplace_back();
+    feature_class.class_id = static_cast<ClassId>(classes.classes.size());
+    for (const ImageId image_id : seen_in) feature_class.observations.push_back({.image_id = image_id});
+  }
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_FALSE(result->is_lattice);
+  EXPECT_THAT(result->world.class_ids, ElementsAre(1, 4));
+  EXPECT_THAT(result->world.areas[1], ElementsAre(3, 4, 5));
+  EXPECT_THAT(result->dropped,
+              testing::UnorderedElementsAre(testing::Pair("few_stations", 1), testing::Pair("scattered", 1)));
+}
+
+TEST(FilterVisibility, NothingLeftNamesTheFilters) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  AddClass({"###.....", "........", "........", "........", "........", "........"}, &classes);
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(result.error().message, HasSubstr("1 by few_stations"));
+}
+
+TEST(FilterVisibility, ClassSeenInAnUnknownImageIsAnError) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  classes.classes.emplace_back().observations.push_back({.image_id = 9999});
+  EXPECT_THAT(FilterVisibility(classes, {}).error().message, HasSubstr("observed in image 9999"));
+}
+
+}  // namespace
+}  // namespace cairn
