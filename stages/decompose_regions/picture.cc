@@ -93,7 +93,7 @@ class Picture {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0f}\" height=\"{:.0f}\" "
         "font-family=\"sans-serif\" "
         "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-        width_ + 240, height);
+        width_ + 300, height);
     DrawStations();
     DrawOutlines();
     DrawScaleBar();
