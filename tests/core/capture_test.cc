@@ -1,0 +1,117 @@
+#include "core/capture.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class CaptureTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ =
+        testing::TempDir() + "/capture_test_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(root_);
+    fs::create_directories(root_ + "/images");
+    Write("cameras.txt", "# comment\n1 PINHOLE 640 480 525 525 320 240\n");
+  }
+  void Write(const std::string& name, const std::string& text) {
+    ASSERT_TRUE(WriteFileAtomically(root_ + "/" + name, text).ok());
+  }
+  void AddFiles(const std::vector<std::string>& names) {
+    for (const std::string& name : names) Write("images/" + name, "x");
+  }
+  std::string root_;
+};
+
+TEST_F(CaptureTest, ReadsImagesWithAndWithoutSecondLines) {
+  AddFiles({"a.jpg", "b c.jpg", "d.jpg"});
+  Write("images.txt",
+        "# header\n1 1 0 0 0 0.5 0 0 1 b c.jpg\n10.5 20.5 -1 30 40 7\n"  // a points line as COLMAP writes it
+        "2 1 0 0 0 1 0 0 1 a.jpg\n3 1 0 0 0 2 0 0 1 d.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  ASSERT_EQ(capture->images.size(), 3u);
+  EXPECT_EQ(capture->images[0].name, "a.jpg");
+  EXPECT_EQ(capture->images[1].name, "b c.jpg");
+  EXPECT_EQ(capture->images[1].cam_from_world->translation.x(), 0.5);
+  EXPECT_TRUE(capture->has_poses);
+}
+
+TEST_F(CaptureTest, BadPosesAndMissingFilesAreRejectsWithReasons) {
+  AddFiles({"a.jpg", "b.jpg", "c.jpg", "d.jpg"});
+  Write("images.txt",
+        "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 nan 0 0 0 0 0 0 1 b.jpg\n\n3 2 0 0 0 0 0 0 1 c.jpg\n\n4 1 0 0 0 0 0 0 "
+        "9 d.jpg\n\n"
+        "5 1 0 0 0 0 0 0 1 e.jpg\n\n6 1 0 0 0 0 0 0 1 a.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  ASSERT_EQ(capture->images.size(), 1u);
+  std::map<std::string, std::string> reasons;
+  for (const Reject& reject : capture->rejects) reasons[reject.name] = reject.reason;
+  EXPECT_THAT(reasons["b.jpg"], HasSubstr("images.txt:3: pose is not finite"));
+  EXPECT_THAT(reasons["c.jpg"], HasSubstr("quaternion of norm 2, expected 1"));
+  EXPECT_THAT(reasons["d.jpg"], HasSubstr("camera 9 is not in"));
+  EXPECT_THAT(reasons["e.jpg"], HasSubstr("no such file"));
+  EXPECT_THAT(reasons["a.jpg"], HasSubstr("listed twice"));
+}
+
+TEST_F(CaptureTest, QueriesAreHeldOutAndStrayFilesAreWarnedOf) {
+  AddFiles({"a.jpg", "q.jpg", "stray.jpg"});
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n");
+  Write("queries.txt", "1 1 0 0 0 0 0 0 1 q.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_EQ(capture->images.size(), 1u);
+  ASSERT_EQ(capture->queries.size(), 1u);
+  EXPECT_THAT(capture->warnings,
+              testing::ElementsAre(HasSubstr("stray.jpg: in neither images.txt nor queries.txt")));
+}
+
+TEST_F(CaptureTest, BrokenListsNameFileAndLine) {
+  AddFiles({"a.jpg"});
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0\n");
+  EXPECT_THAT(ReadCapture(root_).error().message, HasSubstr("images.txt:3: expected IMAGE_ID QW"));
+  Write("images.txt", "1 1 0 0 zero 0 0 0 1 a.jpg\n");
+  EXPECT_THAT(ReadCapture(root_).error().message,
+              HasSubstr("images.txt:1: a pose or camera id is not a number"));
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n");
+  Write("cameras.txt", "1 SPHERE 640 480 1\n");
+  const auto capture = ReadCapture(root_);
+  EXPECT_EQ(capture.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(capture.error().message, HasSubstr("cameras.txt:1: unknown camera model 'SPHERE'; known are"));
+}
+
+TEST_F(CaptureTest, ImpossibleFoldersAreErrors) {
+  EXPECT_EQ(ReadCapture(root_ + "/nowhere").error().code, ErrorCode::kNotFound);
+  Write("images.txt", "# nothing\n");
+  EXPECT_EQ(ReadCapture(root_).error().code, ErrorCode::kNoData);
+}
+
+TEST_F(CaptureTest, WrittenListsReadBackToTheSamePoses) {
+  AddFiles({"a.jpg"});
+  Pose pose;
+  pose.rotation = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
+  pose.translation = {1.25, -2.5, 0.125};
+  ASSERT_TRUE(WriteImagesText(root_ + "/images.txt", {{"a.jpg", 1, pose}}).ok());
+  const auto capture = ReadCapture(root_);
+  EXPECT_LT(RotationErrorDeg(*capture->images[0].cam_from_world, pose), 1e-6);
+  EXPECT_LT(CenterErrorM(*capture->images[0].cam_from_world, pose), 1e-5);
+}
+
+TEST(ParseCamera, AcceptsTheCommandLineForm) {
+  const auto camera = ParseCamera("SIMPLE_RADIAL,640,480,500,320,240,-0.1");
+  ASSERT_TRUE(camera.ok());
+  EXPECT_EQ(camera->model, CameraModel::kSimpleRadial);
+  EXPECT_FALSE(ParseCamera("SIMPLE_RADIAL,640,480,500").ok());
+  EXPECT_FALSE(ParseCamera("").ok());
+}
+
+}  // namespace
+}  // namespace cairn

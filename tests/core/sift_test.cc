@@ -1,0 +1,54 @@
+#include "core/sift.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace cairn {
+namespace {
+
+// A Gaussian blob whose centre is known in COLMAP's pixels.
+cv::Mat Blob(double x, double y, double sigma) {
+  cv::Mat image(96, 128, CV_8UC1);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const double dx = column + 0.5 - x, dy = row + 0.5 - y;
+      image.at<uint8_t>(row, column) = static_cast<uint8_t>(
+          std::lround(60 + 180 * std::exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma))));
+    }
+  }
+  return image;
+}
+
+TEST(ExtractSift, FindsTheCentreOfABlobInColmapsPixels) {
+  for (const auto& [x, y] : {std::pair(60.5, 40.5), std::pair(61.0, 40.0), std::pair(60.25, 44.75)}) {
+    const auto features = ExtractSift(Blob(x, y, 4.0), {});
+    ASSERT_TRUE(features.ok());
+    double least = 1e9;
+    Keypoint nearest;
+    for (const Keypoint& keypoint : features->keypoints) {
+      if (const double distance = std::hypot(keypoint.x - x, keypoint.y - y); distance < least) {
+        least = distance;
+        nearest = keypoint;
+      }
+    }
+    EXPECT_NEAR(nearest.x, x, 0.06);
+    EXPECT_NEAR(nearest.y, y, 0.06);
+    EXPECT_NEAR(nearest.scale, 4.0, 0.8);  // the blob's own sigma
+  }
+}
+
+TEST(ExtractSift, BlankImageHasNoFeatures) {
+  const auto features = ExtractSift(cv::Mat(50, 50, CV_8UC1, cv::Scalar(7)), {});
+  ASSERT_TRUE(features.ok());
+  EXPECT_TRUE(features->keypoints.empty());
+  EXPECT_EQ(features->descriptors.rows(), 0);
+}
+
+TEST(ExtractSift, ColourImageIsAnError) {
+  EXPECT_EQ(ExtractSift(cv::Mat(50, 50, CV_8UC3), {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(ExtractSift(cv::Mat(), {}).error().code, ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,167 @@
+#include "stages/extract_features/extract_features.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/colmap_database.h"
+#include "core/file.h"
+#include "core/random.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// Random blobs of several sizes on grey: plenty of SIFT features.
+cv::Mat BlobImage(uint64_t seed, int width = 320, int height = 240) {
+  Random random(seed);
+  cv::Mat image(height, width, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < 150; ++i) {
+    const cv::Point center(static_cast<int>(random.UniformInt(0, width)),
+                           static_cast<int>(random.UniformInt(0, height)));
+    cv::circle(image, center, static_cast<int>(random.UniformInt(2, 9)), cv::Scalar(random.Uniform(0, 255)),
+               cv::FILLED, cv::LINE_AA);
+  }
+  return image;
+}
+
+class ExtractFeaturesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = testing::TempDir() + "/capture_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(root_);
+    fs::create_directories(root_ + "/images");
+    Camera camera;
+    camera.model = CameraModel::kPinhole;
+    camera.width = 320;
+    camera.height = 240;
+    camera.params = {300, 300, 160, 120};
+    ASSERT_TRUE(WriteCamerasText(root_ + "/cameras.txt", {{1, camera}}).ok());
+  }
+
+  void AddImage(const std::string& name, const cv::Mat& image) {
+    ASSERT_TRUE(cv::imwrite(root_ + "/images/" + name, image));
+    List(name);
+  }
+  void List(const std::string& name) {
+    images_.push_back({name, 1, Pose()});
+    ASSERT_TRUE(WriteImagesText(root_ + "/images.txt", images_).ok());
+  }
+
+  Result<ExtractFeaturesSummary> Extract(int num_threads = 2, const ExtractFeaturesOptions& options = {}) {
+    const Result<Capture> capture = ReadCapture(root_);
+    if (!capture.ok()) return capture.error();
+    NoProgress progress;
+    return ExtractFeatures(*capture, options, root_ + "/features.db", num_threads, progress);
+  }
+
+  std::string root_;
+  std::vector<CaptureImage> images_;
+};
+
+TEST_F(ExtractFeaturesTest, SameBytesForAnyNumberOfThreads) {
+  for (int i = 0; i < 5; ++i) AddImage("image" + std::to_string(i) + ".png", BlobImage(i));
+  ASSERT_TRUE(Extract(1).ok());
+  const std::string one = *ReadFile(root_ + "/features.db");
+  ASSERT_TRUE(Extract(3).ok());
+  EXPECT_EQ(HashBytes(one), *HashFile(root_ + "/features.db"));
+}
+
+TEST_F(ExtractFeaturesTest, FeaturesComeBackFromTheDatabase) {
+  AddImage("b.png", BlobImage(1));
+  AddImage("a.png", BlobImage(2));
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  auto database = OpenDatabaseReadOnly(root_ + "/features.db");
+  ASSERT_TRUE(database.ok());
+  const auto images = ReadDatabaseImages(*database);
+  ASSERT_EQ(images->size(), 2u);
+  EXPECT_EQ((*images)[0].name, "a.png");  // ids in the order of names
+  const auto keypoints = ReadDatabaseKeypoints(*database, 1);
+  const auto descriptors = ReadDatabaseDescriptors(*database, 1);
+  ASSERT_GT(keypoints->size(), 50u);
+  EXPECT_EQ(static_cast<Eigen::Index>(keypoints->size()), descriptors->rows());
+  for (int i = 0; i < descriptors->rows(); ++i) {
+    EXPECT_NEAR(descriptors->row(i).cast<double>().norm(), 512, 8);  // RootSIFT has unit norm
+  }
+}
+
+TEST_F(ExtractFeaturesTest, BadImagesAreRejectedWithReasonsAndTheRestGoesOn) {
+  AddImage("good.png", BlobImage(1));
+  AddImage("small.png", BlobImage(2, 100, 80));
+  AddImage("whole.jpg", BlobImage(3));
+  const std::string jpeg = *ReadFile(root_ + "/images/whole.jpg");
+  std::ofstream(root_ + "/images/cut.jpg", std::ios::binary) << jpeg.substr(0, jpeg.size() / 2);
+  List("cut.jpg");
+  std::ofstream(root_ + "/images/empty.png");
+  List("empty.png");
+  std::ofstream(root_ + "/images/text.png") << "not an image";
+  List("text.png");
+  List("missing.png");
+  std::ofstream(root_ + "/images/stray.png") << "x";
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_images, 2);
+  std::map<std::string, std::string> reasons;
+  for (const Reject& reject : summary->rejects) reasons[reject.name] = reject.reason;
+  EXPECT_EQ(reasons.size(), 5u);
+  EXPECT_THAT(reasons["small.png"], HasSubstr("100 x 80 px, but its camera 1 has 320 x 240 px"));
+  EXPECT_THAT(reasons["cut.jpg"], HasSubstr("truncated JPEG"));
+  EXPECT_THAT(reasons["empty.png"], HasSubstr("zero bytes"));
+  EXPECT_THAT(reasons["text.png"], HasSubstr("not an image"));
+  EXPECT_THAT(reasons["missing.png"], HasSubstr("no such file"));
+  EXPECT_THAT(ReadCapture(root_)->warnings, testing::ElementsAre(HasSubstr("stray.png: in neither")));
+}
+
+TEST_F(ExtractFeaturesTest, NoReadableImageIsAnErrorAndLeavesNoFile) {
+  std::ofstream(root_ + "/images/empty.png");
+  List("empty.png");
+  const auto summary = Extract();
+  ASSERT_FALSE(summary.ok());
+  EXPECT_EQ(summary.error().code, ErrorCode::kNoData);
+  EXPECT_FALSE(fs::exists(root_ + "/features.db"));
+}
+
+TEST_F(ExtractFeaturesTest, MaskSwitchesPixelsOff) {
+  AddImage("a.png", BlobImage(1));
+  fs::create_directories(root_ + "/masks");
+  cv::Mat mask(240, 320, CV_8UC1, cv::Scalar(255));
+  mask(cv::Rect(0, 0, 160, 240)) = 0;
+  cv::imwrite(root_ + "/masks/a.png", mask);
+  ExtractFeaturesOptions options;
+  options.masks = "masks";
+  ASSERT_TRUE(Extract(1, options).ok());
+  auto database = OpenDatabaseReadOnly(root_ + "/features.db");
+  const auto keypoints = ReadDatabaseKeypoints(*database, 1);
+  ASSERT_GT(keypoints->size(), 10u);
+  for (const Keypoint& keypoint : *keypoints) EXPECT_GE(keypoint.x, 159);
+}
+
+TEST_F(ExtractFeaturesTest, BlankImageHasNoFeaturesButIsKept) {
+  AddImage("blank.png", cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)));
+  AddImage("good.png", BlobImage(1));
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok());
+  EXPECT_EQ(summary->num_images, 2);
+}
+
+// The installed colmap reads what we wrote: the strictest check of the schema there is.
+TEST_F(ExtractFeaturesTest, ColmapReadsTheDatabase) {
+  for (int i = 0; i < 2; ++i) AddImage("image" + std::to_string(i) + ".png", BlobImage(i));
+  ASSERT_TRUE(Extract().ok());
+  const std::string copy = root_ + "/copy.db";
+  fs::copy_file(root_ + "/features.db", copy);
+  const std::string command =
+      "QT_QPA_PLATFORM=offscreen colmap exhaustive_matcher --SiftMatching.use_gpu 0 --database_path " + copy +
+      " > " + root_ + "/colmap.log 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << *ReadFile(root_ + "/colmap.log");
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,205 @@
+#include "stages/group_classes/group_classes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+// A row of cameras that see random points, with exact matches between neighbours; the capture states poses
+// with noise.
+struct Survey {
+  MatchedFeatures matched;
+  Capture capture;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Pose> true_poses;
+};
+
+struct SurveyNoise {
+  double pixel = 0.3;
+  double pose_m = 0;
+  double pose_deg = 0;
+  Pose offset;             // true camera_from_given
+  double focal_ratio = 1;  // true over stated
+};
+
+Survey MakeSurvey(const SurveyNoise& noise) {
+  constexpr int kImages = 24, kPoints = 400;
+  Survey survey;
+  Camera camera;
+  camera.model = CameraModel::kPinhole;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {500, 500, 320, 240};
+  survey.matched.cameras.emplace(1, camera);
+  survey.capture.cameras.emplace(1, camera);
+  Camera true_camera = camera;
+  true_camera.params[0] *= noise.focal_ratio;
+  true_camera.params[1] *= noise.focal_ratio;
+  Random random(11);
+  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> looks;
+  for (int p = 0; p < kPoints; ++p) {
+    survey.points.emplace_back(random.Uniform(-3, 3), random.Uniform(-1.2, 1.2), random.Uniform(2, 4));
+    Eigen::Matrix<double, 1, kDescriptorDim> d;
+    for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 6);
+    looks.push_back((d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>());
+  }
+  std::vector<std::map<int, uint32_t>> keypoint_of_point(kImages);
+  for (int i = 0; i < kImages; ++i) {
+    Pose given;
+    const double turn = i * 0.4;
+    given.rotation = Eigen::AngleAxisd(0.2 * std::sin(turn), Eigen::Vector3d(0.3, 1, 0.2).normalized()) *
+                     Eigen::AngleAxisd(0.4 * std::cos(0.7 * turn), Eigen::Vector3d::UnitZ());
+    given.translation = -(given.rotation * Eigen::Vector3d(-1.5 + 3.0 * i / kImages, 0.2 * std::sin(turn),
+                                                           0.3 * std::cos(turn)));
+    const Pose true_pose = noise.offset * given;
+    survey.true_poses.push_back(true_pose);
+    Pose stated = given;
+    stated.translation +=
+        noise.pose_m * Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+    stated.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(noise.pose_deg) * random.Normal(0, 1),
+                                                            Eigen::Vector3d::Unit(i % 3))) *
+                       stated.rotation)
+                          .normalized();
+    const std::string name = fmt::format("image{:02d}.png", i);
+    survey.capture.images.push_back({name, 1, stated});
+    survey.matched.images.push_back({static_cast<ImageId>(i + 1), name, 1});
+    Features features;
+    std::vector<int> seen;
+    for (int p = 0; p < kPoints; ++p) {
+      const auto pixel = ImageFromCamera(true_camera, true_pose * survey.points[p]);
+      if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > 640 || pixel->y() > 480) continue;
+      keypoint_of_point[i][p] = static_cast<uint32_t>(features.keypoints.size());
+      features.keypoints.push_back({static_cast<float>(pixel->x() + random.Normal(0, noise.pixel)),
+                                    static_cast<float>(pixel->y() + random.Normal(0, noise.pixel)), 2, 0});
+      seen.push_back(p);
+    }
+    features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+    for (size_t k = 0; k < seen.size(); ++k)
+      features.descriptors.row(static_cast<Eigen::Index>(k)) = looks[seen[k]];
+    survey.matched.features.push_back(std::move(features));
+  }
+  for (int i = 0; i < kImages; ++i) {
+    for (int j = i + 1; j < std::min(kImages, i + 6); ++j) {
+      TwoViewGeometry geometry;
+      geometry.image_id1 = static_cast<ImageId>(i + 1);
+      geometry.image_id2 = static_cast<ImageId>(j + 1);
+      for (const auto& [p, k] : keypoint_of_point[i]) {
+        if (const auto other = keypoint_of_point[j].find(p); other != keypoint_of_point[j].end()) {
+          geometry.inliers.push_back({k, other->second});
+        }
+      }
+      survey.matched.geometries.push_back(geometry);
+    }
+  }
+  return survey;
+}
+
+GroupClassesResult Group(const Survey& survey, const GroupClassesOptions& options = {}, int num_threads = 2) {
+  NoProgress progress;
+  auto result = GroupClasses(survey.matched, survey.capture, options, num_threads, progress);
+  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
+  return std::move(*result);
+}
+
+double MedianPointError(const Survey& survey, const Classes& classes) {
+  std::vector<double> errors;
+  for (const FeatureClass& c : classes.classes) {
+    double least = 1e9;
+    for (const Eigen::Vector3d& point : survey.points) least = std::min(least, (point - c.position).norm());
+    errors.push_back(least);
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST(GroupClasses, ExactPosesGiveTheTruePoints) {
+  const Survey survey = MakeSurvey({});
+  const GroupClassesResult result = Group(survey);
+  EXPECT_FALSE(result.poses_refined);
+  EXPECT_GT(result.classes.classes.size(), 200u);
+  EXPECT_LT(MedianPointError(survey, result.classes), 0.01);
+  EXPECT_LT(result.final_rms_px, 0.6);
+}
+
+TEST(GroupClasses, NoisyPosesAreRefinedTowardsTheTruth) {
+  const Survey survey = MakeSurvey({.pose_m = 0.02, .pose_deg = 0.5});
+  const GroupClassesResult result = Group(survey);
+  ASSERT_TRUE(result.poses_refined);
+  EXPECT_LT(result.final_rms_px, 0.8);
+  double stated = 0, refined = 0;
+  for (size_t i = 0; i < survey.true_poses.size(); ++i) {
+    stated += CenterErrorM(result.classes.images[i].given_cam_from_world, survey.true_poses[i]);
+    // As the capture would state it: without the offset, which a survey that looks one way pins down badly.
+    const Pose in_given_frame =
+        result.classes.camera_from_given.Inverse() * result.classes.images[i].cam_from_world;
+    refined += CenterErrorM(in_given_frame, survey.true_poses[i]);
+  }
+  EXPECT_LT(refined, 0.6 * stated);
+}
+
+TEST(GroupClasses, ConstantOffsetAndFocalLengthAreFound) {
+  SurveyNoise noise{.pose_m = 0.002, .pose_deg = 0.05, .focal_ratio = 1.02};
+  noise.offset.translation = Eigen::Vector3d(0.04, -0.01, 0.02);
+  noise.offset.rotation = Eigen::AngleAxisd(RadFromDeg(1.5), Eigen::Vector3d(0.6, 0, 0.8));
+  const Survey survey = MakeSurvey(noise);
+  GroupClassesOptions options;
+  options.initial_reprojection_error_px = 30;
+  options.refinement.pose_sigma_m = 0.005;
+  options.refinement.pose_sigma_deg = 0.1;
+  const GroupClassesResult result = Group(survey, options);
+  ASSERT_TRUE(result.poses_refined);
+  EXPECT_LT((result.classes.camera_from_given.translation - noise.offset.translation).norm(), 0.01);
+  EXPECT_LT(RotationErrorDeg(result.classes.camera_from_given, noise.offset), 0.2);
+  EXPECT_NEAR(result.classes.cameras[0].FocalX(), 510, 3);
+}
+
+TEST(GroupClasses, SameResultForAnyNumberOfThreads) {
+  const Survey survey = MakeSurvey({.pose_m = 0.01, .pose_deg = 0.2});
+  const std::string path1 = testing::TempDir() + "/classes1.db", path2 = testing::TempDir() + "/classes2.db";
+  ASSERT_TRUE(WriteClasses(Group(survey, {}, 1).classes, path1).ok());
+  ASSERT_TRUE(WriteClasses(Group(survey, {}, 3).classes, path2).ok());
+  EXPECT_EQ(*HashFile(path1), *HashFile(path2));
+}
+
+TEST(GroupClasses, ClassesReadBackAsTheyWereWritten) {
+  const Classes written = Group(MakeSurvey({})).classes;
+  const std::string path = testing::TempDir() + "/classes_roundtrip.db",
+                    again = testing::TempDir() + "/classes_again.db";
+  ASSERT_TRUE(WriteClasses(written, path).ok());
+  const auto read = ReadClasses(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_TRUE(WriteClasses(*read, again).ok());
+  EXPECT_EQ(*HashFile(path), *HashFile(again));
+  EXPECT_EQ(read->classes.size(), written.classes.size());
+  EXPECT_EQ(read->dropped, written.dropped);
+}
+
+TEST(GroupClasses, CaptureWithoutPosesIsAnErrorWithTheRemedy) {
+  Survey survey = MakeSurvey({});
+  for (CaptureImage& image : survey.capture.images) image.cam_from_world.reset();
+  NoProgress progress;
+  const auto result = GroupClasses(survey.matched, survey.capture, {}, 1, progress);
+  EXPECT_EQ(result.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(result.error().message, HasSubstr("images.txt"));
+}
+
+TEST(GroupClasses, PosesThatDoNotFitAreAnErrorThatSaysWhatTookTheMost) {
+  Survey survey = MakeSurvey({});
+  Random random(3);
+  for (CaptureImage& image : survey.capture.images) {
+    image.cam_from_world->rotation = Eigen::AngleAxisd(random.Uniform(0, 3), Eigen::Vector3d::UnitY());
+    image.cam_from_world->translation = Eigen::Vector3d(random.Uniform(-50, 50), random.Uniform(-50, 50), 0);
+  }
+  NoProgress progress;
+  const auto result = GroupClasses(survey.matched, survey.capture, {}, 1, progress);
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(result.error().message, HasSubstr("by reprojection_error"));
+}
+
+}  // namespace
+}  // namespace cairn

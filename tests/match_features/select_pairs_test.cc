@@ -1,0 +1,50 @@
+#include "stages/match_features/select_pairs.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::Pair;
+
+// A camera at (x, 0, 0) that looks along z, turned by `yaw_deg` about y.
+PosedCamera At(double x, double yaw_deg) {
+  PosedCamera image;
+  image.camera.model = CameraModel::kSimplePinhole;
+  image.camera.width = 640;
+  image.camera.height = 480;
+  image.camera.params = {500, 320, 240};
+  image.cam_from_world.rotation = Eigen::AngleAxisd(RadFromDeg(yaw_deg), Eigen::Vector3d::UnitY());
+  image.cam_from_world.translation = image.cam_from_world.rotation * Eigen::Vector3d(-x, 0, 0);
+  return image;
+}
+
+TEST(SelectPairs, ExhaustiveAndSequencePairsAreAscending) {
+  EXPECT_THAT(ExhaustivePairs(3), ElementsAre(Pair(0, 1), Pair(0, 2), Pair(1, 2)));
+  EXPECT_THAT(SequencePairs(4, 1), ElementsAre(Pair(0, 1), Pair(1, 2), Pair(2, 3)));
+  EXPECT_TRUE(ExhaustivePairs(1).empty());
+  EXPECT_TRUE(ExhaustivePairs(0).empty());
+}
+
+TEST(SelectPairs, FrustaThatShareSceneAreMatchedOthersAreNot) {
+  //  0 and 1 side by side, both ahead; 2 looks backwards; 3 is far away
+  const std::vector<PosedCamera> images = {At(0, 0), At(0.3, 0), At(0, 180), At(50, 0)};
+  EXPECT_THAT(FrustumPairs(images, {}, 2), ElementsAre(Pair(0, 1)));
+}
+
+TEST(SelectPairs, OverlapOfAnImageWithItselfIsFull) {
+  EXPECT_DOUBLE_EQ(FrustumOverlap(At(0, 0), At(0, 0), {}), 1.0);
+  EXPECT_DOUBLE_EQ(FrustumOverlap(At(0, 0), At(0, 180), {}), 0.0);
+}
+
+TEST(SelectPairs, OpposedViewsOfOneWallAreNotMatched) {
+  // Facing each other 4 m apart: the same scene lies in both frusta, seen from opposite sides.
+  PosedCamera opposite = At(0, 180);
+  opposite.cam_from_world.translation = opposite.cam_from_world.rotation * Eigen::Vector3d(0, 0, -4);
+  EXPECT_LT(FrustumOverlap(At(0, 0), opposite, {}), 0.05);
+}
+
+}  // namespace
+}  // namespace cairn
