@@ -66,16 +66,14 @@ void FillBlob(cv::Mat picture, cv::Point2d centre, double radius, double value, 
 // Opaque shapes over each other with radii of density r^-3: the statistics of natural images at every scale
 // ("dead leaves").  `density` is the number of times that the shapes cover the picture.
 void PaintLeaves(cv::Mat picture, double smallest_px, double density, Random& random) {
-  const double largest = 0.3 * std::min(picture.cols, picture.rows);
+  const double largest = 0.35 * std::min(picture.cols, picture.rows);
   if (largest <= smallest_px) return;
   // E[r^2] for density r^-3 on [a, b] is 2 ln(b/a) / (1/a^2 - 1/b^2).
   const double a2 = 1 / (smallest_px * smallest_px), b2 = 1 / (largest * largest);
   const double mean_area = 2.2 * 2 * std::log(largest / smallest_px) / (a2 - b2);
   const int num_shapes = static_cast<int>(density * picture.cols * picture.rows / mean_area);
-  std::vector<double> radii(num_shapes);
-  for (double& radius : radii) radius = 1 / std::sqrt(random.Uniform(b2, a2));
-  std::sort(radii.begin(), radii.end(), std::greater<>());  // large ones first: small ones stay visible
-  for (const double radius : radii) {
+  for (int i = 0; i < num_shapes; ++i) {
+    const double radius = 1 / std::sqrt(random.Uniform(b2, a2));
     const cv::Point2d centre(random.Uniform(0, picture.cols), random.Uniform(0, picture.rows));
     FillBlob(picture, centre, radius, random.Uniform(15, 240), random);
   }
@@ -95,7 +93,7 @@ void PaintText(cv::Mat picture, Random& random) {
   const double ink = dark ? random.Uniform(190, 245) : random.Uniform(10, 60);
   picture.setTo(Grey(paper));
   const int margin = std::max(3, picture.cols / 20);
-  double size = std::max(10.0, picture.rows * random.Uniform(0.12, 0.3));
+  double size = std::max(18.0, picture.rows * random.Uniform(0.12, 0.3));
   for (double y = margin; y + size < picture.rows - margin;) {
     const int fonts[] = {cv::FONT_HERSHEY_SIMPLEX, cv::FONT_HERSHEY_DUPLEX, cv::FONT_HERSHEY_TRIPLEX,
                          cv::FONT_HERSHEY_COMPLEX};
@@ -112,13 +110,14 @@ void PaintText(cv::Mat picture, Random& random) {
       x += extent.width + 0.6 * size;
     }
     y += size * random.Uniform(1.2, 1.6);
-    if (random.Uniform() < 0.4) size = std::clamp(size * random.Uniform(0.45, 1.2), 9.0, picture.rows * 0.3);
+    if (random.Uniform() < 0.4)
+      size = std::clamp(size * random.Uniform(0.5, 1.2), 18.0, std::max(18.0, picture.rows * 0.3));
     if (random.Uniform() < 0.12) {  // a small picture between the lines
       const int h = std::min(static_cast<int>(3 * size) + 12, picture.rows - margin - static_cast<int>(y));
       const int w = std::min(static_cast<int>(h * random.Uniform(1, 2)), picture.cols - 2 * margin);
       if (h > 12 && w > 12) {
         const int x = margin + static_cast<int>(random.Uniform() * (picture.cols - 2 * margin - w));
-        PaintLeaves(picture(cv::Rect(x, static_cast<int>(y), w, h)), 2.5, 1.5, random);
+        PaintLeaves(picture(cv::Rect(x, static_cast<int>(y), w, h)), 8, 1, random);
         y += h + 0.4 * size;
       }
     }
@@ -128,14 +127,14 @@ void PaintText(cv::Mat picture, Random& random) {
 // Contours of a random landscape: curved bands at all scales.
 void PaintContours(cv::Mat picture, Random& random) {
   cv::Mat field(picture.size(), CV_8UC1, Grey(128));
-  AddNoise(field, picture.cols / 2.0, 4, 45, random, 1, 1, 0.9);
+  AddNoise(field, picture.cols / 2.0, 24, 45, random, 1, 1, 0.9);
   const int num_bands = static_cast<int>(random.UniformInt(5, 9));
   uint8_t tones[256];
   std::vector<double> band_tones(num_bands + 1);
   for (double& tone : band_tones) tone = random.Uniform(20, 240);
   for (int v = 0; v < 256; ++v) tones[v] = static_cast<uint8_t>(band_tones[v * num_bands / 256]);
   cv::LUT(field, cv::Mat(1, 256, CV_8UC1, tones), picture);
-  PaintLeaves(picture, 3, 0.3, random);
+  PaintLeaves(picture, 10, 0.1, random);
 }
 
 void PaintPoster(cv::Mat picture, Random& random) {
@@ -145,14 +144,14 @@ void PaintPoster(cv::Mat picture, Random& random) {
   cv::Mat inner = picture(cv::Rect(border, border, picture.cols - 2 * border, picture.rows - 2 * border));
   if (kind < 0.4) {
     inner.setTo(Grey(random.Uniform(60, 200)));
-    PaintLeaves(inner, 2.5, random.Uniform(1.2, 2.5), random);
+    PaintLeaves(inner, 12, random.Uniform(0.8, 1.5), random);
   } else if (kind < 0.6) {
     PaintContours(inner, random);
   } else if (kind < 0.8) {
     PaintText(inner, random);
   } else {  // a picture over a text
     const int split = static_cast<int>(inner.rows * random.Uniform(0.4, 0.7));
-    PaintLeaves(inner.rowRange(0, split), 2.5, 2, random);
+    PaintLeaves(inner.rowRange(0, split), 12, 1.2, random);
     PaintText(inner.rowRange(split, inner.rows), random);
   }
 }
@@ -161,7 +160,7 @@ void PaintPoster(cv::Mat picture, Random& random) {
 void PaintNotices(cv::Mat picture, double texel_m, Random& random) {
   picture.setTo(Grey(random.Uniform(90, 150)));
   AddNoise(picture, 16, 2, 10, random);
-  const int num_sheets = static_cast<int>(picture.cols * picture.rows * texel_m * texel_m * 22);
+  const int num_sheets = static_cast<int>(picture.cols * picture.rows * texel_m * texel_m * 12);
   for (int i = 0; i < num_sheets; ++i) {
     const int w = static_cast<int>(random.Uniform(0.08, 0.25) / texel_m);
     const int h = static_cast<int>(w * random.Uniform(0.7, 1.5));
@@ -170,7 +169,7 @@ void PaintNotices(cv::Mat picture, double texel_m, Random& random) {
       PaintText(sheet, random);
     } else {
       sheet.setTo(Grey(random.Uniform(60, 230)));
-      PaintLeaves(sheet, 2.5, 1.5, random);
+      PaintLeaves(sheet, 8, 0.8, random);
     }
     const double angle = random.Normal(0, 0.12), c = std::cos(angle), s = std::sin(angle);
     const cv::Matx23d map(c, -s, random.Uniform(0, picture.cols) - w / 2.0, s, c,
@@ -199,7 +198,7 @@ void PaintBrick(cv::Mat picture, double texel_m, Random& random) {
       }
     }
   }
-  AddNoise(picture, 64, 2, 9, random);
+  AddNoise(picture, 64, 2, 6, random);
 }
 
 void PaintWood(cv::Mat picture, double texel_m, bool vertical, Random& random) {
@@ -217,7 +216,7 @@ void PaintWood(cv::Mat picture, double texel_m, bool vertical, Random& random) {
       if (x1 > x0) {
         cv::Mat plank = planks(cv::Rect(x0, y0, x1 - x0, y1 - y0));
         plank.setTo(Grey(tone + random.Normal(0, 16)));
-        AddNoise(plank, 16, 2, 14, random, 8, 1);
+        AddNoise(plank, 16, 2, 7, random, 8, 1);
         for (int64_t k = random.UniformInt(0, 3); k > 0; --k) {  // knots
           const cv::Point2d centre(random.Uniform(0, plank.cols), random.Uniform(0, plank.rows));
           const double radius = random.Uniform(0.006, 0.022) / texel_m;
@@ -243,11 +242,11 @@ void PaintMaterial(cv::Mat picture, double texel_m, Material material, Random& r
       return;
     case Material::kPlaster:
       picture.setTo(Grey(random.Uniform(150, 205)));
-      AddNoise(picture, 256, 2, 12, random, 1, 1, 0.35);
+      AddNoise(picture, 256, 4, 10, random, 1, 1, 0.5);
       break;
     case Material::kConcrete:
       picture.setTo(Grey(random.Uniform(110, 160)));
-      AddNoise(picture, 128, 2, 16, random, 1, 1, 0.3);
+      AddNoise(picture, 128, 4, 14, random, 1, 1, 0.5);
       break;
     case Material::kWallpaper: {
       const double tone = random.Uniform(120, 200);
@@ -275,8 +274,8 @@ void PaintMaterial(cv::Mat picture, double texel_m, Material material, Random& r
 cv::Mat PaintWallPanel(int width_px, int height_px, double texel_m, Material material, Random& random) {
   cv::Mat picture(height_px, width_px, CV_8UC1);
   PaintMaterial(picture, texel_m, material, random);
-  // Two or three things hang on the wall between knee and door height, where a robot sees them.
-  const int num_things = static_cast<int>(random.UniformInt(1, 3));
+  // One or two things hang on the wall between knee and door height, where a robot sees them.
+  const int num_things = static_cast<int>(random.UniformInt(1, 2));
   for (int i = 0; i < num_things; ++i) {
     const double kind = random.Uniform();
     const int w = std::min(width_px - 4, static_cast<int>(random.Uniform(0.35, 1.1) / texel_m));

@@ -9,6 +9,9 @@ namespace {
 
 // Pixels in which surfaces meet are the mean of this many rays squared.
 constexpr int kEdgeSamples = 3;
+// A pixel averages a surface over this many times its own width: a lens is never as sharp as its sensor's
+// grid.
+constexpr float kLensWidthPx = 1.5f;
 // Stands for "no surface" beside the values of RayHit::face.
 constexpr int kNoFace = -3;
 // Walls are darker towards the floor: brightness there, of that below the ceiling.
@@ -37,7 +40,8 @@ Shade TraceRay(const Building& building, const Eigen::Vector3d& origin, const Ei
   };
   const Eigen::Vector2f texel(static_cast<float>(surface.u_offset + surface.u_scale * point[surface.u_axis]),
                               static_cast<float>(surface.v_offset + surface.v_scale * point[surface.v_axis]));
-  const float value = building.textures[surface.texture].Sample(texel, footprint(step_x), footprint(step_y));
+  const float value = building.textures[surface.texture].Sample(texel, kLensWidthPx * footprint(step_x),
+                                                                kLensWidthPx * footprint(step_y));
   const double light =
       normal_axis == 2 ? 1 : kBrightnessAtFloor + (1 - kBrightnessAtFloor) * point.z() / building.height_m;
   return {hit->face, value * surface.brightness * static_cast<float>(light)};
