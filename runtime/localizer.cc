@@ -1,0 +1,267 @@
+#include "runtime/localizer.h"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace cairn {
+namespace {
+
+// Seed of RANSAC: fixed, so that an image always gives the same answer.
+constexpr uint64_t kRansacSeed = 0;
+
+std::vector<LandmarkIdx> AllLandmarks(const Map& map) {
+  std::vector<LandmarkIdx> landmarks(map.rows().landmarks.size());
+  std::iota(landmarks.begin(), landmarks.end(), 0);
+  return landmarks;
+}
+
+std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
+  std::vector<int32_t> images;
+  for (const Candidate& candidate : candidates) images.push_back(candidate.image);
+  return images;
+}
+
+std::vector<Correspondence> Select(const std::vector<Correspondence>& correspondences,
+                                   const std::vector<int>& indices) {
+  std::vector<Correspondence> selected;
+  for (const int i : indices) selected.push_back(correspondences[i]);
+  return selected;
+}
+
+std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
+  std::vector<LandmarkIdx> landmarks;
+  for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
+  return landmarks;
+}
+
+// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
+RegionIdx RegionWithMost(const MapRows& rows, const std::vector<Correspondence>& inliers) {
+  RegionIdx best_region = -1;
+  int most = 0;
+  for (size_t region = 0; region < rows.regions.size(); ++region) {
+    const std::vector<LandmarkIdx>& landmarks = rows.regions[region].landmarks;
+    int count = 0;
+    for (const Correspondence& inlier : inliers) {
+      count += std::binary_search(landmarks.begin(), landmarks.end(), inlier.landmark) ? 1 : 0;
+    }
+    if (count > most) {
+      most = count;
+      best_region = static_cast<RegionIdx>(region);
+    }
+  }
+  return best_region;
+}
+
+Localization Failure(NoFix reason, std::string message) {
+  Localization localization;
+  localization.reason = reason;
+  localization.message = std::move(message);
+  return localization;
+}
+
+}  // namespace
+
+// A set of landmarks to match.
+struct Localizer::Attempt {
+  Scope scope = Scope::kAll;
+  std::vector<LandmarkIdx> landmarks;  // ascending
+};
+
+const char* ScopeName(Scope scope) {
+  switch (scope) {
+    case Scope::kPrior:
+      return "prior";
+    case Scope::kRegions:
+      return "regions";
+    case Scope::kImages:
+      return "images";
+    case Scope::kAll:
+      return "all";
+  }
+  return "all";
+}
+
+OptionTable DescribeOptions(LocalizerOptions* options) {
+  OptionTable table;
+  for (const OptionTable& part : {DescribeOptions(&options->sift), DescribeOptions(&options->measurement),
+                                  DescribeOptions(&options->retrieve), DescribeOptions(&options->match),
+                                  DescribeOptions(&options->estimate), DescribeOptions(&options->refine),
+                                  DescribeOptions(&options->accept)}) {
+    table.insert(table.end(), part.begin(), part.end());
+  }
+  table.push_back(
+      {.name = "first_landmarks",
+       .value = &options->first_landmarks,
+       .help = "landmarks to match first: of the candidates' regions or of the candidate images; auto: "
+               "regions, unless the map keeps landmarks that no region has",
+       .choices = {"auto", "regions", "images"}});
+  table.push_back({.name = "fall_back_to_all",
+                   .value = &options->fall_back_to_all,
+                   .help = "try all landmarks of the map when those fail"});
+  return table;
+}
+
+Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
+    : map_(std::move(map)), options_(options) {}
+
+Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
+                                         const std::optional<PosePrior>& prior) {
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  if (grey.cols != camera.width || grey.rows != camera.height) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
+                     camera.width, camera.height);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
+  return LocalizeFeatures(std::move(features), camera, prior);
+}
+
+Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
+                                                 const std::optional<PosePrior>& prior) {
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
+    return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
+                     features.keypoints.size(), features.descriptors.rows());
+  }
+  const int num_features = static_cast<int>(features.keypoints.size());
+  if (num_features < options_.accept.min_num_features) {
+    Localization none = Failure(
+        NoFix::kTooFewFeatures,
+        fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
+    none.num_features = num_features;
+    return none;
+  }
+  const Query query = MakeQuery(std::move(features), camera, options_.measurement);
+
+  std::vector<ImageId> candidate_ids;
+  Localization best = Failure(NoFix::kNoCandidates, "no survey image looks like it");
+  for (const Attempt& attempt : MakeAttempts(query, prior, &candidate_ids)) {
+    Localization localization = Try(query, attempt);
+    // Of the failures, the one that came farthest is the most telling.
+    const bool better = std::pair(localization.num_inliers, localization.num_matches) >=
+                        std::pair(best.num_inliers, best.num_matches);
+    if (localization.has_fix() || better) best = std::move(localization);
+    if (best.has_fix()) break;
+  }
+  best.num_features = num_features;
+  best.candidates = std::move(candidate_ids);
+  if (best.has_fix()) {
+    const Pose given_from_camera = map_->rows().camera_from_given.Inverse();
+    best.cam_from_world = given_from_camera * best.cam_from_world;
+    best.covariance = TransformCovariance(given_from_camera, best.covariance);
+  }
+  return best;
+}
+
+std::vector<Localizer::Attempt> Localizer::MakeAttempts(const Query& query,
+                                                        const std::optional<PosePrior>& prior,
+                                                        std::vector<ImageId>* candidate_ids) const {
+  std::vector<Attempt> attempts;
+  const auto add = [&](Scope scope, std::vector<LandmarkIdx> landmarks) {
+    if (landmarks.empty()) return;
+    for (const Attempt& attempt : attempts) {
+      if (attempt.landmarks == landmarks) return;
+    }
+    attempts.push_back({scope, std::move(landmarks)});
+  };
+  if (prior) {
+    add(Scope::kPrior, LandmarksOfImages(*map_, ImagesOf(RetrieveByPrior(*map_, *prior, options_.retrieve))));
+  }
+  const std::vector<Candidate> candidates =
+      RetrieveByWords(*map_, query.features.descriptors, options_.retrieve);
+  for (const Candidate& candidate : candidates)
+    candidate_ids->push_back(map_->rows().images[candidate.image].image_id);
+  auto of_regions = LandmarksOfRegions(*map_, RegionsOfCandidates(*map_, candidates, options_.retrieve));
+  auto of_images = LandmarksOfImages(*map_, ImagesOf(candidates));
+  const bool images_first = options_.first_landmarks == "images" ||
+                            (options_.first_landmarks == "auto" && map_->rows().landmark_choice == "all");
+  if (images_first) add(Scope::kImages, of_images);
+  add(Scope::kRegions, std::move(of_regions));
+  add(Scope::kImages, std::move(of_images));
+  if (options_.fall_back_to_all) add(Scope::kAll, AllLandmarks(*map_));
+  return attempts;
+}
+
+Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
+  const AcceptOptions& accept = options_.accept;
+  Localization localization;
+  localization.scope = attempt.scope;
+  const auto fail = [&](NoFix reason, std::string message) {
+    localization.reason = reason;
+    localization.message = std::move(message);
+    return localization;
+  };
+
+  std::vector<Correspondence> matches = MatchLandmarks(query, *map_, attempt.landmarks, options_.match);
+  localization.num_matches = static_cast<int>(matches.size());
+  if (localization.num_matches < accept.min_num_matches) {
+    return fail(NoFix::kTooFewMatches,
+                fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
+                            attempt.landmarks.size(), accept.min_num_matches));
+  }
+  const std::vector<PoseMeasurement> measurements = MakeMeasurements(query, map_->rows(), matches);
+  const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
+  if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
+  localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
+  if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
+      localization.num_unguided_inliers < accept.min_inlier_ratio * static_cast<double>(matches.size())) {
+    return fail(NoFix::kTooFewInliers,
+                fmt::format("{} of {} matches agree on a pose, at least {} and {:.0f} % are needed",
+                            estimate->inliers.size(), matches.size(), accept.min_num_unguided_inliers,
+                            100 * accept.min_inlier_ratio));
+  }
+  if (accept.max_second_pose_ratio > 0 && IsAmbiguous(measurements, *estimate)) {
+    return fail(NoFix::kAmbiguous, fmt::format("another pose has at least {:.0f} % as many inliers",
+                                               100 * accept.max_second_pose_ratio));
+  }
+
+  matches = Select(matches, estimate->inliers);
+  if (options_.match.guided_num_images > 0) {
+    std::vector<Correspondence> guided =
+        MatchGuided(query, *map_, CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match),
+                    estimate->cam_from_world, options_.match);
+    if (guided.size() >= matches.size()) matches = std::move(guided);
+  }
+  const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, map_->rows(), matches),
+                                                estimate->cam_from_world, options_.refine);
+  if (!refined)
+    return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
+  const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
+  localization.num_inliers = static_cast<int>(inliers.size());
+  Verdict verdict = JudgePose(*refined, inliers, query, *map_, accept);
+  if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
+  localization.reason = NoFix::kNone;
+  localization.cam_from_world = refined->cam_from_world;
+  localization.covariance = refined->covariance;
+  localization.region = RegionWithMost(map_->rows(), inliers);
+  return localization;
+}
+
+bool Localizer::IsAmbiguous(const std::vector<PoseMeasurement>& measurements,
+                            const PoseEstimate& first) const {
+  const AcceptOptions& accept = options_.accept;
+  const double needed = accept.max_second_pose_ratio * static_cast<double>(first.inliers.size());
+  std::vector<PoseMeasurement> others;
+  size_t next = 0;
+  for (size_t i = 0; i < measurements.size(); ++i) {
+    if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
+      ++next;
+    } else {
+      others.push_back(measurements[i]);
+    }
+  }
+  if (static_cast<double>(others.size()) < needed) return false;
+  EstimateOptions estimate_options = options_.estimate;
+  estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
+  estimate_options.min_num_ransac_iterations =
+      std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
+  const auto second = EstimatePose(others, estimate_options, options_.refine, kRansacSeed);
+  return second && static_cast<double>(second->inliers.size()) >= needed &&
+         (CenterErrorM(first.cam_from_world, second->cam_from_world) > accept.second_pose_distance_m ||
+          RotationErrorDeg(first.cam_from_world, second->cam_from_world) > accept.second_pose_angle_deg);
+}
+
+}  // namespace cairn

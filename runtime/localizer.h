@@ -1,0 +1,93 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "core/error.h"
+#include "core/sift.h"
+#include "runtime/accept.h"
+#include "runtime/estimate.h"
+#include "runtime/map.h"
+#include "runtime/match.h"
+#include "runtime/measurement.h"
+#include "runtime/refine.h"
+#include "runtime/retrieve.h"
+
+namespace cairn {
+
+// The options of every piece of localization, in the order in which they act.
+struct LocalizerOptions {
+  SiftOptions sift;
+  MeasurementOptions measurement;
+  RetrieveOptions retrieve;
+  MatchOptions match;
+  EstimateOptions estimate;
+  RefineOptions refine;
+  AcceptOptions accept;
+  // Landmarks to match first: of the candidates' regions, or of the candidate images themselves; "auto":
+  // regions, unless the map keeps landmarks that no region has.
+  std::string first_landmarks = "auto";
+  // Try all landmarks of the map when those fail.
+  bool fall_back_to_all = true;
+};
+OptionTable DescribeOptions(LocalizerOptions* options);
+
+// Where landmarks to match came from.
+enum class Scope { kPrior, kRegions, kImages, kAll };
+const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all"
+
+// A fix, or the reason for none.
+struct Localization {
+  NoFix reason = NoFix::kNoCandidates;
+  std::string message;  // why there is no fix: found and needed
+  bool has_fix() const { return reason == NoFix::kNone; }
+
+  // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given is
+  // applied).
+  Pose cam_from_world;
+  // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
+  // (Exp(rotation), translation) * cam_from_world.
+  Matrix6d covariance = Matrix6d::Identity();
+  RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
+  Scope scope = Scope::kAll;
+
+  int num_features = 0;
+  int num_matches = 0;              // without knowing the pose
+  int num_unguided_inliers = 0;     // of them
+  int num_inliers = 0;              // in all
+  std::vector<ImageId> candidates;  // survey images, most alike first
+};
+
+// Says where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
+class Localizer {
+ public:
+  explicit Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options = {});
+
+  // From 8-bit grey pixels of the camera's size.  Same image, same result.
+  // Errors: InvalidArgument (not 8-bit grey; a camera that is none or of another size).  An image that cannot
+  // be localized is no error: see Localization::reason.
+  Result<Localization> Localize(const cv::Mat& grey, const Camera& camera,
+                                const std::optional<PosePrior>& prior = std::nullopt);
+
+  // The same from features that are there already (rows of descriptors belong to keypoints).
+  Result<Localization> LocalizeFeatures(Features features, const Camera& camera,
+                                        const std::optional<PosePrior>& prior = std::nullopt);
+
+  const LocalizerOptions& options() const { return options_; }
+
+ private:
+  struct Attempt;
+  std::vector<Attempt> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
+                                    std::vector<ImageId>* candidate_ids) const;
+  Localization Try(const Query& query, const Attempt& attempt) const;
+  bool IsAmbiguous(const std::vector<PoseMeasurement>& measurements, const PoseEstimate& first) const;
+
+  std::shared_ptr<const Map> map_;
+  LocalizerOptions options_;
+};
+
+}  // namespace cairn

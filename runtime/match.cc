@@ -1,0 +1,175 @@
+#include "runtime/match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/descriptor_matcher.h"
+
+namespace cairn {
+namespace {
+
+int32_t Dot(const uint8_t* a, const uint8_t* b) {
+  int32_t sum = 0;
+  for (int i = 0; i < kDescriptorDim; ++i) sum += static_cast<int32_t>(a[i]) * static_cast<int32_t>(b[i]);
+  return sum;
+}
+
+// Keypoints of the query in square cells, for those near a pixel.
+class KeypointGrid {
+ public:
+  KeypointGrid(const Query& query, double cell_px) : query_(query), cell_px_(cell_px) {
+    num_columns_ = static_cast<int>(query.camera.width / cell_px) + 1;
+    num_rows_ = static_cast<int>(query.camera.height / cell_px) + 1;
+    cells_.resize(static_cast<size_t>(num_columns_) * num_rows_);
+    for (KeypointIdx i = 0; i < query.features.keypoints.size(); ++i) {
+      if (!query.rays[i]) continue;
+      const Keypoint& keypoint = query.features.keypoints[i];
+      cells_[static_cast<size_t>(Clamp(keypoint.y, num_rows_)) * num_columns_ +
+             Clamp(keypoint.x, num_columns_)]
+          .push_back(i);
+    }
+  }
+
+  template <typename Visit>
+  void VisitNear(const Eigen::Vector2d& pixel, double radius_px, const Visit& visit) const {
+    for (int row = Clamp(pixel.y() - radius_px, num_rows_); row <= Clamp(pixel.y() + radius_px, num_rows_);
+         ++row) {
+      for (int col = Clamp(pixel.x() - radius_px, num_columns_);
+           col <= Clamp(pixel.x() + radius_px, num_columns_); ++col) {
+        for (const KeypointIdx i : cells_[static_cast<size_t>(row) * num_columns_ + col]) {
+          const Keypoint& keypoint = query_.features.keypoints[i];
+          if (std::hypot(keypoint.x - pixel.x(), keypoint.y - pixel.y()) <= radius_px) visit(i);
+        }
+      }
+    }
+  }
+
+ private:
+  int Clamp(double coordinate, int count) const {
+    return static_cast<int>(std::clamp(coordinate / cell_px_, 0.0, static_cast<double>(count - 1)));
+  }
+
+  const Query& query_;
+  double cell_px_;
+  int num_columns_ = 0;
+  int num_rows_ = 0;
+  std::vector<std::vector<KeypointIdx>> cells_;
+};
+
+bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
+               double max_ratio) {
+  if (landmark.scale_m <= 0) return true;  // not known
+  const double ratio = keypoint.scale * depth_m / (landmark.scale_m * focal_px);
+  return ratio <= max_ratio && ratio * max_ratio >= 1;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(MatchOptions* o) {
+  return {
+      {.name = "max_ratio",
+       .value = &o->max_ratio,
+       .help = "largest ratio of best to second-best descriptor angle, both ways",
+       .min = 1e-3,
+       .max = 1},
+      {.name = "max_angle_rad",
+       .value = &o->max_angle_rad,
+       .help = "largest descriptor angle of a match, radians",
+       .min = 1e-3},
+      {.name = "guided_radius_px",
+       .value = &o->guided_radius_px,
+       .help = "a landmark is looked for this near to its projection, px",
+       .min = 0.1},
+      {.name = "guided_max_angle_rad",
+       .value = &o->guided_max_angle_rad,
+       .help = "largest descriptor angle there, radians",
+       .min = 1e-3},
+      {.name = "guided_max_scale_ratio",
+       .value = &o->guided_max_scale_ratio,
+       .help = "largest ratio of a keypoint's scale to the predicted one, either way",
+       .min = 1},
+      {.name = "guided_num_images",
+       .value = &o->guided_num_images,
+       .help = "survey images whose landmarks are looked for; 0: no guided matching",
+       .min = 0},
+  };
+}
+
+std::vector<Correspondence> MatchLandmarks(const Query& query, const Map& map,
+                                           const std::vector<LandmarkIdx>& landmarks,
+                                           const MatchOptions& options) {
+  const DescriptorMatcherOptions matcher_options{
+      .max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad, .mutual = true};
+  std::vector<Match> matches;
+  if (landmarks.size() == map.rows().landmarks.size()) {
+    matches = MatchDescriptors(query.features.descriptors, map.rows().descriptors, matcher_options);
+  } else {
+    DescriptorMatrix descriptors(static_cast<Eigen::Index>(landmarks.size()), kDescriptorDim);
+    for (size_t i = 0; i < landmarks.size(); ++i)
+      descriptors.row(i) = map.rows().descriptors.row(landmarks[i]);
+    matches = MatchDescriptors(query.features.descriptors, descriptors, matcher_options);
+  }
+  std::vector<Correspondence> correspondences;
+  for (const Match& match : matches) {
+    if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks[match.idx2]});
+  }
+  return correspondences;
+}
+
+std::vector<LandmarkIdx> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                            const MatchOptions& options) {
+  std::map<int32_t, int> num_shared;
+  for (const LandmarkIdx landmark : seen) {
+    for (const int32_t image : map.ImagesOfLandmark(landmark)) ++num_shared[image];
+  }
+  std::vector<std::pair<int, int32_t>> order;
+  for (const auto& [image, count] : num_shared) order.emplace_back(-count, image);
+  std::sort(order.begin(), order.end());
+  std::vector<LandmarkIdx> landmarks = seen;
+  for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
+    const std::vector<LandmarkIdx>& of_image = map.rows().images[order[i].second].landmarks;
+    landmarks.insert(landmarks.end(), of_image.begin(), of_image.end());
+  }
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
+                                        const std::vector<LandmarkIdx>& landmarks, const Pose& cam_from_world,
+                                        const MatchOptions& options) {
+  const KeypointGrid grid(query, std::max(8.0, options.guided_radius_px));
+  const double focal_px = query.camera.MeanFocal();
+  // An angle between RootSIFT vectors of norm 512 as a dot product.
+  const double min_dot = 512.0 * 512.0 * std::cos(options.guided_max_angle_rad);
+  std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
+  for (const LandmarkIdx landmark_idx : landmarks) {
+    const MapLandmark& landmark = map.rows().landmarks[landmark_idx];
+    const Eigen::Vector3d point = cam_from_world * landmark.position;
+    const auto pixel = ImageFromCamera(query.camera, point);
+    if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > query.camera.width ||
+        pixel->y() > query.camera.height) {
+      continue;
+    }
+    const uint8_t* descriptor = map.rows().descriptors.row(landmark_idx).data();
+    std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
+    grid.VisitNear(*pixel, options.guided_radius_px, [&](KeypointIdx i) {
+      if (!ScaleFits(query.features.keypoints[i], landmark, point.z(), focal_px,
+                     options.guided_max_scale_ratio))
+        return;
+      const int32_t dot = Dot(query.features.descriptors.row(i).data(), descriptor);
+      if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
+    });
+    if (best.second < 0 || best.first < min_dot) continue;
+    const auto [entry, inserted] =
+        best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
+    if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+  }
+  std::vector<Correspondence> correspondences;
+  for (const auto& [keypoint, match] : best_of_keypoint) correspondences.push_back({keypoint, match.second});
+  return correspondences;
+}
+
+}  // namespace cairn

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <vector>
+
+#include "core/options.h"
+#include "core/pose.h"
+#include "runtime/map.h"
+#include "runtime/measurement.h"
+
+namespace cairn {
+
+struct MatchOptions {
+  // Largest ratio of best to second-best descriptor angle, both ways.  REQUIRES: in (0, 1]
+  double max_ratio = 0.85;
+  // Largest angle between the descriptors of a match, radians.  REQUIRES: > 0
+  double max_angle_rad = 0.8;
+
+  // Guided by a first pose: a landmark is looked for within this distance of its projection, px.  REQUIRES: >
+  // 0
+  double guided_radius_px = 10;
+  // Largest descriptor angle there, radians.  REQUIRES: > 0
+  double guided_max_angle_rad = 0.7;
+  // Largest ratio of the keypoint's scale to the one that the landmark's size predicts, or of its inverse.
+  // REQUIRES: >= 1
+  double guided_max_scale_ratio = 2.5;
+  // Landmarks looked for are those of this many survey images, which share most inliers with the query; 0: no
+  // guided matching.  REQUIRES: >= 0
+  int guided_num_images = 12;
+};
+OptionTable DescribeOptions(MatchOptions* options);
+
+// Correspondences between the query and these landmarks (ascending; an empty list means none), by mutual
+// nearest descriptors and ratio test, ascending by keypoint.
+std::vector<Correspondence> MatchLandmarks(const Query& query, const Map& map,
+                                           const std::vector<LandmarkIdx>& landmarks,
+                                           const MatchOptions& options);
+
+// Landmarks that should be visible given these: those seen in the survey images that share most of them.
+std::vector<LandmarkIdx> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                            const MatchOptions& options);
+
+// Correspondences of landmarks with keypoints near their projections at `cam_from_world`: per landmark the
+// keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by keypoint.
+std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
+                                        const std::vector<LandmarkIdx>& landmarks, const Pose& cam_from_world,
+                                        const MatchOptions& options);
+
+}  // namespace cairn
