@@ -154,6 +154,16 @@ std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurem
   return squares;
 }
 
+// Noise variance from the median of squared residuals, most of which belong to inliers; the 6 parameters took
+// their part.
+double VarianceFromMedian(std::vector<double> squares) {
+  constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  const double num_residuals = 2.0 * static_cast<double>(squares.size());
+  return std::max(1e-6, *middle / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
+}
+
 // Sum of squared residuals of n two-dimensional inliers, as a variance whose inverse has the right mean for
 // the normalised error squared: E[F(6, d)] = d / (d - 2).
 double VarianceFromSum(double sum, int num_inliers) { return sum / std::max(1, 2 * num_inliers - 6 - 2); }
@@ -232,15 +242,19 @@ std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements,
 
 std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
                                                     const Pose& initial, const RefineOptions& options) {
-  constexpr int kMinNumInliers = 5;            // 10 residuals for 6 parameters
-  constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
+  constexpr int kMinNumInliers = 5;  // 10 residuals for 6 parameters
+  if (static_cast<int>(measurements.size()) < kMinNumInliers) return std::nullopt;
   std::optional<Pose> pose = RefinePose(measurements, initial, options);
   if (!pose) return std::nullopt;
   RefinedPose refined;
   std::vector<double> squares = WhitenedSquares(measurements, *pose);
-  std::vector<double> sorted = squares;
-  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-  refined.noise_variance = std::max(1e-6, sorted[sorted.size() / 2] / kMedianChiSquare);
+  // The loss's scale is in units of the noise, which shows only now.
+  refined.noise_variance = VarianceFromMedian(squares);
+  pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
+                            options.max_num_refine_iterations);
+  if (!pose) return std::nullopt;
+  squares = WhitenedSquares(measurements, *pose);
+  refined.noise_variance = VarianceFromMedian(squares);
   const double truncation = TruncationFactor(options.inlier_chi_square);
   for (int round = 0; round < 4; ++round) {
     std::vector<int> inliers;
