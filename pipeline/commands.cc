@@ -5,6 +5,9 @@
 #if defined(CAIRN_HAS_simulate)
 #include "stages/simulate/command.h"
 #endif
+#if defined(CAIRN_HAS_simulate_worlds)
+#include "stages/simulate_worlds/command.h"
+#endif
 #if defined(CAIRN_HAS_extract_features)
 #include "stages/extract_features/command.h"
 #endif
@@ -56,7 +59,7 @@ std::vector<Command> AllCommands() {
         FilterVisibilityCommand(),
 #endif
 #if defined(CAIRN_HAS_decompose_regions)
-        DecomposeRegionsCommand(),
+        DecomposeRegionsCommand(), CheckRegionsCommand(),
 #endif
 #if defined(CAIRN_HAS_build_vocabulary)
         BuildVocabularyCommand(),
@@ -72,6 +75,9 @@ std::vector<Command> AllCommands() {
 #endif
 #if defined(CAIRN_HAS_inspect_command)
         InspectCommand(),
+#endif
+#if defined(CAIRN_HAS_simulate_worlds)
+        SimulateWorldsCommand(),
 #endif
         CompileCommand(), ConfigureCommand(), RecipeReferenceCommand(),
   };

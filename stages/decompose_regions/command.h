@@ -6,5 +6,7 @@ namespace cairn {
 
 // cairn decompose-regions WORLD -o OUT
 Command DecomposeRegionsCommand();
+// cairn check-regions WORLD REGIONS
+Command CheckRegionsCommand();
 
 }  // namespace cairn

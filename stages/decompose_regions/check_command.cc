@@ -1,0 +1,56 @@
+#include <algorithm>
+
+#include "stages/decompose_regions/check_regions.h"
+#include "stages/decompose_regions/command.h"
+
+namespace cairn {
+namespace {
+
+constexpr size_t kMaxShown = 20;
+
+struct Arguments {
+  std::string world;
+  std::string regions;
+  int max_hole = -1;
+};
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
+  CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions));
+  const RegionCheck check = CheckRegions(world, decomposition, arguments.max_hole);
+  std::ostream& out = *environment.out;
+  out << fmt::format(
+      "algorithm {}, k = {}, tau = {}, rho = {}: {} regions{}\n", decomposition.algorithm, decomposition.k,
+      decomposition.tau, decomposition.rho, decomposition.regions.size(),
+      decomposition.lower_bound ? fmt::format(", at least {} needed", *decomposition.lower_bound) : "");
+  out << fmt::format("{} of {} coverable stations uncovered, largest connected hole {}\n",
+                     check.num_uncovered, check.num_coverable, check.largest_hole);
+  for (size_t i = 0; i < std::min(kMaxShown, check.violations.size()); ++i)
+    out << check.violations[i] << "\n";
+  if (check.violations.empty()) {
+    out << "valid\n";
+    return Ok();
+  }
+  return MakeError(ErrorCode::kFailed, "{}: {} properties fail, the first: {}", arguments.regions,
+                   check.violations.size(), check.violations[0]);
+}
+
+}  // namespace
+
+Command CheckRegionsCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  Command command;
+  command.name = "check-regions";
+  command.summary = "Check a decomposition against the definition of one, and say which property fails";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("world", arguments->world, "world: database or JSON")->required()->type_name("FILE");
+    app.add_option("regions", arguments->regions, "regions: database or JSON")->required()->type_name("FILE");
+    app.add_option("--max-hole", arguments->max_hole,
+                   "most connected uncovered stations that are allowed; -1: any")
+        ->type_name("INT");
+  };
+  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
+  return command;
+}
+
+}  // namespace cairn
