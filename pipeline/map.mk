@@ -122,11 +122,15 @@ $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabu
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
+# The map notes the options of every stage that made it.
+STAGE_OPTIONS := extract_features match_features group_classes filter_visibility decompose_regions build_vocabulary \
+    emit_map
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
-    $(BUILD)/options/emit_map.toml $(BUILD)/options/name $(CAIRN)
+    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN)
 	touch $@.begun
 	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) \
+	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 

@@ -17,9 +17,9 @@ struct StageOptions {
 
 // Wraps a stage's options struct, with its defaults.
 template <typename Options>
-StageOptions MakeStageOptions(std::string stage) {
+StageOptions MakeStageOptions(const std::string& stage) {
   auto options = std::make_shared<Options>();
-  return {.stage = std::move(stage), .table = DescribeOptions(options.get()), .options = options};
+  return {.stage = stage, .table = DescribeOptions(options.get()), .options = options};
 }
 
 // Every stage that a recipe can have a table for, with defaults, in the order of the line.

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <spdlog/spdlog.h>
-
 #include "core/colmap_database.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
@@ -40,8 +38,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                          BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
                                          *environment.progress));
   CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
-  spdlog::info("{}: {} words of depth {} over {} images", arguments.output_path, vocabulary.num_words(),
-               vocabulary.depth, vocabulary.document_ids.size());
+  *environment.out << fmt::format("build_vocabulary: {} words of depth {} over {} images\n",
+                                  vocabulary.num_words(), vocabulary.depth, vocabulary.document_ids.size());
   return Ok();
 }
 

@@ -36,9 +36,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   Result<Decomposition> result = DecomposeRegions(world, arguments.options, environment.seed);
   if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
   const Decomposition& decomposition = *result;
-  spdlog::info(
-      "{} stations, {} features: {} regions{}", world.num_stations(), world.num_features(),
-      decomposition.regions.size(),
+  *environment.out << fmt::format(
+      "decompose_regions: {} stations, {} features, {} regions{}\n", world.num_stations(),
+      world.num_features(), decomposition.regions.size(),
       decomposition.lower_bound ? fmt::format(", at least {} needed", *decomposition.lower_bound) : "");
   if (!decomposition.uncovered.empty()) {
     spdlog::warn(

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include <spdlog/spdlog.h>
-
 #include "core/file.h"
 #include "stages/emit_map/emit_map.h"
 
@@ -57,10 +55,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options));
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
-  spdlog::info("{}: {} landmarks of {} classes in {} regions, {} images, {} words, {:.2f} MB",
-               arguments.output_path, rows.landmarks.size(), classes.classes.size(), rows.regions.size(),
-               rows.images.size(), rows.vocabulary.num_words(),
-               static_cast<double>(std::filesystem::file_size(arguments.output_path)) / 1e6);
+  *environment.out << fmt::format(
+      "emit_map: {} landmarks of {} classes in {} regions, {} images, {} words, {:.2f} MB\n",
+      rows.landmarks.size(), classes.classes.size(), rows.regions.size(), rows.images.size(),
+      rows.vocabulary.num_words(),
+      static_cast<double>(std::filesystem::file_size(arguments.output_path)) / 1e6);
   return Ok();
 }
 

@@ -1,7 +1,5 @@
 #include "stages/filter_visibility/command.h"
 
-#include <spdlog/spdlog.h>
-
 #include "stages/filter_visibility/filter_visibility.h"
 
 namespace cairn {
@@ -14,14 +12,16 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-Status Run(const Arguments& arguments) {
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
   CAIRN_ASSIGN_OR_RETURN(const FilterVisibilityResult result, FilterVisibility(classes, arguments.options));
   const World& world = result.world;
-  spdlog::info("{} survey: {} stations, {} of {} classes kept", result.is_lattice ? "lattice" : "driven",
-               world.num_stations(), world.num_features(), classes.classes.size());
-  for (const auto& [reason, count] : result.dropped) spdlog::info("dropped {} classes: {}", count, reason);
+  *environment.out << fmt::format("filter_visibility: {} survey, {} stations, {} of {} classes kept\n",
+                                  result.is_lattice ? "lattice" : "driven", world.num_stations(),
+                                  world.num_features(), classes.classes.size());
+  for (const auto& [reason, count] : result.dropped)
+    *environment.out << fmt::format("filter_visibility: {} classes dropped: {}\n", count, reason);
   const bool json = arguments.output.ends_with(".json");
   return json ? WriteWorldJson(world, arguments.output) : WriteWorldDatabase(world, arguments.output);
 }
@@ -42,7 +42,7 @@ Command FilterVisibilityCommand() {
         ->type_name("FILE");
     arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
   };
-  command.run = [arguments](const CommandEnvironment&) { return Run(*arguments); };
+  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
   return command;
 }
 

@@ -3,8 +3,6 @@
 #include <memory>
 #include <string>
 
-#include <spdlog/spdlog.h>
-
 #include "core/toml_options.h"
 #include "stages/simulate/simulate.h"
 
@@ -54,9 +52,9 @@ Status Run(const Arguments& given, const CommandEnvironment& environment, Simula
   CAIRN_ASSIGN_OR_RETURN(
       const SimulateResult result,
       SimulateCapture(*options, given.output_path, seed, environment.num_threads, *environment.progress));
-  spdlog::info("{}: {} images from {} stations and {} queries, {} x {} pixels", given.output_path,
-               result.num_images, result.num_stations, result.num_queries, options->image_width_px,
-               options->image_height_px);
+  *environment.out << fmt::format("simulate: {} images from {} stations and {} queries, {} x {} pixels\n",
+                                  result.num_images, result.num_stations, result.num_queries,
+                                  options->image_width_px, options->image_height_px);
   return Ok();
 }
 

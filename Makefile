@@ -1,0 +1,67 @@
+# The front door.  `make help` lists the verbs; the build itself is CMake's, the maps are `cairn compile`'s.
+
+PRESET ?= release
+CAIRN := build/$(PRESET)/cairn
+# Real captures for development, beside the repository; what needs them says so in one line where they are absent.
+DATA ?= ../shared/data
+PREFIX ?= /usr/local
+
+# Debian 12 packages: what the build needs, what the tests and benchmarks run beside it, what checks the style.
+PACKAGES := build-essential cmake ninja-build ccache pkg-config \
+    libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
+    nlohmann-json3-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev \
+    libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap clang-format clang-tidy
+# Turns the demo's picture into PNG; nothing fails without it.
+OPTIONAL_PACKAGES := librsvg2-bin
+
+SOURCES = $(shell git ls-files '*.h' '*.cc')
+
+.DEFAULT_GOAL := all
+.PHONY: all help deps demo test bench maps install format format-check tidy docs clean
+# Verbs run one after the other, whatever MAKEFLAGS says; the steps inside of them run in parallel.
+.NOTPARALLEL:
+
+all: build/$(PRESET)/build.ninja  ## Build the release: build/release/cairn
+	@cmake --build build/$(PRESET)
+
+build/$(PRESET)/build.ninja: CMakePresets.json
+	@cmake --preset $(PRESET)
+	@touch $@
+
+help:  ## List the verbs
+	@awk -F ':.*##' '/^[a-z-]+:.*##/ {printf "make %-14s%s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+deps:  ## Install the Debian packages that are missing (sudo only if needed)
+	@scripts/install_packages $(PACKAGES) -- $(OPTIONAL_PACKAGES)
+
+demo: deps all  ## Render a survey, compile its map, localize held-out images, print the tables, draw the regions
+	@CAIRN=$(CAIRN) DATA=$(DATA) scripts/demo
+
+test: deps all  ## Build and run all tests
+	@ctest --preset $(PRESET) --parallel $(shell nproc)
+
+bench: deps  ## Build and run the benchmarks
+	@cmake --preset $(PRESET) -DCAIRN_BUILD_BENCHMARKS=ON
+	@cmake --build build/$(PRESET)
+	@scripts/run_benchmarks build/$(PRESET)
+
+maps: deps all  ## Compile every recipe under maps/ whose capture is here
+	@CAIRN=$(CAIRN) scripts/compile_maps maps
+
+install: all  ## Install the program and its rules under PREFIX [/usr/local]
+	@cmake --install build/$(PRESET) --prefix $(PREFIX)
+
+format: deps  ## Format all sources in place
+	@clang-format -i $(SOURCES)
+
+format-check: deps  ## Fail if a source is not formatted
+	@clang-format --dry-run --Werror $(SOURCES) && echo "all sources are formatted"
+
+tidy: deps build/$(PRESET)/build.ninja  ## Run clang-tidy over all sources
+	@run-clang-tidy -quiet -p build/$(PRESET) '$(CURDIR)/(core|stages|pipeline|runtime)/.*\.cc' | grep -v '^clang-tidy-'
+
+docs: all  ## Write docs/recipe.md from the options that the stages declare
+	@$(CAIRN) recipe-reference > docs/recipe.md
+
+clean:  ## Remove everything that was built, maps included
+	@rm -rf build maps/*.cairn maps/*.build maps/*.svg maps/*.png
