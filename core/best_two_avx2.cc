@@ -8,6 +8,7 @@ namespace {
 
 struct Avx2 {
   static constexpr int kLanes = 8;
+  static constexpr int kNumChunks = 64;
   static constexpr int kRowBlock = 4;
   static constexpr int kTileGroups = 8;
   using Vector = __m256i;

@@ -8,6 +8,7 @@ namespace {
 
 struct Avx512Vnni {
   static constexpr int kLanes = 16;
+  static constexpr int kNumChunks = 32;
   static constexpr int kRowBlock = 8;
   static constexpr int kTileGroups = 12;
   using Vector = __m512i;

@@ -7,6 +7,7 @@ namespace {
 
 struct Portable {
   static constexpr int kLanes = 4;
+  static constexpr int kNumChunks = 64;
   static constexpr int kRowBlock = 2;
   static constexpr int kTileGroups = 16;
   struct Vector {
@@ -25,12 +26,12 @@ struct Portable {
     return sum;
   }
   static Vector DotAdd(const Vector& sum, const Vector& columns, const Vector& row) {
-    int16_t c[2 * kLanes], r[2 * kLanes];
-    std::memcpy(c, &columns, sizeof(c));
-    std::memcpy(r, &row, sizeof(r));
+    // Two 16-bit halves, both small and positive: no sign to care for.
     Vector result;
     for (int i = 0; i < kLanes; ++i) {
-      result.lane[i] = sum.lane[i] + int32_t{c[2 * i]} * r[2 * i] + int32_t{c[2 * i + 1]} * r[2 * i + 1];
+      const auto c = static_cast<uint32_t>(columns.lane[i]), r = static_cast<uint32_t>(row.lane[i]);
+      result.lane[i] =
+          sum.lane[i] + static_cast<int32_t>((c & 0xFFFF) * (r & 0xFFFF) + (c >> 16) * (r >> 16));
     }
     return result;
   }

@@ -78,19 +78,19 @@ void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& d
   BestTwoSweep sweep;
   sweep.num_rows = num_rows;
   sweep.num_groups = (num_columns + 2 * k.lanes - 1) / (2 * k.lanes) * 2;
-  sweep.num_chunks = k.is_8bit ? kDescriptorDim / 4 : kDescriptorDim / 2;
+  const int num_chunks = k.is_8bit ? kDescriptorDim / 4 : kDescriptorDim / 2;
   const int num_padded = sweep.num_groups * k.lanes;
   const std::vector<int32_t> packed_rows = PackRows(descriptors1, k.is_8bit);
-  std::vector<int32_t> packed_columns(static_cast<size_t>(num_padded) * sweep.num_chunks);
+  std::vector<int32_t> packed_columns(static_cast<size_t>(num_padded) * num_chunks);
   std::vector<int32_t> bias(num_padded, -1);
   for (int column = 0; column < num_columns; ++column) {
     const uint8_t* bytes = descriptors2.row(column).data();
-    int32_t* packed = packed_columns.data() +
-                      static_cast<size_t>(column / k.lanes) * sweep.num_chunks * k.lanes + column % k.lanes;
+    int32_t* packed = packed_columns.data() + static_cast<size_t>(column / k.lanes) * num_chunks * k.lanes +
+                      column % k.lanes;
     int32_t sum = 0;
     for (int d = 0; d < kDescriptorDim; ++d) sum += bytes[d];
     bias[column] = k.is_8bit ? 128 * sum : 0;
-    for (int chunk = 0; chunk < sweep.num_chunks; ++chunk) {
+    for (int chunk = 0; chunk < num_chunks; ++chunk) {
       packed[chunk * k.lanes] =
           static_cast<int32_t>(k.is_8bit ? Chunk8(bytes + 4 * chunk, 0) : Chunk16(bytes + 2 * chunk));
     }
