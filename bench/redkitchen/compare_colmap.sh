@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# Compiles redkitchen with cairn and with the installed COLMAP in one run and prints both as a table: seconds, bytes,
+# registered queries and their errors.  COLMAP gets what cairn gets: known poses and intrinsics of the survey; its
+# queries are matched against every survey image and registered one after the other.
+#
+#   bench/redkitchen/compare_colmap.sh [CAPTURE] [WORK]      about 20 minutes on 2 cores, most of them COLMAP's matching
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+top=$(cd "$here/../.." && pwd)
+capture=$(realpath "${1:-$top/../shared/data/redkitchen}")
+work=${2:-$top/build/bench/redkitchen}
+cairn=${CAIRN:-$top/build/release/cairn}
+[ -f "$capture/images.txt" ] || { echo "$capture: no images.txt; the redkitchen capture is not part of this repository" >&2; exit 3; }
+[ -x "$cairn" ] || { echo "$cairn: not built; run 'make' first" >&2; exit 3; }
+export QT_QPA_PLATFORM=offscreen
+rm -rf "$work"
+mkdir -p "$work"/{known,triangulated,registered,text}
+log=$work/colmap.log
+
+# seconds NAME COMMAND...: runs it, remembers its wall-clock seconds in $work/NAME.s
+seconds() {
+  local name=$1 start end
+  shift
+  start=$(date +%s.%N)
+  "$@" >>"$log" 2>&1 || { echo "$name failed; the end of $log:" >&2; tail -n 20 "$log" >&2; exit 1; }
+  end=$(date +%s.%N)
+  echo "$end $start" | awk '{printf "%.1f\n", $1 - $2}' >"$work/$name.s"
+}
+of() { cat "$work/$1.s"; }
+names() { awk '!/^#/ && NF >= 10 {print $10}' "$1"; }
+
+echo "== cairn: $("$cairn" --version)"
+seconds cairn_compile "$cairn" compile "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
+"$cairn" check-map "$work/cairn.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/cairn.txt"
+
+echo "== $(colmap help | head -n 1)"
+camera=$(awk '!/^#/ && NF {print; exit}' "$capture/cameras.txt")
+model=$(echo "$camera" | awk '{print $2}')
+params=$(echo "$camera" | cut -d' ' -f5- | tr ' ' ',')
+names "$capture/images.txt" >"$work/survey.list"
+names "$capture/queries.txt" >"$work/queries.list"
+database=$work/colmap.db
+extract() {
+  colmap feature_extractor --database_path "$database" --image_path "$capture/images" --image_list_path "$1" \
+    --ImageReader.single_camera 1 --ImageReader.camera_model "$model" --ImageReader.camera_params "$params" \
+    --SiftExtraction.use_gpu 0
+}
+seconds colmap_extract extract "$work/survey.list"
+seconds colmap_match colmap exhaustive_matcher --database_path "$database" --SiftMatching.use_gpu 0
+database_bytes=$(stat -c %s "$database")
+echo "$camera" >"$work/known/cameras.txt"
+: >"$work/known/points3D.txt"
+sqlite3 -separator ' ' "$database" 'SELECT name, image_id FROM images' |
+  awk 'NR == FNR {id[$1] = $2; next} !/^#/ && NF >= 10 && ($10 in id) {$1 = id[$10]; $9 = 1; print; print ""}' - \
+    "$capture/images.txt" >"$work/known/images.txt"
+seconds colmap_triangulate colmap point_triangulator --database_path "$database" --image_path "$capture/images" \
+  --input_path "$work/known" --output_path "$work/triangulated"
+model_bytes=$(du -sb "$work/triangulated" | cut -f1)
+# Queries: the same camera, matched with every survey image, then registered.
+seconds colmap_query_extract colmap feature_extractor --database_path "$database" --image_path "$capture/images" \
+  --image_list_path "$work/queries.list" --ImageReader.existing_camera_id 1 --SiftExtraction.use_gpu 0
+while read -r query; do sed "s|^|$query |" "$work/survey.list"; done <"$work/queries.list" >"$work/pairs.list"
+seconds colmap_query_match colmap matches_importer --database_path "$database" --match_list_path "$work/pairs.list" \
+  --match_type pairs --SiftMatching.use_gpu 0
+seconds colmap_register colmap image_registrator --database_path "$database" --input_path "$work/triangulated" \
+  --output_path "$work/registered"
+colmap model_converter --input_path "$work/registered" --output_path "$work/text" --output_type TXT >>"$log" 2>&1
+python3 "$here/pose_errors.py" "$capture/queries.txt" "$work/text/images.txt" | tee "$work/colmap.txt"
+
+num_queries=$(wc -l <"$work/queries.list")
+echo
+echo "== both, $(nproc) cores, $(wc -l <"$work/survey.list") survey images, $num_queries queries"
+echo "cairn : survey $(of cairn_compile) s; map $(stat -c %s "$work/cairn.cairn") bytes"
+echo "COLMAP: survey $(of colmap_extract) + $(of colmap_match) + $(of colmap_triangulate) s (extract + match + triangulate);" \
+  "database $database_bytes + model $model_bytes bytes"
+echo "COLMAP: queries $(of colmap_query_extract) + $(of colmap_query_match) + $(of colmap_register) s," \
+  "$(cat "$work"/colmap_query_extract.s "$work"/colmap_query_match.s "$work"/colmap_register.s |
+    awk -v n="$num_queries" '{s += $1} END {printf "%.2f s a query", s / n}')"
+echo "survey, COLMAP over cairn: $(cat "$work"/colmap_extract.s "$work"/colmap_match.s "$work"/colmap_triangulate.s |
+  awk -v c="$(of cairn_compile)" '{s += $1} END {printf "%.1f x", s / c}')"
