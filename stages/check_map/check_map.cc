@@ -1,0 +1,177 @@
+#include "stages/check_map/check_map.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "core/image_file.h"
+#include "core/parallel.h"
+#include "core/sift.h"
+
+namespace cairn {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double MillisecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+// Localize, in two steps so that SIFT's time is known.
+Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
+                                   const LocalizerOptions& options, HeldOutResult* result) {
+  CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image.path));
+  if (grey.cols != image.camera.width || grey.rows != image.camera.height) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} px, but its camera takes {} x {} px",
+                     image.path, grey.cols, grey.rows, image.camera.width, image.camera.height);
+  }
+  const Clock::time_point start = Clock::now();
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options.sift));
+  result->sift_ms = MillisecondsSince(start);
+  Result<Localization> localization =
+      Localizer(map, options).LocalizeFeatures(std::move(features), image.camera);
+  result->total_ms = MillisecondsSince(start);
+  return localization;
+}
+
+HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
+                       const LocalizerOptions& options) {
+  HeldOutResult result;
+  result.name = image.name;
+  Result<Localization> localization = LocalizeTimed(map, image, options, &result);
+  if (!localization.ok()) {
+    result.rejected = localization.error().message;
+    return result;
+  }
+  result.localization = std::move(*localization);
+  if (result.localization.has_fix() && image.cam_from_world) {
+    const Pose& found = result.localization.cam_from_world;
+    result.error_m = CenterErrorM(found, *image.cam_from_world);
+    result.error_deg = RotationErrorDeg(found, *image.cam_from_world);
+    const Vector6d error = PerturbationBetween(found, *image.cam_from_world);
+    result.nees = error.dot(result.localization.covariance.inverse() * error);
+  }
+  return result;
+}
+
+// The least value that at least `part` of them do not exceed.  REQUIRES: not empty
+double Quantile(std::vector<double> values, double part) {
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
+  const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOptions& options,
+                     std::map<std::string, double>* figures) {
+  std::vector<double> errors_m, errors_deg, nees;
+  int within_5cm_5deg = 0, within_10cm_2deg = 0, within_10cm_5deg = 0, num_gross_errors = 0;
+  double sum_nees = 0;
+  for (const HeldOutResult& image : images) {
+    if (!image.rejected.empty() || !image.localization.has_fix()) continue;
+    errors_m.push_back(image.error_m);
+    errors_deg.push_back(image.error_deg);
+    nees.push_back(image.nees);
+    sum_nees += image.nees;
+    within_5cm_5deg += image.error_m <= 0.05 && image.error_deg <= 5 ? 1 : 0;
+    within_10cm_2deg += image.error_m <= 0.1 && image.error_deg <= 2 ? 1 : 0;
+    within_10cm_5deg += image.error_m <= 0.1 && image.error_deg <= 5 ? 1 : 0;
+    num_gross_errors +=
+        image.error_m > options.gross_error_m || image.error_deg > options.gross_error_deg ? 1 : 0;
+  }
+  const double num_images = static_cast<double>(images.size());
+  const double num_fixes = static_cast<double>(errors_m.size());
+  auto& f = *figures;
+  f["num_held_out"] = num_images;
+  f["num_localized"] = num_fixes;
+  if (images.empty()) return;
+  f["localized_ratio"] = num_fixes / num_images;
+  f["within_5cm_5deg_ratio"] = within_5cm_5deg / num_images;
+  f["within_10cm_2deg_ratio"] = within_10cm_2deg / num_images;
+  f["within_10cm_5deg_ratio"] = within_10cm_5deg / num_images;
+  f["num_gross_errors"] = num_gross_errors;
+  if (errors_m.empty()) return;
+  f["precision_ratio"] = 1 - num_gross_errors / num_fixes;
+  f["median_error_m"] = Quantile(errors_m, 0.5);
+  f["median_error_deg"] = Quantile(errors_deg, 0.5);
+  f["p90_error_m"] = Quantile(errors_m, 0.9);
+  f["p90_error_deg"] = Quantile(errors_deg, 0.9);
+  f["mean_nees"] = sum_nees / num_fixes;
+  f["median_nees"] = Quantile(nees, 0.5);
+  const double band = 1.96 * std::sqrt(2 * 6 / num_fixes);  // chi-square of 6 degrees of freedom: variance 12
+  f["nees_low"] = std::max(0.0, 6 - band);
+  f["nees_high"] = 6 + band;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(CheckMapOptions* o) {
+  OptionTable table = {
+      {.name = "gross_error_m",
+       .value = &o->gross_error_m,
+       .help = "a fix farther off than this is wrong, m",
+       .min = 1e-6},
+      {.name = "gross_error_deg",
+       .value = &o->gross_error_deg,
+       .help = "a fix turned by more than this is wrong, degrees",
+       .min = 1e-6},
+      {.name = "min_localized_ratio",
+       .value = &o->min_localized_ratio,
+       .help = "gate: least part of the held-out images localized",
+       .min = 0,
+       .max = 1},
+      {.name = "min_precision_ratio",
+       .value = &o->min_precision_ratio,
+       .help = "gate: least part of the fixes that are not wrong",
+       .min = 0,
+       .max = 1},
+  };
+  const OptionTable localizer = DescribeOptions(&o->localizer);
+  table.insert(table.end(), localizer.begin(), localizer.end());
+  return table;
+}
+
+Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
+                                const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
+                                int num_threads, Progress& progress) {
+  CheckMapOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CheckMapReport report;
+  report.images.resize(images.size());
+  progress.Begin("localizing", static_cast<int64_t>(images.size()), "images");
+  ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
+    if (progress.Cancelled()) return;
+    report.images[i] = TryImage(map, images[i], options.localizer);
+    progress.Advance();
+  });
+  progress.End();
+  if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "localizing held-out images was stopped");
+  SummarizeErrors(report.images, options, &report.figures);
+  int num_tried = 0;
+  for (const HeldOutResult& image : report.images) {
+    if (!image.rejected.empty()) continue;
+    ++num_tried;
+    report.mean_sift_ms += image.sift_ms;
+    report.mean_total_ms += image.total_ms;
+  }
+  report.mean_sift_ms /= std::max(1, num_tried);
+  report.mean_total_ms /= std::max(1, num_tried);
+  return report;
+}
+
+Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
+  const auto check = [&](const std::string& name, double least) -> Status {
+    if (least <= 0) return Ok();
+    const auto figure = report.figures.find(name);
+    const double found = figure == report.figures.end() ? 0 : figure->second;
+    if (found >= least) return Ok();
+    return MakeError(ErrorCode::kGate, "below the gate: {} is {:.3f}, at least {:.3f} is asked", name, found,
+                     least);
+  };
+  CAIRN_RETURN_IF_ERROR(check("localized_ratio", options.min_localized_ratio));
+  return check("precision_ratio", options.min_precision_ratio);
+}
+
+}  // namespace cairn

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/error.h"
+#include "core/options.h"
+#include "core/pose.h"
+#include "core/progress.h"
+#include "runtime/localizer.h"
+#include "runtime/map.h"
+
+namespace cairn {
+
+// Tries a map on images that it was not made from: how many are localized, how well, how sure the map is of
+// it, and whether images of another place are refused.  Before: emit_map.  The last stage: its figures are
+// sealed into the map.
+struct CheckMapOptions {
+  // A fix farther than this from the truth is a wrong one: it counts against precision.  REQUIRES: > 0
+  double gross_error_m = 0.5;
+  double gross_error_deg = 10;
+  // Gate: least part of the held-out images localized, and of the fixes that are not gross errors.  REQUIRES:
+  // in [0, 1]
+  double min_localized_ratio = 0;
+  double min_precision_ratio = 0;
+  LocalizerOptions localizer;
+};
+OptionTable DescribeOptions(CheckMapOptions* options);
+
+// An image to localize.  Without a true pose it is of another place, and must be refused.
+struct HeldOutImage {
+  std::string name;
+  std::string path;
+  Camera camera;
+  std::optional<Pose> cam_from_world;
+};
+
+struct HeldOutResult {
+  std::string name;
+  std::string rejected;  // why the image could not be tried (unreadable, wrong size); empty otherwise
+  Localization localization;
+  // Fixes of images with a true pose: distance of the camera centres, angle, normalised estimation error
+  // squared.
+  double error_m = 0;
+  double error_deg = 0;
+  double nees = 0;
+  double sift_ms = 0;
+  double total_ms = 0;  // SIFT included, decoding not
+};
+
+struct CheckMapReport {
+  std::vector<HeldOutResult> images;  // in the given order
+  // Figures without times, by name: what the map's self-test stores.  Ratios are of the images tried; those
+  // that need a fix are left out where there is none.
+  //   num_held_out, num_localized, localized_ratio, median_error_m, median_error_deg, p90_error_m,
+  //   p90_error_deg, within_5cm_5deg_ratio, within_10cm_2deg_ratio, within_10cm_5deg_ratio, num_gross_errors,
+  //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees of
+  //   freedom)
+  std::map<std::string, double> figures;
+  // Means over the images tried.
+  double mean_sift_ms = 0;
+  double mean_total_ms = 0;
+};
+
+// Localizes every image, several at a time, one localizer per image.  Same figures for any number of threads.
+// An unreadable image is listed as rejected and counts as not localized.
+// Errors: InvalidArgument (an option), Cancelled.
+Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
+                                const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
+                                int num_threads, Progress& progress);
+
+// Whether the figures pass the gate.  Errors: Gate, naming the figure, what was found and what is asked.
+Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options);
+
+}  // namespace cairn

@@ -1,0 +1,155 @@
+#include "stages/check_map/command.h"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <opencv2/core/utility.hpp>
+
+#include "core/capture.h"
+#include "stages/check_map/check_map.h"
+#include "stages/check_map/report.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string map_path;
+  std::string queries_path;
+  std::string capture_path;
+  std::vector<std::string> foreign_paths;
+  std::string output_path;
+  bool json = false;
+  CheckMapOptions options;
+  OptionArguments option_arguments;
+};
+
+// The map's camera (its intrinsics may be refined) if it is the same one, else the capture's.
+Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const MapRows& rows) {
+  const auto given = capture.cameras.find(image.camera_id);
+  if (given == capture.cameras.end()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which cameras.txt lacks", capture.root,
+                     image.name, image.camera_id);
+  }
+  for (const Camera& camera : rows.cameras) {
+    if (camera.camera_id == image.camera_id && camera.model == given->second.model &&
+        camera.width == given->second.width && camera.height == given->second.height) {
+      return camera;
+    }
+  }
+  return given->second;
+}
+
+Result<std::vector<HeldOutImage>> ReadHeldOutImages(const Arguments& arguments, const MapRows& rows) {
+  const fs::path folder = fs::path(arguments.queries_path).parent_path();
+  const std::string root = !arguments.capture_path.empty() ? arguments.capture_path
+                           : folder.empty()                ? "."
+                                                           : folder.string();
+  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(root));
+  std::vector<Reject> rejects;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> queries,
+                         ReadImagesText(arguments.queries_path, &rejects));
+  for (const Reject& reject : rejects)
+    spdlog::warn("{}: {}: {}", arguments.queries_path, reject.name, reject.reason);
+  std::vector<HeldOutImage> images;
+  for (const CaptureImage& query : queries) {
+    CAIRN_ASSIGN_OR_RETURN(Camera camera, CameraOf(query, capture, rows));
+    images.push_back({query.name, capture.ImagePath(query), std::move(camera), query.cam_from_world});
+  }
+  return images;
+}
+
+Result<std::vector<HeldOutImage>> ReadForeignImages(const std::vector<std::string>& roots) {
+  std::vector<HeldOutImage> images;
+  for (const std::string& root : roots) {
+    CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(root));
+    for (const auto* list : {&capture.images, &capture.queries}) {
+      for (const CaptureImage& image : *list) {
+        const auto camera = capture.cameras.find(image.camera_id);
+        if (camera == capture.cameras.end()) continue;  // ReadCapture has said so
+        images.push_back({image.name, capture.ImagePath(image), camera->second, std::nullopt});
+      }
+    }
+  }
+  return images;
+}
+
+void WarnOfRejects(const CheckMapReport& report) {
+  for (const HeldOutResult& image : report.images) {
+    if (!image.rejected.empty()) spdlog::warn("not tried: {}: {}", image.name, image.rejected);
+  }
+}
+
+Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& checked,
+            const std::string& path) {
+  CheckMapOptions options = checked;
+  rows.sealed = true;
+  if (!report.images.empty()) rows.self_test = report.figures;
+  rows.stage_options["check_map"] = OptionsToml(DescribeOptions(&options));
+  return WriteMapRows(rows, path);
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  cv::setNumThreads(1);  // images in parallel, each on one thread: times mean one core
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  if (map->rows().sealed && !arguments.output_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is sealed already; -o is for a map from emit-map",
+                     arguments.map_path);
+  }
+  CheckMapReport held_out;
+  if (!arguments.queries_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, map->rows()));
+    CAIRN_ASSIGN_OR_RETURN(
+        held_out, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
+    WarnOfRejects(held_out);
+  }
+  std::optional<CheckMapReport> foreign;
+  if (!arguments.foreign_paths.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images,
+                           ReadForeignImages(arguments.foreign_paths));
+    CAIRN_ASSIGN_OR_RETURN(
+        foreign, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
+    WarnOfRejects(*foreign);
+  }
+  const PrintedReport report{.rows = &map->rows(),
+                             .map_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path)),
+                             .held_out = &held_out,
+                             .foreign = foreign ? &*foreign : nullptr};
+  *environment.out << (arguments.json ? ReportJson(report) : ReportText(report));
+  if (!held_out.images.empty()) CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
+  if (arguments.output_path.empty()) return Ok();
+  return Seal(map->rows(), held_out, arguments.options, arguments.output_path);
+}
+
+}  // namespace
+
+Command CheckMapCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "check-map",
+      .summary = "Localizes held-out images in a map, prints how well, and seals the map",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "map")->required();
+            app.add_option("--queries", arguments->queries_path,
+                           "held-out images with their poses (queries.txt)");
+            app.add_option("--capture", arguments->capture_path,
+                           "capture that has the images [the folder of queries.txt]");
+            app.add_option("--foreign", arguments->foreign_paths,
+                           "capture or folder of images of another place: none may be localized");
+            app.add_option("-o,--output", arguments->output_path,
+                           "sealed map to write, with the figures inside");
+            app.add_flag("--json", arguments->json, "print JSON, every image included");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

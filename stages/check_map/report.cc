@@ -1,0 +1,114 @@
+#include "stages/check_map/report.h"
+
+#include <nlohmann/json.hpp>
+
+namespace cairn {
+namespace {
+
+// Value of a figure; nothing where no image was localized.
+std::optional<double> Figure(const CheckMapReport& report, const std::string& name) {
+  const auto figure = report.figures.find(name);
+  if (figure == report.figures.end()) return std::nullopt;
+  return figure->second;
+}
+
+std::string Text(const std::optional<double>& value, double unit, int digits) {
+  return value ? fmt::format("{:.{}f}", *value / unit, digits) : "-";
+}
+
+nlohmann::json ImagesJson(const CheckMapReport& report, bool with_errors) {
+  nlohmann::json images = nlohmann::json::array();
+  for (const HeldOutResult& result : report.images) {
+    nlohmann::json image = {{"name", result.name}};
+    if (!result.rejected.empty()) {
+      image["rejected"] = result.rejected;
+    } else {
+      const Localization& localization = result.localization;
+      image["reason"] = NoFixName(localization.reason);
+      image["num_features"] = localization.num_features;
+      image["num_matches"] = localization.num_matches;
+      image["num_unguided_inliers"] = localization.num_unguided_inliers;
+      image["num_inliers"] = localization.num_inliers;
+      image["scope"] = ScopeName(localization.scope);
+      image["sift_ms"] = result.sift_ms;
+      image["total_ms"] = result.total_ms;
+      if (!localization.has_fix()) image["message"] = localization.message;
+      if (localization.has_fix()) image["region"] = localization.region;
+      if (localization.has_fix() && with_errors) {
+        image["error_m"] = result.error_m;
+        image["error_deg"] = result.error_deg;
+        image["nees"] = result.nees;
+      }
+    }
+    images.push_back(std::move(image));
+  }
+  return images;
+}
+
+int NumFixes(const CheckMapReport& report) {
+  return static_cast<int>(Figure(report, "num_localized").value_or(0));
+}
+
+}  // namespace
+
+std::string ReportText(const PrintedReport& report) {
+  std::string text;
+  const auto line = [&](const std::string& name, const std::string& value) {
+    text += fmt::format("{:<22} {}\n", name, value);
+  };
+  line("map", fmt::format("{}{}", report.rows->name, report.rows->sealed ? "" : " (unsealed)"));
+  line("landmarks", fmt::format("{} ({})", report.rows->landmarks.size(), report.rows->landmark_choice));
+  line("regions",
+       fmt::format("{} ({}, k = {})", report.rows->regions.size(), report.rows->algorithm, report.rows->k));
+  line("MB", fmt::format("{:.2f}", static_cast<double>(report.map_bytes) / 1e6));
+  if (report.held_out != nullptr && !report.held_out->images.empty()) {
+    const CheckMapReport& held_out = *report.held_out;
+    const auto figure = [&](const char* name) { return Figure(held_out, name); };
+    line("held-out images", fmt::format("{}", held_out.images.size()));
+    line("localized", fmt::format("{} ({} %)", NumFixes(held_out), Text(figure("localized_ratio"), 0.01, 1)));
+    line("median error", fmt::format("{} cm, {} deg", Text(figure("median_error_m"), 0.01, 2),
+                                     Text(figure("median_error_deg"), 1, 3)));
+    line("90th percentile", fmt::format("{} cm, {} deg", Text(figure("p90_error_m"), 0.01, 2),
+                                        Text(figure("p90_error_deg"), 1, 3)));
+    line("within 5 cm, 5 deg", Text(figure("within_5cm_5deg_ratio"), 0.01, 1) + " %");
+    line("within 10 cm, 2 deg", Text(figure("within_10cm_2deg_ratio"), 0.01, 1) + " %");
+    line("within 10 cm, 5 deg", Text(figure("within_10cm_5deg_ratio"), 0.01, 1) + " %");
+    line("precision", fmt::format("{} % ({} wrong fixes)", Text(figure("precision_ratio"), 0.01, 1),
+                                  Text(figure("num_gross_errors"), 1, 0)));
+    line("NEES", fmt::format("mean {}, median {} (95 % band of the mean {} to {})",
+                             Text(figure("mean_nees"), 1, 2), Text(figure("median_nees"), 1, 2),
+                             Text(figure("nees_low"), 1, 2), Text(figure("nees_high"), 1, 2)));
+    line("ms per image",
+         fmt::format("{:.1f} (SIFT alone {:.1f})", held_out.mean_total_ms, held_out.mean_sift_ms));
+  }
+  if (report.foreign != nullptr) {
+    line("other places",
+         fmt::format("{} images, {} false fixes", report.foreign->images.size(), NumFixes(*report.foreign)));
+  }
+  return text;
+}
+
+std::string ReportJson(const PrintedReport& report) {
+  nlohmann::json json = {{"map", report.rows->name},
+                         {"sealed", report.rows->sealed},
+                         {"num_landmarks", report.rows->landmarks.size()},
+                         {"landmarks", report.rows->landmark_choice},
+                         {"num_regions", report.rows->regions.size()},
+                         {"algorithm", report.rows->algorithm},
+                         {"k", report.rows->k},
+                         {"map_bytes", report.map_bytes}};
+  if (report.held_out != nullptr && !report.held_out->images.empty()) {
+    for (const auto& [name, value] : report.held_out->figures) json[name] = value;
+    json["mean_total_ms"] = report.held_out->mean_total_ms;
+    json["mean_sift_ms"] = report.held_out->mean_sift_ms;
+    json["images"] = ImagesJson(*report.held_out, true);
+  }
+  if (report.foreign != nullptr) {
+    json["num_foreign"] = report.foreign->images.size();
+    json["num_false_fixes"] = NumFixes(*report.foreign);
+    json["foreign_images"] = ImagesJson(*report.foreign, false);
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace cairn
