@@ -70,15 +70,19 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
   struct PixelRay {
     Eigen::Vector3d ray, step_x, step_y;
   };
+  // To the next pixel in a direction; at the border, and beside pixels without a ray, from the one before.
+  const auto step = [&](int x, int y, int dx, int dy) {
+    const auto is_inside = [&](int px, int py) { return px >= 0 && py >= 0 && px < width && py < height; };
+    Eigen::Vector2f change = Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN());
+    if (is_inside(x + dx, y + dy)) change = ray_at(x + dx, y + dy) - ray_at(x, y);
+    if (!change.allFinite() && is_inside(x - dx, y - dy)) change = ray_at(x, y) - ray_at(x - dx, y - dy);
+    if (!change.allFinite()) change.setZero();
+    return Eigen::Vector3d(world_from_cam.leftCols<2>() * change.cast<double>());
+  };
   const auto pixel_ray = [&](int x, int y) {
     const Eigen::Vector2f here = ray_at(x, y);
-    const Eigen::Vector2f dx =
-        x + 1 < width ? Eigen::Vector2f(ray_at(x + 1, y) - here) : Eigen::Vector2f(here - ray_at(x - 1, y));
-    const Eigen::Vector2f dy =
-        y + 1 < height ? Eigen::Vector2f(ray_at(x, y + 1) - here) : Eigen::Vector2f(here - ray_at(x, y - 1));
-    return PixelRay{world_from_cam * Eigen::Vector3d(here.x(), here.y(), 1),
-                    world_from_cam.leftCols<2>() * dx.cast<double>(),
-                    world_from_cam.leftCols<2>() * dy.cast<double>()};
+    return PixelRay{world_from_cam * Eigen::Vector3d(here.x(), here.y(), 1), step(x, y, 1, 0),
+                    step(x, y, 0, 1)};
   };
 
   cv::Mat image(height, width, CV_32FC1);
@@ -102,7 +106,6 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
            (y > 0 && faces.at<int>(y - 1, x) != face) || (y + 1 < height && faces.at<int>(y + 1, x) != face));
       if (!is_edge) continue;
       const PixelRay pixel = pixel_ray(x, y);
-      if (!std::isfinite(pixel.step_x.x()) || !std::isfinite(pixel.step_y.x())) continue;
       const Eigen::Vector3d step_x = pixel.step_x / kEdgeSamples, step_y = pixel.step_y / kEdgeSamples;
       float sum = 0;
       for (int j = 0; j < kEdgeSamples; ++j) {

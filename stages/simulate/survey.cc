@@ -192,7 +192,9 @@ Camera MakeCamera(const SimulateOptions& options) {
   camera.model = CameraModel::kPinhole;
   camera.width = options.image_width_px;
   camera.height = options.image_height_px;
-  const double focal = 0.5 * camera.width / std::tan(0.5 * RadFromDeg(options.horizontal_fov_deg));
+  // Rounded to what cameras.txt can say in few digits: 90 degrees give 320, not 320.00000000000006.
+  const double exact = 0.5 * camera.width / std::tan(0.5 * RadFromDeg(options.horizontal_fov_deg));
+  const double focal = std::round(exact * 1e6) / 1e6;
   camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
   return camera;
 }
