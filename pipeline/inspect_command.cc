@@ -1,0 +1,135 @@
+#include "pipeline/inspect_command.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/database.h"
+#include "core/file.h"
+#include "core/map_rows.h"
+#include "pipeline/floor_svg.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string map_path;
+  bool json = false;
+  std::string svg_path;
+};
+
+// Bytes of the pages of each table (its indices included), largest first; the file's remainder is SQLite's
+// own.
+Result<std::vector<std::pair<std::string, int64_t>>> BytesPerTable(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  return WithDatabaseErrors(path, [&]() -> Result<std::vector<std::pair<std::string, int64_t>>> {
+    std::vector<std::pair<std::string, int64_t>> tables;
+    SQLite::Statement query(
+        database,
+        "SELECT coalesce(s.tbl_name, d.name), sum(d.pgsize) FROM dbstat d LEFT JOIN sqlite_master s "
+        "ON s.name = d.name GROUP BY 1 ORDER BY 2 DESC, 1");
+    while (query.executeStep())
+      tables.emplace_back(query.getColumn(0).getString(), query.getColumn(1).getInt64());
+    return tables;
+  });
+}
+
+nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
+                               const std::vector<std::pair<std::string, int64_t>>& tables) {
+  size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
+  for (const auto& postings : rows.vocabulary.inverted_files) num_postings += postings.size();
+  for (const MapStation& station : rows.stations) num_uncovered += station.is_covered ? 0 : 1;
+  for (const MapRegion& region : rows.regions) num_region_landmarks += region.landmarks.size();
+  nlohmann::ordered_json json = {{"name", rows.name},
+                                 {"format", fmt::format("{}.{}", kMapVersionMajor, kMapVersionMinor)},
+                                 {"writer", rows.writer},
+                                 {"sealed", rows.sealed},
+                                 {"seed", rows.seed},
+                                 {"bytes", num_bytes},
+                                 {"num_landmarks", rows.landmarks.size()},
+                                 {"landmarks", rows.landmark_choice},
+                                 {"num_regions", rows.regions.size()},
+                                 {"num_region_landmarks", num_region_landmarks},
+                                 {"algorithm", rows.algorithm},
+                                 {"k", rows.k},
+                                 {"tau", rows.tau},
+                                 {"rho", rows.rho},
+                                 {"num_stations", rows.stations.size()},
+                                 {"num_station_edges", num_edges},
+                                 {"num_uncovered_stations", num_uncovered},
+                                 {"num_images", rows.images.size()},
+                                 {"num_cameras", rows.cameras.size()},
+                                 {"num_words", rows.vocabulary.num_words()},
+                                 {"vocabulary_depth", rows.vocabulary.depth},
+                                 {"num_postings", num_postings}};
+  json["bytes_per_table"] = nlohmann::ordered_json::object();
+  for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
+  json["self_test"] = rows.self_test;
+  json["stage_options"] = rows.stage_options;
+  json["input_hashes"] = rows.input_hashes;
+  return json;
+}
+
+// The same values for people: a line each, options as they stand in the recipe.
+std::string MapText(const nlohmann::ordered_json& json) {
+  std::string text;
+  for (const auto& [key, value] : json.items()) {
+    if (!value.is_object()) {
+      text += fmt::format("{:<24} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+      continue;
+    }
+    if (value.empty()) continue;
+    text += fmt::format("\n{}\n", key);
+    for (const auto& [name, entry] : value.items()) {
+      if (key == "stage_options") {
+        text += fmt::format("  [{}]\n", name);
+        std::string line;
+        for (const char c : entry.get<std::string>()) {
+          if (c != '\n') line += c;
+          if (c == '\n') text += "  " + std::exchange(line, "") + "\n";
+        }
+      } else if (key == "bytes_per_table") {
+        text += fmt::format("  {:<22} {:>12} {:>5.1f} %\n", name, entry.get<int64_t>(),
+                            100.0 * entry.get<double>() / json["bytes"].get<double>());
+      } else {
+        text +=
+            fmt::format("  {:<22} {}\n", name, entry.is_string() ? entry.get<std::string>() : entry.dump());
+      }
+    }
+  }
+  return text;
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const auto tables, BytesPerTable(arguments.map_path));
+  const auto json =
+      MapJson(rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
+  *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json));
+  if (arguments.svg_path.empty()) return Ok();
+  return WriteFileAtomically(arguments.svg_path, FloorSvg(rows));
+}
+
+}  // namespace
+
+Command InspectCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "inspect",
+      .summary = "Shows what is in a map: counts, bytes per table, options, a picture of the floor",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_flag("--json", arguments->json, "Print JSON");
+            app.add_option("--svg", arguments->svg_path, "Write a picture of the floor")
+                ->type_name("FILE.svg");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

@@ -1,0 +1,230 @@
+#include "pipeline/localize_command.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "core/capture.h"
+#include "core/image_file.h"
+#include "core/parallel.h"
+#include "runtime/localizer.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string map_path;
+  std::vector<std::string> images;
+  std::string list_path;
+  std::string output_path;
+  std::string camera;
+  std::string cameras_path;
+  LocalizerOptions options;
+  OptionArguments option_arguments;
+};
+
+// An image's answer.
+struct Answer {
+  std::string image;
+  CameraId camera_id = 0;
+  Result<Localization> localization = Error{};
+};
+
+// The camera to use for an image size: given on the command line, else the map's.
+class CameraChoice {
+ public:
+  static Result<CameraChoice> Make(const Arguments& arguments, std::shared_ptr<const Map> map) {
+    CameraChoice choice;
+    choice.map_ = std::move(map);
+    if (!arguments.camera.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(choice.camera_, ParseCamera(arguments.camera));
+    }
+    if (!arguments.cameras_path.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(choice.cameras_, ReadCamerasText(arguments.cameras_path));
+    }
+    return choice;
+  }
+
+  Result<Camera> ForImage(int width, int height) const {
+    if (camera_) return *camera_;
+    if (cameras_.empty()) return map_->CameraForSize(width, height);
+    const Camera* found = nullptr;
+    for (const auto& [camera_id, camera] : cameras_) {
+      if (camera.width != width || camera.height != height) continue;
+      if (found != nullptr) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "cameras {} and {} of --cameras both take {} x {} px; use --camera",
+                         found->camera_id, camera_id, width, height);
+      }
+      found = &camera;
+    }
+    if (found != nullptr) return *found;
+    return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
+  }
+
+ private:
+  std::shared_ptr<const Map> map_;
+  std::optional<Camera> camera_;
+  std::map<CameraId, Camera> cameras_;
+};
+
+Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>& map,
+                     const CameraChoice& cameras, const LocalizerOptions& options) {
+  Answer answer{.image = image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    return Localizer(map, options).Localize(grey, camera);
+  }();
+  return answer;
+}
+
+nlohmann::ordered_json AnswerJson(const Answer& answer) {
+  nlohmann::ordered_json json = {{"image", answer.image}};
+  if (!answer.localization.ok()) {
+    json["fix"] = false;
+    json["reason"] = ErrorCodeName(answer.localization.error().code);
+    json["message"] = answer.localization.error().message;
+    return json;
+  }
+  const Localization& found = *answer.localization;
+  json["fix"] = found.has_fix();
+  if (found.has_fix()) {
+    const Eigen::Quaterniond& q = found.cam_from_world.rotation;
+    const Eigen::Vector3d& t = found.cam_from_world.translation;
+    const Eigen::Vector3d center = found.cam_from_world.Center();
+    json["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+    json["translation_m"] = {t.x(), t.y(), t.z()};
+    json["center_m"] = {center.x(), center.y(), center.z()};
+    json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
+    json["region"] = found.region;
+  } else {
+    json["reason"] = NoFixName(found.reason);
+    json["message"] = found.message;
+  }
+  json["scope"] = ScopeName(found.scope);
+  json["num_features"] = found.num_features;
+  json["num_matches"] = found.num_matches;
+  json["num_inliers"] = found.num_inliers;
+  json["candidates"] = found.candidates;
+  return json;
+}
+
+// Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
+class ImageNames {
+ public:
+  static Result<ImageNames> Make(const Arguments& arguments) {
+    ImageNames names;
+    names.names_ = arguments.images;
+    if (!arguments.list_path.empty()) {
+      std::ifstream list(arguments.list_path);
+      if (!list) return MakeError(ErrorCode::kNotFound, "{}: no such file", arguments.list_path);
+      for (std::string line; std::getline(list, line);) {
+        if (!line.empty()) names.names_.push_back(line);
+      }
+    }
+    if (names.names_.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "no image: name images, use --list FILE, or '-' for stdin");
+    }
+    return names;
+  }
+
+  // Up to `count` names; only one at a time from stdin, so that it is answered before the next is read.
+  std::vector<std::string> Next(size_t count) {
+    std::vector<std::string> batch;
+    while (batch.size() < count && position_ < names_.size()) {
+      if (names_[position_] == "-") {
+        if (!batch.empty()) return batch;
+        std::string line;
+        while (std::getline(std::cin, line) && line.empty()) {
+        }
+        if (!line.empty()) return {line};
+        ++position_;
+      } else {
+        batch.push_back(names_[position_++]);
+      }
+    }
+    return batch;
+  }
+
+ private:
+  std::vector<std::string> names_;
+  size_t position_ = 0;
+};
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  cv::setNumThreads(1);  // images in parallel, each on one thread
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras, CameraChoice::Make(arguments, map));
+  CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments));
+
+  std::vector<CaptureImage> poses;
+  std::optional<Error> first_error;
+  int num_images = 0, num_failed = 0;
+  const size_t batch_size = 4 * static_cast<size_t>(NumThreads(environment.num_threads));
+  for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
+    std::vector<Answer> answers(batch.size());
+    ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads,
+                [&](int64_t i) { answers[i] = LocalizeImage(batch[i], map, cameras, arguments.options); });
+    for (const Answer& answer : answers) {
+      *environment.out << AnswerJson(answer).dump() << "\n" << std::flush;
+      ++num_images;
+      if (!answer.localization.ok()) {
+        ++num_failed;
+        if (!first_error) first_error = answer.localization.error();
+      } else if (answer.localization->has_fix()) {
+        poses.push_back({.name = std::filesystem::path(answer.image).filename().string(),
+                         .camera_id = answer.camera_id,
+                         .cam_from_world = answer.localization->cam_from_world});
+      }
+    }
+    if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "localizing was stopped");
+  }
+  if (!arguments.output_path.empty()) CAIRN_RETURN_IF_ERROR(WriteImagesText(arguments.output_path, poses));
+  spdlog::info("{} of {} images localized", poses.size(), num_images);
+  if (!first_error) return Ok();
+  return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
+                   num_images, first_error->message);
+}
+
+}  // namespace
+
+Command LocalizeCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "localize",
+      .summary = "Says where images were taken, as JSON lines",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_option("images", arguments->images, "Image files; '-' reads names from stdin")
+                ->type_name("IMAGE");
+            app.add_option("--list", arguments->list_path, "File with an image's name per line")
+                ->type_name("FILE");
+            app.add_option("-o,--output", arguments->output_path,
+                           "Write the poses found in COLMAP's images.txt form too")
+                ->type_name("poses.txt");
+            app.add_option("--camera", arguments->camera, "Camera of the images [the map's one of that size]")
+                ->type_name("MODEL,W,H,P...");
+            app.add_option("--cameras", arguments->cameras_path, "cameras.txt; chosen by image size")
+                ->type_name("FILE");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn
