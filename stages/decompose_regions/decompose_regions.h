@@ -29,14 +29,15 @@ namespace cairn {
 struct DecomposeRegionsOptions {
   // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, V-C].
   std::string algorithm = "b2";
-  // Number of features that are visible everywhere in a region [Sala06: 4 and 10].  REQUIRES: >= 1
-  int k = 4;
+  // Number of features that are visible everywhere in a region [Sala06: 4 and 10; here more, so that a
+  // query may miss some].  REQUIRES: >= 1
+  int k = 40;
   // Overlap: the tau-neighbourhood of every station lies in some region, hops [Sala06: 0 and 1].  REQUIRES:
   // >= 0
   int tau = 1;
   // A region is kept only if it covers more than this many stations that nothing else covers [Sala06: 9 in
   // simulated worlds, 3 in the real one].  REQUIRES: >= 0
-  int rho = 9;
+  int rho = 0;
   // Algorithm C: least share of a disc's stations that are open [Sala06: 0.85].  REQUIRES: in [0, 1]
   double alpha = 0.85;
 };
