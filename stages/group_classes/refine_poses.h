@@ -12,8 +12,8 @@ namespace cairn {
 struct RefinePosesOptions {
   // Standard deviation of the stated survey poses, metres and degrees: how far the images may move them.
   // REQUIRES: > 0
-  double pose_sigma_m = 0.02;
-  double pose_sigma_deg = 0.5;
+  double pose_sigma_m = 0.01;
+  double pose_sigma_deg = 0.25;
   // Standard deviation of a keypoint's position, pixels.  REQUIRES: > 0
   double keypoint_sigma_px = 1.0;
   // Refine one rigid offset between all stated poses and their cameras (the poses may be a depth camera's or
@@ -24,7 +24,7 @@ struct RefinePosesOptions {
   double offset_sigma_deg = 3.0;
   // Refine one factor on the focal length of each pinhole camera, and its standard deviation about 1.
   // REQUIRES: > 0
-  bool refine_focal = true;
+  bool refine_focal = false;
   double focal_sigma_ratio = 0.03;
   // Most iterations of the solver.  REQUIRES: >= 1
   int max_num_iterations = 30;

@@ -127,7 +127,7 @@ TEST(GroupClasses, ExactPosesGiveTheTruePoints) {
 }
 
 TEST(GroupClasses, NoisyPosesAreRefinedTowardsTheTruth) {
-  const Survey survey = MakeSurvey({.pose_m = 0.02, .pose_deg = 0.5});
+  const Survey survey = MakeSurvey({.pose_m = 0.01, .pose_deg = 0.25});
   const GroupClassesResult result = Group(survey);
   ASSERT_TRUE(result.poses_refined);
   EXPECT_LT(result.final_rms_px, 0.8);
@@ -149,6 +149,7 @@ TEST(GroupClasses, ConstantOffsetAndFocalLengthAreFound) {
   const Survey survey = MakeSurvey(noise);
   GroupClassesOptions options;
   options.initial_reprojection_error_px = 30;
+  options.refinement.refine_focal = true;
   options.refinement.pose_sigma_m = 0.005;
   options.refinement.pose_sigma_deg = 0.1;
   const GroupClassesResult result = Group(survey, options);
