@@ -83,7 +83,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
 void RemoveStaleTemporaries(const std::string& build_dir) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(build_dir, error)) {
-    if (entry.path().filename().string().find(".tmp-") == std::string::npos) continue;
+    const bool is_stale = entry.path().filename().string().find(".tmp-") != std::string::npos ||
+                          entry.path().extension() == ".begun";  // the stamp of a rule that did not end
+    if (!is_stale) continue;
     std::error_code remove_error;  // one that cannot be removed only takes room
     fs::remove(entry.path(), remove_error);
   }

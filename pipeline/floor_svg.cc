@@ -124,7 +124,7 @@ double MarkerSizePx(const MapRows& rows, const View& view) {
       if (distance > 1e-6) least = std::min(least, distance);
     }
   }
-  return std::clamp(0.45 * least * view.px_per_m, 3.0, 16.0);
+  return std::clamp(0.45 * least * view.px_per_m, 3.0, 26.0);
 }
 
 // Sectors of one place leave each other room: the arrow points away from the centre.

@@ -63,6 +63,19 @@ Status CheckName(const std::string& path, const toml::node& node, const std::str
       TomlPlace(path, node), name);
 }
 
+// The keys of [gate]: those options of check_map that a map must reach to be written.
+OptionTable GateOptions(const std::vector<StageOptions>& stages) {
+  OptionTable gate;
+  for (const StageOptions& stage : stages) {
+    if (stage.stage != "check_map") continue;
+    for (const Option& option : stage.table) {
+      if (option.name == "min_localized_ratio" || option.name == "min_precision_ratio")
+        gate.push_back(option);
+    }
+  }
+  return gate;
+}
+
 // Reads the keys of one recipe file; a class only to keep the path and the recipe at hand.
 class RecipeReader {
  public:
@@ -111,10 +124,13 @@ class RecipeReader {
     }
     if (name == "seed") return ReadSeed(node);
     if (name == "capture") return ReadCaptures(node);
+    if (name == "gate" && node.is_table()) {
+      return SetOptionsFromToml(*node.as_table(), path_, GateOptions(recipe_.stages));
+    }
     const auto stage = std::find_if(recipe_.stages.begin(), recipe_.stages.end(),
                                     [&](const StageOptions& s) { return s.stage == name; });
     if (stage == recipe_.stages.end()) {
-      std::vector<std::string> valid = {"name", "seed", "capture"};
+      std::vector<std::string> valid = {"name", "seed", "capture", "gate"};
       for (const StageOptions& s : recipe_.stages) valid.push_back(s.stage);
       return UnknownKey(path_, key, node.is_table() ? "table" : "key", valid);
     }
@@ -217,6 +233,20 @@ std::string EscapePipes(std::string text) {
   return text;
 }
 
+void AppendOptions(std::string* page, const OptionTable& table) {
+  if (table.empty()) {
+    *page += "\nNo options.\n";
+    return;
+  }
+  *page += "\n| key | default | range | meaning |\n|---|---|---|---|\n";
+  for (const Option& option : table) {
+    const std::string line = OptionsToml({option});  // "key = value\n"
+    const std::string value = line.substr(option.name.size() + 3, line.size() - option.name.size() - 4);
+    *page += fmt::format("| `{}` | `{}` | {} | {} |\n", option.name, value, EscapePipes(RangeText(option)),
+                         EscapePipes(option.help));
+  }
+}
+
 }  // namespace
 
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages) {
@@ -235,21 +265,13 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
   AppendKeys(&page, kTopKeys);
   page += "\n## `[[capture]]`\n\nOne survey. A recipe has either this or `[simulate]`.\n";
   AppendKeys(&page, kCaptureKeys);
+  page += "\n## `[gate]`\n\nBelow these figures no map is written. They are options of `[check_map]`.\n";
+  AppendOptions(&page, GateOptions(stages));
   for (const StageOptions& stage : stages) {
     page += fmt::format("\n## `[{}]`\n", stage.stage);
     if (stage.stage == "simulate")
       page += "\nThe capture is rendered first; an empty table takes all defaults.\n";
-    if (stage.table.empty()) {
-      page += "\nNo options.\n";
-      continue;
-    }
-    page += "\n| key | default | range | meaning |\n|---|---|---|---|\n";
-    for (const Option& option : stage.table) {
-      const std::string line = OptionsToml({option});  // "key = value\n"
-      const std::string value = line.substr(option.name.size() + 3, line.size() - option.name.size() - 4);
-      page += fmt::format("| `{}` | `{}` | {} | {} |\n", option.name, value, EscapePipes(RangeText(option)),
-                          EscapePipes(option.help));
-    }
+    AppendOptions(&page, stage.table);
   }
   return page;
 }

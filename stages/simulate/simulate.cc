@@ -1,14 +1,15 @@
 #include "stages/simulate/simulate.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <optional>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
@@ -93,6 +94,25 @@ Status ReplaceFolder(const std::string& temporary, const std::string& path) {
   return Ok();
 }
 
+// Removes the temporary folders beside `path` of processes that were killed.
+void RemoveLeftovers(const std::string& path) {
+  const fs::path target(path);
+  const std::string prefix = target.filename().string() + ".tmp-";
+  std::vector<fs::path> leftovers;
+  std::error_code error;
+  const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  for (const fs::directory_entry& entry : fs::directory_iterator(parent, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    pid_t process = 0;
+    const char* end = name.data() + name.size();
+    const auto [rest, parse_error] = std::from_chars(name.data() + prefix.size(), end, process);
+    const bool is_ours = parse_error == std::errc() && process > 0 && (rest == end || *rest == '-');
+    if (is_ours && kill(process, 0) != 0 && errno == ESRCH) leftovers.push_back(entry.path());
+  }
+  for (const fs::path& leftover : leftovers) fs::remove_all(leftover, error);
+}
+
 // Refuses to replace what is not a capture.
 Status CheckOutput(const std::string& path) {
   std::error_code error;
@@ -126,6 +146,7 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
   CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, seed));
   const Renderer renderer(building, survey.camera);
 
+  RemoveLeftovers(target);
   const std::string temporary = fmt::format("{}.tmp-{}", target, getpid());
   const auto write = [&]() -> Status {
     std::error_code error;

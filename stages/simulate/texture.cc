@@ -46,7 +46,7 @@ Texture::Texture(const cv::Mat& grey) {
 }
 
 float Texture::SampleLevels(float x, float y, int level, float fraction) const {
-  const float scale = 1.0f / static_cast<float>(1 << level);
+  const float scale = std::bit_cast<float>(static_cast<uint32_t>(127 - level) << 23);  // 2^-level
   const float fine = Bilinear(levels_[level], x * scale, y * scale);
   if (fraction <= 0 || level + 1 >= static_cast<int>(levels_.size())) return fine;
   const float coarse = Bilinear(levels_[level + 1], 0.5f * x * scale, 0.5f * y * scale);
@@ -60,7 +60,7 @@ float Texture::Sample(const Eigen::Vector2f& position, const Eigen::Vector2f& st
   const float length = std::max(major.norm(), 1e-6f);
   const float area = std::abs(step_x.x() * step_y.y() - step_x.y() * step_y.x());
   const float minor = std::max(area / length, 1.0f);  // no detail below one texel
-  const int num_taps = std::clamp(static_cast<int>(std::ceil(length / minor)), 1, kMaxTaps);
+  const int num_taps = std::clamp(static_cast<int>(length / minor + 0.5f), 1, kMaxTaps);
   const float footprint = std::max(length / static_cast<float>(num_taps), minor);
 
   // log2 by its exponent and, linearly, its mantissa: continuous, and fast.

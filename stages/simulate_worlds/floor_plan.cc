@@ -54,7 +54,7 @@ Polygon DrawPerimeter(const SimulateWorldsOptions& options, Random* random) {
   const int num_sides = which < 0.1    ? 4
                         : which < 0.55 ? RoundedNormal(5, 0.5, random)
                                        : RoundedNormal(7, 2, random);
-  return DrawPolygon(Eigen::Vector2d::Zero(), std::clamp(num_sides, 4, 12), radius, 0.1 * radius, random);
+  return DrawPolygon(Eigen::Vector2d::Zero(), std::clamp(num_sides, 4, 12), 1.1 * radius, 0.1 * radius, random);
 }
 
 int DrawNumObstacles(const SimulateWorldsOptions& options, Random* random) {
@@ -111,7 +111,7 @@ std::vector<Side> Sides(const FloorPlan& plan) {
 }
 
 void DrawFeatures(const SimulateWorldsOptions& options, Random* random, FloorPlan* plan) {
-  static constexpr int kNumFeatures[] = {5200, 1600, 4400, 1500};
+  static constexpr int kNumFeatures[] = {5400, 1700, 5000, 1700};
   const int num_features = static_cast<int>(
       std::lround((options.num_features > 0 ? options.num_features : kNumFeatures[options.setting - 1]) *
                   options.area_scale));

@@ -94,11 +94,12 @@ TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
 
 TEST_F(BuildFolderTest, StaleTemporariesAreRemovedAndNothingElse) {
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
-  for (const char* name : {"/features.db.tmp-123", "/features.db"}) {
+  for (const char* name : {"/features.db.tmp-123", "/features.db.stamp.begun", "/features.db"}) {
     ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + name, "x").ok());
   }
   RemoveStaleTemporaries(paths_.build_dir);
   EXPECT_FALSE(fs::exists(paths_.build_dir + "/features.db.tmp-123"));
+  EXPECT_FALSE(fs::exists(paths_.build_dir + "/features.db.stamp.begun"));
   EXPECT_TRUE(fs::exists(paths_.build_dir + "/features.db"));
 }
 

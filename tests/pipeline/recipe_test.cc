@@ -75,6 +75,14 @@ TEST_F(RecipeTest, UpOfTheCaptureReachesTheStageThatLaysOutTheFloor) {
               HasSubstr("three numbers"));
 }
 
+TEST_F(RecipeTest, GateSetsWhatAMapMustReach) {
+  const auto recipe = Read("name = \"a\"\n[simulate]\n[gate]\nmin_localized_ratio = 0.9\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_EQ(OptionsToml(recipe->stages[3].table), "min_localized_ratio = 0.9\ngross_error_m = 0.5\n");
+  EXPECT_THAT(Message("name = \"a\"\n[simulate]\n[gate]\ngross_error_m = 1\n"),
+              HasSubstr("recipe.toml:4: unknown"));
+}
+
 TEST_F(RecipeTest, UnknownKeysNameLineAndNearestValidOne) {
   EXPECT_THAT(Message("nme = \"a\"\n"), HasSubstr("recipe.toml:1: unknown key 'nme'; did you mean 'name'?"));
   EXPECT_THAT(Message("name = \"a\"\n[extract_feature]\n"),

@@ -6,7 +6,7 @@
 
 namespace cairn {
 
-// Two stages with a few options each, so that tests of recipes do not change with the stages' own options.
+// Four stages with a few options each, so that tests of recipes do not change with the stages' own options.
 struct ExtractTestOptions {
   int max_num_features = 2000;
   double contrast_threshold = 0.02;
@@ -36,10 +36,21 @@ inline OptionTable DescribeOptions(SimulateTestOptions* o) {
   return {{.name = "width_m", .value = &o->width_m, .help = "width", .min = 4, .max = 200}};
 }
 
+struct CheckTestOptions {
+  double min_localized_ratio = 0;
+  double gross_error_m = 0.5;
+};
+inline OptionTable DescribeOptions(CheckTestOptions* o) {
+  return {
+      {.name = "min_localized_ratio", .value = &o->min_localized_ratio, .help = "gate", .min = 0, .max = 1},
+      {.name = "gross_error_m", .value = &o->gross_error_m, .help = "gross", .min = 0}};
+}
+
 inline std::vector<StageOptions> TestStages() {
   return {MakeStageOptions<SimulateTestOptions>("simulate"),
           MakeStageOptions<ExtractTestOptions>("extract_features"),
-          MakeStageOptions<VisibilityTestOptions>("filter_visibility")};
+          MakeStageOptions<VisibilityTestOptions>("filter_visibility"),
+          MakeStageOptions<CheckTestOptions>("check_map")};
 }
 
 }  // namespace cairn

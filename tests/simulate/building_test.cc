@@ -132,7 +132,8 @@ TEST(CastRay, FindsTheFirstBox) {
   Random random(1);
   int num_hits = 0;
   for (int i = 0; i < 20000; ++i) {
-    const Eigen::Vector3d origin(random.Uniform(0, 9.5), random.Uniform(0, 7.5), random.Uniform(0.1, 2.05));  // below the lintels
+    const Eigen::Vector3d origin(random.Uniform(0, 9.5), random.Uniform(0, 7.5),
+                                 random.Uniform(0.1, 2.05));  // below the lintels
     const Eigen::Vector3d ray(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 0.3));
     if (ClearanceM(building, origin.x(), origin.y()) < 0.01) continue;
     double nearest = ((ray.z() < 0 ? 0 : building.height_m) - origin.z()) / ray.z();

@@ -94,6 +94,14 @@ TEST_F(SimulateCaptureTest, ReplacesAnOldCaptureAsAWhole) {
             1);  // nothing left beside it
 }
 
+TEST_F(SimulateCaptureTest, ClearsAwayWhatAKilledRunLeft) {
+  fs::create_directories(Path("capture.tmp-999999999") + "/images");  // no process has this number
+  fs::create_directories(Path("capture.tmp-notes"));
+  ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("capture"), 0, 2, progress_).ok());
+  EXPECT_FALSE(fs::exists(Path("capture.tmp-999999999")));
+  EXPECT_TRUE(fs::exists(Path("capture.tmp-notes")));
+}
+
 TEST_F(SimulateCaptureTest, RefusesToReplaceWhatIsNotACapture) {
   fs::create_directories(Path("home"));
   std::ofstream(Path("home") + "/letter.txt") << "x";
