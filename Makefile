@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev \
-    libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap clang-format clang-tidy
+    libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap jq python3 clang-format clang-tidy
 # Turns the demo's picture into PNG; nothing fails without it.
 OPTIONAL_PACKAGES := librsvg2-bin
 

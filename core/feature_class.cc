@@ -104,8 +104,10 @@ Status WriteClasses(const Classes& classes, const std::string& path) {
       class_row.exec();
       class_row.reset();
     }
-    SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?)");
+    SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?)");
     BindArray(alignment_row, 1, ArrayFromPose(classes.camera_from_given));
+    alignment_row.bind(2, classes.stated_pose_sigma_m);
+    alignment_row.bind(3, classes.stated_pose_sigma_deg);
     alignment_row.exec();
     SQLite::Statement dropped_row(database, "INSERT INTO dropped VALUES (?, ?)");
     for (const auto& [reason, num_classes] : classes.dropped) {
@@ -164,11 +166,14 @@ Result<Classes> ReadClasses(const std::string& path) {
       CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class, ClassFromRow(class_row, path, image_ids));
       classes.classes.push_back(std::move(feature_class));
     }
-    SQLite::Statement alignment_row(database, "SELECT camera_from_given FROM alignment");
+    SQLite::Statement alignment_row(
+        database, "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg FROM alignment");
     if (alignment_row.executeStep()) {
       CAIRN_ASSIGN_OR_RETURN(const PoseArray pose,
                              ArrayFromColumn<7>(alignment_row.getColumn(0), path + ": alignment"));
       classes.camera_from_given = PoseFromArray(pose);
+      classes.stated_pose_sigma_m = alignment_row.getColumn(1).getDouble();
+      classes.stated_pose_sigma_deg = alignment_row.getColumn(2).getDouble();
     }
     SQLite::Statement dropped_row(database, "SELECT reason, num_classes FROM dropped ORDER BY 1");
     while (dropped_row.executeStep())

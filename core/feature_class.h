@@ -51,6 +51,11 @@ struct Classes {
   // Constant offset between the pose that the capture states and its camera, if refined, else identity:
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
   Pose camera_from_given;
+  // Where poses were refined: how far they moved from the stated ones, root mean square per axis of the
+  // camera's place and rotation.  An error that the survey's poses share with whoever is localized against
+  // them.
+  double stated_pose_sigma_m = 0;
+  double stated_pose_sigma_deg = 0;
   DropCounts dropped;  // classes, by reason
 };
 

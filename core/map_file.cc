@@ -60,7 +60,9 @@ void WriteHead(SQLite::Database& database, const MapRows& rows) {
               {"algorithm", rows.algorithm},
               {"k", std::to_string(rows.k)},
               {"tau", std::to_string(rows.tau)},
-              {"rho", std::to_string(rows.rho)}});
+              {"rho", std::to_string(rows.rho)},
+              {"stated_pose_sigma_m", fmt::format("{}", rows.stated_pose_sigma_m)},
+              {"stated_pose_sigma_deg", fmt::format("{}", rows.stated_pose_sigma_deg)}});
   WriteTexts(database, "INSERT INTO stage_options VALUES (?, ?)", rows.stage_options);
   WriteTexts(database, "INSERT INTO inputs VALUES (?, ?)", rows.input_hashes);
   SQLite::Statement frame(database, "INSERT INTO frames VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
@@ -215,6 +217,11 @@ Status ReadHead(SQLite::Database& database, const std::string& path, MapRows* ro
       !ParseNumber(meta["tau"], &rows->tau) || !ParseNumber(meta["rho"], &rows->rho)) {
     return Corrupt(path, "table meta: seed '{}', k '{}', tau '{}' or rho '{}' is not an integer",
                    meta["seed"], meta["k"], meta["tau"], meta["rho"]);
+  }
+  if (!ParseNumber(meta["stated_pose_sigma_m"], &rows->stated_pose_sigma_m) ||
+      !ParseNumber(meta["stated_pose_sigma_deg"], &rows->stated_pose_sigma_deg)) {
+    return Corrupt(path, "table meta: stated_pose_sigma_m '{}' or stated_pose_sigma_deg '{}' is not a number",
+                   meta["stated_pose_sigma_m"], meta["stated_pose_sigma_deg"]);
   }
   rows->stage_options = ReadTexts(database, "SELECT stage, options FROM stage_options");
   rows->input_hashes = ReadTexts(database, "SELECT name, hash FROM inputs");

@@ -94,6 +94,10 @@ Status CheckMapRows(const MapRows& rows) {
   }
   if (!IsPose(rows.floor_from_world) || !IsPose(rows.camera_from_given))
     return Invalid("a frame's rotation is none");
+  if (!(rows.stated_pose_sigma_m >= 0 && rows.stated_pose_sigma_m < 1e3) ||
+      !(rows.stated_pose_sigma_deg >= 0 && rows.stated_pose_sigma_deg <= 180)) {
+    return Invalid("the noise of the stated poses is no valid number");
+  }
   size_t image = 0;
   for (const ImageId image_id : rows.vocabulary.document_ids) {
     while (image < rows.images.size() && rows.images[image].image_id < image_id) ++image;

@@ -71,6 +71,9 @@ struct MapRows {
   // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
   // noise.
   Pose camera_from_given;
+  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
+  double stated_pose_sigma_m = 0;
+  double stated_pose_sigma_deg = 0;
 
   std::vector<Camera> cameras;   // ascending camera_id
   std::vector<MapImage> images;  // ascending image_id

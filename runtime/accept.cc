@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -26,7 +27,21 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
       std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
 }
 
+double Log10Choose(int n, int k) {
+  return (std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0)) / std::numbers::ln10;
+}
+
 }  // namespace
+
+double Log10ChancePoses(int num_matches, int num_inliers, double max_error_px, const Camera& camera) {
+  constexpr int kSampleSize = 3;
+  if (num_inliers <= kSampleSize) return std::numeric_limits<double>::infinity();
+  const double image_area = static_cast<double>(camera.width) * camera.height;
+  const double p = std::min(1.0, std::numbers::pi * max_error_px * max_error_px / image_area);
+  return Log10Choose(num_matches, kSampleSize) +
+         Log10Choose(num_matches - kSampleSize, num_inliers - kSampleSize) +
+         (num_inliers - kSampleSize) * std::log10(p);
+}
 
 const char* NoFixName(NoFix reason) {
   switch (reason) {
@@ -68,11 +83,9 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .value = &o->min_num_unguided_inliers,
        .help = "least matches found without the pose that agree with it",
        .min = 4},
-      {.name = "min_inlier_ratio",
-       .value = &o->min_inlier_ratio,
-       .help = "least part of the matches that agree",
-       .min = 0,
-       .max = 1},
+      {.name = "max_log10_chance",
+       .value = &o->max_log10_chance,
+       .help = "log10 of the number of poses that random matches would agree on as well, at most"},
       {.name = "min_num_inliers", .value = &o->min_num_inliers, .help = "least inliers in all", .min = 5},
       {.name = "spread_grid",
        .value = &o->spread_grid,

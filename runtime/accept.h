@@ -30,13 +30,14 @@ struct AcceptOptions {
   // Least features of the image.  REQUIRES: >= 4
   int min_num_features = 30;
   // Least matches to try for a pose.  REQUIRES: >= 4
-  int min_num_matches = 10;
+  int min_num_matches = 7;
   // Least matches, found without knowing the pose, that agree with it.  REQUIRES: >= 4
-  int min_num_unguided_inliers = 9;
-  // The same as part of all matches.  REQUIRES: in [0, 1]
-  double min_inlier_ratio = 0.1;
+  int min_num_unguided_inliers = 6;
+  // Log10 of the number of poses that would have as many inliers if all matches were random
+  // (Log10ChancePoses), at most.
+  double max_log10_chance = -4;
   // Least inliers in all.  REQUIRES: >= 5
-  int min_num_inliers = 12;
+  int min_num_inliers = 7;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells. REQUIRES: >= 1
   int spread_grid = 6;
@@ -57,6 +58,12 @@ struct AcceptOptions {
   double second_pose_angle_deg = 15;
 };
 OptionTable DescribeOptions(AcceptOptions* options);
+
+// Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches whose
+// keypoints lie anywhere in the image:  C(n, 3) C(n - 3, m - 3) p^(m - 3), p = area of a disc of
+// `max_error_px` over the image's. [Moisan & Stival, "A probabilistic criterion to detect rigid point
+// matches", 2004: number of false alarms]
+double Log10ChancePoses(int num_matches, int num_inliers, double max_error_px, const Camera& camera);
 
 struct Verdict {
   NoFix reason = NoFix::kNone;

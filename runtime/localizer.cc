@@ -1,6 +1,7 @@
 #include "runtime/localizer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -105,7 +106,13 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
 }
 
 Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
-    : map_(std::move(map)), options_(options) {}
+    : map_(std::move(map)), options_(options) {
+  // What the survey's poses were off by does not average out over landmarks.
+  options_.refine.systematic_sigma_m =
+      std::hypot(options.refine.systematic_sigma_m, map_->rows().stated_pose_sigma_m);
+  options_.refine.systematic_sigma_deg =
+      std::hypot(options.refine.systematic_sigma_deg, map_->rows().stated_pose_sigma_deg);
+}
 
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
                                          const std::optional<PosePrior>& prior) {
@@ -206,12 +213,17 @@ Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
   const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
   if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
+  const double log10_chance = Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers,
+                                               options_.estimate.max_error_px, query.camera);
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
-      localization.num_unguided_inliers < accept.min_inlier_ratio * static_cast<double>(matches.size())) {
-    return fail(NoFix::kTooFewInliers,
-                fmt::format("{} of {} matches agree on a pose, at least {} and {:.0f} % are needed",
-                            estimate->inliers.size(), matches.size(), accept.min_num_unguided_inliers,
-                            100 * accept.min_inlier_ratio));
+      log10_chance > accept.max_log10_chance) {
+    return fail(
+        NoFix::kTooFewInliers,
+        fmt::format(
+            "{} of {} matches agree on a pose, as 10^{:.1f} poses would by chance; at least {} and at "
+            "most 10^{:g} are needed",
+            estimate->inliers.size(), matches.size(), log10_chance, accept.min_num_unguided_inliers,
+            accept.max_log10_chance));
   }
   if (accept.max_second_pose_ratio > 0 && IsAmbiguous(measurements, *estimate)) {
     return fail(NoFix::kAmbiguous, fmt::format("another pose has at least {:.0f} % as many inliers",

@@ -10,12 +10,12 @@ namespace cairn {
 
 struct RetrieveOptions {
   // Most candidate images.  REQUIRES: >= 1
-  int max_num_candidates = 12;
+  int max_num_candidates = 20;
   // Candidates score at least this part of the best one's score [Mariottini11: a percentage of the maximum,
   // not given]. REQUIRES: in [0, 1]
   double min_score_ratio = 0.3;
   // Most regions whose landmarks are matched first.  REQUIRES: >= 1
-  int max_num_regions = 6;
+  int max_num_regions = 12;
   // With a prior: survey images within this distance and angle of it (beyond 3 of its standard deviations)
   // are candidates.  REQUIRES: >= 0
   double prior_distance_m = 3;

@@ -30,7 +30,10 @@ CREATE TABLE classes (
 );
 
 CREATE TABLE alignment (
-  camera_from_given BLOB NOT NULL  -- float64[7], as images.refined
+  camera_from_given BLOB NOT NULL,  -- float64[7], as images.refined
+  -- how far refined poses moved from the stated ones, root mean square per axis; 0: poses as stated
+  stated_pose_sigma_m   REAL NOT NULL,
+  stated_pose_sigma_deg REAL NOT NULL
 );
 
 CREATE TABLE dropped (

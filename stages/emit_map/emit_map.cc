@@ -214,6 +214,8 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   rows.rho = decomposition.rho;
   rows.floor_from_world = world.floor_from_world;
   rows.camera_from_given = classes.camera_from_given;
+  rows.stated_pose_sigma_m = classes.stated_pose_sigma_m;
+  rows.stated_pose_sigma_deg = classes.stated_pose_sigma_deg;
   rows.cameras = classes.cameras;
   CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
   CAIRN_RETURN_IF_ERROR(AddStations(world, decomposition, &rows));

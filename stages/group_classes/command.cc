@@ -30,12 +30,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                                   dropped.empty() ? "none" : dropped);
   if (result.poses_refined) {
     const Pose& offset = classes.camera_from_given;
+    *environment.out << fmt::format("group_classes: poses refined, reprojection error {:.2f} -> {:.2f} px, ",
+                                    result.initial_rms_px, result.final_rms_px);
     *environment.out << fmt::format(
-        "group_classes: poses refined, reprojection error {:.2f} -> {:.2f} px, offset {:.1f} cm / {:.2f} "
-        "deg, focal length "
-        "x {:.4f}\n",
-        result.initial_rms_px, result.final_rms_px, 100 * offset.translation.norm(),
-        RotationErrorDeg(offset, Pose()),
+        "offset {:.1f} cm / {:.2f} deg, stated poses off by {:.1f} cm / {:.2f} deg an axis, focal length x "
+        "{:.4f}\n",
+        100 * offset.translation.norm(), RotationErrorDeg(offset, Pose()), 100 * classes.stated_pose_sigma_m,
+        classes.stated_pose_sigma_deg,
         classes.cameras.front().FocalX() / matched.cameras.begin()->second.FocalX());
   } else {
     *environment.out << fmt::format("group_classes: poses as stated, reprojection error {:.2f} px\n",

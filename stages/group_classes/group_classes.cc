@@ -185,6 +185,20 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
   }
 }
 
+// How far the refined poses moved from the stated ones, once the common offset is taken off.
+void MeasurePoseNoise(Classes* classes) {
+  double squared_m = 0, squared_deg = 0;
+  for (const SurveyImage& image : classes->images) {
+    const Pose in_given_frame = classes->camera_from_given.Inverse() * image.cam_from_world;
+    squared_m += std::pow(CenterErrorM(in_given_frame, image.given_cam_from_world), 2);
+    squared_deg += std::pow(RotationErrorDeg(in_given_frame, image.given_cam_from_world), 2);
+  }
+  const double num_axes = 3.0 * static_cast<double>(classes->images.size());
+  // Below a micrometre it is arithmetic, not noise.
+  classes->stated_pose_sigma_m = std::round(1e6 * std::sqrt(squared_m / num_axes)) / 1e6;
+  classes->stated_pose_sigma_deg = std::round(1e4 * std::sqrt(squared_deg / num_axes)) / 1e4;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(GroupClassesOptions* o) {
@@ -363,6 +377,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
     classes.images.push_back({image.image_id, image.name, image.camera_id, state.poses[i], posed.stated[i]});
   }
   classes.camera_from_given = state.camera_from_given;
+  MeasurePoseNoise(&classes);
   MakeClasses(matched, tracks, triangulations, posed, options, &classes);
   progress.Advance();
   progress.End();

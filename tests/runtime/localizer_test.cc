@@ -20,6 +20,13 @@ std::shared_ptr<const Map> RoomMap() {
   return map;
 }
 
+// The synthetic rooms' errors are independent of each other: no factor for those that are not.
+LocalizerOptions IndependentErrors() {
+  LocalizerOptions options;
+  options.refine.covariance_scale = 1;
+  return options;
+}
+
 TEST(Localizer, FindsEveryFreePoseOfACleanRoom) {
   Localizer localizer(RoomMap());
   Random random(5);
@@ -60,7 +67,7 @@ TEST(Localizer, CovarianceIsRight) {
   int num_fixes = 0;
   Random random(7);
   for (int i = 0; i < kNumTrials; ++i) {
-    Localizer localizer(*Map::FromRows(WithLandmarkNoise(Room(), 0.01, random)));
+    Localizer localizer(*Map::FromRows(WithLandmarkNoise(Room(), 0.01, random)), IndependentErrors());
     const Pose truth = RandomPose(random);
     const auto found = *localizer.LocalizeFeatures(
         RenderFeatures(Room(), truth, {.num_swapped_ratio = 0.2}, 100 + i), Room().camera);
@@ -79,12 +86,11 @@ TEST(Localizer, CovarianceFollowsNoiseThatNobodyAnnounced) {
   double sum = 0;
   int num_fixes = 0;
   Random random(8);
-  Localizer localizer(RoomMap());
+  Localizer localizer(RoomMap(), IndependentErrors());
   for (int i = 0; i < 200; ++i) {
     const Pose truth = RandomPose(random);
     const RenderOptions noisy{
         .keypoint_sigma_px = 1.5, .keypoint_sigma_per_scale = 0.6, .detection_ratio = 0.4};
-    LocalizerOptions options;
     const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, noisy, i), Room().camera);
     if (!found.has_fix()) continue;
     ++num_fixes;
@@ -94,6 +100,31 @@ TEST(Localizer, CovarianceFollowsNoiseThatNobodyAnnounced) {
   ASSERT_GT(num_fixes, 190);
   // The search radius cuts the largest of these errors off, so that a little is missing: within 20 %.
   EXPECT_NEAR(sum / num_fixes, 6, 1.2);
+}
+
+TEST(Localizer, NoiseOfTheSurveysPosesWidensTheCovariance) {
+  MapRows rows = Room().rows;
+  rows.stated_pose_sigma_m = 0.03;
+  rows.stated_pose_sigma_deg = 1;
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  const auto without = *Localizer(RoomMap()).LocalizeFeatures(features, Room().camera);
+  const auto with = *Localizer(*Map::FromRows(rows)).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(with.has_fix());
+  const Vector6d added = with.covariance.diagonal() - without.covariance.diagonal();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(std::sqrt(added[i]), RadFromDeg(1), 1e-6);
+    EXPECT_NEAR(std::sqrt(added[3 + i]), 0.03, 1e-6);
+  }
+}
+
+TEST(Log10ChancePoses, FollowsTheDefinition) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  // C(10, 3) = 120, C(7, 3) = 35, p = pi 6^2 / 307200 = 3.6816e-4, p^3 = 4.990e-11: 2.096e-7
+  EXPECT_NEAR(Log10ChancePoses(10, 6, 6, camera), std::log10(120 * 35 * 4.990e-11), 1e-3);
+  EXPECT_GT(Log10ChancePoses(10, 3, 6, camera), 1e9);  // three matches always agree
+  EXPECT_LT(Log10ChancePoses(20, 8, 6, camera), Log10ChancePoses(40, 8, 6, camera));
 }
 
 TEST(Localizer, AnotherPlaceIsRefused) {

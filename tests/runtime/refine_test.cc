@@ -8,6 +8,9 @@
 namespace cairn {
 namespace {
 
+// The errors made here are independent of each other: no factor for those that are not.
+const RefineOptions kIndependent{.covariance_scale = 1};
+
 // Points in front of a camera with focal length 500 px, seen with noise of sigma_px and, in part, wrongly.
 std::vector<PoseMeasurement> MakeScene(const Pose& truth, int num_points, double sigma_px,
                                        double outlier_ratio, Random& random) {
@@ -41,7 +44,7 @@ TEST(Refine, CleanMeasurementsGiveTheTruth) {
   Random random(1);
   auto measurements = MakeScene(Truth(), 20, 0, 0, random);
   for (PoseMeasurement& measurement : measurements) measurement.ray.sigma_px = 1;
-  const auto pose = RefinePose(measurements, Disturbed(), {});
+  const auto pose = RefinePose(measurements, Disturbed(), kIndependent);
   ASSERT_TRUE(pose);
   EXPECT_LT(PerturbationBetween(*pose, Truth()).norm(), 1e-8);
 }
@@ -49,7 +52,7 @@ TEST(Refine, CleanMeasurementsGiveTheTruth) {
 TEST(Refine, OutliersAreLeftOut) {
   Random random(2);
   const auto measurements = MakeScene(Truth(), 100, 0.5, 0.2, random);
-  const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), {});
+  const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
   ASSERT_TRUE(refined);
   EXPECT_LT(CenterErrorM(refined->cam_from_world, Truth()), 0.02);
   EXPECT_LT(refined->inliers.size(), 90u);
@@ -65,7 +68,7 @@ TEST(Refine, NormalisedErrorSquaredHasMeanSix) {
       for (int i = 0; i < 600; ++i) {
         auto measurements = MakeScene(Truth(), num_points, 1, 0, random);
         for (PoseMeasurement& measurement : measurements) measurement.ray.sigma_px = claimed;
-        const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), {});
+        const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
         if (!refined) continue;
         const Vector6d error = PerturbationBetween(refined->cam_from_world, Truth());
         sum += error.dot(refined->covariance.inverse() * error);
@@ -89,7 +92,7 @@ TEST(Refine, LandmarkCovarianceWeighsAndCounts) {
       measurements[k].point_covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
       for (int axis = 0; axis < 3; ++axis) measurements[k].point[axis] += random.Normal(0, 0.05);
     }
-    const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), {});
+    const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
     ASSERT_TRUE(refined);
     const Vector6d error = PerturbationBetween(refined->cam_from_world, Truth());
     sum += error.dot(refined->covariance.inverse() * error);
@@ -122,7 +125,7 @@ TEST(Refine, TooFewOrDegeneratePointsGiveNothing) {
   EXPECT_FALSE(RefinePoseWithCovariance(MakeScene(Truth(), 3, 1, 0, random), Disturbed(), {}));
   auto same = MakeScene(Truth(), 1, 1, 0, random);
   same.resize(20, same[0]);  // one point twenty times
-  const auto refined = RefinePoseWithCovariance(same, Disturbed(), {});
+  const auto refined = RefinePoseWithCovariance(same, Disturbed(), kIndependent);
   EXPECT_TRUE(!refined || std::sqrt(refined->covariance.diagonal().maxCoeff()) > 10);
 }
 
