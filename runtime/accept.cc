@@ -33,14 +33,36 @@ double Log10Choose(int n, int k) {
 
 }  // namespace
 
-double Log10ChancePoses(int num_matches, int num_inliers, double max_error_px, const Camera& camera) {
+double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
+                      double max_error_px, const Camera& camera) {
+  constexpr size_t kMaxSamples = 400;  // matches looked at; pairs grow with their square
+  const size_t stride = measurements.size() / kMaxSamples + 1;
+  std::vector<std::pair<const QueryRay*, Eigen::Vector2d>> samples;  // keypoint, its landmark's ray
+  for (size_t i = 0; i < measurements.size(); i += stride) {
+    const Eigen::Vector3d point = cam_from_world * measurements[i].point;
+    if (point.z() > 0) samples.emplace_back(&measurements[i].ray, point.hnormalized());
+  }
+  int64_t num_close = 0;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    for (size_t j = 0; j < samples.size(); ++j) {
+      const Eigen::Vector2d offset =
+          samples[i].first->pixel_from_ray * (samples[j].second - samples[i].first->ray);
+      num_close += i != j && offset.squaredNorm() <= max_error_px * max_error_px ? 1 : 0;
+    }
+  }
+  const double num_pairs =
+      std::max(1.0, static_cast<double>(samples.size()) * (static_cast<double>(samples.size()) - 1));
+  const double disc =
+      std::numbers::pi * max_error_px * max_error_px / (static_cast<double>(camera.width) * camera.height);
+  return std::min(1.0, std::max(disc, static_cast<double>(num_close) / num_pairs));
+}
+
+double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier) {
   constexpr int kSampleSize = 3;
   if (num_inliers <= kSampleSize) return std::numeric_limits<double>::infinity();
-  const double image_area = static_cast<double>(camera.width) * camera.height;
-  const double p = std::min(1.0, std::numbers::pi * max_error_px * max_error_px / image_area);
   return Log10Choose(num_matches, kSampleSize) +
          Log10Choose(num_matches - kSampleSize, num_inliers - kSampleSize) +
-         (num_inliers - kSampleSize) * std::log10(p);
+         (num_inliers - kSampleSize) * std::log10(chance_of_inlier);
 }
 
 const char* NoFixName(NoFix reason) {
@@ -87,6 +109,11 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .value = &o->max_log10_chance,
        .help = "log10 of the number of poses that random matches would agree on as well, at most"},
       {.name = "min_num_inliers", .value = &o->min_num_inliers, .help = "least inliers in all", .min = 5},
+      {.name = "min_kept_ratio",
+       .value = &o->min_kept_ratio,
+       .help = "least inliers after refinement, as part of those before",
+       .min = 0,
+       .max = 1},
       {.name = "spread_grid",
        .value = &o->spread_grid,
        .help = "cells per side of the image for the spread",

@@ -38,6 +38,10 @@ struct AcceptOptions {
   double max_log10_chance = -4;
   // Least inliers in all.  REQUIRES: >= 5
   int min_num_inliers = 7;
+  // Least part of the inliers found without knowing the pose that refinement must keep (by number): where
+  // points crowd in the image, many lie within the wide limit of a wrong pose and few within the refined
+  // one's.  REQUIRES: in [0, 1]
+  double min_kept_ratio = 0.5;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells. REQUIRES: >= 1
   int spread_grid = 6;
@@ -59,11 +63,17 @@ struct AcceptOptions {
 };
 OptionTable DescribeOptions(AcceptOptions* options);
 
-// Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches whose
-// keypoints lie anywhere in the image:  C(n, 3) C(n - 3, m - 3) p^(m - 3), p = area of a disc of
-// `max_error_px` over the image's. [Moisan & Stival, "A probabilistic criterion to detect rigid point
-// matches", 2004: number of false alarms]
-double Log10ChancePoses(int num_matches, int num_inliers, double max_error_px, const Camera& camera);
+// Probability that a keypoint lies within `max_error_px` of a landmark that it does not show, at this pose:
+// measured on the matches themselves, each keypoint against the other matches' landmarks, and no less than a
+// disc's share of the image.  Near 1 where all landmarks project into one corner: there, inliers say nothing.
+double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
+                      double max_error_px, const Camera& camera);
+
+// Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches at
+// random:
+//   C(n, 3) C(n - 3, m - 3) p^(m - 3)
+// [Moisan & Stival, "A probabilistic criterion to detect rigid point matches", 2004: number of false alarms]
+double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier);
 
 struct Verdict {
   NoFix reason = NoFix::kNone;

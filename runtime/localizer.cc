@@ -213,8 +213,10 @@ Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
   const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
   if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
-  const double log10_chance = Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers,
-                                               options_.estimate.max_error_px, query.camera);
+  const double chance_of_inlier =
+      ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, query.camera);
+  const double log10_chance =
+      Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier);
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
       log10_chance > accept.max_log10_chance) {
     return fail(
@@ -243,6 +245,13 @@ Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
     return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
   const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
   localization.num_inliers = static_cast<int>(inliers.size());
+  if (localization.num_inliers < accept.min_kept_ratio * localization.num_unguided_inliers) {
+    return fail(
+        NoFix::kTooFewInliers,
+        fmt::format(
+            "of {} matches that agree on a pose {} are left after refinement, at least {:.0f} % are needed",
+            localization.num_unguided_inliers, localization.num_inliers, 100 * accept.min_kept_ratio));
+  }
   Verdict verdict = JudgePose(*refined, inliers, query, *map_, accept);
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
   localization.reason = NoFix::kNone;

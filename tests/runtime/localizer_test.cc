@@ -117,14 +117,32 @@ TEST(Localizer, NoiseOfTheSurveysPosesWidensTheCovariance) {
   }
 }
 
-TEST(Log10ChancePoses, FollowsTheDefinition) {
+TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {
   Camera camera;
   camera.width = 640;
   camera.height = 480;
-  // C(10, 3) = 120, C(7, 3) = 35, p = pi 6^2 / 307200 = 3.6816e-4, p^3 = 4.990e-11: 2.096e-7
-  EXPECT_NEAR(Log10ChancePoses(10, 6, 6, camera), std::log10(120 * 35 * 4.990e-11), 1e-3);
-  EXPECT_GT(Log10ChancePoses(10, 3, 6, camera), 1e9);  // three matches always agree
-  EXPECT_LT(Log10ChancePoses(20, 8, 6, camera), Log10ChancePoses(40, 8, 6, camera));
+  Random random(4);
+  std::vector<PoseMeasurement> measurements(100);
+  for (PoseMeasurement& measurement : measurements) {
+    measurement.point = Eigen::Vector3d(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), 3);
+    measurement.ray.ray = measurement.point.hnormalized();
+    measurement.ray.pixel_from_ray = 480 * Eigen::Matrix2d::Identity();
+  }
+  const double disc = M_PI * 36 / (640 * 480);
+  EXPECT_NEAR(ChanceOfInlier(measurements, Pose(), 6, camera), disc, disc);
+  Pose far;  // from 1000 m everything is one point, and so are the keypoints that show it
+  far.translation.z() = 1000;
+  for (PoseMeasurement& measurement : measurements)
+    measurement.ray.ray = (far * measurement.point).hnormalized();
+  EXPECT_GT(ChanceOfInlier(measurements, far, 6, camera), 0.9);
+  EXPECT_NEAR(ChanceOfInlier({}, Pose(), 6, camera), disc, 1e-12);
+}
+
+TEST(Log10ChancePoses, FollowsTheDefinition) {
+  // C(10, 3) = 120, C(7, 3) = 35
+  EXPECT_NEAR(Log10ChancePoses(10, 6, 1e-3), std::log10(120 * 35 * 1e-9), 1e-9);
+  EXPECT_GT(Log10ChancePoses(10, 3, 1e-3), 1e9);  // three matches always agree
+  EXPECT_LT(Log10ChancePoses(20, 8, 1e-3), Log10ChancePoses(40, 8, 1e-3));
 }
 
 TEST(Localizer, AnotherPlaceIsRefused) {
