@@ -1,0 +1,63 @@
+#include "stages/check_map/check_map.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "stages/check_map/report.h"
+#include "tests/runtime/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+const std::shared_ptr<const Map>& RoomMap() {
+  static const auto& map = *new std::shared_ptr<const Map>(*Map::FromRows(MakeSyntheticRoom(1).rows));
+  return map;
+}
+
+// An image in which there is nothing to find, as a file.
+HeldOutImage BlankImage(const std::string& name) {
+  const std::string path = testing::TempDir() + "/" + name;
+  cv::imwrite(path, cv::Mat(480, 640, CV_8UC1, cv::Scalar(128)));
+  return {name, path, RoomMap()->rows().cameras.front(), Pose()};
+}
+
+Result<CheckMapReport> Check(const std::vector<HeldOutImage>& images, const CheckMapOptions& options = {}) {
+  NoProgress progress;
+  return CheckMap(RoomMap(), images, options, 2, progress);
+}
+
+TEST(CheckMap, ImagesThatCannotBeLocalizedCountAgainstRecallWithTheirReason) {
+  HeldOutImage missing = BlankImage("missing.png");
+  missing.path += ".nowhere";
+  const auto report = Check({BlankImage("blank.png"), missing});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->figures.at("num_held_out"), 2);
+  EXPECT_EQ(report->figures.at("num_localized"), 0);
+  EXPECT_EQ(report->figures.at("localized_ratio"), 0);
+  EXPECT_EQ(report->figures.count("median_error_m"), 0u);  // of no fix there is none
+  EXPECT_THAT(report->images[1].rejected, HasSubstr("no such file"));
+}
+
+TEST(CheckMap, GateNamesTheFigureThatFails) {
+  CheckMapOptions options;
+  options.min_localized_ratio = 0.5;
+  const auto report = Check({BlankImage("blank.png")}, options);
+  const Status status = CheckGate(*report, options);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kGate);
+  EXPECT_THAT(status.error().message, HasSubstr("localized_ratio"));
+  EXPECT_TRUE(CheckGate(*report, CheckMapOptions()).ok());
+}
+
+TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
+  const auto report = Check({BlankImage("quote\".png")});
+  const PrintedReport printed{&RoomMap()->rows(), 1000000, &*report, nullptr};
+  EXPECT_THAT(ReportText(printed), HasSubstr("held-out images        1"));
+  EXPECT_THAT(ReportJson(printed), HasSubstr("quote\\\".png"));
+}
+
+}  // namespace
+}  // namespace cairn
