@@ -54,7 +54,8 @@ Polygon DrawPerimeter(const SimulateWorldsOptions& options, Random* random) {
   const int num_sides = which < 0.1    ? 4
                         : which < 0.55 ? RoundedNormal(5, 0.5, random)
                                        : RoundedNormal(7, 2, random);
-  return DrawPolygon(Eigen::Vector2d::Zero(), std::clamp(num_sides, 4, 12), 1.1 * radius, 0.1 * radius, random);
+  return DrawPolygon(Eigen::Vector2d::Zero(), std::clamp(num_sides, 4, 12), 1.1 * radius, 0.1 * radius,
+                     random);
 }
 
 int DrawNumObstacles(const SimulateWorldsOptions& options, Random* random) {
