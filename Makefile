@@ -14,6 +14,10 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
 # Turns the demo's picture into PNG; nothing fails without it.
 OPTIONAL_PACKAGES := librsvg2-bin
 
+# A clone elsewhere compiles the same files: let ccache see that.
+export CCACHE_BASEDIR := $(CURDIR)
+export CCACHE_NOHASHDIR := true
+
 SOURCES = $(shell git ls-files '*.h' '*.cc')
 
 .DEFAULT_GOAL := all
