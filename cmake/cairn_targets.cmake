@@ -12,11 +12,15 @@ function(cairn_test name)
   cmake_parse_arguments(ARG "" "LABEL" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  # Tests of one program may write files of one name: they run one after the other, in a folder of their own.
+  set(folder ${CMAKE_BINARY_DIR}/tests_tmp/${name})
+  file(MAKE_DIRECTORY ${folder})
+  set(labels)
   if(ARG_LABEL)
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 1200)
-  else()
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+    set(labels LABELS ${ARG_LABEL})
   endif()
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
+    PROPERTIES ${labels} TIMEOUT 1200 RESOURCE_LOCK ${name} ENVIRONMENT TEST_TMPDIR=${folder})
 endfunction()
 
 # cairn_benchmark(NAME SOURCES file... LIBS target...): a Google Benchmark program.

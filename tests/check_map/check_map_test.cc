@@ -19,7 +19,9 @@ const std::shared_ptr<const Map>& RoomMap() {
 
 // An image in which there is nothing to find, as a file.
 HeldOutImage BlankImage(const std::string& name) {
-  const std::string path = testing::TempDir() + "/" + name;
+  // One file per test: they run in parallel.
+  const std::string path =
+      testing::TempDir() + "/" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
   cv::imwrite(path, cv::Mat(480, 640, CV_8UC1, cv::Scalar(128)));
   return {name, path, RoomMap()->rows().cameras.front(), Pose()};
 }

@@ -25,7 +25,9 @@ OptionTable Describe(Fields* f) {
 }
 
 std::string WriteToml(const std::string& text) {
-  const std::string path = testing::TempDir() + "/options.toml";
+  // One file per test: they run in parallel.
+  const std::string path = testing::TempDir() + "/options_" +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
   EXPECT_TRUE(WriteFileAtomically(path, text).ok());
   return path;
 }
