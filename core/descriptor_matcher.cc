@@ -127,11 +127,20 @@ void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& d
   }
 }
 
+PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel)
+    : kernel_(kernel), descriptors_(descriptors) {}
+
 std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
                                     const DescriptorMatrix& descriptors2,
                                     const DescriptorMatcherOptions& options) {
+  return MatchDescriptors(PackedDescriptors(descriptors1), PackedDescriptors(descriptors2), options);
+}
+
+std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
+                                    const PackedDescriptors& descriptors2,
+                                    const DescriptorMatcherOptions& options) {
   std::vector<BestTwo> rows, columns;
-  FindBestTwo(descriptors1, descriptors2, FastestKernel(), &rows, &columns);
+  FindBestTwo(descriptors1.descriptors(), descriptors2.descriptors(), descriptors1.kernel(), &rows, &columns);
   constexpr double kSquaredNorm = 512.0 * 512.0;
   const auto angle = [&](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
   const auto passes = [&](const BestTwo& b) {

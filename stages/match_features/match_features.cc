@@ -20,7 +20,7 @@ constexpr int64_t kBatchSize = 1024;  // pairs
 struct View {
   ImageId image_id = 0;
   const Camera* camera = nullptr;
-  DescriptorMatrix descriptors;
+  PackedDescriptors descriptors;
   std::vector<Eigen::Vector2d> rays;  // normalised coordinates of the keypoints, NaN where undefined
   std::optional<Pose> cam_from_world;
 };
@@ -50,12 +50,14 @@ Result<Views> ReadViews(SQLite::Database& database, const Capture* capture) {
     View view;
     view.image_id = image.image_id;
     view.camera = &camera->second;
-    CAIRN_ASSIGN_OR_RETURN(view.descriptors, ReadDatabaseDescriptors(database, image.image_id));
+    CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
+                           ReadDatabaseDescriptors(database, image.image_id));
+    view.descriptors = PackedDescriptors(descriptors);
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
                            ReadDatabaseKeypoints(database, image.image_id));
-    if (static_cast<size_t>(view.descriptors.rows()) != keypoints.size()) {
+    if (static_cast<size_t>(descriptors.rows()) != keypoints.size()) {
       return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
-                       database.getFilename(), image.name, keypoints.size(), view.descriptors.rows());
+                       database.getFilename(), image.name, keypoints.size(), descriptors.rows());
     }
     for (const Keypoint& keypoint : keypoints) {
       const auto ray = CameraFromImage(*view.camera, Eigen::Vector2d(keypoint.x, keypoint.y));
@@ -201,7 +203,7 @@ Result<MatchFeaturesSummary> MatchFeatures(const std::string& features_path, con
   auto views = WithDatabaseErrors(features_path, [&] { return ReadViews(features, capture); });
   if (!views.ok()) return views.error();
   MatchFeaturesSummary summary;
-  for (const View& view : views->views) summary.num_images += view.descriptors.rows() > 0 ? 1 : 0;
+  for (const View& view : views->views) summary.num_images += view.descriptors.size() > 0 ? 1 : 0;
   if (summary.num_images < 2) {
     return MakeError(ErrorCode::kNoData, "{}: {} image(s) with features, at least 2 are needed to match",
                      features_path, summary.num_images);

@@ -112,5 +112,18 @@ TEST(MatchDescriptors, EmptySetsMatchNothing) {
   EXPECT_TRUE(MatchDescriptors(RandomDescriptors(5, 255, 1), none, {}).empty());
 }
 
+TEST(PackedDescriptors, MatchLikeUnpackedOnesAndKeepToTheStatedMemory) {
+  const DescriptorMatrix d1 = RandomDescriptors(300, 90, 1);
+  DescriptorMatrix d2 = RandomDescriptors(200, 90, 2);
+  d2.topRows(50) = d1.middleRows(100, 50);
+  const PackedDescriptors packed1(d1), packed2(d2);
+  EXPECT_EQ(packed1.size(), 300);
+  EXPECT_GE(packed1.num_bytes(), 300 * kDescriptorDim);
+  EXPECT_LE(packed1.num_bytes(), PackedDescriptors::NumBytes(300));
+  const std::vector<Match> matches = MatchDescriptors(packed1, packed2, {});
+  EXPECT_GE(matches.size(), 50u);
+  EXPECT_EQ(matches, MatchDescriptors(d1, d2, {}));
+}
+
 }  // namespace
 }  // namespace cairn
