@@ -18,6 +18,8 @@ CAIRN ?= $(shell command -v cairn)
 # Put before every command, for example a cluster's `srun`.
 LAUNCH ?=
 THREADS ?= 0
+# Most memory for the features that match-features holds at a time, MiB; empty: its default.
+MEMORY ?=
 PROGRESS ?= auto
 LOG_LEVEL ?= info
 
@@ -90,11 +92,16 @@ $(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/opti
 	    --depfile $(@D)/features.d -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
+# Matching wants the visual words first where it looks for images that look alike.
+PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
+    $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
+$(BUILD)/matches.db.stamp: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
 $(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(CAIRN) \
-    $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+    $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)
 	touch $@.begun
-	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) \
-	    --options $(@D)/options/match_features.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) $(addprefix --memory ,$(MEMORY)) \
+	    $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) --options $(@D)/options/match_features.toml -o $(@:.stamp=) \
+	    $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 $(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \

@@ -1,20 +1,17 @@
 #include "stages/build_vocabulary/build_vocabulary.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "core/parallel.h"
 #include "core/random.h"
-#include "stages/build_vocabulary/split_node.h"
 
 namespace cairn {
 namespace {
 
-// Streams of the seed.
+// Stream of the seed; the others grow the tree.
 constexpr uint64_t kSampleStream = 0;
-constexpr uint64_t kFirstNodeStream = 1;
 
 // `count` of the numbers below `total`, drawn without repetition, ascending.
 std::vector<int64_t> Draw(int64_t total, int64_t count, uint64_t seed) {
@@ -42,67 +39,12 @@ DescriptorMatrix TrainingDescriptors(const std::vector<ImageDescriptors>& images
   return training;
 }
 
-// Depth at which branching^depth words hold nearest to `descriptors_per_word` descriptors.
-int DepthFromCount(int64_t num_descriptors, const BuildVocabularyOptions& options) {
-  const double num_words = static_cast<double>(num_descriptors) / options.descriptors_per_word;
-  const double levels = std::log(std::max(1.0, num_words)) / std::log(static_cast<double>(options.branching));
-  return std::clamp(static_cast<int>(std::lround(levels)), 1, 8);
-}
-
-// Grows the tree level by level; nodes of a level in parallel, or the descriptors of a node where there are
-// few nodes.
-Status GrowTree(const DescriptorMatrix& training, const BuildVocabularyOptions& options, uint64_t seed,
-                int num_threads, Progress& progress, Vocabulary* vocabulary) {
-  std::vector<std::vector<int32_t>> level(1);  // members of the nodes of the current level
-  level[0].resize(training.rows());
-  std::iota(level[0].begin(), level[0].end(), 0);
-  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> centres(1);
-  centres[0].setZero();
-  vocabulary->nodes.resize(1);
-  size_t first_node = 0;  // of the level
-  progress.Begin("training vocabulary", training.rows() * vocabulary->depth, "descriptors");
-  for (int depth = 0; depth < vocabulary->depth; ++depth) {
-    std::vector<std::vector<NodeChild>> children(level.size());
-    const bool parallel_nodes = static_cast<int>(level.size()) >= 4 * NumThreads(num_threads);
-    ParallelFor(static_cast<int64_t>(level.size()), parallel_nodes ? num_threads : 1, [&](int64_t i) {
-      const int64_t num_members = static_cast<int64_t>(level[i].size());
-      if (!progress.Cancelled() && (depth == 0 || num_members >= options.min_num_descriptors_to_split)) {
-        children[i] = SplitNode(training, level[i], options.branching, options.max_num_iterations,
-                                MixSeed(seed, kFirstNodeStream + first_node + static_cast<uint64_t>(i)),
-                                parallel_nodes ? 1 : num_threads);
-      }
-      progress.Advance(num_members);
-    });
-    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "training the vocabulary was stopped");
-    std::vector<std::vector<int32_t>> next_level;
-    for (size_t i = 0; i < level.size(); ++i) {
-      vocabulary->nodes[first_node + i].num_children = static_cast<int32_t>(children[i].size());
-      for (NodeChild& child : children[i]) {
-        centres.push_back(child.centre);
-        next_level.push_back(std::move(child.members));
-      }
-    }
-    first_node += level.size();
-    level = std::move(next_level);
-    vocabulary->nodes.resize(centres.size());
-  }
-  progress.End();
-  vocabulary->centres.resize(static_cast<Eigen::Index>(centres.size()), kDescriptorDim);
-  for (size_t i = 0; i < centres.size(); ++i) vocabulary->centres.row(i) = centres[i];
-  return NumberVocabularyNodes(vocabulary);
-}
-
 void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_document_ratio,
                        int num_threads, Progress& progress, Vocabulary* vocabulary) {
   std::vector<std::vector<WordIdx>> words(images.size());  // ascending
   progress.Begin("filling inverted files", static_cast<int64_t>(images.size()), "images");
   ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
-    const DescriptorMatrix& descriptors = images[i].descriptors;
-    words[i].resize(descriptors.rows());
-    for (Eigen::Index row = 0; row < descriptors.rows(); ++row) {
-      words[i][row] = QuantizeDescriptor(*vocabulary, descriptors.row(row).data());
-    }
-    std::sort(words[i].begin(), words[i].end());
+    words[i] = QuantizeDescriptors(*vocabulary, images[i].descriptors);
     progress.Advance();
   });
   progress.End();
@@ -127,21 +69,21 @@ void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_d
 OptionTable DescribeOptions(BuildVocabularyOptions* o) {
   return {
       {.name = "branching",
-       .value = &o->branching,
+       .value = &o->tree.branching,
        .help = "most children of a node [Mariottini11: 10]",
        .min = 2,
        .max = 256},
       {.name = "depth",
-       .value = &o->depth,
+       .value = &o->tree.depth,
        .help = "levels below the root [Mariottini11: 4]; 0: from the data",
        .min = 0,
        .max = 8},
       {.name = "descriptors_per_word",
-       .value = &o->descriptors_per_word,
+       .value = &o->tree.descriptors_per_word,
        .help = "descriptors a word should hold on average when the depth comes from the data",
        .min = 1},
       {.name = "min_num_descriptors_to_split",
-       .value = &o->min_num_descriptors_to_split,
+       .value = &o->tree.min_num_descriptors_to_split,
        .help = "a node with fewer training descriptors is not split",
        .min = 2},
       {.name = "max_num_training_descriptors",
@@ -149,7 +91,7 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
        .help = "most descriptors that train the tree",
        .min = 1},
       {.name = "max_num_iterations",
-       .value = &o->max_num_iterations,
+       .value = &o->tree.max_num_iterations,
        .help = "most rounds of k-means per node",
        .min = 1},
       {.name = "max_document_ratio",
@@ -178,14 +120,10 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
     return MakeError(ErrorCode::kNoData,
                      "build_vocabulary: no descriptors in {} images; are the images blank?", images.size());
   }
-  Vocabulary vocabulary;
-  vocabulary.branching = options.branching;
-  vocabulary.depth = options.depth > 0 ? options.depth : DepthFromCount(num_descriptors, options);
-  {
-    const DescriptorMatrix training =
-        TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed);
-    CAIRN_RETURN_IF_ERROR(GrowTree(training, options, seed, num_threads, progress, &vocabulary));
-  }
+  CAIRN_ASSIGN_OR_RETURN(
+      Vocabulary vocabulary,
+      GrowVocabulary(TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed),
+                     num_descriptors, options.tree, seed, num_threads, progress));
   FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary);
   WeightVocabulary(&vocabulary);
   return vocabulary;

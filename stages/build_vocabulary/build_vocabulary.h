@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/features.h"
+#include "core/grow_vocabulary.h"
 #include "core/ids.h"
 #include "core/options.h"
 #include "core/progress.h"
@@ -15,26 +16,13 @@ namespace cairn {
 // Learns the visual words of a place, and notes which survey image shows which of them, so that the images
 // most like a robot's view are found in a few milliseconds.  Before: extract_features.  After: emit_map.
 // Implements [Mariottini11 §IV]: hierarchical k-means with branching k = 10; each leaf is a word with an
-// inverted file; documents are weighted by word count times inverse document frequency.  Differs from it: the
-// depth follows the number of descriptors (the source: L = 4), branches without descriptors are pruned, a
-// node that holds too few is not split, and k-means runs on directions (largest dot product), as the tree's
-// query does.
+// inverted file; documents are weighted by word count times inverse document frequency.  Differs from it
+// as core/grow_vocabulary.h says.
 struct BuildVocabularyOptions {
-  // Most children of a node [Mariottini11: k = 10].  REQUIRES: in [2, 256]
-  int branching = 10;
-  // Levels below the root [Mariottini11: L = 4]; 0: the depth at which a word gets nearest to
-  // descriptors_per_word. REQUIRES: in [0, 8]
-  int depth = 0;
-  // Descriptors that a word should hold on average when the depth is chosen (on a logarithmic scale).
-  // REQUIRES: >= 1
-  double descriptors_per_word = 40;
-  // A node below the root with fewer training descriptors than this is not split.  REQUIRES: >= 2
-  int min_num_descriptors_to_split = 20;
+  GrowVocabularyOptions tree;
   // Most descriptors that train the tree, drawn evenly from all; the inverted files always cover all.
   // REQUIRES: >= 1
   int max_num_training_descriptors = 200000;
-  // Most rounds of k-means per node.  REQUIRES: >= 1
-  int max_num_iterations = 10;
   // Stop list [Mariottini11 §VII-A]: words that occur in more than this part of the images do not score (the
   // source gives no value; 1 = no stop list).  REQUIRES: in (0, 1]
   double max_document_ratio = 1;

@@ -2,13 +2,15 @@
 
 #include <optional>
 
+#include <spdlog/spdlog.h>
+
 #include "stages/match_features/match_features.h"
 
 namespace cairn {
 namespace {
 
 struct Arguments {
-  std::string features;
+  MatchFeaturesInputs inputs;
   std::string capture;
   std::string output;
   MatchFeaturesOptions options;
@@ -21,9 +23,15 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
+  MatchFeaturesInputs inputs = arguments.inputs;
+  if (capture) inputs.capture = &*capture;
   CAIRN_ASSIGN_OR_RETURN(const MatchFeaturesSummary summary,
-                         MatchFeatures(arguments.features, capture ? &*capture : nullptr, arguments.options,
-                                       arguments.output, environment.num_threads, *environment.progress));
+                         MatchFeatures(inputs, arguments.options, arguments.output, environment.seed,
+                                       environment.num_threads, *environment.progress));
+  if (summary.num_without_features > 0) {
+    spdlog::warn("{}: {} of {} images without features are skipped", inputs.features_path,
+                 summary.num_without_features, summary.num_images + summary.num_without_features);
+  }
   *environment.out << fmt::format(
       "match_features: {} images, {} pairs tried ({}), {} verified, {} of {} matches\n", summary.num_images,
       summary.num_pairs_tried, summary.pairs, summary.num_pairs_verified, summary.num_inliers,
@@ -39,11 +47,21 @@ Command MatchFeaturesCommand() {
           .summary = "Match and verify image pairs (stage 2)",
           .add_arguments =
               [arguments](CLI::App& app) {
-                app.add_option("features", arguments->features, "COLMAP database with features")
+                app.add_option("features", arguments->inputs.features_path, "COLMAP database with features")
                     ->required()
                     ->type_name("features.db");
                 app.add_option("--capture", arguments->capture,
                                "Capture folder: its poses choose and verify pairs");
+                app.add_option("--vocabulary", arguments->inputs.vocabulary_path,
+                               "Vocabulary for retrieval and loop candidates [one grown from the images]")
+                    ->type_name("vocabulary.db");
+                app.add_option("--pair-list", arguments->inputs.pair_list_path,
+                               "Match these pairs instead: a line has the names of two images, as in COLMAP")
+                    ->type_name("FILE");
+                app.add_option("--memory", arguments->options.matching.memory_budget_mib,
+                               "Most memory for features of images at a time, MiB [1024]")
+                    ->check(CLI::Range(1, 1 << 24))
+                    ->type_name("MIB");
                 app.add_option("-o,--output", arguments->output, "COLMAP database to write")
                     ->required()
                     ->type_name("matches.db");

@@ -1,121 +1,113 @@
 #include "stages/match_features/match_features.h"
 
+#include <algorithm>
 #include <filesystem>
-#include <limits>
-#include <map>
-#include <optional>
+#include <utility>
 
 #include <opencv2/core/utility.hpp>
 
 #include "core/colmap_database.h"
 #include "core/file.h"
-#include "core/parallel.h"
+#include "stages/match_features/pair_list.h"
+#include "stages/match_features/retrieve_pairs.h"
 
 namespace cairn {
 namespace {
 
-constexpr int64_t kBatchSize = 1024;  // pairs
-
-// What matching needs to know of one image.
-struct View {
-  ImageId image_id = 0;
-  const Camera* camera = nullptr;
-  PackedDescriptors descriptors;
-  std::vector<Eigen::Vector2d> rays;  // normalised coordinates of the keypoints, NaN where undefined
-  std::optional<Pose> cam_from_world;
-};
-
-struct Views {
-  std::map<CameraId, Camera> cameras;
-  std::vector<View> views;
-  bool all_posed = true;
-};
-
-Result<Views> ReadViews(SQLite::Database& database, const Capture* capture) {
-  Views result;
-  CAIRN_ASSIGN_OR_RETURN(result.cameras, ReadDatabaseCameras(database));
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadDatabaseImages(database));
-  std::map<std::string, Pose> poses;
-  if (capture != nullptr) {
-    for (const CaptureImage& image : capture->images) {
-      if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
-    }
-  }
-  for (const DatabaseImage& image : images) {
-    const auto camera = result.cameras.find(image.camera_id);
-    if (camera == result.cameras.end()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
-                       database.getFilename(), image.name, image.camera_id);
-    }
-    View view;
-    view.image_id = image.image_id;
-    view.camera = &camera->second;
-    CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                           ReadDatabaseDescriptors(database, image.image_id));
-    view.descriptors = PackedDescriptors(descriptors);
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
-                           ReadDatabaseKeypoints(database, image.image_id));
-    if (static_cast<size_t>(descriptors.rows()) != keypoints.size()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
-                       database.getFilename(), image.name, keypoints.size(), descriptors.rows());
-    }
-    for (const Keypoint& keypoint : keypoints) {
-      const auto ray = CameraFromImage(*view.camera, Eigen::Vector2d(keypoint.x, keypoint.y));
-      view.rays.push_back(ray.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
-    }
-    if (const auto pose = poses.find(image.name); pose != poses.end()) view.cam_from_world = pose->second;
-    result.all_posed &= view.cam_from_world.has_value();
-    result.views.push_back(std::move(view));
-  }
-  return result;
+// How pairs are chosen: options.pairs, "auto" resolved.
+std::string ChooseMethod(const MatchImages& images, const MatchFeaturesOptions& options) {
+  if (options.pairs != "auto") return options.pairs;
+  if (images.AllPosed()) return "frustum";
+  const int num_images = static_cast<int>(images.images.size());
+  return num_images <= options.max_num_exhaustive_images ? "exhaustive" : "retrieval";
 }
 
-Result<IndexPairs> SelectPairs(const Views& views, const MatchFeaturesOptions& options, int num_threads,
-                               std::string* chosen) {
-  const int num_images = static_cast<int>(views.views.size());
-  *chosen = options.pairs != "auto" ? options.pairs : views.all_posed ? "frustum" : "exhaustive";
-  if (*chosen == "exhaustive") return ExhaustivePairs(num_images);
-  if (*chosen == "sequence") return SequencePairs(num_images, options.sequence_window);
-  if (!views.all_posed) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "pairs = frustum needs a pose for every image; give --capture, or choose pairs = exhaustive");
-  }
+Result<IndexPairs> SelectFrustumPairs(const MatchImages& images, const MatchFeaturesOptions& options,
+                                      int num_threads) {
   std::vector<PosedCamera> posed;
-  for (const View& view : views.views) posed.push_back({*view.camera, *view.cam_from_world});
+  for (const MatchImage& image : images.images) {
+    if (!image.cam_from_world) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "pairs = frustum needs a pose for every image, {} has none; give --capture, or choose "
+                       "pairs = retrieval or exhaustive",
+                       image.name);
+    }
+    posed.push_back({images.cameras.at(image.camera_id), *image.cam_from_world});
+  }
   return FrustumPairs(posed, options.frustum, num_threads);
 }
 
-Status MatchAll(const Views& views, const IndexPairs& pairs, const MatchFeaturesOptions& options,
-                int num_threads, Progress& progress, MatchFeaturesSummary* summary,
-                SQLite::Database& database) {
-  for (int64_t begin = 0; begin < summary->num_pairs_tried; begin += kBatchSize) {
-    const int64_t size = std::min<int64_t>(kBatchSize, summary->num_pairs_tried - begin);
-    std::vector<TwoViewGeometry> geometries(size);
-    std::vector<size_t> num_putative(size, 0);
-    ParallelFor(size, num_threads, [&](int64_t i) {
-      if (progress.Cancelled()) return;
-      const auto& [idx1, idx2] = pairs[begin + i];
-      const View& view1 = views.views[idx1];
-      const View& view2 = views.views[idx2];
-      const std::vector<Match> matches =
-          MatchDescriptors(view1.descriptors, view2.descriptors, options.matcher);
-      num_putative[i] = matches.size();
-      geometries[i] =
-          VerifyPair({view1.camera, &view1.rays, view1.cam_from_world},
-                     {view2.camera, &view2.rays, view2.cam_from_world}, matches, options.verification);
-      geometries[i].image_id1 = view1.image_id;
-      geometries[i].image_id2 = view2.image_id;
-      progress.Advance();
-    });
-    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while matching features");
-    for (int64_t i = 0; i < size; ++i) {
-      summary->num_putative += static_cast<int64_t>(num_putative[i]);
-      if (geometries[i].inliers.empty()) continue;
-      WriteDatabaseTwoViewGeometry(database, geometries[i]);
-      summary->num_pairs_verified++;
-      summary->num_inliers += static_cast<int64_t>(geometries[i].inliers.size());
-    }
+Result<IndexPairs> SelectSequencePairs(SQLite::Database& features, const MatchImages& images,
+                                       const MatchFeaturesInputs& inputs, const MatchFeaturesOptions& options,
+                                       uint64_t seed, int num_threads, Progress& progress) {
+  std::vector<std::string> names;
+  for (const MatchImage& image : images.images) names.push_back(image.name);
+  const std::vector<int> order = NaturalOrder(names);
+  IndexPairs pairs = SequencePairs(order, options.sequence_window);
+  if (options.num_loop_candidates == 0) return pairs;
+  CAIRN_ASSIGN_OR_RETURN(
+      const ImageSimilarity similarity,
+      MeasureSimilarity(features, images, inputs.vocabulary_path, seed, num_threads, progress));
+  const IndexPairs loops =
+      LoopPairs(similarity, order, options.sequence_window, options.num_loop_candidates, num_threads);
+  pairs.insert(pairs.end(), loops.begin(), loops.end());
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+Result<IndexPairs> SelectPairs(SQLite::Database& features, const MatchImages& images,
+                               const MatchFeaturesInputs& inputs, const MatchFeaturesOptions& options,
+                               uint64_t seed, int num_threads, Progress& progress, std::string* chosen) {
+  if (!inputs.pair_list_path.empty()) {
+    *chosen = "list";
+    CAIRN_ASSIGN_OR_RETURN(PairList list, ReadPairList(inputs.pair_list_path, images));
+    return std::move(list.pairs);
+  }
+  *chosen = ChooseMethod(images, options);
+  const int num_images = static_cast<int>(images.images.size());
+  if (*chosen == "exhaustive") return ExhaustivePairs(num_images);
+  if (*chosen == "sequence")
+    return SelectSequencePairs(features, images, inputs, options, seed, num_threads, progress);
+  if (*chosen == "frustum") return SelectFrustumPairs(images, options, num_threads);
+  CAIRN_ASSIGN_OR_RETURN(
+      const ImageSimilarity similarity,
+      MeasureSimilarity(features, images, inputs.vocabulary_path, seed, num_threads, progress));
+  return RetrievedPairs(similarity, num_images, options.num_retrieved, num_threads);
+}
+
+// Matches the chosen pairs and adds the verified ones to the database.
+Status MatchInto(SQLite::Database& features, const MatchImages& images, const IndexPairs& pairs,
+                 const MatchFeaturesOptions& options, int num_threads, Progress& progress,
+                 MatchFeaturesSummary* summary, SQLite::Database& database) {
+  const auto take = [&](const TwoViewGeometry& geometry, int num_putative) {
+    ++summary->num_pairs_tried;
+    summary->num_putative += num_putative;
+    if (geometry.inliers.empty()) return;
+    WriteDatabaseTwoViewGeometry(database, geometry);
+    ++summary->num_pairs_verified;
+    summary->num_inliers += static_cast<int64_t>(geometry.inliers.size());
+  };
+  progress.Begin("match features", static_cast<int64_t>(pairs.size()), "pairs");
+  CAIRN_RETURN_IF_ERROR(MatchPairs(features, images, pairs, options.matching, num_threads, progress, take));
+  progress.End();
+  return Ok();
+}
+
+Status CheckRanges(const MatchFeaturesOptions& options) {
+  if (options.frustum.near_m >= options.frustum.far_m) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "frustum_near_m = {:g} must be less than frustum_far_m = {:g}", options.frustum.near_m,
+                     options.frustum.far_m);
+  }
+  const VerifyPairOptions& verification = options.matching.verification;
+  if (verification.max_prior_error_px < verification.max_epipolar_error_px) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "max_prior_error_px = {:g} must be at least max_epipolar_error_px = {:g}",
+                     verification.max_prior_error_px, verification.max_epipolar_error_px);
+  }
+  if (options.matching.memory_budget_mib < 1) {
+    return MakeError(ErrorCode::kInvalidArgument, "a memory budget of {} MiB; expected at least 1",
+                     options.matching.memory_budget_mib);
   }
   return Ok();
 }
@@ -126,12 +118,26 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
   return {
       {.name = "pairs",
        .value = &o->pairs,
-       .help = "which images to match; auto: frustum where all images have poses, else exhaustive",
-       .choices = {"auto", "exhaustive", "frustum", "sequence"}},
+       .help = "which images to match; auto: frustum where all images have poses, else exhaustive for few "
+               "images, else retrieval",
+       .choices = {"auto", "exhaustive", "frustum", "retrieval", "sequence"}},
+      {.name = "max_num_exhaustive_images",
+       .value = &o->max_num_exhaustive_images,
+       .help = "pairs = auto: most images without poses that are matched exhaustively",
+       .min = 0},
+      {.name = "num_retrieved",
+       .value = &o->num_retrieved,
+       .help = "pairs = retrieval: number of images most like it that each image is matched with",
+       .min = 1},
       {.name = "sequence_window",
        .value = &o->sequence_window,
        .help = "pairs = sequence: number of successors that each image is matched with",
        .min = 1},
+      {.name = "num_loop_candidates",
+       .value = &o->num_loop_candidates,
+       .help =
+           "pairs = sequence: number of images most like it, but no neighbours, that each is matched with",
+       .min = 0},
       {.name = "frustum_near_m",
        .value = &o->frustum.near_m,
        .help = "pairs = frustum: nearest scene, metres",
@@ -155,87 +161,79 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .help = "pairs = frustum: largest ratio of the two distances to a point",
        .min = 1},
       {.name = "max_ratio",
-       .value = &o->matcher.max_ratio,
+       .value = &o->matching.matcher.max_ratio,
        .help = "largest ratio of the angles to the best and second best descriptor",
        .min = 0,
        .max = 1},
       {.name = "max_angle_rad",
-       .value = &o->matcher.max_angle_rad,
+       .value = &o->matching.matcher.max_angle_rad,
        .help = "largest angle between matched descriptors, radians",
        .min = 0,
        .max = 3.2},
       {.name = "max_epipolar_error_px",
-       .value = &o->verification.max_epipolar_error_px,
+       .value = &o->matching.verification.max_epipolar_error_px,
        .help = "largest distance of an inlier to its epipolar line, pixels",
        .min = 1e-3},
       {.name = "max_prior_error_px",
-       .value = &o->verification.max_prior_error_px,
+       .value = &o->matching.verification.max_prior_error_px,
        .help =
            "with known poses: largest distance of a match to the epipolar line of the stated poses, pixels",
        .min = 1e-3},
       {.name = "min_num_inliers",
-       .value = &o->verification.min_num_inliers,
+       .value = &o->matching.verification.min_num_inliers,
        .help = "fewest inliers of a verified pair",
        .min = 8},
       {.name = "min_homography_ratio",
-       .value = &o->verification.min_homography_ratio,
+       .value = &o->matching.verification.min_homography_ratio,
        .help = "part of the inliers on one homography that makes a pair planar or panoramic (COLMAP: 0.8)",
        .min = 0,
        .max = 1},
   };
 }
 
-Result<MatchFeaturesSummary> MatchFeatures(const std::string& features_path, const Capture* capture,
+Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const MatchFeaturesOptions& options,
-                                           const std::string& matches_path, int num_threads,
+                                           const std::string& matches_path, uint64_t seed, int num_threads,
                                            Progress& progress) {
-  if (options.frustum.near_m >= options.frustum.far_m) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "frustum_near_m = {:g} must be less than frustum_far_m = {:g}", options.frustum.near_m,
-                     options.frustum.far_m);
-  }
-  if (options.verification.max_prior_error_px < options.verification.max_epipolar_error_px) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "max_prior_error_px = {:g} must be at least max_epipolar_error_px = {:g}",
-                     options.verification.max_prior_error_px, options.verification.max_epipolar_error_px);
-  }
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenDatabaseReadOnly(features_path));
-  auto views = WithDatabaseErrors(features_path, [&] { return ReadViews(features, capture); });
-  if (!views.ok()) return views.error();
+  CAIRN_RETURN_IF_ERROR(CheckRanges(options));
+  const std::string& path = inputs.features_path;
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenDatabaseReadOnly(path));
+  const auto images = WithDatabaseErrors(path, [&] { return ReadMatchImages(features, inputs.capture); });
+  if (!images.ok()) return images.error();
   MatchFeaturesSummary summary;
-  for (const View& view : views->views) summary.num_images += view.descriptors.size() > 0 ? 1 : 0;
+  summary.num_images = static_cast<int>(images->images.size());
+  summary.num_without_features = static_cast<int>(images->without_features.size());
   if (summary.num_images < 2) {
     return MakeError(ErrorCode::kNoData, "{}: {} image(s) with features, at least 2 are needed to match",
-                     features_path, summary.num_images);
+                     path, summary.num_images);
   }
-  CAIRN_ASSIGN_OR_RETURN(const IndexPairs pairs, SelectPairs(*views, options, num_threads, &summary.pairs));
-  summary.num_pairs_tried = static_cast<int64_t>(pairs.size());
-
   cv::setNumThreads(1);  // pairs are the unit of parallel work
-  progress.Begin("match features", summary.num_pairs_tried, "pairs");
-  const Status status = ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
+  const auto pairs = WithDatabaseErrors(path, [&] {
+    return SelectPairs(features, *images, inputs, options, seed, num_threads, progress, &summary.pairs);
+  });
+  if (!pairs.ok()) return pairs.error();
+
+  CAIRN_RETURN_IF_ERROR(ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
     std::error_code error;
-    if (!std::filesystem::copy_file(features_path, temporary, error)) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be copied to {}: {}", features_path, temporary,
-                       error.message());
+    if (!std::filesystem::copy_file(path, temporary, error)) {
+      return MakeError(ErrorCode::kIo, "{}: cannot be copied to {}: {}", path, temporary, error.message());
     }
     return WithDatabaseErrors(temporary, [&]() -> Status {
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
       database.exec(
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");
-      CAIRN_RETURN_IF_ERROR(MatchAll(*views, pairs, options, num_threads, progress, &summary, database));
+      CAIRN_RETURN_IF_ERROR(
+          MatchInto(features, *images, *pairs, options, num_threads, progress, &summary, database));
       if (summary.num_pairs_verified == 0) {
         return MakeError(
             ErrorCode::kNoData,
             "{}: none of {} pairs ({}) has {} verified matches; do the images overlap, and do the poses fit?",
-            features_path, summary.num_pairs_tried, summary.pairs, options.verification.min_num_inliers);
+            path, summary.num_pairs_tried, summary.pairs, options.matching.verification.min_num_inliers);
       }
       database.exec("COMMIT");
       return Ok();
     });
-  });
-  progress.End();
-  if (!status.ok()) return status.error();
+  }));
   return summary;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -35,8 +36,10 @@ double FrustumOverlap(const PosedCamera& image1, const PosedCamera& image2,
 // Index pairs (i < j), ascending.
 using IndexPairs = std::vector<std::pair<int, int>>;
 IndexPairs ExhaustivePairs(int num_images);
-// Each image with its `window` successors.
-IndexPairs SequencePairs(int num_images, int window);
+// Image indices in the natural order of their names: digits compare by value ("2.jpg" before "10.jpg").
+std::vector<int> NaturalOrder(const std::vector<std::string>& names);
+// Each image with its `window` successors in `order`, a permutation of the image indices.
+IndexPairs SequencePairs(const std::vector<int>& order, int window);
 // Pairs of which either frustum overlaps the other by min_overlap_ratio.  O(images^2), on `num_threads`
 // threads.
 IndexPairs FrustumPairs(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,

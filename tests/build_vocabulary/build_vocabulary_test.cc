@@ -70,7 +70,9 @@ TEST(BuildVocabulary, EveryDescriptorIsInTheFileOfItsWord) {
   for (const auto& postings : vocabulary.inverted_files) {
     for (size_t i = 0; i < postings.size(); ++i) {
       total += postings[i].count;
-      if (i > 0) EXPECT_LT(postings[i - 1].document, postings[i].document);
+      if (i > 0) {
+        EXPECT_LT(postings[i - 1].document, postings[i].document);
+      }
     }
   }
   EXPECT_EQ(total, 5 * 200);
@@ -82,8 +84,8 @@ TEST(BuildVocabulary, EveryDescriptorIsInTheFileOfItsWord) {
 
 TEST(BuildVocabulary, NodeWithFewDescriptorsIsNotSplit) {
   BuildVocabularyOptions options;
-  options.depth = 6;
-  options.min_num_descriptors_to_split = 50;
+  options.tree.depth = 6;
+  options.tree.min_num_descriptors_to_split = 50;
   const Vocabulary vocabulary = *Build(RandomImages(1, 400, 3), options);
   EXPECT_LT(vocabulary.num_words(), 400);
   EXPECT_GT(vocabulary.num_words(), 10);
@@ -118,8 +120,8 @@ TEST(BuildVocabulary, StopListSilencesWordsOfManyImages) {
   const auto common = RandomDescriptor(random);
   for (ImageDescriptors& image : images) image.descriptors.row(0) = common;
   BuildVocabularyOptions options;
-  options.depth = 3;
-  options.min_num_descriptors_to_split = 2;
+  options.tree.depth = 3;
+  options.tree.min_num_descriptors_to_split = 2;
   options.max_document_ratio = 0.5;
   const Vocabulary vocabulary = *Build(images, options);
   const WordIdx word = QuantizeDescriptor(vocabulary, common.data());
@@ -143,7 +145,7 @@ TEST(BuildVocabulary, NoDescriptorsIsAnError) {
 
 TEST(BuildVocabulary, OptionOutsideItsRangeIsAnError) {
   BuildVocabularyOptions options;
-  options.branching = 1;
+  options.tree.branching = 1;
   EXPECT_EQ(Build(RandomImages(1, 10, 1), options).error().code, ErrorCode::kInvalidArgument);
 }
 

@@ -86,7 +86,7 @@ TEST(VocabularyTree, ScoresEqualBruteForceOverDenseVectors) {
     images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(60 + 5 * i, i)});
   NoProgress progress;
   BuildVocabularyOptions options;
-  options.depth = 2;
+  options.tree.depth = 2;
   const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
   const int num_words = vocabulary.num_words();
 
@@ -117,7 +117,9 @@ TEST(VocabularyTree, ScoresEqualBruteForceOverDenseVectors) {
   ASSERT_EQ(scored.size(), 9u);
   for (size_t i = 0; i < scored.size(); ++i) {
     EXPECT_NEAR(scored[i].score, expected[scored[i].document], 1e-5);
-    if (i > 0) EXPECT_GE(scored[i - 1].score, scored[i].score);
+    if (i > 0) {
+      EXPECT_GE(scored[i - 1].score, scored[i].score);
+    }
   }
 }
 
@@ -126,7 +128,7 @@ TEST(VocabularyTree, ImageOfTheSurveyFindsItself) {
   for (int i = 0; i < 20; ++i) images.push_back({static_cast<ImageId>(i + 1), RandomDescriptors(50, i)});
   NoProgress progress;
   BuildVocabularyOptions options;
-  options.depth = 3;
+  options.tree.depth = 3;
   const Vocabulary vocabulary = *BuildVocabulary(images, options, 0, 1, progress);
   for (int i = 0; i < 20; ++i) {
     const auto scored = QueryVocabulary(vocabulary, images[i].descriptors, 1);

@@ -9,6 +9,7 @@
 #include "core/colmap_database.h"
 #include "core/file.h"
 #include "core/random.h"
+#include "core/vocabulary_tree.h"
 
 namespace cairn {
 namespace {
@@ -67,13 +68,16 @@ class MatchFeaturesTest : public testing::Test {
   }
 
   Result<MatchFeaturesSummary> Match(bool with_poses, int num_threads = 2) {
+    inputs_.features_path = folder_ + "/features.db";
+    inputs_.capture = with_poses ? &capture_ : nullptr;
     NoProgress progress;
-    return MatchFeatures(folder_ + "/features.db", with_poses ? &capture_ : nullptr, {},
-                         folder_ + "/matches.db", num_threads, progress);
+    return MatchFeatures(inputs_, options_, folder_ + "/matches.db", /*seed=*/0, num_threads, progress);
   }
 
   std::string folder_;
   Capture capture_;
+  MatchFeaturesInputs inputs_;
+  MatchFeaturesOptions options_;
 };
 
 TEST_F(MatchFeaturesTest, FindsAllPairsWithAndWithoutPoses) {
@@ -97,6 +101,111 @@ TEST_F(MatchFeaturesTest, SameBytesForAnyNumberOfThreads) {
   const std::string one = *HashFile(folder_ + "/matches.db");
   ASSERT_TRUE(Match(false, 4).ok());
   EXPECT_EQ(*HashFile(folder_ + "/matches.db"), one);
+}
+
+TEST_F(MatchFeaturesTest, SameBytesForAnyMemoryBudget) {
+  // 80 features of 176 bytes and 16 KiB of room each: a budget of 1 MiB holds 17 of 20 images at a time.
+  WriteFeatures(20);
+  options_.pairs = "exhaustive";
+  ASSERT_TRUE(Match(true).ok());
+  const std::string all_in_memory = *HashFile(folder_ + "/matches.db");
+  options_.matching.memory_budget_mib = 1;
+  ASSERT_TRUE(Match(true).ok());
+  EXPECT_EQ(*HashFile(folder_ + "/matches.db"), all_in_memory);
+}
+
+TEST_F(MatchFeaturesTest, SequenceWithLoopsAndAllImagesAgreeOnFewImages) {
+  WriteFeatures(5);
+  ASSERT_TRUE(Match(false).ok());
+  const std::string exhaustive = *HashFile(folder_ + "/matches.db");
+  options_.pairs = "sequence";
+  ASSERT_TRUE(Match(false).ok());
+  EXPECT_EQ(*HashFile(folder_ + "/matches.db"), exhaustive);
+}
+
+TEST_F(MatchFeaturesTest, RetrievalMatchesImagesThatShowTheSameWords) {
+  // Images 1 and 2 show one place, 3 and 4 another.
+  const auto other_place = [](SQLite::Database& database) {
+    Random random(11);
+    std::string bytes(80 * kDescriptorDim, '\0');
+    for (char& byte : bytes) byte = static_cast<char>(200 * std::pow(random.Uniform(), 4));
+    SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 2");
+    update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+    update.exec();
+  };
+  WriteFeatures(4, other_place);
+  options_.max_num_exhaustive_images = 3;
+  const auto summary = Match(false);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->pairs, "retrieval");
+  EXPECT_EQ(summary->num_pairs_tried, 2);
+  auto database = OpenDatabaseReadOnly(folder_ + "/matches.db");
+  const auto geometries = ReadDatabaseTwoViewGeometries(*database, 15);
+  ASSERT_EQ(geometries->size(), 2u);
+  EXPECT_EQ(geometries->at(0).image_id2, 2u);
+  EXPECT_EQ(geometries->at(1).image_id1, 3u);
+}
+
+TEST_F(MatchFeaturesTest, VocabularyWithoutWordsIsAnError) {
+  WriteFeatures(3);
+  Vocabulary vocabulary;
+  vocabulary.nodes.resize(1);
+  ASSERT_TRUE(NumberVocabularyNodes(&vocabulary).ok());
+  vocabulary.centres.setZero(1, kDescriptorDim);
+  ASSERT_TRUE(WriteVocabulary(vocabulary, folder_ + "/vocabulary.db").ok());
+  options_.pairs = "retrieval";
+  inputs_.vocabulary_path = folder_ + "/vocabulary.db";
+  const auto summary = Match(false);
+  ASSERT_FALSE(summary.ok());
+  EXPECT_EQ(summary.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(summary.error().message, HasSubstr("tells no images apart"));
+  inputs_.vocabulary_path = folder_ + "/absent.db";
+  EXPECT_EQ(Match(false).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(MatchFeaturesTest, ImagesWithoutFeaturesAreSkippedAndCounted) {
+  WriteFeatures(3, [](SQLite::Database& database) {
+    database.exec("UPDATE keypoints SET rows = 0, data = x'' WHERE image_id = 2");
+    database.exec("DELETE FROM descriptors WHERE image_id = 2");
+  });
+  const auto summary = Match(true);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_images, 2);
+  EXPECT_EQ(summary->num_without_features, 1);
+  EXPECT_EQ(summary->num_pairs_verified, 1);
+}
+
+TEST_F(MatchFeaturesTest, PairListChoosesThePairs) {
+  WriteFeatures(4);
+  inputs_.pair_list_path = folder_ + "/pairs.txt";
+  std::ofstream(inputs_.pair_list_path) << "# left right\nimage0.png image2.png\n\nimage2.png  image0.png\n"
+                                           "image3.png image1.png\r\n";
+  const auto summary = Match(true);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->pairs, "list");
+  EXPECT_EQ(summary->num_pairs_tried, 2);
+  EXPECT_EQ(summary->num_pairs_verified, 2);
+}
+
+TEST_F(MatchFeaturesTest, BadLineOfAPairListIsNamed) {
+  WriteFeatures(3, [](SQLite::Database& database) {
+    database.exec("DELETE FROM keypoints WHERE image_id = 3; DELETE FROM descriptors WHERE image_id = 3");
+  });
+  inputs_.pair_list_path = folder_ + "/pairs.txt";
+  const auto message_of = [&](const std::string& text) {
+    std::ofstream(inputs_.pair_list_path) << text;
+    const auto summary = Match(true);
+    return summary.ok() ? "" : summary.error().message;
+  };
+  EXPECT_THAT(
+      message_of("image0.png image1.png\nimage0.png imag1.png\n"),
+      HasSubstr("pairs.txt, line 2: the database has no image 'imag1.png'; did you mean 'image1.png'?"));
+  EXPECT_THAT(message_of("image0.png\n"), HasSubstr("line 1: 1 word(s), expected the names of two images"));
+  EXPECT_THAT(message_of("image0.png image0.png\n"), HasSubstr("'image0.png' is paired with itself"));
+  EXPECT_THAT(message_of("image0.png image2.png\n"), HasSubstr("no pair of images with features (1 pair(s)"));
+  EXPECT_THAT(message_of(""), HasSubstr("names no pair"));
+  fs::remove(inputs_.pair_list_path);
+  EXPECT_EQ(Match(true).error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(MatchFeaturesTest, OneImageIsAnErrorAndLeavesNoFile) {

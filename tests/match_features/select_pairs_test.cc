@@ -23,9 +23,16 @@ PosedCamera At(double x, double yaw_deg) {
 
 TEST(SelectPairs, ExhaustiveAndSequencePairsAreAscending) {
   EXPECT_THAT(ExhaustivePairs(3), ElementsAre(Pair(0, 1), Pair(0, 2), Pair(1, 2)));
-  EXPECT_THAT(SequencePairs(4, 1), ElementsAre(Pair(0, 1), Pair(1, 2), Pair(2, 3)));
+  EXPECT_THAT(SequencePairs({0, 1, 2, 3}, 1), ElementsAre(Pair(0, 1), Pair(1, 2), Pair(2, 3)));
   EXPECT_TRUE(ExhaustivePairs(1).empty());
   EXPECT_TRUE(ExhaustivePairs(0).empty());
+}
+
+TEST(SelectPairs, SequenceFollowsNumbersInNames) {
+  EXPECT_THAT(NaturalOrder({"1.jpg", "10.jpg", "2.jpg"}), ElementsAre(0, 2, 1));
+  EXPECT_THAT(NaturalOrder({"b/1.png", "a/12.png", "a/012.png", "a/3.png", "a"}), ElementsAre(4, 3, 1, 2, 0));
+  EXPECT_THAT(SequencePairs(NaturalOrder({"1.jpg", "10.jpg", "2.jpg"}), 1),
+              ElementsAre(Pair(0, 2), Pair(1, 2)));
 }
 
 TEST(SelectPairs, FrustaThatShareSceneAreMatchedOthersAreNot) {

@@ -1,4 +1,4 @@
-#include "stages/build_vocabulary/split_node.h"
+#include "core/split_node.h"
 
 #include <algorithm>
 #include <array>

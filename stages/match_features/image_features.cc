@@ -1,0 +1,88 @@
+#include "stages/match_features/image_features.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace cairn {
+namespace {
+
+// Rows that a table of features states for each image.
+Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, const std::string& table) {
+  std::map<ImageId, int64_t> counts;
+  SQLite::Statement query(database, "SELECT image_id, rows FROM " + table);
+  while (query.executeStep()) {
+    const int64_t rows = query.getColumn(1).getInt64();
+    if (rows < 0 || rows > std::numeric_limits<int>::max()) {
+      return MakeError(ErrorCode::kCorrupt, "{}: table {}, row {}: {} rows", database.getFilename(), table,
+                       query.getColumn(0).getInt64(), rows);
+    }
+    counts[query.getColumn(0).getUInt()] = rows;
+  }
+  return counts;
+}
+
+}  // namespace
+
+bool MatchImages::AllPosed() const {
+  return std::all_of(images.begin(), images.end(),
+                     [](const MatchImage& image) { return image.cam_from_world.has_value(); });
+}
+
+Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture) {
+  MatchImages result;
+  CAIRN_ASSIGN_OR_RETURN(result.cameras, ReadDatabaseCameras(database));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadDatabaseImages(database));
+  CAIRN_ASSIGN_OR_RETURN(auto num_keypoints, ReadRowCounts(database, "keypoints"));
+  CAIRN_ASSIGN_OR_RETURN(auto num_descriptors, ReadRowCounts(database, "descriptors"));
+  std::map<std::string, Pose> poses;
+  if (capture != nullptr) {
+    for (const CaptureImage& image : capture->images) {
+      if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
+    }
+  }
+  for (const DatabaseImage& image : images) {
+    if (!result.cameras.contains(image.camera_id)) {
+      return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
+                       database.getFilename(), image.name, image.camera_id);
+    }
+    if (num_keypoints[image.image_id] != num_descriptors[image.image_id]) {
+      return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
+                       database.getFilename(), image.name, num_keypoints[image.image_id],
+                       num_descriptors[image.image_id]);
+    }
+    if (num_keypoints[image.image_id] == 0) {
+      result.without_features.insert(image.name);
+      continue;
+    }
+    MatchImage match_image{.image_id = image.image_id, .name = image.name, .camera_id = image.camera_id};
+    if (const auto pose = poses.find(image.name); pose != poses.end())
+      match_image.cam_from_world = pose->second;
+    match_image.num_features = static_cast<int>(num_keypoints[image.image_id]);
+    result.images.push_back(std::move(match_image));
+  }
+  return result;
+}
+
+int64_t ImageFeatures::NumBytes(int num_features) {
+  return PackedDescriptors::NumBytes(num_features) +
+         static_cast<int64_t>(sizeof(Eigen::Vector2d)) * num_features;
+}
+
+Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
+                                        const Camera& camera) {
+  CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
+                         ReadDatabaseDescriptors(database, image.image_id));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+                         ReadDatabaseKeypoints(database, image.image_id));
+  ImageFeatures features;
+  features.descriptors = PackedDescriptors(descriptors);
+  features.rays.reserve(keypoints.size());
+  for (const Keypoint& keypoint : keypoints) {
+    const auto ray = CameraFromImage(camera, Eigen::Vector2d(keypoint.x, keypoint.y));
+    features.rays.push_back(
+        ray.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
+  }
+  return features;
+}
+
+}  // namespace cairn

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera.h"
+#include "core/capture.h"
+#include "core/colmap_database.h"
+#include "core/descriptor_matcher.h"
+#include "core/pose.h"
+
+namespace cairn {
+
+// An image to match, without its features: these stay in the database until a pair needs them.
+struct MatchImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+  std::optional<Pose> cam_from_world;
+  int num_features = 0;
+};
+
+struct MatchImages {
+  std::map<CameraId, Camera> cameras;
+  std::vector<MatchImage> images;          // those with features, ascending image_id
+  std::set<std::string> without_features;  // names of those that the database has besides
+
+  bool AllPosed() const;
+};
+
+// Cameras and images of a COLMAP database; poses by image name from `capture` (may be null).  Throws
+// SQLite::Exception: call it inside WithDatabaseErrors.  Errors: Corrupt (an image without camera, counts of
+// keypoints and descriptors that differ).
+Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture);
+
+// The features of one image, as matching and verification read them.
+struct ImageFeatures {
+  PackedDescriptors descriptors;
+  std::vector<Eigen::Vector2d> rays;  // normalised coordinates of the keypoints, NaN where undefined
+
+  // At most what the features of an image take, bytes.
+  static int64_t NumBytes(int num_features);
+};
+
+// Errors: Corrupt.  Throws like ReadMatchImages.
+Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
+                                        const Camera& camera);
+
+}  // namespace cairn

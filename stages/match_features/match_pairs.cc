@@ -1,0 +1,143 @@
+#include "stages/match_features/match_pairs.h"
+
+#include <algorithm>
+#include <future>
+#include <memory>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "core/parallel.h"
+
+namespace cairn {
+namespace {
+
+// Results that wait to be taken, pairs.
+constexpr int64_t kBatchSize = 512;
+
+using FeaturesOfImages = std::unordered_map<int, std::shared_ptr<const ImageFeatures>>;
+
+// Every other bit of the result, from the lowest.
+uint64_t SpreadBits(uint32_t value) {
+  uint64_t bits = value;
+  bits = (bits | bits << 16) & 0x0000ffff0000ffff;
+  bits = (bits | bits << 8) & 0x00ff00ff00ff00ff;
+  bits = (bits | bits << 4) & 0x0f0f0f0f0f0f0f0f;
+  bits = (bits | bits << 2) & 0x3333333333333333;
+  return (bits | bits << 1) & 0x5555555555555555;
+}
+
+uint64_t CurvePosition(const std::pair<int, int>& pair) {
+  return SpreadBits(static_cast<uint32_t>(pair.first)) << 1 | SpreadBits(static_cast<uint32_t>(pair.second));
+}
+
+// Features of all images of pairs [begin, end); those that `held` has are not read again.
+Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImages& images,
+                                     const IndexPairs& pairs, int64_t begin, int64_t end,
+                                     const FeaturesOfImages& held, const Progress& progress) {
+  FeaturesOfImages result;
+  for (int64_t i = begin; i < end; ++i) {
+    for (const int idx : {pairs[i].first, pairs[i].second}) {
+      if (result.contains(idx)) continue;
+      if (const auto it = held.find(idx); it != held.end()) {
+        result.emplace(idx, it->second);
+        continue;
+      }
+      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
+      const MatchImage& image = images.images[idx];
+      CAIRN_ASSIGN_OR_RETURN(ImageFeatures features,
+                             ReadImageFeatures(database, image, images.cameras.at(image.camera_id)));
+      result.emplace(idx, std::make_shared<const ImageFeatures>(std::move(features)));
+    }
+  }
+  return result;
+}
+
+struct PairResult {
+  TwoViewGeometry geometry;
+  int num_putative = 0;
+};
+
+PairResult MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
+                     const FeaturesOfImages& features, const MatchPairsOptions& options) {
+  const MatchImage& image1 = images.images[pair.first];
+  const MatchImage& image2 = images.images[pair.second];
+  const ImageFeatures& features1 = *features.at(pair.first);
+  const ImageFeatures& features2 = *features.at(pair.second);
+  const std::vector<Match> matches =
+      MatchDescriptors(features1.descriptors, features2.descriptors, options.matcher);
+  PairResult result;
+  result.num_putative = static_cast<int>(matches.size());
+  result.geometry = VerifyPair({&images.cameras.at(image1.camera_id), &features1.rays, image1.cam_from_world},
+                               {&images.cameras.at(image2.camera_id), &features2.rays, image2.cam_from_world},
+                               matches, options.verification);
+  result.geometry.image_id1 = image1.image_id;
+  result.geometry.image_id2 = image2.image_id;
+  return result;
+}
+
+}  // namespace
+
+void SortAlongCurve(IndexPairs* pairs) {
+  std::sort(pairs->begin(), pairs->end(),
+            [](const auto& a, const auto& b) { return CurvePosition(a) < CurvePosition(b); });
+}
+
+std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<MatchImage>& images,
+                                      int64_t max_num_bytes) {
+  std::vector<int64_t> ends;
+  std::unordered_set<int> held;
+  int64_t num_bytes = 0;
+  for (int64_t i = 0; i < static_cast<int64_t>(pairs.size()); ++i) {
+    const auto [idx1, idx2] = pairs[i];
+    const auto bytes_of = [&](int idx) { return ImageFeatures::NumBytes(images[idx].num_features); };
+    const int64_t num_more =
+        (held.contains(idx1) ? 0 : bytes_of(idx1)) + (held.contains(idx2) ? 0 : bytes_of(idx2));
+    if (!held.empty() && num_bytes + num_more > max_num_bytes) {
+      ends.push_back(i);
+      held.clear();
+      num_bytes = bytes_of(idx1) + bytes_of(idx2);
+    } else {
+      num_bytes += num_more;
+    }
+    held.insert({idx1, idx2});
+  }
+  if (!pairs.empty()) ends.push_back(static_cast<int64_t>(pairs.size()));
+  return ends;
+}
+
+Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPairs pairs,
+                  const MatchPairsOptions& options, int num_threads, Progress& progress,
+                  const TakeGeometry& take) {
+  SortAlongCurve(&pairs);
+  const int64_t budget = static_cast<int64_t>(options.memory_budget_mib) << 20;
+  const std::vector<int64_t> ends = CutIntoStretches(pairs, images.images, budget / 2);
+  FeaturesOfImages features;
+  int64_t begin = 0;
+  for (size_t stretch = 0; stretch < ends.size(); ++stretch) {
+    if (stretch == 0) {
+      CAIRN_ASSIGN_OR_RETURN(features, ReadStretch(database, images, pairs, 0, ends[0], {}, progress));
+    }
+    std::future<Result<FeaturesOfImages>> next;
+    if (stretch + 1 < ends.size()) {
+      next = std::async(std::launch::async, [&, stretch] {
+        return ReadStretch(database, images, pairs, ends[stretch], ends[stretch + 1], features, progress);
+      });
+    }
+    for (; begin < ends[stretch]; begin = std::min(begin + kBatchSize, ends[stretch])) {
+      std::vector<PairResult> results(std::min(kBatchSize, ends[stretch] - begin));
+      ParallelFor(static_cast<int64_t>(results.size()), num_threads, [&](int64_t i) {
+        if (progress.Cancelled()) return;
+        results[i] = MatchPair(images, pairs[begin + i], features, options);
+        progress.Advance();
+      });
+      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while matching features");
+      for (const PairResult& result : results) take(result.geometry, result.num_putative);
+    }
+    if (next.valid()) {
+      CAIRN_ASSIGN_OR_RETURN(features, next.get());
+    }
+  }
+  return Ok();
+}
+
+}  // namespace cairn

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/descriptor_matcher.h"
+#include "core/error.h"
+#include "core/progress.h"
+#include "stages/match_features/image_features.h"
+#include "stages/match_features/select_pairs.h"
+#include "stages/match_features/verify_pair.h"
+
+namespace cairn {
+
+struct MatchPairsOptions {
+  // Most memory that the features of images may take at a time, MiB: beyond it they are read again when they
+  // are needed.  Two images are always held.  REQUIRES: >= 1
+  int memory_budget_mib = 1024;
+  DescriptorMatcherOptions matcher;
+  VerifyPairOptions verification;
+};
+
+// Pairs in the order in which they are matched: along a Z-order curve through the (idx1, idx2) square
+// [Morton 1966].  Any stretch of the curve touches few images, whatever the length of the stretch, so that
+// one order serves every budget.
+void SortAlongCurve(IndexPairs* pairs);
+
+// Stretches of `pairs` whose images take at most `max_num_bytes`: the end of each, ascending, the last is
+// pairs.size().  A stretch holds at least one pair.
+std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<MatchImage>& images,
+                                      int64_t max_num_bytes);
+
+// Takes a pair's verified geometry (no inliers: not verified) and its number of putative matches.
+using TakeGeometry = std::function<void(const TwoViewGeometry& geometry, int num_putative)>;
+
+// Matches and verifies `pairs` (indices into images.images; sorted along the curve here) and hands each
+// result to `take`, in the curve's order and on the calling thread.  The features of one stretch of the curve
+// are in memory while a second thread reads those of the next: together within the budget.  Same calls for
+// any budget and number of threads.  Cost: pairs * features^2 * 128 multiply-adds.  Memory: the budget, and 8
+// bytes per pair.  Errors: Corrupt, Cancelled; throws SQLite::Exception as the readers do.
+Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPairs pairs,
+                  const MatchPairsOptions& options, int num_threads, Progress& progress,
+                  const TakeGeometry& take);
+
+}  // namespace cairn
