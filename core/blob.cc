@@ -49,6 +49,17 @@ float BlobReader::Float32() { return std::bit_cast<float>(static_cast<uint32_t>(
 
 double BlobReader::Float64() { return std::bit_cast<double>(LittleEndian(8)); }
 
+std::string BlobReader::ZeroTerminated() {
+  const size_t end = bytes_.find('\0', position_);
+  if (!ok_ || end == std::string_view::npos) {
+    ok_ = false;
+    return "";
+  }
+  const std::string text(bytes_.substr(position_, end - position_));
+  position_ = end + 1;
+  return text;
+}
+
 std::string EncodeAscending(const std::vector<int32_t>& values) {
   BlobWriter writer;
   int32_t previous = -1;

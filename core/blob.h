@@ -9,14 +9,19 @@
 
 namespace cairn {
 
-// Byte layouts of our own for the blobs in our files: little-endian numbers and varints (7 bits a byte,
-// lowest first, the top bit says that more follow).  schemas/FORMAT.md draws each blob.
+// Byte layouts of binary files and blobs: little-endian numbers and varints (7 bits a byte, lowest first, the
+// top bit says that more follow).  schemas/FORMAT.md draws each blob of a map.
 class BlobWriter {
  public:
   void Varint(uint64_t value);
+  void UInt8(uint8_t value) { LittleEndian(value, 1); }
+  void UInt32(uint32_t value) { LittleEndian(value, 4); }
+  void UInt64(uint64_t value) { LittleEndian(value, 8); }
   void Float32(float value);
   void Float64(double value);
   void Bytes(const uint8_t* bytes, size_t num_bytes);
+  // The text up to its first zero byte, and a zero byte.
+  void ZeroTerminated(const std::string& text) { bytes_.append(text.c_str()).push_back('\0'); }
   std::string Take() { return std::move(bytes_); }
 
  private:
@@ -32,8 +37,14 @@ class BlobReader {
   explicit BlobReader(std::string_view bytes) : bytes_(bytes) {}
 
   uint64_t Varint();
+  uint8_t UInt8() { return static_cast<uint8_t>(LittleEndian(1)); }
+  uint32_t UInt32() { return static_cast<uint32_t>(LittleEndian(4)); }
+  uint64_t UInt64() { return LittleEndian(8); }
   float Float32();
   double Float64();
+  // The bytes before the next zero byte, which is read too.
+  std::string ZeroTerminated();
+  size_t num_left() const { return bytes_.size() - position_; }
   bool ok() const { return ok_; }
   // Whether everything was read, without a failure.
   bool Finished() const { return ok_ && position_ == bytes_.size(); }

@@ -4,22 +4,21 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <set>
 #include <sstream>
 #include <tuple>
 
+#include "core/colmap_model.h"
 #include "core/file.h"
 #include "core/image_file.h"
+#include "core/text.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kMaxQuaternionNormError = 0.01;
 
 bool HasImageSuffix(const fs::path& path) {
   static const std::set<std::string> kSuffixes = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
@@ -43,27 +42,10 @@ std::vector<std::string> ListImages(const std::string& folder) {
   return names;
 }
 
-bool ParseDouble(const std::string& text, double* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-bool ParseUnsigned(const std::string& text, uint32_t* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-std::vector<std::string> SplitWords(const std::string& line) {
-  std::istringstream stream(line);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-
 bool IsPointsLine(const std::vector<std::string>& words) {
   double value = 0;
   return words.size() % 3 == 0 && std::all_of(words.begin(), words.end(), [&](const std::string& word) {
-           return ParseDouble(word, &value);
+           return ParseNumber(word, &value);
          });
 }
 
@@ -81,7 +63,7 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
   Camera camera;
   CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromName(words[first]));
   uint32_t width = 0, height = 0;
-  if (!ParseUnsigned(words[first + 1], &width) || !ParseUnsigned(words[first + 2], &height)) {
+  if (!ParseNumber(words[first + 1], &width) || !ParseNumber(words[first + 2], &height)) {
     return MakeError(ErrorCode::kCorrupt, "image size '{} x {}' is not two positive integers",
                      words[first + 1], words[first + 2]);
   }
@@ -89,7 +71,7 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
   camera.height = static_cast<int>(std::min(height, 1u << 30));
   for (size_t i = first + 3; i < words.size(); ++i) {
     double param = 0;
-    if (!ParseDouble(words[i], &param)) {
+    if (!ParseNumber(words[i], &param)) {
       return MakeError(ErrorCode::kCorrupt, "camera parameter '{}' is not a number", words[i]);
     }
     camera.params.push_back(param);
@@ -194,7 +176,7 @@ Result<std::map<CameraId, Camera>> ReadCamerasText(const std::string& path) {
     const std::vector<std::string> words = SplitWords(line);
     if (words.empty() || words[0][0] == '#') continue;
     CameraId camera_id = 0;
-    if (!ParseUnsigned(words[0], &camera_id)) {
+    if (!ParseNumber(words[0], &camera_id)) {
       return MakeError(ErrorCode::kCorrupt, "{}:{}: camera id '{}' is not a number", path, line_number,
                        words[0]);
     }
@@ -235,38 +217,14 @@ Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::v
     const bool is_points_line = follows_image && IsPointsLine(words);
     follows_image = false;
     if (words.empty() || words[0][0] == '#' || is_points_line) continue;
-    if (words.size() < 10) {
-      return MakeError(
-          ErrorCode::kCorrupt,
-          "{}:{}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, found {} fields; is the file "
-          "truncated?",
-          path, line_number, words.size());
+    Result<ModelImage> image = ParseImageLine(line);
+    if (!image.ok()) {
+      return MakeError(image.error().code, "{}:{}: {}", path, line_number, image.error().message);
     }
-    std::array<double, 7> numbers{};
-    bool are_numbers = true;
-    for (int i = 0; i < 7; ++i) are_numbers &= ParseDouble(words[1 + i], &numbers[i]);
-    CaptureImage image;
-    if (!are_numbers || !ParseUnsigned(words[8], &image.camera_id)) {
-      return MakeError(ErrorCode::kCorrupt, "{}:{}: a pose or camera id is not a number: '{}'", path,
-                       line_number, line);
-    }
-    image.name = line.substr(
-        line.find(words[9], line.find(words[8], line.find(words[7]) + words[7].size()) + words[8].size()));
-    image.name.erase(image.name.find_last_not_of(" \t") + 1);
-    Pose pose;
-    pose.rotation = Eigen::Quaterniond(numbers[0], numbers[1], numbers[2], numbers[3]);
-    pose.translation = Eigen::Vector3d(numbers[4], numbers[5], numbers[6]);
-    const double norm = pose.rotation.norm();
-    const bool is_finite = pose.translation.allFinite() && std::isfinite(norm);
-    if (!is_finite || std::abs(norm - 1) > kMaxQuaternionNormError) {
-      rejects->push_back(
-          {image.name,
-           is_finite ? fmt::format("{}:{}: quaternion of norm {:g}, expected 1", path, line_number, norm)
-                     : fmt::format("{}:{}: pose is not finite", path, line_number)});
+    if (const Status status = NormalizePose(&image->cam_from_world); !status.ok()) {
+      rejects->push_back({image->name, fmt::format("{}:{}: {}", path, line_number, status.error().message)});
     } else {
-      pose.rotation.normalize();
-      image.cam_from_world = pose;
-      images.push_back(std::move(image));
+      images.push_back({std::move(image->name), image->camera_id, image->cam_from_world});
     }
     follows_image = true;
   }

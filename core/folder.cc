@@ -1,0 +1,105 @@
+#include "core/folder.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Puts the whole folder `temporary` in the place of `path`, in one step where there is something already.
+Status ReplaceFolder(const std::string& temporary, const std::string& path) {
+  const int fd = open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int synced = fd < 0 ? -1 : syncfs(fd);
+  if (fd >= 0) close(fd);
+  if (synced != 0)
+    return MakeError(ErrorCode::kIo, "{}: cannot be synced: {}", temporary, std::strerror(errno));
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    if (std::rename(temporary.c_str(), path.c_str()) == 0) return Ok();
+    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", path, std::strerror(errno));
+  }
+  if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) != 0) {
+    // File systems that cannot exchange: the old folder steps aside first.
+    const std::string aside = temporary + "-old";
+    if (std::rename(path.c_str(), aside.c_str()) != 0 || std::rename(temporary.c_str(), path.c_str()) != 0) {
+      return MakeError(ErrorCode::kIo, "{}: cannot be replaced: {}", path, std::strerror(errno));
+    }
+    fs::remove_all(aside, error);
+  }
+  fs::remove_all(temporary, error);
+  return Ok();
+}
+
+// Removes the temporary folders beside `path` of processes that were killed.
+void RemoveLeftovers(const std::string& path) {
+  const fs::path target(path);
+  const std::string prefix = target.filename().string() + ".tmp-";
+  std::vector<fs::path> leftovers;
+  std::error_code error;
+  const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  for (const fs::directory_entry& entry : fs::directory_iterator(parent, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    pid_t process = 0;
+    const char* end = name.data() + name.size();
+    const auto [rest, parse_error] = std::from_chars(name.data() + prefix.size(), end, process);
+    const bool is_ours = parse_error == std::errc() && process > 0 && (rest == end || *rest == '-');
+    if (is_ours && kill(process, 0) != 0 && errno == ESRCH) leftovers.push_back(entry.path());
+  }
+  for (const fs::path& leftover : leftovers) fs::remove_all(leftover, error);
+}
+
+// Refuses to replace what is not of the kind.
+Status CheckTarget(const std::string& path, const std::string& kind, const std::vector<std::string>& marks) {
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    const fs::path parent = fs::path(path).parent_path();
+    if (parent.empty() || fs::is_directory(parent, error)) return Ok();
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path,
+                     parent.string());
+  }
+  if (!fs::is_directory(path, error)) {
+    return MakeError(ErrorCode::kIo, "{}: is a file, expected a folder; remove it or name another", path);
+  }
+  const auto is_marked = [&](const std::string& mark) { return fs::exists(fs::path(path) / mark, error); };
+  if (!fs::is_empty(path, error) && std::none_of(marks.begin(), marks.end(), is_marked)) {
+    return MakeError(ErrorCode::kIo,
+                     "{}: is a folder, but not {} (it has no {}), and is not replaced; remove it or name "
+                     "another",
+                     path, kind, fmt::join(marks, " or "));
+  }
+  return Ok();
+}
+
+}  // namespace
+
+Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
+                               const std::vector<std::string>& marks,
+                               const std::function<Status(const std::string&)>& write) {
+  std::string target = path;
+  while (target.size() > 1 && target.back() == '/') target.pop_back();
+  CAIRN_RETURN_IF_ERROR(CheckTarget(target, kind, marks));
+  RemoveLeftovers(target);
+  const std::string temporary = fmt::format("{}.tmp-{}", target, getpid());
+  std::error_code error;
+  fs::remove_all(temporary, error);
+  if (!fs::create_directories(temporary, error)) {
+    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", temporary, error.message());
+  }
+  Status status = write(temporary);
+  if (status.ok()) status = ReplaceFolder(temporary, target);
+  if (!status.ok()) fs::remove_all(temporary, error);
+  return status;
+}
+
+}  // namespace cairn

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cairn {
+
+// Words of a line, split at white space.
+std::vector<std::string> SplitWords(std::string_view line);
+
+// Fields of a line between separators ("a, ,b" at ',' gives "a", "", "b"), without white space at their ends.
+std::vector<std::string> SplitFields(std::string_view line, char separator);
+
+// Text without white space at its ends.
+std::string_view Trim(std::string_view text);
+
+// Lines of a text without their ends ("\n" or "\r\n").  A last line without an end counts.
+std::vector<std::string_view> SplitLines(std::string_view text);
+
+// Whether the whole of `text` is a number of this type, then in `value`.  The locale does not matter.
+template <typename T>
+bool ParseNumber(std::string_view text, T* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace cairn
