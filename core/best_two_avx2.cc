@@ -1,36 +1,60 @@
 // Compiled with -mavx2.
-#include <immintrin.h>
+#include "core/best_two_avx2.h"
 
 #include "core/best_two_sweep.h"
 
 namespace cairn {
 namespace {
 
-struct Avx2 {
-  static constexpr int kLanes = 8;
-  static constexpr int kNumChunks = 64;
+// Any values: widened to 16 bits on the way, even and odd ones.
+struct Avx2 : Avx2Keys {
+  static constexpr int kRowOffset = 0;
+  static constexpr int kNumBias = 0;
+  static constexpr uint32_t kSumStart = 0;
+  static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 4;
-  static constexpr int kTileGroups = 8;
-  using Vector = __m256i;
-  static Vector Load(const int32_t* p) { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); }
-  static void Store(int32_t* p, Vector v) { _mm256_storeu_si256(reinterpret_cast<__m256i*>(p), v); }
-  static Vector Set1(int32_t value) { return _mm256_set1_epi32(value); }
-  static Vector Iota() { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
-  static Vector Add(Vector a, Vector b) { return _mm256_add_epi32(a, b); }
-  static Vector DotAdd(Vector sum, Vector columns, Vector row) {
-    return _mm256_add_epi32(sum, _mm256_madd_epi16(columns, row));
+  static constexpr int kGroupBlock = 2;
+  static constexpr int kTileGroups = 16;
+  struct Operand {
+    Vector even, odd;
+  };
+  static Operand Split(Vector bytes) {
+    return {_mm256_and_si256(bytes, _mm256_set1_epi16(0xFF)), _mm256_srli_epi16(bytes, 8)};
   }
-  static void UpdateBestTwo(Vector value, Vector idx, int32_t* best, int32_t* second, int32_t* best_idx) {
-    const Vector old_best = Load(best);
-    const Vector is_better = _mm256_cmpgt_epi32(value, old_best);
-    Store(second, _mm256_max_epi32(Load(second), _mm256_min_epi32(value, old_best)));
-    Store(best, _mm256_max_epi32(value, old_best));
-    Store(best_idx, _mm256_blendv_epi8(Load(best_idx), idx, is_better));
+  static Operand LoadColumn(const uint32_t* p) { return Split(Load(p)); }
+  static Operand LoadRow(const uint32_t* p) { return Split(Set1(*p)); }
+  static Vector DotAdd(Vector sum, Operand column, Operand row) {
+    sum = _mm256_add_epi32(sum, _mm256_madd_epi16(column.even, row.even));
+    return _mm256_add_epi32(sum, _mm256_madd_epi16(column.odd, row.odd));
+  }
+};
+
+// Values whose products fit: rows less 64 are signed 8-bit (values up to 191), every pair of products fits
+// into 16 bits, and 16 of them, made up for the 64 and less 2^15 by the bias, do so again.
+struct Avx2Small : Avx2Keys {
+  static constexpr int kRowOffset = 64;
+  static constexpr int kNumBias = 4;
+  static constexpr uint32_t kSumStart = 8 << 15;
+  static constexpr bool kPartial = true;
+  static constexpr int kRowBlock = 4;
+  static constexpr int kGroupBlock = 2;
+  static constexpr int kTileGroups = 16;
+  using Operand = Vector;
+  using Partial = Vector;
+  static Operand LoadColumn(const uint32_t* p) { return Load(p); }
+  static Operand LoadRow(const uint32_t* p) { return Set1(*p); }
+  static Partial LoadPartial(const uint32_t* p) { return Load(p); }
+  static Partial PartialDotAdd(Partial sum, Operand column, Operand row) {
+    return _mm256_add_epi16(sum, _mm256_maddubs_epi16(column, row));
+  }
+  static Vector Widen(Vector sum, Partial partial) {
+    return _mm256_add_epi32(sum, _mm256_madd_epi16(partial, _mm256_set1_epi16(1)));
   }
 };
 
 }  // namespace
 
-void SweepAvx2(const BestTwoSweep& sweep) { best_two_internal::SweepAll<Avx2>(sweep); }
+const BestTwoKernel kBestTwoAvx2 = CAIRN_BEST_TWO_KERNEL(Avx2);
+const BestTwoKernel kBestTwoAvx2Small = CAIRN_BEST_TWO_KERNEL(Avx2Small);
 
 }  // namespace cairn

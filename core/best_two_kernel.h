@@ -7,25 +7,51 @@
 
 namespace cairn {
 
-// One sweep over all dot products of `num_rows` rows with `num_groups * lanes` columns.
+// All dot products of a block of rows with a block of columns, and the best two of each row and of each
+// column.
 //
-// A row or column is packed in chunks of 4 bytes: with VNNI 32 chunks of four 8-bit values (columns unsigned,
-// rows less 128 and signed; the bias of a column, 128 times its sum, restores the product), else 64 of two
-// 16-bit values (bias 0).  A column of padding has bias -1 and zeros: no result picks it.
+// Layout of both sides: descriptors in groups of `lanes`; a group is 32 chunks x lanes words, a word being
+// four consecutive 8-bit values of one (permuted) descriptor.  So a vector load yields one chunk of `lanes`
+// columns, and the same words, broadcast one by one, serve as rows.
+//
+// A result is a key: dot << index_bits | (2^index_bits - 1 - index within the block).  The largest key is the
+// largest product with the smallest index, and two maxima and a minimum keep the best two.  0 means none; the
+// caller sees to it that indices stay below 2^index_bits - 1 and dot products below 2^(key bits -
+// index_bits).
 struct BestTwoSweep {
-  const int32_t* rows = nullptr;         // num_rows x chunks
-  const int32_t* columns = nullptr;      // num_groups x chunks x lanes
-  const int32_t* column_bias = nullptr;  // num_groups x lanes
-  int num_rows = 0;
-  int num_groups = 0;  // even
-  // Running best, second best and index of the best: of every row per lane (num_rows x lanes), of every
-  // column (num_groups x lanes).  Set to -1 by the caller.
-  int32_t *row_best = nullptr, *row_second = nullptr, *row_idx = nullptr;
-  int32_t *column_best = nullptr, *column_second = nullptr, *column_idx = nullptr;
+  const uint32_t* rows = nullptr;     // num_row_groups x 32 x lanes, values less the kernel's row offset
+  const uint32_t* columns = nullptr;  // num_column_groups x 32 x lanes
+  // What a kernel with a row offset starts its sums from, to make up for it: num_column_groups x bias words
+  // x lanes.
+  const uint32_t* bias = nullptr;
+  int num_row_groups = 0;
+  int num_column_groups = 0;
+  int index_bits = 0;
+  uint32_t* row_states = nullptr;   // scratch: rows x 2 x lanes
+  uint32_t* row_keys = nullptr;     // out: rows x (best, second)
+  uint32_t* column_keys = nullptr;  // out: num_column_groups x (best, second) x lanes
 };
 
-void SweepPortable(const BestTwoSweep& sweep);    // 4 lanes, 16-bit
-void SweepAvx2(const BestTwoSweep& sweep);        // 8 lanes, 16-bit
-void SweepAvx512Vnni(const BestTwoSweep& sweep);  // 16 lanes, 8-bit
+// How a kernel wants its input.
+struct BestTwoKernel {
+  void (*sweep)(const BestTwoSweep&);
+  int lanes;
+  int row_offset;  // subtracted from the values of rows
+  int num_bias;    // words of bias per column
+  int key_bits;    // of a 32-bit key that it can compare
+};
+
+// Chunks whose products the kernels for small values sum in 16 bits.
+inline constexpr int kBestTwoPartialChunks = 8;
+
+// For descriptors of which every sum of 16 products that shares a 16-bit lane is exact: see FitsIn16Bits.
+extern const BestTwoKernel kBestTwoPortableSmall;
+extern const BestTwoKernel kBestTwoAvx2Small;
+// For all.
+extern const BestTwoKernel kBestTwoPortable;
+extern const BestTwoKernel kBestTwoAvx2;
+extern const BestTwoKernel kBestTwoAvxVnni;
+extern const BestTwoKernel kBestTwoAvx512Vnni;
+extern const BestTwoKernel kBestTwoNeonDot;
 
 }  // namespace cairn

@@ -1,6 +1,7 @@
 #include "core/descriptor_matcher.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/best_two_kernel.h"
@@ -8,127 +9,131 @@
 namespace cairn {
 namespace {
 
-struct KernelRow {
-  MatchKernel kernel;
-  void (*sweep)(const BestTwoSweep&);
-  int lanes;
-  bool is_8bit;  // VNNI packing, else 16-bit
+constexpr int kNumChunks = kDescriptorDim / 4;
+// Indices of at most 8191 in a sweep: its states stay in the second-level cache.
+constexpr int kMaxIndexBits = 13;
+
+// Kept from pair to pair: allocating takes longer than matching small images.
+struct Scratch {
+  AlignedWords rows, row_states, row_keys, column_keys;
 };
 
-KernelRow RowOf(MatchKernel kernel) {
-#if defined(__x86_64__)
-  if (kernel == MatchKernel::kAvx512Vnni) return {kernel, SweepAvx512Vnni, 16, true};
-  if (kernel == MatchKernel::kAvx2) return {kernel, SweepAvx2, 8, false};
-#endif
-  return {MatchKernel::kPortable, SweepPortable, 4, false};
+// A run of groups of a block.
+struct GroupRange {
+  const DescriptorBlock& block;
+  int begin = 0;
+  int end = 0;
+};
+
+// The range's rows less the kernel's offset.
+const uint32_t* OffsetRows(const GroupRange& range, const BestTwoKernel& kernel, AlignedWords* scratch) {
+  const int64_t group_size = kNumChunks * kernel.lanes;
+  const uint32_t* rows = range.block.words.data() + range.begin * group_size;
+  if (kernel.row_offset == 0) return rows;
+  const int64_t num_words = (range.end - range.begin) * group_size;
+  scratch->Resize(num_words);
+  const auto* from = reinterpret_cast<const uint8_t*>(rows);
+  auto* to = reinterpret_cast<uint8_t*>(scratch->data());
+  const auto offset = static_cast<uint8_t>(kernel.row_offset);
+  for (int64_t i = 0; i < 4 * num_words; ++i) to[i] = static_cast<uint8_t>(from[i] - offset);
+  return scratch->data();
 }
 
-uint32_t Chunk8(const uint8_t* bytes, uint8_t flip) {
-  uint32_t chunk = 0;
-  for (int i = 0; i < 4; ++i)
-    chunk |= static_cast<uint32_t>(static_cast<uint8_t>(bytes[i] ^ flip)) << (8 * i);
-  return chunk;
+// Offers the best two of a sweep, as keys, to a descriptor of image `range` is not of.
+void Offer(uint32_t best_key, uint32_t second_key, int index_bits, const GroupRange& range, int lanes,
+           BestTwo* kept) {
+  const uint32_t last = (uint32_t{1} << index_bits) - 1;
+  const int first = range.begin * lanes;
+  const int num = static_cast<int>(range.block.idx.size());
+  // -1 for padding, which comes after all that is real.
+  const auto position = [&](uint32_t key) {
+    const int i = first + static_cast<int>(last - (key & last));
+    return key != 0 && i < num ? i : -1;
+  };
+  const int best_position = position(best_key);
+  if (best_position < 0) return;
+  const auto best = static_cast<int32_t>(best_key >> index_bits);
+  const int32_t second = position(second_key) < 0 ? -1 : static_cast<int32_t>(second_key >> index_bits);
+  const int32_t idx = range.block.idx[best_position];
+  if (best > kept->best || (best == kept->best && idx < kept->idx)) {
+    *kept = {idx, best, std::max(kept->best, second)};
+  } else {
+    kept->second = std::max(kept->second, best);
+  }
 }
 
-uint32_t Chunk16(const uint8_t* bytes) { return bytes[0] | static_cast<uint32_t>(bytes[1]) << 16; }
+void SweepRanges(const GroupRange& range1, const GroupRange& range2, const BestTwoKernel& kernel,
+                 int index_bits, Scratch* scratch, std::vector<BestTwo>* rows,
+                 std::vector<BestTwo>* columns) {
+  const int lanes = kernel.lanes;
+  BestTwoSweep sweep;
+  sweep.num_row_groups = range1.end - range1.begin;
+  sweep.num_column_groups = range2.end - range2.begin;
+  sweep.index_bits = index_bits;
+  const int64_t num_rows = sweep.num_row_groups * lanes;
+  scratch->row_states.Resize(num_rows * 2 * lanes);
+  scratch->row_keys.Resize(num_rows * 2);
+  scratch->column_keys.Resize(static_cast<int64_t>(sweep.num_column_groups) * 2 * lanes);
+  sweep.rows = OffsetRows(range1, kernel, &scratch->rows);
+  sweep.columns = range2.block.words.data() + static_cast<int64_t>(range2.begin) * kNumChunks * lanes;
+  if (kernel.num_bias > 0)
+    sweep.bias = range2.block.bias.data() + static_cast<int64_t>(range2.begin) * kernel.num_bias * lanes;
+  sweep.row_states = scratch->row_states.data();
+  sweep.row_keys = scratch->row_keys.data();
+  sweep.column_keys = scratch->column_keys.data();
+  kernel.sweep(sweep);
 
-// Rows as the kernel reads them: x - 128 (which flips the top bit) in 8 bits, or x in 16.
-std::vector<int32_t> PackRows(const DescriptorMatrix& descriptors, bool is_8bit) {
-  const int num_chunks = is_8bit ? kDescriptorDim / 4 : kDescriptorDim / 2;
-  std::vector<int32_t> packed(descriptors.rows() * num_chunks);
-  for (Eigen::Index row = 0; row < descriptors.rows(); ++row) {
-    const uint8_t* bytes = descriptors.row(row).data();
-    for (int chunk = 0; chunk < num_chunks; ++chunk) {
-      packed[row * num_chunks + chunk] =
-          static_cast<int32_t>(is_8bit ? Chunk8(bytes + 4 * chunk, 0x80) : Chunk16(bytes + 2 * chunk));
+  const int num1 = std::min(range1.end * lanes, static_cast<int>(range1.block.idx.size()));
+  for (int i = range1.begin * lanes; i < num1; ++i) {
+    const uint32_t* keys = sweep.row_keys + 2 * (i - range1.begin * lanes);
+    Offer(keys[0], keys[1], index_bits, range2, lanes, &(*rows)[range1.block.idx[i]]);
+  }
+  const int num2 = std::min(range2.end * lanes, static_cast<int>(range2.block.idx.size()));
+  for (int i = range2.begin * lanes; i < num2; ++i) {
+    const uint32_t* keys =
+        sweep.column_keys + static_cast<int64_t>(i / lanes - range2.begin) * 2 * lanes + i % lanes;
+    Offer(keys[0], keys[lanes], index_bits, range1, lanes, &(*columns)[range2.block.idx[i]]);
+  }
+}
+
+// All of a block of one image with all of a block of the other, in ranges that keys can index.
+void SweepBlocks(const DescriptorBlock& block1, const DescriptorBlock& block2, const BestTwoKernel& kernel,
+                 Scratch* scratch, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
+  // Cauchy and Schwarz: no product is larger.
+  const double max_dot =
+      std::sqrt(static_cast<double>(block1.max_squared_norm) * static_cast<double>(block2.max_squared_norm));
+  const int dot_bits = std::bit_width(static_cast<uint32_t>(max_dot) + 1);
+  const int index_bits = std::min(kernel.key_bits - dot_bits, kMaxIndexBits);
+  const int max_groups = ((1 << index_bits) - 1) / kernel.lanes;
+  for (int begin2 = 0; begin2 < block2.num_groups; begin2 += max_groups) {
+    const GroupRange range2{block2, begin2, std::min(begin2 + max_groups, block2.num_groups)};
+    for (int begin1 = 0; begin1 < block1.num_groups; begin1 += max_groups) {
+      const GroupRange range1{block1, begin1, std::min(begin1 + max_groups, block1.num_groups)};
+      SweepRanges(range1, range2, kernel, index_bits, scratch, rows, columns);
     }
   }
-  return packed;
 }
 
 }  // namespace
 
-bool IsKernelSupported(MatchKernel kernel) {
-#if defined(__x86_64__)
-  if (kernel == MatchKernel::kAvx512Vnni) {
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni");
-  }
-  if (kernel == MatchKernel::kAvx2) return __builtin_cpu_supports("avx2");
-#endif
-  return kernel == MatchKernel::kPortable;
-}
-
-MatchKernel FastestKernel() {
-  static const MatchKernel kernel = IsKernelSupported(MatchKernel::kAvx512Vnni) ? MatchKernel::kAvx512Vnni
-                                    : IsKernelSupported(MatchKernel::kAvx2)     ? MatchKernel::kAvx2
-                                                                                : MatchKernel::kPortable;
-  return kernel;
+void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
+                 std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
+  thread_local Scratch scratch;
+  rows->assign(descriptors1.size(), {});
+  columns->assign(descriptors2.size(), {});
+  const BestTwoKernel& kernel = KernelForAll(descriptors1.kernel());
+  if (const BestTwoKernel* for_small = KernelForSmall(descriptors1.kernel()))
+    SweepBlocks(descriptors1.small(), descriptors2.small(), *for_small, &scratch, rows, columns);
+  SweepBlocks(descriptors1.small(), descriptors2.other(), kernel, &scratch, rows, columns);
+  SweepBlocks(descriptors1.other(), descriptors2.small(), kernel, &scratch, rows, columns);
+  SweepBlocks(descriptors1.other(), descriptors2.other(), kernel, &scratch, rows, columns);
 }
 
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
                  MatchKernel kernel, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns) {
-  const KernelRow k = RowOf(kernel);
-  const int num_rows = static_cast<int>(descriptors1.rows());
-  const int num_columns = static_cast<int>(descriptors2.rows());
-  rows->assign(num_rows, {});
-  columns->assign(num_columns, {});
-  if (num_rows == 0 || num_columns == 0) return;
-
-  BestTwoSweep sweep;
-  sweep.num_rows = num_rows;
-  sweep.num_groups = (num_columns + 2 * k.lanes - 1) / (2 * k.lanes) * 2;
-  const int num_chunks = k.is_8bit ? kDescriptorDim / 4 : kDescriptorDim / 2;
-  const int num_padded = sweep.num_groups * k.lanes;
-  const std::vector<int32_t> packed_rows = PackRows(descriptors1, k.is_8bit);
-  std::vector<int32_t> packed_columns(static_cast<size_t>(num_padded) * num_chunks);
-  std::vector<int32_t> bias(num_padded, -1);
-  for (int column = 0; column < num_columns; ++column) {
-    const uint8_t* bytes = descriptors2.row(column).data();
-    int32_t* packed = packed_columns.data() + static_cast<size_t>(column / k.lanes) * num_chunks * k.lanes +
-                      column % k.lanes;
-    int32_t sum = 0;
-    for (int d = 0; d < kDescriptorDim; ++d) sum += bytes[d];
-    bias[column] = k.is_8bit ? 128 * sum : 0;
-    for (int chunk = 0; chunk < num_chunks; ++chunk) {
-      packed[chunk * k.lanes] =
-          static_cast<int32_t>(k.is_8bit ? Chunk8(bytes + 4 * chunk, 0) : Chunk16(bytes + 2 * chunk));
-    }
-  }
-  std::vector<int32_t> row_state(3 * static_cast<size_t>(num_rows) * k.lanes, -1);
-  std::vector<int32_t> column_state(3 * static_cast<size_t>(num_padded), -1);
-  sweep.rows = packed_rows.data();
-  sweep.columns = packed_columns.data();
-  sweep.column_bias = bias.data();
-  sweep.row_best = row_state.data();
-  sweep.row_second = sweep.row_best + static_cast<size_t>(num_rows) * k.lanes;
-  sweep.row_idx = sweep.row_second + static_cast<size_t>(num_rows) * k.lanes;
-  sweep.column_best = column_state.data();
-  sweep.column_second = sweep.column_best + num_padded;
-  sweep.column_idx = sweep.column_second + num_padded;
-  k.sweep(sweep);
-
-  for (int row = 0; row < num_rows; ++row) {
-    BestTwo& merged = (*rows)[row];
-    for (int lane = 0; lane < k.lanes; ++lane) {
-      const size_t i = static_cast<size_t>(row) * k.lanes + lane;
-      const int32_t best = sweep.row_best[i], idx = sweep.row_idx[i];
-      if (best > merged.best || (best == merged.best && idx >= 0 && idx < merged.idx)) {
-        merged.second = std::max(merged.best, sweep.row_second[i]);
-        merged.best = best;
-        merged.idx = idx;
-      } else {
-        merged.second = std::max(merged.second, best);
-      }
-    }
-  }
-  for (int column = 0; column < num_columns; ++column) {
-    (*columns)[column] = {sweep.column_idx[column], sweep.column_best[column], sweep.column_second[column]};
-  }
+  FindBestTwo(PackedDescriptors(descriptors1, kernel), PackedDescriptors(descriptors2, kernel), rows,
+              columns);
 }
-
-PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel)
-    : kernel_(kernel), descriptors_(descriptors) {}
 
 std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
                                     const DescriptorMatrix& descriptors2,
@@ -140,7 +145,7 @@ std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
                                     const PackedDescriptors& descriptors2,
                                     const DescriptorMatcherOptions& options) {
   std::vector<BestTwo> rows, columns;
-  FindBestTwo(descriptors1.descriptors(), descriptors2.descriptors(), descriptors1.kernel(), &rows, &columns);
+  FindBestTwo(descriptors1, descriptors2, &rows, &columns);
   constexpr double kSquaredNorm = 512.0 * 512.0;
   const auto angle = [&](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
   const auto passes = [&](const BestTwo& b) {

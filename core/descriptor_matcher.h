@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/features.h"
+#include "core/packed_descriptors.h"
 
 namespace cairn {
 
@@ -15,34 +16,6 @@ struct DescriptorMatcherOptions {
   double max_angle_rad = 0.7;
   // Keep only pairs that are each other's best.
   bool mutual = true;
-};
-
-// Instruction sets that have a kernel.
-enum class MatchKernel { kPortable, kAvx2, kAvx512Vnni };
-bool IsKernelSupported(MatchKernel kernel);
-// The fastest one that this processor supports.
-MatchKernel FastestKernel();
-
-// The descriptors of one image in the layout of a kernel: packed once, matched with many others.  Immutable,
-// may be shared between threads.
-class PackedDescriptors {
- public:
-  PackedDescriptors() = default;
-  explicit PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel = FastestKernel());
-
-  // Number of descriptors.
-  int size() const { return static_cast<int>(descriptors_.rows()); }
-  MatchKernel kernel() const { return kernel_; }
-  // Memory that it holds.
-  int64_t num_bytes() const { return NumBytes(size()); }
-  // At most what `num_descriptors` descriptors will take once packed, by any kernel: for memory budgets.
-  static int64_t NumBytes(int64_t num_descriptors) { return 160 * num_descriptors + 16384; }
-
-  const DescriptorMatrix& descriptors() const { return descriptors_; }
-
- private:
-  MatchKernel kernel_ = MatchKernel::kPortable;
-  DescriptorMatrix descriptors_;
 };
 
 // Matches of two sets of RootSIFT descriptors by exact search over all dot products (kernels chosen at run
@@ -58,14 +31,16 @@ std::vector<Match> MatchDescriptors(const DescriptorMatrix& descriptors1,
                                     const DescriptorMatrix& descriptors2,
                                     const DescriptorMatcherOptions& options);
 
-// The two largest dot products of one row: what the kernels compute.  idx -1 where there are fewer than one
-// column.
+// The two largest dot products of one descriptor: what the kernels compute.  -1 where there are fewer.
 struct BestTwo {
-  int32_t idx = -1;
+  int32_t idx = -1;  // of the best, the smallest if several are
   int32_t best = -1;
   int32_t second = -1;
 };
-// Best two columns for every row of 1, and best two rows for every column of 2, in one sweep.
+// Best two of 2 for every descriptor of 1 (rows), and best two of 1 for every one of 2 (columns), in one
+// sweep. REQUIRES: both packed for the same kernel.
+void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
+                 std::vector<BestTwo>* rows, std::vector<BestTwo>* columns);
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,
                  MatchKernel kernel, std::vector<BestTwo>* rows, std::vector<BestTwo>* columns);
 

@@ -76,9 +76,8 @@ TEST_P(FindBestTwoTest, SaturatedAndZeroDescriptorsDoNotOverflow) {
   ExpectEqual(columns, OracleRows(d2, d1));
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, FindBestTwoTest,
-                         testing::Values(MatchKernel::kPortable, MatchKernel::kAvx2,
-                                         MatchKernel::kAvx512Vnni));
+INSTANTIATE_TEST_SUITE_P(Kernels, FindBestTwoTest, testing::ValuesIn(kMatchKernels),
+                         [](const auto& param) { return std::string(NameOf(param.param)); });
 
 // A unit vector of norm 512 along one axis, turned by `angle` towards the next.
 void SetDirection(DescriptorMatrix* descriptors, int row, int axis, double angle) {
