@@ -235,8 +235,8 @@ void WriteDatabaseTwoViewGeometry(SQLite::Database& database, const TwoViewGeome
   BindMatrix(insert, 5, geometry.F);
   BindMatrix(insert, 6, geometry.E);
   BindMatrix(insert, 7, geometry.H);
-  // The relative pose is not stored by COLMAP's own matcher either: the mapper estimates it.  Identity, zero.
-  const double qvec[4] = {1, 0, 0, 0};
+  // COLMAP 3.8's matcher leaves the relative pose zero, too: its mapper estimates it from the matches.
+  const double qvec[4] = {0, 0, 0, 0};
   const double tvec[3] = {0, 0, 0};
   BindBlob(insert, 8, qvec, sizeof(qvec));
   BindBlob(insert, 9, tvec, sizeof(tvec));

@@ -33,6 +33,8 @@ enum class TwoViewConfig : int {
   kPlanar = 4,
   kPanoramic = 5,
   kPlanarOrPanoramic = 6,
+  kWatermark = 7,
+  kMultiple = 8,  // several objects that move: of COLMAP's databases, never of ours
 };
 
 // The verified matches of two images, image_id1 < image_id2.

@@ -1,253 +1,269 @@
 #include "stages/match_features/verify_pair.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/Dense>
-#include <opencv2/calib3d.hpp>
+
+#include "stages/match_features/estimate_models.h"
+#include "stages/match_features/relative_pose.h"
+#include "stages/match_features/two_view_error.h"
 
 namespace cairn {
 namespace {
 
-constexpr double kPureRotationBaselineM = 1e-3;
+// Error limits of a pair as angles.
+struct Limits {
+  double epipolar = 0, homography = 0, prior = 0;  // rad
+};
 
-Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d skew;
-  skew << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return skew;
-}
+// What the matches say, on bearings.
+struct Model {
+  TwoViewConfig config = TwoViewConfig::kDegenerate;
+  std::optional<Eigen::Matrix3d> E, F, H;
+  // The one whose inliers are kept: E or F, else H.
+  bool is_homography = false;
+  std::vector<int> inliers;
 
-Eigen::Matrix3d EssentialMatrix(const Pose& cam2_from_cam1) {
-  return Skew(cam2_from_cam1.translation.normalized()) * cam2_from_cam1.rotation.toRotationMatrix();
-}
-
-// Two unit vectors that span the plane orthogonal to v.
-Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
-  const Eigen::Vector3d axis = std::abs(v.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = v.cross(axis).normalized();
-  basis.col(1) = v.cross(basis.col(0)).normalized();
-  return basis;
-}
-
-// Signed Sampson distance.
-double SampsonResidual(const Eigen::Matrix3d& E, const Eigen::Vector2d& x1, const Eigen::Vector2d& x2) {
-  const Eigen::Vector3d Ex1 = E * x1.homogeneous();
-  const Eigen::Vector3d Etx2 = E.transpose() * x2.homogeneous();
-  const double norm2 = Ex1.head<2>().squaredNorm() + Etx2.head<2>().squaredNorm();
-  return x2.homogeneous().dot(Ex1) / std::sqrt(std::max(norm2, 1e-18));
-}
-
-// The correspondences of a pair in normalised coordinates, with the index of the match behind each.
-struct Correspondences {
-  std::vector<Eigen::Vector2d> x1, x2;
-  std::vector<int> match_idx;
+  const Eigen::Matrix3d& Epipolar() const { return E ? *E : *F; }
 };
 
 Correspondences CollectCorrespondences(const ViewForVerification& view1, const ViewForVerification& view2,
                                        const std::vector<Match>& matches) {
   Correspondences c;
   for (size_t i = 0; i < matches.size(); ++i) {
-    const Eigen::Vector2d& x1 = (*view1.rays)[matches[i].idx1];
-    const Eigen::Vector2d& x2 = (*view2.rays)[matches[i].idx2];
-    if (!x1.allFinite() || !x2.allFinite()) continue;
-    c.x1.push_back(x1);
-    c.x2.push_back(x2);
-    c.match_idx.push_back(static_cast<int>(i));
+    const Eigen::Vector3d& bearing1 = (*view1.bearings)[matches[i].idx1];
+    const Eigen::Vector3d& bearing2 = (*view2.bearings)[matches[i].idx2];
+    if (bearing1.allFinite() && bearing2.allFinite()) c.Add(bearing1, bearing2, static_cast<int>(i));
   }
   return c;
 }
 
-// One Gauss-Newton step on sum_i w_i r_i^2 over rotation (left perturbation) and direction of the
-// translation, with Cauchy weights of the given scale.  Derivatives are central differences: five columns,
-// cheap and exact enough.
-Pose RefineStep(const Pose& pose, const Correspondences& c, double scale) {
-  const Eigen::Matrix<double, 3, 2> tangent = TangentBasis(pose.translation);
-  const auto perturbed = [&](int parameter, double step) {
-    Pose p = pose;
-    if (parameter < 3) {
-      p.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(step, Eigen::Vector3d::Unit(parameter))) * p.rotation;
-    } else {
-      p.translation = (p.translation + step * tangent.col(parameter - 3)).normalized();
-    }
-    return EssentialMatrix(p);
-  };
-  constexpr double kStep = 1e-6;
-  const Eigen::Matrix3d E = EssentialMatrix(pose);
-  std::array<Eigen::Matrix3d, 5> dE;
-  for (int p = 0; p < 5; ++p) dE[p] = (perturbed(p, kStep) - perturbed(p, -kStep)) / (2 * kStep);
-  Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Identity() * 1e-12;
-  Eigen::Matrix<double, 5, 1> gradient = Eigen::Matrix<double, 5, 1>::Zero();
-  for (size_t i = 0; i < c.x1.size(); ++i) {
-    const Eigen::Vector3d h1 = c.x1[i].homogeneous(), h2 = c.x2[i].homogeneous();
-    const Eigen::Vector3d Ex1 = E * h1, Etx2 = E.transpose() * h2;
-    const double inverse_norm =
-        1 / std::sqrt(std::max(Ex1.head<2>().squaredNorm() + Etx2.head<2>().squaredNorm(), 1e-18));
-    const double residual = h2.dot(Ex1) * inverse_norm;
-    const double weight = 1 / (1 + residual * residual / (scale * scale));
-    Eigen::Matrix<double, 5, 1> row;  // the change of the norm is of second order near the solution
-    for (int p = 0; p < 5; ++p) row[p] = h2.dot(dE[p] * h1) * inverse_norm;
-    normal.noalias() += weight * row * row.transpose();
-    gradient += weight * residual * row;
+std::vector<int> EpipolarInliers(const Eigen::Matrix3d& M, const Correspondences& c, double max_error) {
+  std::vector<int> inliers;
+  for (int i = 0; i < c.size(); ++i) {
+    if (SquaredSampsonError(M, c.bearings1[i], c.bearings2[i]) <= max_error * max_error) inliers.push_back(i);
   }
-  const Eigen::Matrix<double, 5, 1> step = normal.ldlt().solve(-gradient);
-  if (!step.allFinite()) return pose;
-  Pose refined = pose;
-  const double angle = step.head<3>().norm();
-  if (angle > 0) {
-    refined.rotation =
-        (Eigen::Quaterniond(Eigen::AngleAxisd(angle, step.head<3>() / angle)) * pose.rotation).normalized();
-  }
-  refined.translation = (pose.translation + tangent * step.tail<2>()).normalized();
-  return refined;
+  return inliers;
 }
 
-// Relative pose from the stated one; nothing when too few matches agree with it.
-std::optional<Eigen::Matrix3d> RefineStatedPose(const Pose& stated, const Correspondences& all,
-                                                double focal_px, const VerifyPairOptions& options) {
+std::vector<int> HomographyInliers(const Eigen::Matrix3d& H, const Correspondences& c, double max_error) {
+  std::vector<int> inliers;
+  for (int i = 0; i < c.size(); ++i) {
+    if (SquaredTransferError(H, c.bearings1[i], c.bearings2[i]) <= max_error * max_error)
+      inliers.push_back(i);
+  }
+  return inliers;
+}
+
+Correspondences Subset(const Correspondences& c, const std::vector<int>& indices) {
+  Correspondences subset;
+  for (const int i : indices) subset.Add(c.bearings1[i], c.bearings2[i], c.match_idx[i]);
+  return subset;
+}
+
+bool IsPart(size_t num, double ratio, size_t num_all) {
+  return static_cast<double>(num) > ratio * static_cast<double>(num_all);
+}
+
+// No baseline, no epipolar line: a match must lie where the rotation takes it.
+Model TurnedCamera(const Pose& stated, const Correspondences& c, const Limits& limits) {
+  Model model;
+  model.is_homography = true;
+  const Correspondences near =
+      Subset(c, HomographyInliers(stated.rotation.toRotationMatrix(), c, limits.prior));
+  if (near.size() < 3) return model;
+  Eigen::Quaterniond rotation = RefineRotation(stated.rotation, near, limits.prior / 4, 3);
+  rotation = RefineRotation(rotation, near, limits.homography / 2, 3);
+  model.H = rotation.toRotationMatrix();
+  model.inliers = HomographyInliers(*model.H, c, limits.homography);
+  model.config = TwoViewConfig::kPanoramic;
+  return model;
+}
+
+// Planar and panoramic pairs among those with an essential matrix and a known baseline.
+void RecogniseHomography(const Pose& pose, const Correspondences& c, const Limits& limits,
+                         const VerifyPairOptions& options, Model* model) {
+  const Correspondences inliers = Subset(c, model->inliers);
+  const Eigen::Matrix3d R =
+      RefineRotation(pose.rotation, inliers, limits.homography / 2, 3).toRotationMatrix();
+  const size_t num_inliers = model->inliers.size();
+  if (IsPart(HomographyInliers(R, inliers, limits.homography).size(), options.min_homography_ratio,
+             num_inliers)) {
+    model->config = TwoViewConfig::kPanoramic;
+    model->H = R;
+    return;
+  }
+  // Where no homography has most of the inliers, a few samples show it: 30 miss one that has 4 of 5 in 1 of
+  // 10 million.
+  constexpr int kNumSamples = 30;
+  model->H = EstimateHomography(inliers, {limits.homography, kNumSamples});
+  if (model->H && IsPart(HomographyInliers(*model->H, inliers, limits.homography).size(),
+                         options.min_homography_ratio, num_inliers)) {
+    model->config = TwoViewConfig::kPlanar;
+  }
+}
+
+Model PosedCameras(const Pose& stated, const Correspondences& c, const Limits& limits,
+                   const VerifyPairOptions& options) {
+  if (stated.translation.norm() < options.min_baseline_m) return TurnedCamera(stated, c, limits);
+  Model model;
+  const Correspondences near = Subset(c, EpipolarInliers(EssentialMatrix(stated), c, limits.prior));
+  if (near.size() < options.min_num_inliers) return model;
   Pose pose = stated;
-  pose.translation.normalize();
-  Correspondences near;
-  const Eigen::Matrix3d stated_E = EssentialMatrix(pose);
-  const double max_prior_error = options.max_prior_error_px / focal_px;
-  for (size_t i = 0; i < all.x1.size(); ++i) {
-    if (SquaredSampsonError(stated_E, all.x1[i], all.x2[i]) > max_prior_error * max_prior_error) continue;
-    near.x1.push_back(all.x1[i]);
-    near.x2.push_back(all.x2[i]);
-  }
-  if (static_cast<int>(near.x1.size()) < options.min_num_inliers) return std::nullopt;
   // The scale shrinks from a quarter of the prior's error to half of an inlier's.
-  for (const double scale_px : {options.max_prior_error_px / 4, options.max_epipolar_error_px,
-                                options.max_epipolar_error_px / 2, options.max_epipolar_error_px / 2}) {
-    for (int iteration = 0; iteration < 3; ++iteration) pose = RefineStep(pose, near, scale_px / focal_px);
-  }
-  return EssentialMatrix(pose);
+  for (const double scale : {limits.prior / 4, limits.epipolar, limits.epipolar / 2, limits.epipolar / 2})
+    pose = RefineRelativePose(pose, near, scale, 3);
+  model.E = EssentialMatrix(pose);
+  model.inliers = EpipolarInliers(*model.E, c, limits.epipolar);
+  if (static_cast<int>(model.inliers.size()) < options.min_num_inliers) return model;
+  model.config = TwoViewConfig::kCalibrated;
+  RecogniseHomography(pose, c, limits, options, &model);
+  return model;
 }
 
-std::optional<Eigen::Matrix3d> EstimateEssentialMatrix(const Correspondences& c, double focal_px,
-                                                       const VerifyPairOptions& options) {
-  if (static_cast<int>(c.x1.size()) < options.min_num_inliers) return std::nullopt;
-  std::vector<cv::Point2d> points1, points2;
-  for (size_t i = 0; i < c.x1.size(); ++i) {
-    points1.emplace_back(c.x1[i].x(), c.x1[i].y());
-    points2.emplace_back(c.x2[i].x(), c.x2[i].y());
-  }
-  cv::UsacParams params;
-  params.confidence = 0.999;
-  params.maxIterations = 5000;
-  params.threshold = options.max_epipolar_error_px / focal_px;
-  params.score = cv::SCORE_METHOD_MAGSAC;
-  params.sampler = cv::SAMPLING_UNIFORM;
-  params.loMethod = cv::LOCAL_OPTIM_SIGMA;
-  params.loIterations = 10;
-  params.loSampleSize = 50;
-  params.randomGeneratorState = 0;
-  params.isParallel = false;
-  try {
-    cv::Mat mask;
-    const cv::Mat identity = cv::Mat::eye(3, 3, CV_64F);
-    const cv::Mat E = cv::findEssentialMat(points1, points2, identity, identity, cv::noArray(), cv::noArray(),
-                                           mask, params);
-    if (E.rows != 3 || E.cols != 3) return std::nullopt;
-    Eigen::Matrix3d matrix;
-    for (int r = 0; r < 3; ++r) {
-      for (int k = 0; k < 3; ++k) matrix(r, k) = E.at<double>(r, k);
+// The essential matrix of USAC, refined over all bearings where that gains inliers.
+void EstimateCalibrated(const Correspondences& c, const Limits& limits, Model* model) {
+  const auto E = EstimateEssentialMatrix(c, {.max_error_rad = limits.epipolar});
+  if (!E) return;
+  model->E = E;
+  model->inliers = EpipolarInliers(*E, c, limits.epipolar);
+  const Correspondences near = Subset(c, EpipolarInliers(*E, c, 2 * limits.epipolar));
+  if (near.size() < 8) return;
+  const Eigen::Matrix3d refined =
+      EssentialMatrix(RefineRelativePose(PoseFromEssentialMatrix(*E, near), near, limits.epipolar / 2, 6));
+  std::vector<int> inliers = EpipolarInliers(refined, c, limits.epipolar);
+  if (inliers.size() < model->inliers.size()) return;
+  model->E = refined;
+  model->inliers = std::move(inliers);
+}
+
+// COLMAP 3.8's choice between the models.
+Model UnposedCameras(bool has_intrinsics, const Correspondences& c, const Limits& limits,
+                     const VerifyPairOptions& options) {
+  Model model;
+  if (c.size() < options.min_num_inliers) return model;
+  if (has_intrinsics) EstimateCalibrated(c, limits, &model);
+  const auto is_enough = [&](const std::vector<int>& inliers) {
+    return static_cast<int>(inliers.size()) >= options.min_num_inliers;
+  };
+  // E that explains nearly all matches leaves no room for a better F.
+  if (!model.E || !IsPart(model.inliers.size(), options.min_essential_ratio, c.size())) {
+    const auto F = EstimateFundamentalMatrix(c, {.max_error_rad = limits.epipolar});
+    std::vector<int> inliers = F ? EpipolarInliers(*F, c, limits.epipolar) : std::vector<int>();
+    if (!is_enough(model.inliers) ||
+        !IsPart(model.inliers.size(), options.min_essential_ratio, inliers.size())) {
+      model.E.reset();
+      model.F = F;
+      model.inliers = std::move(inliers);
     }
-    return matrix;
-  } catch (const cv::Exception&) {
-    return std::nullopt;  // OpenCV's estimator throws on some degenerate sets
   }
+  model.H = EstimateHomography(c, {.max_error_rad = limits.homography});
+  std::vector<int> on_homography =
+      model.H ? HomographyInliers(*model.H, c, limits.homography) : std::vector<int>();
+  if (is_enough(model.inliers)) {
+    model.config = IsPart(on_homography.size(), options.min_homography_ratio, model.inliers.size())
+                       ? TwoViewConfig::kPlanarOrPanoramic
+                   : model.E ? TwoViewConfig::kCalibrated
+                             : TwoViewConfig::kUncalibrated;
+  } else if (is_enough(on_homography)) {
+    model.config = TwoViewConfig::kPlanarOrPanoramic;
+    model.is_homography = true;
+    model.E.reset();
+    model.F.reset();
+    model.inliers = std::move(on_homography);
+  }
+  return model;
 }
 
-Eigen::Matrix3d InverseCalibration(const Camera& camera) {
+std::vector<Match> GuidedInliers(const ViewForVerification& view1, const ViewForVerification& view2,
+                                 const Model& model, const Limits& limits, const std::vector<Match>& inliers,
+                                 const VerifyPairOptions& options) {
+  const GuidedView guided1{view1.bearings, view1.descriptors}, guided2{view2.bearings, view2.descriptors};
+  if (model.is_homography)
+    return GuideByHomography(guided1, guided2, *model.H, limits.homography, inliers, options.guided);
+  return GuideByEpipolarLines(guided1, guided2, model.Epipolar(), limits.epipolar, inliers, options.guided);
+}
+
+bool IsOnBorder(const Camera& camera, const Keypoint& keypoint, double border_ratio) {
+  const double border = border_ratio * std::hypot(camera.width, camera.height);
+  return !(keypoint.x >= border && keypoint.x <= camera.width - border && keypoint.y >= border &&
+           keypoint.y <= camera.height - border);
+}
+
+// Whether most inliers are on the borders and keep their place up to one shift: of the shifts that single
+// inliers propose, the best has enough followers.
+bool IsWatermark(const ViewForVerification& view1, const ViewForVerification& view2,
+                 const std::vector<Match>& inliers, const VerifyPairOptions& options) {
+  std::vector<Eigen::Vector2d> shifts;
+  size_t num_on_border = 0;
+  for (const Match& match : inliers) {
+    const Keypoint &k1 = (*view1.keypoints)[match.idx1], &k2 = (*view2.keypoints)[match.idx2];
+    shifts.emplace_back(k2.x - k1.x, k2.y - k1.y);
+    num_on_border += IsOnBorder(*view1.camera, k1, options.watermark_border_ratio) &&
+                             IsOnBorder(*view2.camera, k2, options.watermark_border_ratio)
+                         ? 1
+                         : 0;
+  }
+  const double num_needed = options.min_watermark_ratio * static_cast<double>(inliers.size());
+  if (static_cast<double>(num_on_border) < num_needed) return false;
+  // A shift that most share is the median of both coordinates.
+  const auto median = [&](int axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector2d& shift : shifts) values.push_back(shift[axis]);
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  const Eigen::Vector2d shift(median(0), median(1));
+  const auto num_followers = std::count_if(shifts.begin(), shifts.end(), [&](const Eigen::Vector2d& s) {
+    return (s - shift).norm() <= options.max_homography_error_px;
+  });
+  return static_cast<double>(num_followers) >= num_needed;
+}
+
+Eigen::Matrix3d Calibration(const Camera& camera) {
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
   K(0, 0) = camera.FocalX();
   K(1, 1) = camera.FocalY();
   K.topRightCorner<2, 1>() = camera.PrincipalPoint();
-  return K.inverse();
-}
-
-// Homography of the inliers (least squares with a robust start) and how many of them it explains.
-int CountHomographyInliers(const Correspondences& c, const std::vector<int>& inliers, double max_error,
-                           Eigen::Matrix3d* H) {
-  std::vector<cv::Point2d> points1, points2;
-  for (const int i : inliers) {
-    points1.emplace_back(c.x1[i].x(), c.x1[i].y());
-    points2.emplace_back(c.x2[i].x(), c.x2[i].y());
-  }
-  try {
-    cv::Mat mask;
-    const cv::Mat h = cv::findHomography(points1, points2, cv::RANSAC, max_error, mask, 500, 0.99);
-    if (h.rows != 3) return 0;
-    for (int r = 0; r < 3; ++r) {
-      for (int k = 0; k < 3; ++k) (*H)(r, k) = h.at<double>(r, k);
-    }
-    return cv::countNonZero(mask);
-  } catch (const cv::Exception&) {
-    return 0;
-  }
+  return K;
 }
 
 }  // namespace
 
-double SquaredSampsonError(const Eigen::Matrix3d& E, const Eigen::Vector2d& x1, const Eigen::Vector2d& x2) {
-  const double residual = SampsonResidual(E, x1, x2);
-  return residual * residual;
-}
-
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
                            const std::vector<Match>& matches, const VerifyPairOptions& options) {
+  const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
+  const Limits limits{options.max_epipolar_error_px / focal_px, options.max_homography_error_px / focal_px,
+                      options.max_prior_error_px / focal_px};
+  const Correspondences c = CollectCorrespondences(view1, view2, matches);
+  const Model model =
+      view1.cam_from_world && view2.cam_from_world
+          ? PosedCameras(*view2.cam_from_world * view1.cam_from_world->Inverse(), c, limits, options)
+          : UnposedCameras(view1.camera->has_focal_prior && view2.camera->has_focal_prior, c, limits,
+                           options);
+
   TwoViewGeometry geometry;
   geometry.config = TwoViewConfig::kDegenerate;
-  const Correspondences c = CollectCorrespondences(view1, view2, matches);
-  const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
-  const double max_error = options.max_epipolar_error_px / focal_px;
-
-  std::vector<int> inliers;
-  if (view1.cam_from_world && view2.cam_from_world) {
-    const Pose cam2_from_cam1 = *view2.cam_from_world * view1.cam_from_world->Inverse();
-    if (cam2_from_cam1.translation.norm() < kPureRotationBaselineM) {
-      // No baseline, no epipolar line: a match must lie where the rotation takes it.
-      geometry.config = TwoViewConfig::kPanoramic;
-      geometry.H = cam2_from_cam1.rotation.toRotationMatrix();
-      for (size_t i = 0; i < c.x1.size(); ++i) {
-        const Eigen::Vector3d turned = cam2_from_cam1.rotation * c.x1[i].homogeneous();
-        const double error = options.max_prior_error_px / focal_px;
-        if (turned.z() > 0 && (turned.hnormalized() - c.x2[i]).norm() <= error)
-          inliers.push_back(static_cast<int>(i));
-      }
-    } else if (const auto E = RefineStatedPose(cam2_from_cam1, c, focal_px, options)) {
-      geometry.E = *E;
-      geometry.config = TwoViewConfig::kCalibrated;
-    }
-  } else if (const auto E = EstimateEssentialMatrix(c, focal_px, options)) {
-    geometry.E = *E;
-    geometry.config = TwoViewConfig::kCalibrated;
+  if (model.config == TwoViewConfig::kDegenerate ||
+      static_cast<int>(model.inliers.size()) < options.min_num_inliers) {
+    return geometry;
   }
-  if (geometry.config == TwoViewConfig::kCalibrated) {
-    for (size_t i = 0; i < c.x1.size(); ++i) {
-      if (SquaredSampsonError(geometry.E, c.x1[i], c.x2[i]) <= max_error * max_error)
-        inliers.push_back(static_cast<int>(i));
-    }
+  std::vector<Match> inliers;
+  for (const int i : model.inliers) inliers.push_back(matches[c.match_idx[i]]);
+  if (IsWatermark(view1, view2, inliers, options)) {
+    geometry.config = TwoViewConfig::kWatermark;
+    return geometry;
   }
-  if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
-    return TwoViewGeometry{.image_id1 = 0, .image_id2 = 0, .config = TwoViewConfig::kDegenerate};
-  }
-  if (geometry.config == TwoViewConfig::kCalibrated) {
-    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-    const int num_on_homography = CountHomographyInliers(c, inliers, 2 * max_error, &H);
-    if (num_on_homography >= options.min_homography_ratio * static_cast<double>(inliers.size())) {
-      geometry.config = TwoViewConfig::kPlanarOrPanoramic;
-      geometry.H = H;
-    }
-  }
-  const Eigen::Matrix3d K1_inverse = InverseCalibration(*view1.camera),
-                        K2_inverse = InverseCalibration(*view2.camera);
-  geometry.F = K2_inverse.transpose() * geometry.E * K1_inverse;
-  geometry.H = K2_inverse.inverse() * geometry.H * K1_inverse;
-  for (const int i : inliers) geometry.inliers.push_back(matches[c.match_idx[i]]);
-  std::sort(geometry.inliers.begin(), geometry.inliers.end());
+  geometry.config = model.config;
+  if (options.guided_matching && view1.descriptors != nullptr && view2.descriptors != nullptr)
+    inliers = GuidedInliers(view1, view2, model, limits, inliers, options);
+  std::sort(inliers.begin(), inliers.end());
+  geometry.inliers = std::move(inliers);
+  const Eigen::Matrix3d K1_inverse = Calibration(*view1.camera).inverse(), K2 = Calibration(*view2.camera);
+  if (model.E) geometry.E = *model.E;
+  if (model.E || model.F) geometry.F = K2.inverse().transpose() * model.Epipolar() * K1_inverse;
+  if (model.H) geometry.H = K2 * *model.H * K1_inverse;
   return geometry;
 }
 

@@ -9,40 +9,68 @@
 #include "core/colmap_database.h"
 #include "core/features.h"
 #include "core/pose.h"
+#include "stages/match_features/guided_match.h"
 
 namespace cairn {
 
 struct VerifyPairOptions {
-  // Largest Sampson distance of an inlier to its epipolar line, pixels.  REQUIRES: > 0
+  // Largest distance of an inlier to its epipolar line, pixels (Sampson distance; as an angle: over the mean
+  // focal length).  REQUIRES: > 0
   double max_epipolar_error_px = 2.0;
+  // Largest distance of an inlier of a homography from where that puts it, pixels (COLMAP: 4).  REQUIRES: > 0
+  double max_homography_error_px = 4.0;
   // With known poses: matches farther than this from the epipolar line of the stated poses are dropped before
   // the relative pose is refined, pixels; as wide as the poses are wrong.  REQUIRES: >= max_epipolar_error_px
   double max_prior_error_px = 16.0;
+  // With known poses: a shorter baseline is none, metres.  REQUIRES: > 0
+  double min_baseline_m = 1e-3;
   // Fewest inliers of a verified pair.  REQUIRES: >= 8
   int min_num_inliers = 15;
-  // A pair with at least this part of its inliers on one homography is planar or panoramic (COLMAP: 0.8).
+  // With more than this part of its inliers on one homography a pair is planar or panoramic (COLMAP: 0.8).
   double min_homography_ratio = 0.8;
+  // An essential matrix with fewer inliers than this part of the fundamental matrix's says that the
+  // intrinsics are wrong: the pair counts as uncalibrated (COLMAP: 0.95).
+  double min_essential_ratio = 0.95;
+  // A watermark: at least this part of the inliers lies on the border of both images and keeps its place up
+  // to one shift (COLMAP: 0.7), ...
+  double min_watermark_ratio = 0.7;
+  // ... the border being as wide as this part of the diagonal (COLMAP: 0.1).
+  double watermark_border_ratio = 0.1;
+  // Match again along the epipolar lines of what was found.
+  bool guided_matching = true;
+  GuidedMatchOptions guided;
 };
 
 // One image of the pair: camera, keypoints, and its stated pose if there is one.
 struct ViewForVerification {
   const Camera* camera = nullptr;
-  const std::vector<Eigen::Vector2d>* rays =
-      nullptr;  // normalised coordinates of every keypoint, NaN where undefined
+  const std::vector<Keypoint>* keypoints = nullptr;
+  // Unit vector in the camera frame of every keypoint, NaN where undefined.
+  const std::vector<Eigen::Vector3d>* bearings = nullptr;
+  // Null: no guided matching.
+  const DescriptorMatrix* descriptors = nullptr;
   std::optional<Pose> cam_from_world;
 };
 
-// Keeps the putative matches that one relative pose explains.  Known intrinsics; essential matrix:
-// - both poses known: refined from the stated relative pose by iteratively reweighted Gauss-Newton on the
-// Sampson
-//   distance (no sampling), after dropping what the stated pose excludes;
-// - else: OpenCV's USAC (MAGSAC) five-point estimator with a fixed seed.
-// Result: configuration, inliers (ascending) and E, F as COLMAP writes them; fewer inliers than asked for:
-// kDegenerate and no inliers.
+// Keeps the putative matches that one geometry explains, on bearings, hence for any field of view:
+// - both poses known: essential matrix refined from the stated relative pose by iteratively reweighted
+//   Gauss-Newton on the Sampson distance (no sampling), after dropping what the stated pose excludes.
+//   kPanoramic where no baseline is stated or a rotation alone explains the inliers, kPlanar where a
+//   homography does.
+// - poses unknown, intrinsics known (Camera::has_focal_prior of both): essential matrix by USAC, refined;
+//   configuration as COLMAP 3.8 decides it from the inliers of E, F and H
+//   (src/estimators/two_view_geometry.cc there): kCalibrated, kUncalibrated (E explains too little of what F
+//   does), kPlanarOrPanoramic. Differs from it: inliers are those of E also where F has more, so that they
+//   obey the known intrinsics.
+// - focal length guessed: fundamental matrix by USAC; kUncalibrated or kPlanarOrPanoramic.
+// Then guided matching adds what the geometry allows (guided_match.h).
+//
+// Result: configuration; inliers ascending, all of them within the options' error of the geometry; E on
+// normalised coordinates, F and H on pixels, zero where not estimated (E of uncalibrated pairs; E and F where
+// no baseline is stated).  F and H hold for cameras without distortion: they are K2^-T E K1^-1, K2 H K1^-1.
+// Without inliers: kDegenerate (fewer than asked for) or kWatermark.  Deterministic.
+// O(matches), O(n log n + candidates) with guided matching of n keypoints.
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
                            const std::vector<Match>& matches, const VerifyPairOptions& options);
-
-// Squared Sampson distance of a correspondence in normalised coordinates: x2' E x1 over its gradient.
-double SquaredSampsonError(const Eigen::Matrix3d& E, const Eigen::Vector2d& x1, const Eigen::Vector2d& x2);
 
 }  // namespace cairn

@@ -1,69 +1,34 @@
 #include "stages/match_features/verify_pair.h"
 
-#include <set>
+#include <limits>
 
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "stages/match_features/two_view_error.h"
+#include "tests/match_features/two_view_scene.h"
 
 namespace cairn {
 namespace {
 
-// Two cameras that look at random points in a box, with matches of which the last `num_outliers` are wrong.
-struct Scene {
-  Camera camera;
-  Pose cam1_from_world, cam2_from_world;
-  std::vector<Eigen::Vector2d> rays1, rays2;
-  std::vector<Match> matches;
-};
-
-Scene MakeScene(int num_points, int num_outliers, double noise_px, bool is_flat = false,
-                double baseline_m = 0.5) {
-  Scene scene;
-  scene.camera.model = CameraModel::kPinhole;
-  scene.camera.width = 640;
-  scene.camera.height = 480;
-  scene.camera.params = {500, 500, 320, 240};
-  scene.cam2_from_world.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY());
-  scene.cam2_from_world.translation = Eigen::Vector3d(-baseline_m, 0.05 * (baseline_m > 0), 0);
-  Random random(7);
-  for (int i = 0; i < num_points + num_outliers; ++i) {
-    const Eigen::Vector3d point(random.Uniform(-1, 1), random.Uniform(-0.7, 0.7),
-                                is_flat ? 3 : random.Uniform(2, 5));
-    const auto noise = [&] {
-      return Eigen::Vector2d(random.Normal(0, noise_px), random.Normal(0, noise_px));
-    };
-    const Eigen::Vector2d pixel1 = *ImageFromCamera(scene.camera, scene.cam1_from_world * point) + noise();
-    Eigen::Vector2d pixel2 = *ImageFromCamera(scene.camera, scene.cam2_from_world * point) + noise();
-    if (i >= num_points) pixel2 = Eigen::Vector2d(random.Uniform(0, 640), random.Uniform(0, 480));
-    scene.rays1.push_back(*CameraFromImage(scene.camera, pixel1));
-    scene.rays2.push_back(*CameraFromImage(scene.camera, pixel2));
-    scene.matches.push_back({static_cast<uint32_t>(i), static_cast<uint32_t>(i)});
-  }
-  return scene;
+TwoViewGeometry Verify(const TwoViewScene& scene, std::optional<Pose> stated1, std::optional<Pose> stated2,
+                       const VerifyPairOptions& options = {}) {
+  return VerifyPair(scene.View1(stated1), scene.View2(stated2), scene.matches, options);
 }
-
-TwoViewGeometry Verify(const Scene& scene, std::optional<Pose> stated1, std::optional<Pose> stated2) {
-  return VerifyPair({&scene.camera, &scene.rays1, stated1}, {&scene.camera, &scene.rays2, stated2},
-                    scene.matches, {});
+TwoViewGeometry VerifyPosed(const TwoViewScene& scene) {
+  return Verify(scene, scene.cam1_from_world, scene.cam2_from_world);
 }
-
-int NumTrueInliers(const TwoViewGeometry& geometry, int num_points) {
-  int num = 0;
-  for (const Match& match : geometry.inliers) num += static_cast<int>(match.idx1) < num_points ? 1 : 0;
-  return num;
-}
+TwoViewGeometry VerifyUnposed(const TwoViewScene& scene) { return Verify(scene, std::nullopt, std::nullopt); }
 
 TEST(VerifyPair, KnownPosesKeepTrueMatchesAndDropMostOutliers) {
-  const Scene scene = MakeScene(100, 100, 0.5);
-  const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, scene.cam2_from_world);
+  const TwoViewScene scene = MakeTwoViewScene({.num_outliers = 100, .noise_px = 0.5});
+  const TwoViewGeometry geometry = VerifyPosed(scene);
   EXPECT_EQ(geometry.config, TwoViewConfig::kCalibrated);
   EXPECT_GE(NumTrueInliers(geometry, 100), 98);
   EXPECT_LE(geometry.inliers.size(), 100u + 8u);  // an outlier may lie on its epipolar line by chance
 }
 
 TEST(VerifyPair, WrongStatedPoseIsRefinedWithinItsNoise) {
-  const Scene scene = MakeScene(200, 50, 0.3);
+  const TwoViewScene scene = MakeTwoViewScene({.num_points = 200, .num_outliers = 50});
   Pose wrong = scene.cam2_from_world;
   wrong.translation += Eigen::Vector3d(0.02, -0.03, 0.02);
   wrong.rotation =
@@ -71,13 +36,13 @@ TEST(VerifyPair, WrongStatedPoseIsRefinedWithinItsNoise) {
   const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, wrong);
   EXPECT_GE(NumTrueInliers(geometry, 200), 195);
   for (int i = 0; i < 200; ++i) {  // E explains the true points better than the stated pose does
-    EXPECT_LT(std::sqrt(SquaredSampsonError(geometry.E, scene.rays1[i], scene.rays2[i])) * 500, 2.5);
+    EXPECT_LT(std::sqrt(SquaredSampsonError(geometry.E, scene.bearings1[i], scene.bearings2[i])) * 500, 2.5);
   }
 }
 
 TEST(VerifyPair, AliasedMatchesThatContradictTheStatedPosesAreRefused) {
   // The second camera saw an identical place: its matches fit a pose, but not the stated one.
-  const Scene scene = MakeScene(100, 0, 0.3);
+  const TwoViewScene scene = MakeTwoViewScene({});
   Pose elsewhere = scene.cam2_from_world;
   elsewhere.rotation =
       Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX())) * elsewhere.rotation;
@@ -87,41 +52,186 @@ TEST(VerifyPair, AliasedMatchesThatContradictTheStatedPosesAreRefused) {
 }
 
 TEST(VerifyPair, WithoutPosesTheFivePointEstimatorFindsTheInliers) {
-  const Scene scene = MakeScene(100, 60, 0.3);
-  const TwoViewGeometry geometry = Verify(scene, std::nullopt, std::nullopt);
+  const TwoViewScene scene = MakeTwoViewScene({.num_outliers = 60});
+  const TwoViewGeometry geometry = VerifyUnposed(scene);
   EXPECT_EQ(geometry.config, TwoViewConfig::kCalibrated);
+  EXPECT_GE(NumTrueInliers(geometry, 100), 98);
+  EXPECT_LE(geometry.inliers.size(), 100u + 6u);
+  EXPECT_EQ(geometry.inliers, VerifyUnposed(scene).inliers);  // fixed seed
+  const Eigen::Vector3d singular = geometry.E.jacobiSvd().singularValues();
+  EXPECT_NEAR(singular[0], singular[1], 1e-9);
+  EXPECT_NEAR(singular[2], 0, 1e-9);
+}
+
+TEST(VerifyPair, GuessedFocalLengthGivesAFundamentalMatrix) {
+  TwoViewScene scene = MakeTwoViewScene({.num_outliers = 40});
+  scene.camera.has_focal_prior = false;
+  const TwoViewGeometry geometry = VerifyUnposed(scene);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kUncalibrated);
   EXPECT_GE(NumTrueInliers(geometry, 100), 95);
-  EXPECT_EQ(geometry.inliers, Verify(scene, std::nullopt, std::nullopt).inliers);  // fixed seed
+  EXPECT_EQ(geometry.E.norm(), 0);
+  EXPECT_GT(geometry.F.norm(), 0);
+}
+
+TEST(VerifyPair, WrongIntrinsicsAreFoundOut) {
+  // Pixels taken for oblong: no essential matrix explains what the fundamental matrix does.
+  TwoViewScene scene = MakeTwoViewScene({.num_points = 300, .turn_rad = 0.5});
+  scene.cam2_from_world.translation = {-1.5, 0.4, 0.5};
+  scene.camera.params[0] = 1000;
+  scene.camera.params[1] = 250;
+  for (int i = 0; i < 300; ++i) {
+    scene.bearings1[i] = BearingOf(scene.camera, scene.keypoints1[i]);
+    scene.bearings2[i] = BearingOf(scene.camera, scene.keypoints2[i]);
+  }
+  EXPECT_EQ(VerifyUnposed(scene).config, TwoViewConfig::kUncalibrated);
 }
 
 TEST(VerifyPair, FundamentalMatrixActsOnPixels) {
-  const Scene scene = MakeScene(100, 0, 0);
-  const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, scene.cam2_from_world);
-  for (int i = 0; i < 100; ++i) {
-    const Eigen::Vector3d p1(500 * scene.rays1[i].x() + 320, 500 * scene.rays1[i].y() + 240, 1);
-    const Eigen::Vector3d p2(500 * scene.rays2[i].x() + 320, 500 * scene.rays2[i].y() + 240, 1);
-    EXPECT_NEAR(p2.dot(geometry.F * p1) / (geometry.F * p1).head<2>().norm(), 0, 0.01);
+  const TwoViewScene scene = MakeTwoViewScene({.noise_px = 0});
+  for (const bool is_posed : {true, false}) {
+    const TwoViewGeometry geometry = is_posed ? VerifyPosed(scene) : VerifyUnposed(scene);
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d p1(scene.keypoints1[i].x, scene.keypoints1[i].y, 1);
+      const Eigen::Vector3d p2(scene.keypoints2[i].x, scene.keypoints2[i].y, 1);
+      EXPECT_NEAR(p2.dot(geometry.F * p1) / (geometry.F * p1).head<2>().norm(), 0, 0.01);
+    }
   }
 }
 
-TEST(VerifyPair, FlatSceneIsCalledPlanar) {
-  const Scene scene = MakeScene(100, 0, 0.2, /*is_flat=*/true);
-  EXPECT_EQ(Verify(scene, scene.cam1_from_world, scene.cam2_from_world).config,
-            TwoViewConfig::kPlanarOrPanoramic);
+TEST(VerifyPair, FlatSceneIsPlanarAndItsHomographyActsOnPixels) {
+  const TwoViewScene scene = MakeTwoViewScene({.noise_px = 0.2, .is_flat = true});
+  EXPECT_EQ(VerifyPosed(scene).config, TwoViewConfig::kPlanar);
+  const TwoViewGeometry geometry = VerifyUnposed(scene);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kPlanarOrPanoramic);
+  EXPECT_EQ(NumTrueInliers(geometry, 100), 100);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d p1(scene.keypoints1[i].x, scene.keypoints1[i].y, 1);
+    const Eigen::Vector2d p2(scene.keypoints2[i].x, scene.keypoints2[i].y);
+    EXPECT_LT(((geometry.H * p1).hnormalized() - p2).norm(), 2);
+  }
 }
 
 TEST(VerifyPair, PureRotationNeedsNoEpipolarLine) {
-  const Scene scene = MakeScene(60, 40, 0.3, false, /*baseline_m=*/0);
-  const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, scene.cam2_from_world);
+  const TwoViewScene scene = MakeTwoViewScene({.num_points = 60, .num_outliers = 40, .baseline_m = 0});
+  const TwoViewGeometry geometry = VerifyPosed(scene);
   EXPECT_EQ(geometry.config, TwoViewConfig::kPanoramic);
   EXPECT_EQ(NumTrueInliers(geometry, 60), 60);
   EXPECT_LE(geometry.inliers.size(), 62u);
+  EXPECT_EQ(geometry.E.norm(), 0);
+  EXPECT_EQ(VerifyUnposed(scene).config, TwoViewConfig::kPlanarOrPanoramic);
 }
 
-TEST(VerifyPair, TooFewMatchesAreNoPair) {
-  const Scene scene = MakeScene(10, 0, 0.1);
-  EXPECT_TRUE(Verify(scene, scene.cam1_from_world, scene.cam2_from_world).inliers.empty());
-  EXPECT_TRUE(Verify(scene, std::nullopt, std::nullopt).inliers.empty());
+TEST(VerifyPair, RotationWithAWronglyStatedBaselineIsPanoramic) {
+  const TwoViewScene scene = MakeTwoViewScene({.baseline_m = 0});
+  Pose stated = scene.cam2_from_world;
+  stated.translation = {0.01, -0.02, 0.01};
+  const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, stated);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kPanoramic);
+  EXPECT_GE(NumTrueInliers(geometry, 100), 98);
+}
+
+TEST(VerifyPair, RotationStatedWithAnErrorIsRefined) {
+  const TwoViewScene scene = MakeTwoViewScene({.baseline_m = 0});
+  Pose stated = scene.cam2_from_world;  // 10 px off, more than an inlier may be
+  stated.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitY())) * stated.rotation;
+  const TwoViewGeometry geometry = Verify(scene, scene.cam1_from_world, stated);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kPanoramic);
+  EXPECT_EQ(NumTrueInliers(geometry, 100), 100);
+}
+
+TEST(VerifyPair, IdenticalImagesAreNoBaseline) {
+  TwoViewScene scene = MakeTwoViewScene({});
+  scene.keypoints2 = scene.keypoints1;
+  scene.bearings2 = scene.bearings1;
+  EXPECT_EQ(VerifyUnposed(scene).config, TwoViewConfig::kPlanarOrPanoramic);
+  EXPECT_EQ(Verify(scene, scene.cam1_from_world, scene.cam1_from_world).config, TwoViewConfig::kPanoramic);
+}
+
+TEST(VerifyPair, WatermarkOnTheBordersIsNoPair) {
+  // A caption along the lower edge of both images, shifted by three pixels, and little else.
+  TwoViewScene scene = MakeTwoViewScene({.num_points = 0, .num_outliers = 60});
+  Random random(3);
+  for (int i = 0; i < 60; ++i) {
+    if (i < 50) {
+      scene.keypoints1[i] = {static_cast<float>(10 * i + 50), static_cast<float>(random.Uniform(430, 475)), 1,
+                             0};
+      scene.keypoints2[i] = {scene.keypoints1[i].x + 3, scene.keypoints1[i].y, 1, 0};
+    }
+    scene.bearings1[i] = BearingOf(scene.camera, scene.keypoints1[i]);
+    scene.bearings2[i] = BearingOf(scene.camera, scene.keypoints2[i]);
+  }
+  const TwoViewGeometry geometry = VerifyUnposed(scene);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kWatermark);
+  EXPECT_TRUE(geometry.inliers.empty());
+}
+
+TEST(VerifyPair, FisheyeBearingsBeyond90DegreesCount) {
+  // A camera in the middle of its points that looks all around, moved by half a metre; a third of the points
+  // lies behind it, where no perspective coordinates exist.
+  TwoViewScene scene = MakeTwoViewScene({.num_points = 0});
+  Random random(5);
+  for (uint32_t i = 0; i < 240; ++i) {
+    Eigen::Vector3d point(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0.4, 1));
+    point *= random.Uniform(2, 5) / point.norm();
+    const auto noise = [&] {
+      return Eigen::Vector3d(random.Normal(0, 5e-4), random.Normal(0, 5e-4), random.Normal(0, 5e-4));
+    };
+    scene.bearings1.push_back(((scene.cam1_from_world * point).normalized() + noise()).normalized());
+    scene.bearings2.push_back(
+        ((Pose{scene.cam2_from_world.rotation, {-0.5, 0.02, 0}} * point).normalized() + noise())
+            .normalized());
+    scene.keypoints1.push_back({static_cast<float>(random.Uniform(100, 500)), 240, 1, 0});
+    scene.keypoints2.push_back({static_cast<float>(random.Uniform(100, 500)), 240, 1, 0});
+    scene.matches.push_back({i, i});
+  }
+  scene.cam2_from_world.translation = {-0.5, 0.02, 0};
+  for (const bool is_posed : {true, false}) {
+    const TwoViewGeometry geometry = is_posed ? VerifyPosed(scene) : VerifyUnposed(scene);
+    EXPECT_EQ(geometry.config, TwoViewConfig::kCalibrated);
+    EXPECT_GE(NumTrueInliers(geometry, 240), 235);
+  }
+}
+
+TEST(VerifyPair, FewerThanEightMatchesAreNoPair) {
+  for (const int num : {0, 1, 4, 7}) {
+    const TwoViewScene scene = MakeTwoViewScene({.num_points = num});
+    EXPECT_TRUE(VerifyPosed(scene).inliers.empty());
+    EXPECT_TRUE(VerifyUnposed(scene).inliers.empty());
+  }
+}
+
+TEST(VerifyPair, FewerInliersThanAskedForAreNoPair) {
+  const TwoViewScene scene = MakeTwoViewScene({.num_points = 14});
+  EXPECT_TRUE(VerifyPosed(scene).inliers.empty());
+  EXPECT_TRUE(VerifyUnposed(scene).inliers.empty());
+}
+
+TEST(VerifyPair, KeypointsWithoutBearingAreLeftOut) {
+  TwoViewScene scene = MakeTwoViewScene({});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int i = 0; i < 10; ++i) scene.bearings1[i] = Eigen::Vector3d::Constant(nan);
+  scene.bearings2[10] = Eigen::Vector3d(0, nan, 1);
+  for (const bool is_posed : {true, false}) {
+    const TwoViewGeometry geometry = is_posed ? VerifyPosed(scene) : VerifyUnposed(scene);
+    ASSERT_GE(geometry.inliers.size(), 85u);
+    EXPECT_GE(geometry.inliers.front().idx1, 11u);
+  }
+}
+
+TEST(VerifyPair, MatchesOnOneLineOrOnOnePointDoNotCrash) {
+  for (const bool is_point : {true, false}) {
+    TwoViewScene scene = MakeTwoViewScene({});
+    for (int i = 0; i < 100; ++i) {
+      const auto x = static_cast<float>(is_point ? 300 : 100 + 3 * i);
+      scene.keypoints1[i] = {x, 200, 1, 0};
+      scene.keypoints2[i] = {x + 20, 210, 1, 0};
+      scene.bearings1[i] = BearingOf(scene.camera, scene.keypoints1[i]);
+      scene.bearings2[i] = BearingOf(scene.camera, scene.keypoints2[i]);
+    }
+    const TwoViewGeometry geometry = VerifyUnposed(scene);
+    EXPECT_TRUE(geometry.F.allFinite() && geometry.E.allFinite() && geometry.H.allFinite());
+    EXPECT_TRUE(VerifyPosed(scene).F.allFinite());
+  }
 }
 
 }  // namespace

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace cairn {
+
+// Matches of two images as unit bearings in their camera frames; `match_idx` tells the match behind each.
+struct Correspondences {
+  std::vector<Eigen::Vector3d> bearings1, bearings2;
+  std::vector<int> match_idx;
+
+  int size() const { return static_cast<int>(bearings1.size()); }
+  void Add(const Eigen::Vector3d& bearing1, const Eigen::Vector3d& bearing2, int idx) {
+    bearings1.push_back(bearing1);
+    bearings2.push_back(bearing2);
+    match_idx.push_back(idx);
+  }
+};
+
+// First-order distance of a correspondence to the epipolar constraint b2' E b1 = 0, squared, rad^2: the
+// Sampson error [Hartley & Zisserman 2004, 11.4.3] with the gradient taken in the tangent planes of the two
+// unit bearings, so that it holds for any field of view.  NaN for NaN.
+inline double SquaredSampsonError(const Eigen::Matrix3d& E, const Eigen::Vector3d& bearing1,
+                                  const Eigen::Vector3d& bearing2) {
+  const Eigen::Vector3d normal2 = E * bearing1;
+  const Eigen::Vector3d normal1 = E.transpose() * bearing2;
+  const double residual = bearing2.dot(normal2);
+  // Both normals have the component `residual` along their bearing; the rest lies in the tangent plane.
+  const double gradient2 = normal1.squaredNorm() + normal2.squaredNorm() - 2 * residual * residual;
+  return residual * residual / std::max(gradient2, 1e-18);
+}
+
+// Distance of the second bearing from where the homography takes the first one, squared, rad^2 (as a chord).
+inline double SquaredTransferError(const Eigen::Matrix3d& H, const Eigen::Vector3d& bearing1,
+                                   const Eigen::Vector3d& bearing2) {
+  return ((H * bearing1).normalized() - bearing2).squaredNorm();
+}
+
+// Two unit vectors that span the plane orthogonal to the unit vector v.
+inline Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
+  const Eigen::Vector3d axis = std::abs(v.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = v.cross(axis).normalized();
+  basis.col(1) = v.cross(basis.col(0)).normalized();
+  return basis;
+}
+
+}  // namespace cairn
