@@ -90,12 +90,13 @@ int DiscRadius(const Cover& cover) {
 
 }  // namespace
 
-void AlgorithmC(double alpha, uint64_t seed, Cover* cover) {
+void AlgorithmC(double alpha, Cover* cover) {
   const ReducedWorld& world = cover->world();
   FeatureChooser chooser(cover);
   const int radius = DiscRadius(*cover);  // [line 2]
   Disc disc(*cover);
-  for (const StationIdx station : RandomRanks(world.num_stations(), seed)) {  // [line 3], in random order
+  // [line 3] In the order of the stations, so that discs lie side by side: in random order they leave gaps.
+  for (StationIdx station = 0; station < world.num_stations(); ++station) {
     if (cover->num_open() == 0) break;
     disc.Start(station);  // [line 4] C = N_r(v) ∩ U
     for (int t = 0; t < radius && disc.Widen(); ++t) {

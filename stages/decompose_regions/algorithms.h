@@ -18,8 +18,7 @@ void AlgorithmA3(uint64_t seed, Cover* cover);  // a random open station (algori
 void AlgorithmB1(Cover* cover);  // regions stay                                (algorithm_b1.cc)
 void AlgorithmB2(Cover* cover);  // a region pushes out others                  (algorithm_b2.cc)
 // C, Fig. 5: as B, but the features are visible all over a disc; B.1 covers the rest.
-void AlgorithmC(double alpha, uint64_t seed,
-                Cover* cover);  //                                (algorithm_c.cc)
+void AlgorithmC(double alpha, Cover* cover);  //                                (algorithm_c.cc)
 
 // What they share.
 

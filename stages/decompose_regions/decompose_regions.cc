@@ -33,7 +33,7 @@ void RunAlgorithm(const DecomposeRegionsOptions& options, uint64_t seed, Cover* 
   if (options.algorithm == "a3") AlgorithmA3(seed, cover);
   if (options.algorithm == "b1") AlgorithmB1(cover);
   if (options.algorithm == "b2") AlgorithmB2(cover);
-  if (options.algorithm == "c") AlgorithmC(options.alpha, seed, cover);
+  if (options.algorithm == "c") AlgorithmC(options.alpha, cover);
   // [Sala06 §V-D] B.2 leaves no redundant region.
   if (options.algorithm != "b2") DropRedundantRegions(cover);
 }
