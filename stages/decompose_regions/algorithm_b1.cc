@@ -5,7 +5,7 @@ namespace cairn {
 
 void AlgorithmB1(Cover* cover) {
   FeatureChooser chooser(cover);
-  while (cover->num_open() > 0) {                // [line 2]
+  while (cover->HasOpen()) {                     // [line 2]
     const CoreRegion region = chooser.Choose();  // [lines 3-9]
     cover->AddComponents(region.features,
                          region.stations);  // [lines 10-11], subject to rho; split if unconnected

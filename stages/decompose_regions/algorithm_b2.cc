@@ -44,7 +44,7 @@ class Purge {
 void AlgorithmB2(Cover* cover) {
   FeatureChooser chooser(cover);
   Purge purge(cover);
-  while (cover->num_open() > 0) {                // [line 2]
+  while (cover->HasOpen()) {                     // [line 2]
     const CoreRegion region = chooser.Choose();  // [lines 3-9]
     for (std::vector<StationIdx>& component : cover->Components(region.stations)) {
       const int num_gained =

@@ -97,7 +97,7 @@ void AlgorithmC(double alpha, Cover* cover) {
   Disc disc(*cover);
   // [line 3] In the order of the stations, so that discs lie side by side: in random order they leave gaps.
   for (StationIdx station = 0; station < world.num_stations(); ++station) {
-    if (cover->num_open() == 0) break;
+    if (!cover->HasOpen()) return;
     disc.Start(station);  // [line 4] C = N_r(v) ∩ U
     for (int t = 0; t < radius && disc.Widen(); ++t) {
     }

@@ -33,7 +33,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
   WarnIfDisconnected(world);
-  Result<Decomposition> result = DecomposeRegions(world, arguments.options, environment.seed);
+  Result<Decomposition> result =
+      DecomposeRegions(world, arguments.options, environment.seed, *environment.progress);
   if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
   const Decomposition& decomposition = *result;
   *environment.out << fmt::format(

@@ -16,9 +16,10 @@ uint64_t HeapEntry(int32_t count, int32_t feature) {
 
 }  // namespace
 
-Cover::Cover(const ReducedWorld& world, int rho)
+Cover::Cover(const ReducedWorld& world, int rho, Progress* progress)
     : world_(world),
       rho_(rho),
+      progress_(progress),
       finder_(world.neighbours),
       open_(world.coverable),
       num_open_(world.num_coverable),
@@ -66,13 +67,18 @@ void Cover::Close(StationIdx station) {
   for (const int32_t feature : world_.sets[station]) --open_counts_[feature];
 }
 
-int Cover::Add(const CoreRegion& region) {
+int Cover::Add(const CoreRegion& region, int rho) {
   int num_gained = 0;
   for (const StationIdx station : region.stations) {
     num_gained += cover_counts_[station] == 0;
     if (open_[station]) Close(station);
   }
-  if (num_gained <= rho_) return 0;
+  // B.2 reopens stations: progress is the least number that was open.
+  if (const int num_closed = world_.num_coverable - num_open_; progress_ && num_closed > num_reported_) {
+    progress_->Advance(num_closed - num_reported_);
+    num_reported_ = num_closed;
+  }
+  if (num_gained <= rho) return 0;
   const int idx = static_cast<int>(regions_.size());
   regions_.push_back(region);
   num_exclusive_.push_back(num_gained);

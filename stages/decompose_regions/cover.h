@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/progress.h"
 #include "stages/decompose_regions/reduced_world.h"
 
 namespace cairn {
@@ -19,12 +20,15 @@ struct CoreRegion {
 // num_exclusive of a region = number of its stations that no other region covers.
 class Cover {
  public:
-  // U = { v : |F_v| >= k }, D = {}.
-  Cover(const ReducedWorld& world, int rho);
+  // U = { v : |F_v| >= k }, D = {}.  `progress`, if any, advances by the stations that leave U for the first
+  // time.
+  Cover(const ReducedWorld& world, int rho, Progress* progress = nullptr);
 
   const ReducedWorld& world() const { return world_; }
   bool IsOpen(StationIdx station) const { return open_[station] != 0; }
   int num_open() const { return num_open_; }
+  // Whether an algorithm still has something to do: a station is open, and nobody cancelled.
+  bool HasOpen() const { return num_open_ > 0 && !(progress_ && progress_->Cancelled()); }
   // Number of open stations that see a feature.
   int OpenCount(int32_t feature) const { return open_counts_[feature]; }
   // The feature that most open stations see; the first of equal ones.  REQUIRES: num_open() > 0
@@ -32,12 +36,17 @@ class Cover {
 
   // U = U \ R; D = D u {R} if R covers more than rho stations that no region covers [Sala06 §V-E].  Returns
   // the number of those if the region was added, else 0.  REQUIRES: R is connected
-  int Add(const CoreRegion& region);
+  int Add(const CoreRegion& region) { return Add(region, rho_); }
+  int Add(const CoreRegion& region, int rho);
   // The same for each connected component of a set of stations.
   void AddComponents(const std::vector<int32_t>& features, std::span<const StationIdx> stations);
   std::vector<std::vector<StationIdx>> Components(std::span<const StationIdx> stations) {
     return finder_.Components(stations);
   }
+
+  // U = U u {v}, U = U \ {v}: for work on a part of the stations.  REQUIRES: coverable; not open, open
+  void Open(StationIdx station);
+  void Close(StationIdx station);
 
   // D = D \ {R}; stations that no region covers any more go back into U.
   void Drop(int region);
@@ -51,12 +60,12 @@ class Cover {
   std::vector<int> TakeChangedRegions() { return std::exchange(changed_regions_, {}); }
 
  private:
-  void Open(StationIdx station);
-  void Close(StationIdx station);
   void PushFeature(int32_t feature);
 
   const ReducedWorld& world_;
   const int rho_;
+  Progress* const progress_;
+  int num_reported_ = 0;
   ComponentFinder finder_;
   std::vector<char> open_;
   int num_open_ = 0;
@@ -77,5 +86,11 @@ class Cover {
 //   mu(R) = min over v in R of |{R' in D : v in R'}|;
 // mu >= 2 leaves every station covered.  Among equals the one that was added first goes.
 void DropRedundantRegions(Cover* cover);
+
+// Covers part of every connected set of more than `max_hole` coverable stations that no region covers, until
+// none is left: in such a set, B.1 chooses a region, whatever its size.  REQUIRES: num_open() == 0.  The rule
+// of rho does not bound holes: remainders that were let go one by one can lie side by side.  Returns whether
+// a region was added.
+bool LimitHoles(int max_hole, Cover* cover);
 
 }  // namespace cairn

@@ -34,8 +34,9 @@ void RunAlgorithm(const DecomposeRegionsOptions& options, uint64_t seed, Cover* 
   if (options.algorithm == "b1") AlgorithmB1(cover);
   if (options.algorithm == "b2") AlgorithmB2(cover);
   if (options.algorithm == "c") AlgorithmC(options.alpha, cover);
+  const bool added = options.max_hole >= 0 && cover->num_open() == 0 && LimitHoles(options.max_hole, cover);
   // [Sala06 §V-D] B.2 leaves no redundant region.
-  if (options.algorithm != "b2") DropRedundantRegions(cover);
+  if (options.algorithm != "b2" || added) DropRedundantRegions(cover);
 }
 
 // [Theorem 4.2] Grows the regions back and names their features as the world does.
@@ -96,6 +97,10 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .value = &o->rho,
        .help = "a region must cover more than this many stations that nothing else covers (Sala06: 9, 3)",
        .min = 0},
+      {.name = "max_hole",
+       .value = &o->max_hole,
+       .help = "most connected coverable stations that may be in no region; -1: what rho leaves",
+       .min = -1},
       {.name = "alpha",
        .value = &o->alpha,
        .help = "algorithm c: least share of a disc's stations that are open (Sala06: 0.85)",
@@ -106,14 +111,23 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
 
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed) {
+  NoProgress progress;
+  return DecomposeRegions(world, options, seed, progress);
+}
+
+Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
+                                       uint64_t seed, Progress& progress) {
   DecomposeRegionsOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (world.num_stations() == 0) return MakeError(ErrorCode::kNoData, "the world has no station");
   const ReducedWorld reduced = ReduceWorld(world, options.k, options.tau, seed);
   if (reduced.num_coverable == 0) return NothingCoverable(world, reduced, options);
 
-  Cover cover(reduced, options.rho);
+  progress.Begin("decompose regions", reduced.num_coverable, "stations");
+  Cover cover(reduced, options.rho, &progress);
   RunAlgorithm(options, seed, &cover);
+  progress.End();
+  if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
 
   Decomposition decomposition{
       .algorithm = options.algorithm, .k = options.k, .tau = options.tau, .rho = options.rho, .seed = seed};

@@ -7,6 +7,7 @@
 #include "core/decomposition.h"
 #include "core/error.h"
 #include "core/options.h"
+#include "core/progress.h"
 #include "core/world.h"
 
 namespace cairn {
@@ -38,6 +39,9 @@ struct DecomposeRegionsOptions {
   // A region is kept only if it covers more than this many stations that nothing else covers [Sala06: 9 in
   // simulated worlds, 3 in the real one].  REQUIRES: >= 0
   int rho = 0;
+  // Most connected coverable stations that no region may cover; -1: what rho leaves.  Remainders that rho
+  // lets go one by one can add up to larger holes; those get regions.  REQUIRES: >= -1
+  int max_hole = -1;
   // Algorithm C: least share of a disc's stations that are open [Sala06: 0.85].  REQUIRES: in [0, 1]
   double alpha = 0.85;
 };
@@ -46,7 +50,9 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 // Pure: same world, options and seed, same result.  B.2 costs O(incidences) per reading of the world plus,
 // for each region, O(k) passes over the incidences of the region's stations; memory is proportional to the
 // incidences. REQUIRES: CheckWorld(world) is ok. Errors: InvalidArgument for a bad option, NoData when no
-// station is coverable (says what k the best one allows).
+// station is coverable (says what k the best one allows), Cancelled.
+Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
+                                       uint64_t seed, Progress& progress);
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed);
 

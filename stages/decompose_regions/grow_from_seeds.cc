@@ -119,6 +119,7 @@ void GrowFromSeeds(const std::vector<StationIdx>& seed_order, uint64_t seed, Cov
   GrowingRegion growing(*cover, ranks);
   // [line 2] while U is not empty; [line 3] its first station in the order of the algorithm
   for (const StationIdx station : seed_order) {
+    if (!cover->HasOpen()) return;
     if (!cover->IsOpen(station)) continue;
     const CoreRegion region = growing.Grow(station);
     // [lines 15-16] U = U \ R; D = D u {R}, subject to rho

@@ -64,6 +64,80 @@ TEST(DecomposeRegions, RhoLetsSmallRemaindersGo) {
   EXPECT_EQ(d.uncovered_limit, 1);
 }
 
+// Two features of three stations each, side by side; rho = 3 lets both go, and they make a hole of six:
+//   0 1 2 3 4 5 6 7 8 9
+//   # # # # . . . . . .
+//   . . . . # # # . . .
+//   . . . . . . . # # #
+World WorldOfRemainders() {
+  return AsciiWorld({"oooooooooo"}, {{"####......"}, {"....###..."}, {".......###"}});
+}
+
+TEST(DecomposeRegions, RejectedRemaindersAddUpToAHoleLargerThanRho) {
+  for (const char* algorithm : kAlgorithms) {
+    const Decomposition d =
+        Decompose(WorldOfRemainders(), {.algorithm = algorithm, .k = 1, .tau = 0, .rho = 3});
+    EXPECT_EQ(d.regions.size(), 1) << algorithm;
+    EXPECT_EQ(CheckRegions(WorldOfRemainders(), d).largest_hole, 6) << algorithm;
+  }
+}
+
+TEST(DecomposeRegions, MaxHoleBoundsHoles) {
+  for (const char* algorithm : kAlgorithms) {
+    DecomposeRegionsOptions options{.algorithm = algorithm, .k = 1, .tau = 0, .rho = 3, .max_hole = 5};
+    const Decomposition d = Decompose(WorldOfRemainders(), options);
+    // One of the two remainders becomes a region, and the other is small enough.
+    EXPECT_EQ(d.regions.size(), 2) << algorithm;
+    EXPECT_EQ(d.uncovered.size(), 3) << algorithm;
+    EXPECT_THAT(CheckRegions(WorldOfRemainders(), d, 5).violations, IsEmpty()) << algorithm;
+  }
+}
+
+TEST(DecomposeRegions, MaxHoleHoldsOnRandomWorlds) {
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    const World world = RandomWorld(14, 10, 50, seed % 2 == 1, seed);
+    const int max_hole = static_cast<int>(seed % 4);
+    for (const char* algorithm : kAlgorithms) {
+      const DecomposeRegionsOptions options{
+          .algorithm = algorithm, .k = 2, .tau = static_cast<int>(seed % 3), .rho = 5, .max_hole = max_hole};
+      const Result<Decomposition> result = DecomposeRegions(world, options, seed);
+      if (!result.ok()) continue;  // nothing coverable
+      EXPECT_THAT(CheckRegions(world, *result, max_hole).violations, IsEmpty())
+          << algorithm << " seed " << seed;
+    }
+  }
+}
+
+// Cancels once as many stations are assigned as `limit`.
+class CancelAfter : public Progress {
+ public:
+  explicit CancelAfter(int64_t limit) : limit_(limit) {}
+  void Begin(std::string_view, int64_t total, std::string_view) override { total_ = total; }
+  void Advance(int64_t num_items) override { done_ += num_items; }
+  void End() override {}
+  bool Cancelled() const override { return done_ >= limit_; }
+  int64_t done_ = 0, total_ = 0;
+
+ private:
+  const int64_t limit_;
+};
+
+TEST(DecomposeRegions, ReportsEveryCoverableStationOnceAndStopsWhenCancelled) {
+  const World world = RandomWorld(14, 10, 50, false, 3);
+  for (const char* algorithm : kAlgorithms) {
+    const DecomposeRegionsOptions options{.algorithm = algorithm, .k = 2, .tau = 0, .rho = 0};
+    CancelAfter never(1000000);
+    ASSERT_TRUE(DecomposeRegions(world, options, 0, never).ok());
+    EXPECT_EQ(never.done_, never.total_) << algorithm;
+    EXPECT_EQ(never.total_, static_cast<int64_t>(CoverableStations(world, 2, 0).size()));
+    CancelAfter soon(1);
+    const Result<Decomposition> result = DecomposeRegions(world, options, 0, soon);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+    EXPECT_LT(soon.done_, soon.total_) << algorithm;
+  }
+}
+
 TEST(DecomposeRegions, RegionOfUnconnectedStationsIsSplit) {
   // One feature is seen at both ends of the corridor: two regions, never one.
   const World world = AsciiWorld({"oooooo"}, {{"##..##"}});
