@@ -1,7 +1,5 @@
 #include "core/capture.h"
 
-#include <libexif/exif-data.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <tuple>
 
 #include "core/colmap_model.h"
+#include "core/exif.h"
 #include "core/file.h"
 #include "core/image_file.h"
 #include "core/text.h"
@@ -80,20 +79,6 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
   return camera;
 }
 
-// 35 mm equivalent focal length from EXIF, mm; 0 where there is none.
-double FocalLength35mm(const std::string& path) {
-  ExifData* exif = exif_data_new_from_file(path.c_str());
-  if (exif == nullptr) return 0;
-  double focal_mm = 0;
-  const ExifEntry* entry =
-      exif_content_get_entry(exif->ifd[EXIF_IFD_EXIF], EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
-  if (entry != nullptr && entry->format == EXIF_FORMAT_SHORT && entry->size >= 2) {
-    focal_mm = exif_get_short(entry->data, exif_data_get_byte_order(exif));
-  }
-  exif_data_unref(exif);
-  return focal_mm;
-}
-
 // A folder of images without lists: one camera for each image size and focal length.
 Status ReadFlatFolder(Capture* capture) {
   capture->images_folder =
@@ -106,7 +91,7 @@ Status ReadFlatFolder(Capture* capture) {
       capture->rejects.push_back({name, image.error().message});
       continue;
     }
-    const double focal_mm = FocalLength35mm(path);
+    const double focal_mm = ReadExif(path).focal_length_35mm_mm;
     const auto [entry, is_new] = camera_ids.emplace(std::tuple(image->cols, image->rows, focal_mm),
                                                     static_cast<CameraId>(camera_ids.size() + 1));
     if (is_new) {
@@ -264,6 +249,9 @@ Result<Capture> ReadCapture(const std::string& root) {
     CAIRN_ASSIGN_OR_RETURN(capture.images, ReadImagesText(root + "/images.txt", &capture.rejects));
     if (fs::exists(root + "/queries.txt", error)) {
       CAIRN_ASSIGN_OR_RETURN(capture.queries, ReadImagesText(root + "/queries.txt", &capture.rejects));
+    }
+    if (const std::string frame = root + "/" + kCaptureFrameFile; fs::exists(frame, error)) {
+      CAIRN_ASSIGN_OR_RETURN(capture.frame, ReadCaptureFrame(frame));
     }
     const std::vector<std::string> names = ListImages(capture.images_folder);
     std::set<std::string> unlisted(names.begin(), names.end());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "core/capture_frame.h"
 #include "core/error.h"
 #include "core/pose.h"
 
@@ -34,14 +35,15 @@ struct Capture {
   std::vector<Reject> rejects;        // named in images.txt, but missing or with a pose that is none
   std::vector<std::string> warnings;  // e.g. image files that neither list names
   bool has_poses = false;
+  std::optional<CaptureFrame> frame;  // of frame.json, if there is one
 
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
 };
 
-// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt) or a flat folder of
-// images: then cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.  Image files are looked
-// for, not decoded. Errors: NotFound (no such folder), NoData (no image), Corrupt (a list that cannot be
-// parsed; file and line), Unsupported (camera model).
+// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt and frame.json) or a
+// flat folder of images: then cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.  Image
+// files are looked for, not decoded. Errors: NotFound (no such folder), NoData (no image), Corrupt (a list
+// that cannot be parsed; file and line), Unsupported (camera model).
 Result<Capture> ReadCapture(const std::string& root);
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that

@@ -50,7 +50,21 @@ void WriteTexts(SQLite::Database& database, const char* sql,
   }
 }
 
+// Rows of `meta` that say what the world frame means.
+std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
+  std::map<std::string, std::string> texts = {{"unit", frame.unit},
+                                              {"frame_source", frame.source},
+                                              {"is_reconstructed", frame.is_reconstructed ? "1" : "0"}};
+  if (frame.anchor) {
+    texts["anchor_latitude_deg"] = fmt::format("{}", frame.anchor->latitude_deg);
+    texts["anchor_longitude_deg"] = fmt::format("{}", frame.anchor->longitude_deg);
+    texts["anchor_altitude_m"] = fmt::format("{}", frame.anchor->altitude_m);
+  }
+  return texts;
+}
+
 void WriteHead(SQLite::Database& database, const MapRows& rows) {
+  WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", FrameTexts(rows.frame));
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
              {{"name", rows.name},
               {"writer", rows.writer},
@@ -206,6 +220,24 @@ Status CheckVersion(SQLite::Database& database, const std::string& path) {
                                : "Compile the map again.");
 }
 
+// Of a map without these rows, the frame is a survey's, in metres.
+Status ReadFrame(std::map<std::string, std::string> meta, const std::string& path, CaptureFrame* frame) {
+  if (meta.count("unit") > 0) frame->unit = meta["unit"];
+  if (meta.count("frame_source") > 0) frame->source = meta["frame_source"];
+  frame->is_reconstructed = meta["is_reconstructed"] == "1";
+  if (meta.count("anchor_latitude_deg") > 0) {
+    frame->anchor.emplace();
+    if (!ParseNumber(meta["anchor_latitude_deg"], &frame->anchor->latitude_deg) ||
+        !ParseNumber(meta["anchor_longitude_deg"], &frame->anchor->longitude_deg) ||
+        !ParseNumber(meta["anchor_altitude_m"], &frame->anchor->altitude_m)) {
+      return Corrupt(path, "table meta: anchor '{}', '{}', '{}' is not three numbers",
+                     meta["anchor_latitude_deg"], meta["anchor_longitude_deg"], meta["anchor_altitude_m"]);
+    }
+  }
+  const Status status = CheckCaptureFrame(*frame);
+  return status.ok() ? status : Corrupt(path, "table meta: {}", status.error().message);
+}
+
 Status ReadHead(SQLite::Database& database, const std::string& path, MapRows* rows) {
   auto meta = ReadTexts(database, "SELECT key, value FROM meta");
   rows->name = meta["name"];
@@ -223,6 +255,7 @@ Status ReadHead(SQLite::Database& database, const std::string& path, MapRows* ro
     return Corrupt(path, "table meta: stated_pose_sigma_m '{}' or stated_pose_sigma_deg '{}' is not a number",
                    meta["stated_pose_sigma_m"], meta["stated_pose_sigma_deg"]);
   }
+  CAIRN_RETURN_IF_ERROR(ReadFrame(meta, path, &rows->frame));
   rows->stage_options = ReadTexts(database, "SELECT stage, options FROM stage_options");
   rows->input_hashes = ReadTexts(database, "SELECT name, hash FROM inputs");
   SQLite::Statement frames(database, "SELECT name, qw, qx, qy, qz, tx, ty, tz FROM frames");

@@ -76,6 +76,7 @@ Status CheckRegions(const MapRows& rows) {
 }  // namespace
 
 Status CheckMapRows(const MapRows& rows) {
+  CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(rows.frame));
   CAIRN_RETURN_IF_ERROR(CheckImages(rows));
   CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {

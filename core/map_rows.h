@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/camera.h"
+#include "core/capture_frame.h"
 #include "core/error.h"
 #include "core/features.h"
 #include "core/ids.h"
@@ -67,6 +68,8 @@ struct MapRows {
   std::map<std::string, std::string> input_hashes;   // file -> XXH3
   std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map
 
+  // What the world frame's coordinates mean: their unit, and where on the Earth they are.
+  CaptureFrame frame;
   Pose floor_from_world;
   // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
   // noise.

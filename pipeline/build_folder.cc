@@ -31,14 +31,49 @@ std::string Absolute(const std::string& path) {
   return text;
 }
 
+// The value of an option of [reconstruct].
+std::string ReconstructOptionText(const Recipe& recipe, const std::string& name) {
+  for (const StageOptions& stage : recipe.stages) {
+    if (stage.stage != "reconstruct") continue;
+    for (const Option& option : stage.table) {
+      if (option.name == name) return OptionValueText(option);
+    }
+  }
+  return "";
+}
+
+// Files that tell where images stand, beside the capture's own.
+Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture) {
+  std::string files;
+  for (const char* name : {"control_points", "distances"}) {
+    const std::string file = ReconstructOptionText(recipe, name);
+    if (file.empty()) continue;
+    const std::string path = (fs::path(capture) / file).lexically_normal().string();
+    CAIRN_RETURN_IF_ERROR(CheckMakePath(fmt::format("[reconstruct] {}", name), path));
+    if (!fs::exists(path)) {
+      return MakeError(ErrorCode::kNotFound,
+                       "[reconstruct] {} = \"{}\": there is no {} (paths are relative to the capture)", name,
+                       file, path);
+    }
+    files += (files.empty() ? "" : " ") + path;
+  }
+  return files;
+}
+
 // The held-out images that check_map localizes; empty = the map is sealed without a self-test.
-std::string QueriesPath(const Recipe& recipe, const std::string& capture) {
+std::string QueriesPath(const Recipe& recipe, const std::string& capture, const std::string& build_dir) {
   if (!recipe.queries_path.empty()) return Absolute(recipe.queries_path);
+  if (IsReconstructed(recipe))
+    return ReconstructOptionText(recipe, "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
   const std::string queries = capture + "/queries.txt";
   return recipe.simulated || fs::exists(queries) ? queries : "";
 }
 
 }  // namespace
+
+bool IsReconstructed(const Recipe& recipe) {
+  return !recipe.simulated && !fs::exists(recipe.capture_path + "/images.txt");
+}
 
 Status CheckMakePath(const std::string& what, const std::string& path) {
   static constexpr std::string_view kSpecial = "$#%:;&|<>()[]*?'\"`\\=!";
@@ -55,7 +90,7 @@ Status CheckMakePath(const std::string& what, const std::string& path) {
 
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string capture = recipe.simulated ? paths.build_dir + "/capture" : Absolute(recipe.capture_path);
-  const std::string queries = QueriesPath(recipe, capture);
+  const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the map", paths.map));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", capture));
@@ -73,10 +108,16 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/capture", capture + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
+  std::string known_places;
+  if (IsReconstructed(recipe)) {
+    CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
+  }
   const std::string config = fmt::format(
       "# Written by cairn from the recipe; edit that instead.\n"
-      "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nQUERIES := {}\nNAME := {}\nSEED := {}\n",
-      paths.map, capture, recipe.simulated ? "yes" : "no", queries, recipe.name, seed);
+      "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
+      "NAME := {}\nSEED := {}\n",
+      paths.map, capture, recipe.simulated ? "yes" : "no", IsReconstructed(recipe) ? "yes" : "no",
+      known_places, queries, recipe.name, seed);
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 

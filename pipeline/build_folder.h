@@ -18,11 +18,15 @@ struct BuildPaths {
 // $#%:;&|<>()[]*?'"`\=!
 Status CheckMakePath(const std::string& what, const std::string& path);
 
+// Whether the capture has no poses of its own: then `reconstruct` finds them.
+bool IsReconstructed(const Recipe& recipe);
+
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
 //   options/seed, name, capture, queries    one value each
-//   config.mk             MAP, CAPTURE, SIMULATED, QUERIES, NAME, SEED for map.mk
-// Errors: InvalidArgument (CheckMakePath), Io.
+//   config.mk             MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED for
+//   map.mk
+// Errors: InvalidArgument (CheckMakePath), NotFound (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
 
 // Removes temporary files that killed runs left in the folder.  REQUIRES: the folder is locked.

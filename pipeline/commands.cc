@@ -11,6 +11,7 @@
 #include "stages/filter_visibility/command.h"
 #include "stages/group_classes/command.h"
 #include "stages/match_features/command.h"
+#include "stages/reconstruct/command.h"
 #include "stages/simulate/command.h"
 #include "stages/simulate_worlds/command.h"
 
@@ -18,10 +19,11 @@ namespace cairn {
 
 std::vector<Command> AllCommands() {
   return {
-      SimulateCommand(),         ExtractFeaturesCommand(),  MatchFeaturesCommand(), GroupClassesCommand(),
-      FilterVisibilityCommand(), DecomposeRegionsCommand(), CheckRegionsCommand(),  BuildVocabularyCommand(),
-      EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),      InspectCommand(),
-      SimulateWorldsCommand(),   CompileCommand(),          ConfigureCommand(),     RecipeReferenceCommand(),
+      SimulateCommand(),        ExtractFeaturesCommand(),  MatchFeaturesCommand(),    ReconstructCommand(),
+      GroupClassesCommand(),    FilterVisibilityCommand(), DecomposeRegionsCommand(), CheckRegionsCommand(),
+      BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
+      InspectCommand(),         SimulateWorldsCommand(),   CompileCommand(),          ConfigureCommand(),
+      RecipeReferenceCommand(),
   };
 }
 

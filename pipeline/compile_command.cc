@@ -36,10 +36,11 @@ struct StageFile {
   const char* file;
 };
 constexpr StageFile kStageFiles[] = {
-    {"simulate", "capture.stamp"},         {"extract_features", "features.db"},
-    {"match_features", "matches.db"},      {"group_classes", "classes.db"},
-    {"filter_visibility", "world.db"},     {"decompose_regions", "regions.db"},
-    {"build_vocabulary", "vocabulary.db"}, {"emit_map", "unsealed.cairn"}};
+    {"simulate", "capture.stamp"},       {"extract_features", "features.db"},
+    {"match_features", "matches.db"},    {"reconstruct", "poses"},
+    {"group_classes", "classes.db"},     {"filter_visibility", "world.db"},
+    {"decompose_regions", "regions.db"}, {"build_vocabulary", "vocabulary.db"},
+    {"emit_map", "unsealed.cairn"}};
 
 Result<std::string> ProgramPath() {
   std::error_code error;
@@ -83,10 +84,15 @@ Result<Recipe> ReadRecipeWithSeed(const Arguments& arguments, const CommandEnvir
   return recipe;
 }
 
-Result<std::string> MakeGoal(const std::string& until, const BuildPaths& paths) {
+Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, const BuildPaths& paths) {
   if (until.empty() || until == "check_map" || until == "check-map") return paths.map;
   std::string stage = until;
   std::replace(stage.begin(), stage.end(), '-', '_');
+  if (stage == "reconstruct" && !IsReconstructed(recipe)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--until {}: the capture has poses of its own (images.txt); nothing is reconstructed",
+                     until);
+  }
   std::vector<std::string> stages;
   for (const StageFile& file : kStageFiles) {
     if (stage == file.stage) return paths.build_dir + "/" + file.file;
@@ -154,7 +160,7 @@ Error StageError(const std::string& error_file, const BuildPaths& paths) {
 Status Compile(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
-  CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, paths));
+  CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, recipe, paths));
   CAIRN_ASSIGN_OR_RETURN(const std::string rules, RulesPath(paths.program));
   CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir));
   RemoveStaleTemporaries(paths.build_dir);

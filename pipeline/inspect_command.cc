@@ -49,6 +49,8 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
                                  {"writer", rows.writer},
                                  {"sealed", rows.sealed},
                                  {"seed", rows.seed},
+                                 {"unit", rows.frame.unit},
+                                 {"frame_source", rows.frame.source},
                                  {"bytes", num_bytes},
                                  {"num_landmarks", rows.landmarks.size()},
                                  {"landmarks", rows.landmark_choice},
@@ -66,6 +68,11 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
                                  {"num_words", rows.vocabulary.num_words()},
                                  {"vocabulary_depth", rows.vocabulary.depth},
                                  {"num_postings", num_postings}};
+  if (rows.frame.anchor) {
+    json["anchor"] = {{"latitude_deg", rows.frame.anchor->latitude_deg},
+                      {"longitude_deg", rows.frame.anchor->longitude_deg},
+                      {"altitude_m", rows.frame.anchor->altitude_m}};
+  }
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;

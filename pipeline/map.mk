@@ -31,7 +31,7 @@ $(BUILD)/config.mk: $(RECIPE) $(CAIRN)
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SIMULATED, QUERIES, NAME and SEED; `cairn configure` writes it beside the options.
+# Sets MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME and SEED; `cairn configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -40,13 +40,17 @@ MAP := $(CAIRN_MAP)
 endif
 $(BUILD)/%: MAP := $(MAP)
 $(BUILD)/%: CAPTURE := $(CAPTURE)
+$(BUILD)/%: POSES := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE))
 $(BUILD)/%: QUERIES := $(QUERIES)
 $(BUILD)/%: NAME := $(NAME)
 $(BUILD)/%: SEED := $(SEED)
 
 CAIRN_OUTPUTS := $(addprefix $(BUILD)/,features.db matches.db classes.db world.db regions.db vocabulary.db unsealed.cairn)
-# Poses and cameras, read by the stages that know the capture.
-CAPTURE_LISTS := $(wildcard $(CAPTURE)/cameras.txt $(CAPTURE)/images.txt)
+ifeq ($(RECONSTRUCTED),yes)
+CAIRN_OUTPUTS += $(BUILD)/poses
+endif
+# Poses, cameras and frame, read by the stages that know the capture.
+CAPTURE_LISTS := $(wildcard $(CAPTURE)/cameras.txt $(CAPTURE)/images.txt $(CAPTURE)/frame.json)
 # The images of the last run, from the dependency file that extract-features writes, and their folders: a new or a
 # removed image changes its folder's date.  One that is gone is no prerequisite any more.
 CAPTURE_IMAGES := $(wildcard $(filter-out \ %:,$(file <$(BUILD)/features.d)))
@@ -85,6 +89,10 @@ else
 CAPTURE_STAMP :=
 endif
 
+# What the stages after matching take poses from.
+POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
+$(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(wildcard $(CAPTURE)/frame.json))
+
 $(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(CAIRN) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_FOLDERS) $(CAPTURE_IMAGES)
 	touch $@.begun
@@ -104,10 +112,18 @@ $(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.
 	    $(CAIRN_FLAGS)
 	mv $@.begun $@
 
-$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \
-    $(CAPTURE_STAMP) $(CAPTURE_LISTS)
+# Captures without poses only.  The folder's date is that of its last change.
+$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(CAIRN) \
+    $(CAPTURE_IMAGES) $(KNOWN_PLACES)
 	touch $@.begun
-	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(CAPTURE) \
+	$(LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
+	    --options $(@D)/options/reconstruct.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	mv $@.begun $@
+
+$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \
+    $(POSES_READY)
+	touch $@.begun
+	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
@@ -123,27 +139,31 @@ $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/options/decompose_regions.
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
-$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(CAIRN)
+# Held-out images of a reconstructed capture have features too, but no words.
+$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(CAIRN) \
+    $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
 	touch $@.begun
 	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
+	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 # The map notes the options of every stage that made it.
-STAGE_OPTIONS := extract_features match_features group_classes filter_visibility decompose_regions build_vocabulary \
-    emit_map
+STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCTED)),reconstruct) group_classes \
+    filter_visibility decompose_regions build_vocabulary emit_map
+$(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
-    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN)
+    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN) $(POSES_READY)
 	touch $@.begun
 	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
-	    --vocabulary $(@D)/vocabulary.db --name $(NAME) \
+	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
-    $(BUILD)/options/seed $(CAIRN) $(CAPTURE_STAMP) $(QUERY_LIST) $(QUERY_IMAGES)
+    $(BUILD)/options/seed $(CAIRN) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	touch $@.begun
-	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(CAPTURE)) \
+	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
 	mv $@.begun $@

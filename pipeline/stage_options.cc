@@ -8,6 +8,7 @@
 #include "stages/filter_visibility/filter_visibility.h"
 #include "stages/group_classes/group_classes.h"
 #include "stages/match_features/match_features.h"
+#include "stages/reconstruct/reconstruct.h"
 #include "stages/simulate/options.h"
 
 namespace cairn {
@@ -17,6 +18,7 @@ std::vector<StageOptions> AllStageOptions() {
       MakeStageOptions<SimulateOptions>("simulate"),
       MakeStageOptions<ExtractFeaturesOptions>("extract_features"),
       MakeStageOptions<MatchFeaturesOptions>("match_features"),
+      MakeStageOptions<ReconstructOptions>("reconstruct"),
       MakeStageOptions<GroupClassesOptions>("group_classes"),
       MakeStageOptions<FilterVisibilityOptions>("filter_visibility"),
       MakeStageOptions<DecomposeRegionsOptions>("decompose_regions"),

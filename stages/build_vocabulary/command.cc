@@ -1,9 +1,12 @@
 #include "stages/build_vocabulary/command.h"
 
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "core/capture.h"
 #include "core/colmap_database.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
@@ -12,17 +15,21 @@ namespace {
 
 struct Arguments {
   std::string features_path;
+  std::string capture_path;
   std::string output_path;
   BuildVocabularyOptions options;
   OptionArguments option_arguments;
 };
 
-Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path) {
+// `survey`: names of the images to read; none: all.
+Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path,
+                                                      const std::optional<std::set<std::string>>& survey) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<ImageDescriptors>> {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> database_images, ReadDatabaseImages(database));
     std::vector<ImageDescriptors> images;
     for (const DatabaseImage& image : database_images) {
+      if (survey && survey->count(image.name) == 0) continue;
       CAIRN_ASSIGN_OR_RETURN(DescriptorMatrix descriptors, ReadDatabaseDescriptors(database, image.image_id));
       images.push_back({image.image_id, std::move(descriptors)});
     }
@@ -32,8 +39,14 @@ Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  std::optional<std::set<std::string>> survey;
+  if (!arguments.capture_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture_path));
+    survey.emplace();
+    for (const CaptureImage& image : capture.images) survey->insert(image.name);
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
-                         ReadDescriptors(arguments.features_path));
+                         ReadDescriptors(arguments.features_path, survey));
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
                          BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
                                          *environment.progress));
@@ -53,6 +66,8 @@ Command BuildVocabularyCommand() {
       .add_arguments =
           [arguments](CLI::App& app) {
             app.add_option("features", arguments->features_path, "features.db")->required();
+            app.add_option("--capture", arguments->capture_path,
+                           "Capture folder: only its survey images have words [all of features.db]");
             app.add_option("-o,--output", arguments->output_path, "vocabulary.db to write")->required();
             arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
           },

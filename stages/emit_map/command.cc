@@ -17,6 +17,7 @@ struct Arguments {
   std::string world_path;
   std::string regions_path;
   std::string vocabulary_path;
+  std::string frame_path;
   std::string name;
   std::vector<std::string> stage_options;  // "STAGE=FILE.toml"
   std::string output_path;
@@ -53,6 +54,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions_path));
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary_path));
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options));
+  if (!arguments.frame_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(rows.frame, ReadCaptureFrame(arguments.frame_path));
+  }
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
   *environment.out << fmt::format(
@@ -76,6 +80,8 @@ Command EmitMapCommand() {
             app.add_option("--world", arguments->world_path, "world.db")->required();
             app.add_option("--regions", arguments->regions_path, "regions.db")->required();
             app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
+            app.add_option("--frame", arguments->frame_path,
+                           "frame.json of the poses: unit and place on the Earth [metres, anywhere]");
             app.add_option("--name", arguments->name, "name of the map")->required();
             app.add_option("--stage-options", arguments->stage_options,
                            "STAGE=FILE.toml, once per stage: options to note in the map");

@@ -16,7 +16,11 @@ struct Arguments {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
-  CAIRN_ASSIGN_OR_RETURN(const MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
+  CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
+  // A reconstruction refines the database's cameras, under their numbers, along with the poses.
+  if (capture.frame && capture.frame->is_reconstructed) {
+    for (const auto& [camera_id, camera] : capture.cameras) matched.cameras[camera_id] = camera;
+  }
   CAIRN_ASSIGN_OR_RETURN(
       const GroupClassesResult result,
       GroupClasses(matched, capture, arguments.options, environment.num_threads, *environment.progress));

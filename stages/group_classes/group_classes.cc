@@ -220,7 +220,8 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
        .max = 180},
       {.name = "refine_poses",
        .value = &o->refine_poses,
-       .help = "refine the survey's poses; auto: when the first triangulation's error exceeds "
+       .help = "refine the survey's poses; auto: not reconstructed ones, others when the first "
+               "triangulation's error exceeds "
                "auto_refine_error_px",
        .choices = {"auto", "always", "never"}},
       {.name = "auto_refine_error_px",
@@ -348,9 +349,10 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   std::vector<Triangulation> triangulations = TriangulateAll(tracks, posed, state, first, num_threads);
   result.initial_rms_px = RmsErrorPx(triangulations);
   progress.Advance();
+  const bool is_reconstructed = capture.frame && capture.frame->is_reconstructed;
   result.poses_refined =
-      options.refine_poses == "always" ||
-      (options.refine_poses == "auto" && result.initial_rms_px > options.auto_refine_error_px);
+      options.refine_poses == "always" || (options.refine_poses == "auto" && !is_reconstructed &&
+                                           result.initial_rms_px > options.auto_refine_error_px);
   if (result.poses_refined) {
     for (int round = 0; round < options.num_rounds && !progress.Cancelled(); ++round) {
       Refine(matched, tracks, triangulations, posed, options.refinement, &state);

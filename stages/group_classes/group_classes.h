@@ -25,7 +25,8 @@ namespace cairn {
 struct GroupClassesOptions {
   TriangulateOptions triangulation;
   // "never": the stated poses are exact.  "always": refine them.  "auto": refine when the first
-  // triangulation's root mean square error exceeds auto_refine_error_px.
+  // triangulation's root mean square error exceeds auto_refine_error_px; reconstructed poses, which are the
+  // optimum of such an adjustment already, never.
   std::string refine_poses = "auto";
   double auto_refine_error_px = 1.0;  // REQUIRES: > 0
   // Largest reprojection error in the first triangulation, before poses are refined, pixels.  REQUIRES: > 0

@@ -1,0 +1,179 @@
+#include "stages/reconstruct/command.h"
+
+#include <filesystem>
+
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/folder.h"
+#include "stages/reconstruct/reconstruct.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kReportFile = "reconstruction.json";
+
+struct Arguments {
+  std::string matches;
+  std::string capture;
+  std::string output;
+  ReconstructOptions options;
+  OptionArguments option_arguments;
+};
+
+std::string ReportJson(const ReconstructResult& result) {
+  nlohmann::ordered_json report = {{"num_images", result.images.size()},
+                                   {"num_queries", result.queries.size()},
+                                   {"model_sizes", result.model_sizes},
+                                   {"num_points", result.num_points},
+                                   {"mean_error_px", result.mean_error_px}};
+  report["residuals"] = nlohmann::ordered_json::array();
+  for (const AlignmentResidual& residual : result.residuals) {
+    report["residuals"].push_back(
+        {{"name", residual.name}, {"residual_m", residual.residual_m}, {"is_off", residual.is_off}});
+  }
+  report["rejects"] = nlohmann::ordered_json::array();
+  for (const Reject& reject : result.rejects)
+    report["rejects"].push_back({{"name", reject.name}, {"reason", reject.reason}});
+  return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+// The capture that the result is: the image lists, and a link to the images.
+Status WritePosesFolder(const ReconstructResult& result, const Capture& capture, const std::string& folder) {
+  CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", result.cameras));
+  CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/images.txt", result.images));
+  if (!result.queries.empty())
+    CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt", result.queries));
+  CAIRN_RETURN_IF_ERROR(
+      WriteFileAtomically(folder + "/" + kCaptureFrameFile, CaptureFrameJson(result.frame)));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kReportFile, ReportJson(result)));
+  std::error_code error;
+  const fs::path images = fs::canonical(capture.images_folder, error);
+  if (!error) fs::create_directory_symlink(images, folder + "/images", error);
+  if (!error) return Ok();
+  return MakeError(ErrorCode::kIo, "{}/images: the link to {} cannot be made: {}", folder,
+                   capture.images_folder, error.message());
+}
+
+// The files of a folder with what is in them, or what links point to.
+std::map<std::string, std::string> Contents(const std::string& folder) {
+  std::map<std::string, std::string> contents;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename();
+    if (entry.is_symlink()) {
+      contents[name] = fs::read_symlink(entry.path(), error);
+    } else {
+      const auto text = ReadFile(entry.path());
+      contents[name] = text.ok() ? *text : "";
+    }
+  }
+  return contents;
+}
+
+std::string ResidualText(const ReconstructResult& result) {
+  double total = 0, most = 0;
+  int num_off = 0;
+  std::string off;
+  for (const AlignmentResidual& residual : result.residuals) {
+    total += residual.residual_m;
+    most = std::max(most, residual.residual_m);
+    if (!residual.is_off) continue;
+    off += fmt::format("{}{} ({:.2f} m)", ++num_off == 1 ? "" : ", ", residual.name, residual.residual_m);
+  }
+  return fmt::format("residual mean {:.3f} m, max {:.3f} m over {}; off: {}",
+                     total / static_cast<double>(result.residuals.size()), most, result.residuals.size(),
+                     off.empty() ? "none" : off);
+}
+
+std::string ResultText(const ReconstructResult& result) {
+  const size_t num_registered = result.images.size() + result.queries.size();
+  std::string text = fmt::format(
+      "reconstruct: {} of {} images registered ({} held out), {} points, error {:.2f} px, models of {} "
+      "images\n",
+      num_registered, num_registered + result.rejects.size(), result.queries.size(), result.num_points,
+      result.mean_error_px, fmt::join(result.model_sizes, ", "));
+  for (const auto& [camera_id, camera] : result.cameras) {
+    text += fmt::format("reconstruct: camera {}: {} {:.2f}\n", camera_id, CameraModelName(camera.model),
+                        fmt::join(camera.params, " "));
+  }
+  if (result.frame.unit == "arbitrary") {
+    text += "reconstruct: no scale: the unit is arbitrary\n";
+  } else {
+    text += fmt::format("reconstruct: scale from {}, {}\n", result.frame.source, ResidualText(result));
+  }
+  if (result.frame.anchor) {
+    text += fmt::format("reconstruct: east, north, up at {:.7f}, {:.7f}, {:.2f} m\n",
+                        result.frame.anchor->latitude_deg, result.frame.anchor->longitude_deg,
+                        result.frame.anchor->altitude_m);
+  }
+  return text;
+}
+
+// Reconstructs in `folder` and leaves only the result there.
+Result<ReconstructResult> ReconstructInto(const Arguments& arguments, const Capture& capture,
+                                          const MapperInput& input, const std::string& folder,
+                                          Progress& progress) {
+  const std::string work = folder + "/work";
+  std::error_code error;
+  if (!fs::create_directory(work, error))
+    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", work, error.message());
+  CAIRN_ASSIGN_OR_RETURN(ReconstructResult result,
+                         Reconstruct(input, capture, arguments.options, work, progress));
+  fs::remove_all(work, error);
+  CAIRN_RETURN_IF_ERROR(WritePosesFolder(result, capture, folder));
+  // The same contents as before keep the folder's date: nothing that reads it has to run again.
+  if (fs::is_directory(arguments.output, error) && Contents(folder) == Contents(arguments.output))
+    fs::last_write_time(folder, fs::last_write_time(arguments.output, error), error);
+  return result;
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
+  if (capture.has_poses) {
+    spdlog::warn("{}: has poses of its own (images.txt), which the reconstruction does not look at",
+                 capture.root);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const MapperInput input, ReadMapperInput(arguments.matches));
+  ReconstructResult result;
+  CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(
+      arguments.output, "a folder of poses", {kCaptureFrameFile}, [&](const std::string& folder) -> Status {
+        CAIRN_ASSIGN_OR_RETURN(result,
+                               ReconstructInto(arguments, capture, input, folder, *environment.progress));
+        return Ok();
+      }));
+  for (const std::string& warning : result.warnings) spdlog::warn("{}", warning);
+  for (const Reject& reject : result.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
+  *environment.out << ResultText(result);
+  return Ok();
+}
+
+}  // namespace
+
+Command ReconstructCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "reconstruct",
+      .summary =
+          "Find the poses of a capture without any, with COLMAP, in metres where they can be had (stage 2b)",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
+                ->required()
+                ->type_name("matches.db");
+            app.add_option("--capture", arguments->capture, "Capture folder: the images and their EXIF")
+                ->required();
+            app.add_option("-o,--output", arguments->output,
+                           "Folder to write: a capture with poses (COLMAP text layout)")
+                ->required()
+                ->type_name("poses/");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+}
+
+}  // namespace cairn

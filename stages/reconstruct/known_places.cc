@@ -1,0 +1,123 @@
+#include "stages/reconstruct/known_places.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "core/file.h"
+#include "core/text.h"
+
+namespace cairn {
+namespace {
+
+std::set<std::string> NamesOf(const Capture& capture) {
+  std::set<std::string> names;
+  for (const CaptureImage& image : capture.images) names.insert(image.name);
+  return names;
+}
+
+// Words [first, last) as they would stand in a name with single spaces.
+std::string Join(const std::vector<std::string>& words, size_t first, size_t last) {
+  return fmt::format("{}", fmt::join(words.begin() + static_cast<std::ptrdiff_t>(first),
+                                     words.begin() + static_cast<std::ptrdiff_t>(last), " "));
+}
+
+// Calls `read` with the words of each line that says something; its error gets the line's place.
+Status ReadLines(const std::string& path,
+                 const std::function<Status(const std::vector<std::string>& words)>& read) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  int line_number = 0;
+  for (const std::string_view line : SplitLines(text)) {
+    ++line_number;
+    const std::vector<std::string> words = SplitWords(line);
+    if (words.empty() || words[0][0] == '#') continue;
+    if (const Status status = read(words); !status.ok())
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: {}", path, line_number, status.error().message);
+  }
+  return Ok();
+}
+
+// Splits words [0, last) into two names that the capture has.
+Status SplitNames(const std::vector<std::string>& words, size_t last, const std::set<std::string>& names,
+                  KnownDistance* known) {
+  for (size_t middle = 1; middle < last; ++middle) {
+    known->name1 = Join(words, 0, middle);
+    known->name2 = Join(words, middle, last);
+    if (names.count(known->name1) > 0 && names.count(known->name2) > 0) return Ok();
+  }
+  return MakeError(ErrorCode::kCorrupt, "'{}' are not the names of two images of the capture",
+                   Join(words, 0, last));
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double WrapLongitude(double longitude_deg) { return std::remainder(longitude_deg, 360.0); }
+
+}  // namespace
+
+Result<std::vector<KnownDistance>> ReadKnownDistances(const std::string& path, const Capture& capture) {
+  const std::set<std::string> names = NamesOf(capture);
+  std::vector<KnownDistance> distances;
+  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& words) -> Status {
+    KnownDistance known;
+    if (words.size() < 3 || !ParseNumber(words.back(), &known.distance_m) ||
+        !std::isfinite(known.distance_m) || known.distance_m <= 0) {
+      return MakeError(ErrorCode::kCorrupt, "expected IMAGE1 IMAGE2 METRES, with more than 0 metres");
+    }
+    CAIRN_RETURN_IF_ERROR(SplitNames(words, words.size() - 1, names, &known));
+    if (known.name1 == known.name2)
+      return MakeError(ErrorCode::kCorrupt, "{} is given a distance to itself", known.name1);
+    distances.push_back(known);
+    return Ok();
+  }));
+  return distances;
+}
+
+Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::string& path,
+                                                                 const Capture& capture) {
+  const std::set<std::string> names = NamesOf(capture);
+  std::map<std::string, Eigen::Vector3d> points;
+  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& words) -> Status {
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();
+    bool is_valid = words.size() >= 4;
+    for (size_t i = 0; is_valid && i < 3; ++i)
+      is_valid = ParseNumber(words[words.size() - 3 + i], &point[static_cast<Eigen::Index>(i)]);
+    if (!is_valid || !point.allFinite())
+      return MakeError(ErrorCode::kCorrupt, "expected IMAGE X Y Z, in metres");
+    const std::string name = Join(words, 0, words.size() - 3);
+    if (names.count(name) == 0) return MakeError(ErrorCode::kCorrupt, "the capture has no image '{}'", name);
+    if (!points.emplace(name, point).second)
+      return MakeError(ErrorCode::kCorrupt, "image '{}' is listed twice", name);
+    return Ok();
+  }));
+  return points;
+}
+
+std::map<std::string, ExifTags> ReadGpsTags(const Capture& capture) {
+  std::map<std::string, ExifTags> tags;
+  for (const CaptureImage& image : capture.images) {
+    const ExifTags exif = ReadExif(capture.ImagePath(image));
+    if (exif.gps) tags.emplace(image.name, exif);
+  }
+  return tags;
+}
+
+GeodeticPosition MedianPosition(const std::map<std::string, ExifTags>& tags) {
+  const double first = tags.begin()->second.gps->longitude_deg;
+  std::vector<double> latitudes, longitudes, altitudes;
+  for (const auto& [name, exif] : tags) {
+    latitudes.push_back(exif.gps->latitude_deg);
+    longitudes.push_back(WrapLongitude(exif.gps->longitude_deg - first));
+    if (exif.has_altitude) altitudes.push_back(exif.gps->altitude_m);
+  }
+  return {std::round(1e7 * Median(latitudes)) / 1e7,
+          std::round(1e7 * WrapLongitude(first + Median(longitudes))) / 1e7,
+          altitudes.empty() ? 0 : std::round(100 * Median(altitudes)) / 100};
+}
+
+}  // namespace cairn

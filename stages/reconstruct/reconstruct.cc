@@ -1,0 +1,315 @@
+#include "stages/reconstruct/reconstruct.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "stages/reconstruct/align.h"
+#include "stages/reconstruct/known_places.h"
+
+namespace cairn {
+namespace {
+
+constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
+constexpr double kMaxSigmas = 3;
+
+// The poses of the kept model, by image name, in its own frame.
+using ModelPoses = std::map<std::string, Pose>;
+
+std::vector<Pose> PosesOf(const ModelPoses& model) {
+  std::vector<Pose> poses;
+  for (const auto& [name, pose] : model) poses.push_back(pose);
+  return poses;
+}
+
+std::string InputPath(const Capture& capture, const std::string& path) {
+  return (std::filesystem::path(capture.root) / path).lexically_normal().string();
+}
+
+// Aligns to the images' known positions; appends to the residuals.
+Result<Similarity> AlignImages(const ModelPoses& model, const std::map<std::string, PositionTarget>& known,
+                               const ReconstructOptions& options, ReconstructResult* result) {
+  std::vector<std::string> names;
+  std::vector<PositionTarget> targets;
+  for (const auto& [name, target] : known) {
+    const auto pose = model.find(name);
+    if (pose == model.end()) continue;
+    names.push_back(name);
+    targets.push_back(target);
+    targets.back().model = pose->second.Center();
+  }
+  CAIRN_ASSIGN_OR_RETURN(const Alignment alignment,
+                         AlignToPositions(targets, MeanUp(PosesOf(model)), options.up_sigma_deg));
+  for (size_t i = 0; i < names.size(); ++i)
+    result->residuals.push_back({names[i], alignment.residuals_m[i], alignment.is_off[i]});
+  return alignment.world_from_model;
+}
+
+Result<Similarity> AlignToGps(const ModelPoses& model, const Capture& capture,
+                              const ReconstructOptions& options, ReconstructResult* result) {
+  const std::map<std::string, ExifTags> tags = ReadGpsTags(capture);
+  if (tags.empty()) return MakeError(ErrorCode::kNoData, "no image has a GPS position in its EXIF block");
+  const GeodeticPosition anchor = MedianPosition(tags);
+  std::map<std::string, PositionTarget> known;
+  for (const auto& [name, exif] : tags) {
+    const double altitude_sigma_m = exif.has_altitude ? options.gps_altitude_sigma_m : kNoAltitudeSigmaM;
+    GeodeticPosition position = *exif.gps;
+    if (!exif.has_altitude) position.altitude_m = anchor.altitude_m;
+    known[name] = {.world = EnuFromGeodetic(anchor, position),
+                   .sigma_m = {options.gps_sigma_m, options.gps_sigma_m, altitude_sigma_m}};
+  }
+  CAIRN_ASSIGN_OR_RETURN(const Similarity similarity, AlignImages(model, known, options, result));
+  result->frame.source = "gps";
+  result->frame.anchor = anchor;
+  return similarity;
+}
+
+Result<Similarity> AlignToControlPoints(const ModelPoses& model, const Capture& capture,
+                                        const ReconstructOptions& options, ReconstructResult* result) {
+  const std::string path = InputPath(capture, options.control_points);
+  CAIRN_ASSIGN_OR_RETURN(const auto points, ReadControlPoints(path, capture));
+  std::map<std::string, PositionTarget> known;
+  for (const auto& [name, point] : points) {
+    known[name] = {.world = point, .sigma_m = Eigen::Vector3d::Constant(options.control_point_sigma_m)};
+    if (model.count(name) == 0)
+      result->warnings.push_back(fmt::format("{}: image {} was not registered", path, name));
+  }
+  result->frame.source = "control_points";
+  Result<Similarity> similarity = AlignImages(model, known, options, result);
+  if (similarity.ok()) return similarity;
+  return MakeError(similarity.error().code, "{}: of the registered images: {}", path,
+                   similarity.error().message);
+}
+
+Result<Similarity> ScaleByDistances(const ModelPoses& model, const Capture& capture,
+                                    const ReconstructOptions& options, ReconstructResult* result) {
+  const std::string path = InputPath(capture, options.distances);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<KnownDistance> distances, ReadKnownDistances(path, capture));
+  std::vector<DistanceTarget> targets;
+  std::vector<std::string> names;
+  for (const KnownDistance& known : distances) {
+    const auto pose1 = model.find(known.name1), pose2 = model.find(known.name2);
+    if (pose1 == model.end() || pose2 == model.end()) {
+      result->warnings.push_back(fmt::format("{}: image {} was not registered", path,
+                                             pose1 == model.end() ? known.name1 : known.name2));
+      continue;
+    }
+    targets.push_back({CenterErrorM(pose1->second, pose2->second), known.distance_m});
+    names.push_back(known.name1 + " " + known.name2);
+  }
+  const Result<double> scale = ScaleFromDistances(targets);
+  if (!scale.ok()) return MakeError(scale.error().code, "{}: {}", path, scale.error().message);
+  for (size_t i = 0; i < targets.size(); ++i) {
+    const double residual_m = std::abs(*scale * targets[i].model - targets[i].world_m);
+    const double sigma_m = options.distance_sigma_ratio * targets[i].world_m;
+    result->residuals.push_back({names[i], residual_m, residual_m > kMaxSigmas * sigma_m});
+  }
+  result->frame.source = "distances";
+  return LevelledFrame(PosesOf(model), *scale);
+}
+
+Similarity WithoutScale(const ModelPoses& model, const ReconstructOptions& options,
+                        ReconstructResult* result) {
+  result->frame.unit = "arbitrary";
+  result->frame.source = "none";
+  const std::vector<Pose> poses = PosesOf(model);
+  const double step = MedianStep(poses);
+  return LevelledFrame(poses, step > 0 ? options.unscaled_step / step : 1);
+}
+
+Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
+                             const ReconstructOptions& options, ReconstructResult* result) {
+  const std::string& from = options.scale_from;
+  if (from == "control_points" || (from == "auto" && !options.control_points.empty()))
+    return AlignToControlPoints(model, capture, options, result);
+  if (from == "distances" || (from == "auto" && !options.distances.empty()))
+    return ScaleByDistances(model, capture, options, result);
+  if (from == "none") return WithoutScale(model, options, result);
+  Result<Similarity> similarity = AlignToGps(model, capture, options, result);
+  if (similarity.ok()) return similarity;
+  if (from == "gps") {
+    return MakeError(similarity.error().code, "{}: scale_from = gps: {}", capture.root,
+                     similarity.error().message);
+  }
+  result->warnings.push_back(
+      fmt::format("{}: nothing gives a scale ({}): the map's unit is arbitrary; give control_points or "
+                  "distances for metres",
+                  capture.root, similarity.error().message));
+  return WithoutScale(model, options, result);
+}
+
+// Why an image is not in the model kept.
+std::string RejectReason(ImageId image_id, const MapperInput& input, const std::vector<ColmapModel>& models,
+                         const std::set<ImageId>& registered) {
+  for (size_t m = 1; m < models.size(); ++m) {
+    for (const ModelImage& image : models[m].images) {
+      if (image.image_id == image_id) {
+        return fmt::format("not registered with the others: in a part of its own, of {} images",
+                           models[m].images.size());
+      }
+    }
+  }
+  size_t num_pairs = 0, most = 0;
+  for (const TwoViewGeometry& geometry : input.geometries) {
+    const bool joins = (geometry.image_id1 == image_id && registered.count(geometry.image_id2) > 0) ||
+                       (geometry.image_id2 == image_id && registered.count(geometry.image_id1) > 0);
+    if (!joins) continue;
+    ++num_pairs;
+    most = std::max(most, geometry.inliers.size());
+  }
+  if (num_pairs == 0)
+    return fmt::format("not registered: no {} verified matches with any registered image", kMinNumMatches);
+  return fmt::format("not registered: {} pairs with registered images, of at most {} matches, gave no pose",
+                     num_pairs, most);
+}
+
+void CollectRejects(const MapperInput& input, const std::vector<ColmapModel>& models,
+                    ReconstructResult* result) {
+  std::set<ImageId> registered;
+  for (const ModelImage& image : models[0].images) registered.insert(image.image_id);
+  for (const DatabaseImage& image : input.images) {
+    if (registered.count(image.image_id) > 0) continue;
+    result->rejects.push_back({image.name, RejectReason(image.image_id, input, models, registered)});
+  }
+}
+
+Status CheckRegistered(const MapperInput& input, const ReconstructOptions& options,
+                       ReconstructResult* result) {
+  const size_t num_images = input.images.size(), num_registered = num_images - result->rejects.size();
+  if (num_registered == num_images) return Ok();
+  const std::string text = fmt::format(
+      "only {} of {} images were registered ({:.0f} %); models of {} images", num_registered, num_images,
+      100.0 * static_cast<double>(num_registered) / num_images, fmt::join(result->model_sizes, ", "));
+  if (static_cast<double>(num_registered) >= options.min_registered_ratio * num_images) {
+    result->warnings.push_back(text + "; the largest is kept");
+    return Ok();
+  }
+  std::string reasons;
+  for (size_t i = 0; i < std::min<size_t>(result->rejects.size(), 5); ++i)
+    reasons += fmt::format("\n  {}: {}", result->rejects[i].name, result->rejects[i].reason);
+  return MakeError(ErrorCode::kNoData,
+                   "{}, below min_registered_ratio = {:g}; images that join the parts or more features per "
+                   "image (extract_features: max_num_features) help; a lower ratio accepts the largest part. "
+                   "The first that are missing:{}",
+                   text, options.min_registered_ratio, reasons);
+}
+
+void CollectImages(const ColmapModel& model, const Similarity& world_from_model, int hold_out_every,
+                   ReconstructResult* result) {
+  result->cameras = model.cameras;
+  std::vector<CaptureImage> images;
+  for (const ModelImage& image : model.images)
+    images.push_back({image.name, image.camera_id, TransformPose(world_from_model, image.cam_from_world)});
+  std::sort(images.begin(), images.end(),
+            [](const CaptureImage& a, const CaptureImage& b) { return a.name < b.name; });
+  for (size_t i = 0; i < images.size(); ++i) {
+    const bool is_held_out = hold_out_every > 0 && (i + 1) % static_cast<size_t>(hold_out_every) == 0;
+    (is_held_out ? result->queries : result->images).push_back(std::move(images[i]));
+  }
+}
+
+Status CheckReconstructOptions(const ReconstructOptions& options) {
+  ReconstructOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  for (const auto& [scale_from, file] :
+       {std::pair("control_points", options.control_points), std::pair("distances", options.distances)}) {
+    if (options.scale_from == scale_from && file.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
+    }
+  }
+  if (options.hold_out_every == 1)
+    return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
+  return Ok();
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(ReconstructOptions* o) {
+  return {
+      {.name = "max_hours",
+       .value = &o->mapper.max_hours,
+       .help = "longest time that COLMAP's mapper gets, hours",
+       .min = 1e-6},
+      {.name = "refine_focal_length",
+       .value = &o->mapper.refine_focal_length,
+       .help = "refine the cameras' focal lengths"},
+      {.name = "refine_distortion",
+       .value = &o->mapper.refine_distortion,
+       .help = "refine distortion; cameras given without any get one radial parameter"},
+      {.name = "deterministic",
+       .value = &o->mapper.deterministic,
+       .help = "one thread and the same bytes on every run; false: all cores in bundle adjustment"},
+      {.name = "min_registered_ratio",
+       .value = &o->min_registered_ratio,
+       .help = "least part of the images that must be registered together",
+       .min = 0,
+       .max = 1},
+      {.name = "scale_from",
+       .value = &o->scale_from,
+       .help = "where scale and axes come from; auto: the files that are given, else GPS, else none",
+       .choices = {"auto", "gps", "control_points", "distances", "none"}},
+      {.name = "control_points",
+       .value = &o->control_points,
+       .help =
+           "file of known camera positions, IMAGE X Y Z a line, metres, z up; absolute or relative to the "
+           "capture"},
+      {.name = "distances",
+       .value = &o->distances,
+       .help = "file of known distances between cameras, IMAGE1 IMAGE2 METRES a line; absolute or relative "
+               "to the capture"},
+      {.name = "gps_sigma_m",
+       .value = &o->gps_sigma_m,
+       .help = "standard deviation of GPS positions per level axis, metres",
+       .min = 1e-3},
+      {.name = "gps_altitude_sigma_m",
+       .value = &o->gps_altitude_sigma_m,
+       .help = "standard deviation of GPS altitudes, metres",
+       .min = 1e-3},
+      {.name = "control_point_sigma_m",
+       .value = &o->control_point_sigma_m,
+       .help = "standard deviation of control points per axis, metres",
+       .min = 1e-6},
+      {.name = "distance_sigma_ratio",
+       .value = &o->distance_sigma_ratio,
+       .help = "standard deviation of a known distance over its length",
+       .min = 1e-6},
+      {.name = "up_sigma_deg",
+       .value = &o->up_sigma_deg,
+       .help = "standard deviation of the cameras' mean up against the vertical, degrees",
+       .min = 1e-3,
+       .max = 180},
+      {.name = "unscaled_step",
+       .value = &o->unscaled_step,
+       .help = "without any scale: median distance of an image to its nearest other, in the map's unit",
+       .min = 1e-6},
+      {.name = "hold_out_every",
+       .value = &o->hold_out_every,
+       .help = "every so many registered images one is kept out of the map, as a query; 0: none",
+       .min = 0},
+  };
+}
+
+Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
+                                      const ReconstructOptions& options, const std::string& work_folder,
+                                      Progress& progress) {
+  CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ColmapModel> models,
+                         RunMapper(input, capture.images_folder, options.mapper, work_folder, progress));
+  const ColmapModel& model = models[0];
+  ReconstructResult result;
+  result.frame.is_reconstructed = true;
+  for (const ColmapModel& m : models) result.model_sizes.push_back(static_cast<int>(m.images.size()));
+  result.num_points = static_cast<int>(model.points.size());
+  for (const ModelPoint& point : model.points)
+    result.mean_error_px += point.error_px / static_cast<double>(model.points.size());
+  CollectRejects(input, models, &result);
+  CAIRN_RETURN_IF_ERROR(CheckRegistered(input, options, &result));
+  ModelPoses poses;
+  for (const ModelImage& image : model.images) poses.emplace(image.name, image.cam_from_world);
+  CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(poses, capture, options, &result));
+  CollectImages(model, world_from_model, options.hold_out_every, &result);
+  return result;
+}
+
+}  // namespace cairn

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/capture.h"
+#include "core/capture_frame.h"
+#include "core/error.h"
+#include "core/options.h"
+#include "core/progress.h"
+#include "stages/reconstruct/mapper.h"
+
+namespace cairn {
+
+// Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
+// (mapper.h), which GPS, known positions or known distances then fix (align.h).  Before: match_features.
+// After: group_classes and all that reads poses.
+struct ReconstructOptions {
+  MapperOptions mapper;
+  // Least part of the capture's images that the largest model must have; below, there is no result.
+  // REQUIRES: in [0, 1]
+  double min_registered_ratio = 0.5;
+  // Where scale and axes come from: "gps" (EXIF), "control_points", "distances", or "none"; "auto": the
+  // control points if their file is given, else the distances if theirs is, else GPS where three images with
+  // it spread far enough, else none.
+  std::string scale_from = "auto";
+  // Files, absolute or relative to the capture (known_places.h says what is in them).
+  std::string control_points;
+  std::string distances;
+  // Standard deviations: of a GPS position, level and in altitude; of a control point; of a known distance,
+  // over its length; of the cameras' mean up against the vertical, degrees.  REQUIRES: > 0
+  double gps_sigma_m = 5;
+  double gps_altitude_sigma_m = 10;
+  double control_point_sigma_m = 0.05;
+  double distance_sigma_ratio = 0.02;
+  double up_sigma_deg = 5;
+  // Where nothing gives a scale: median distance of an image to the nearest other, in the map's unit, so that
+  // the later stages' lengths mean something.  REQUIRES: > 0
+  double unscaled_step = 0.5;
+  // Every so many registered images, in the order of names, one is kept out of the map and becomes a query
+  // with its reconstructed pose; 0: none.  REQUIRES: >= 0, not 1
+  int hold_out_every = 0;
+};
+OptionTable DescribeOptions(ReconstructOptions* options);
+
+// How far an image is from where it is known to be; for distances, by how much the two are wrong.
+struct AlignmentResidual {
+  std::string name;  // an image, or "IMAGE1 IMAGE2"
+  double residual_m = 0;
+  bool is_off = false;  // by more than three standard deviations: it hardly counted
+};
+
+struct ReconstructResult {
+  std::map<CameraId, Camera> cameras;  // as the mapper refined them
+  std::vector<CaptureImage> images;    // ascending by name; poses in `frame`
+  std::vector<CaptureImage> queries;   // held out, likewise
+  CaptureFrame frame;
+  std::vector<AlignmentResidual> residuals;
+  std::vector<Reject> rejects;  // images that are in neither list, and why
+  std::vector<std::string> warnings;
+  std::vector<int> model_sizes;  // images of each model, the kept one first
+  int num_points = 0;            // of the model kept
+  double mean_error_px = 0;      // its mean reprojection error
+};
+
+// Runs COLMAP on the matches and puts the largest model into a frame.  `work_folder` is an empty folder.
+// Same result on every run where options.mapper.deterministic.
+// Errors: InvalidArgument (options); NoData (too few images registered, the asked-for scale cannot be had, no
+// image of the database in the capture); those of RunMapper and of the files.
+Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
+                                      const ReconstructOptions& options, const std::string& work_folder,
+                                      Progress& progress);
+
+}  // namespace cairn

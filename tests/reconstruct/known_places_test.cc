@@ -1,0 +1,77 @@
+#include "stages/reconstruct/known_places.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+class KnownPlacesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* name : {"a.jpg", "b c.jpg", "d.jpg"}) capture_.images.push_back({name, 1, std::nullopt});
+  }
+  std::string Write(const std::string& text) {
+    const std::string path = testing::TempDir() + "/known_places.txt";
+    EXPECT_TRUE(WriteFileAtomically(path, text).ok());
+    return path;
+  }
+  Capture capture_;
+};
+
+TEST_F(KnownPlacesTest, ReadsDistancesBetweenImagesWithSpacesInTheirNames) {
+  const auto distances =
+      ReadKnownDistances(Write("# from the tape\n\na.jpg b c.jpg 2.5\nb c.jpg  d.jpg 1e1\r\n"), capture_);
+  ASSERT_TRUE(distances.ok()) << distances.error().message;
+  ASSERT_EQ(distances->size(), 2u);
+  EXPECT_EQ((*distances)[0].name1, "a.jpg");
+  EXPECT_EQ((*distances)[0].name2, "b c.jpg");
+  EXPECT_EQ((*distances)[1].distance_m, 10);
+}
+
+TEST_F(KnownPlacesTest, WrongDistancesNameTheLine) {
+  for (const char* line : {"a.jpg d.jpg", "a.jpg d.jpg x", "a.jpg d.jpg -1", "a.jpg d.jpg 0",
+                           "a.jpg d.jpg inf", "a.jpg e.jpg 1", "a.jpg 1", "a.jpg a.jpg 1"}) {
+    const auto distances = ReadKnownDistances(Write(std::string("a.jpg d.jpg 1\n") + line), capture_);
+    ASSERT_FALSE(distances.ok()) << line;
+    EXPECT_EQ(distances.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(distances.error().message, HasSubstr("known_places.txt:2: "));
+  }
+  EXPECT_EQ(ReadKnownDistances("/no/such/file", capture_).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(KnownPlacesTest, ReadsControlPoints) {
+  const auto points = ReadControlPoints(Write("a.jpg 1 2 3\nb c.jpg -1.5 0 2e-1\n"), capture_);
+  ASSERT_TRUE(points.ok()) << points.error().message;
+  EXPECT_EQ(points->at("a.jpg"), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(points->at("b c.jpg"), Eigen::Vector3d(-1.5, 0, 0.2));
+}
+
+TEST_F(KnownPlacesTest, WrongControlPointsNameTheLine) {
+  for (const char* line :
+       {"a.jpg 1 2", "d.jpg 1 2 z", "d.jpg 1 nan 2", "e.jpg 1 2 3", "a.jpg 1 2 4", "1 2 3"}) {
+    const auto points = ReadControlPoints(Write(std::string("a.jpg 1 2 3\n") + line), capture_);
+    ASSERT_FALSE(points.ok()) << line;
+    EXPECT_THAT(points.error().message, HasSubstr("known_places.txt:2: "));
+  }
+}
+
+TEST_F(KnownPlacesTest, AnchorIsTheMedianAlsoAcrossThe180thMeridian) {
+  std::map<std::string, ExifTags> tags;
+  const double longitudes[] = {179.9999, -179.9999, -179.9998, 170};  // the last is a wild fix
+  for (int i = 0; i < 4; ++i) {
+    tags["image" + std::to_string(i)] = {.gps = GeodeticPosition{-17 - 1e-4 * i, longitudes[i], 10.0 + i},
+                                         .has_altitude = i != 0};
+  }
+  const GeodeticPosition anchor = MedianPosition(tags);
+  EXPECT_NEAR(std::abs(anchor.longitude_deg), 179.9999, 1e-6);
+  EXPECT_NEAR(anchor.latitude_deg, -17.0001, 2e-4);
+  EXPECT_DOUBLE_EQ(anchor.altitude_m, 12);
+}
+
+}  // namespace
+}  // namespace cairn
