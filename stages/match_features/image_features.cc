@@ -64,23 +64,21 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 }
 
 int64_t ImageFeatures::NumBytes(int num_features) {
-  return PackedDescriptors::NumBytes(num_features) +
-         static_cast<int64_t>(sizeof(Eigen::Vector2d)) * num_features;
+  constexpr int64_t kRowBytes = sizeof(Keypoint) + sizeof(Eigen::Vector3d) + kDescriptorDim;
+  return PackedDescriptors::NumBytes(num_features) + kRowBytes * num_features;
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
                                         const Camera& camera) {
-  CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                         ReadDatabaseDescriptors(database, image.image_id));
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
-                         ReadDatabaseKeypoints(database, image.image_id));
   ImageFeatures features;
-  features.descriptors = PackedDescriptors(descriptors);
-  features.rays.reserve(keypoints.size());
-  for (const Keypoint& keypoint : keypoints) {
-    const auto ray = CameraFromImage(camera, Eigen::Vector2d(keypoint.x, keypoint.y));
-    features.rays.push_back(
-        ray.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
+  CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id));
+  CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
+  features.packed = PackedDescriptors(features.descriptors);
+  features.bearings.reserve(features.keypoints.size());
+  for (const Keypoint& keypoint : features.keypoints) {
+    const auto bearing = BearingFromImage(camera, Eigen::Vector2d(keypoint.x, keypoint.y));
+    features.bearings.push_back(
+        bearing.value_or(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())));
   }
   return features;
 }

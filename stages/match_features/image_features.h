@@ -40,8 +40,10 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 
 // The features of one image, as matching and verification read them.
 struct ImageFeatures {
-  PackedDescriptors descriptors;
-  std::vector<Eigen::Vector2d> rays;  // normalised coordinates of the keypoints, NaN where undefined
+  std::vector<Keypoint> keypoints;
+  std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
+  DescriptorMatrix descriptors;
+  PackedDescriptors packed;
 
   // At most what the features of an image take, bytes.
   static int64_t NumBytes(int num_features);

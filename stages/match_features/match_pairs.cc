@@ -57,19 +57,23 @@ struct PairResult {
   int num_putative = 0;
 };
 
+ViewForVerification ForVerification(const MatchImages& images, const MatchImage& image,
+                                    const ImageFeatures& features) {
+  return {&images.cameras.at(image.camera_id), &features.keypoints, &features.bearings, &features.descriptors,
+          image.cam_from_world};
+}
+
 PairResult MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
                      const FeaturesOfImages& features, const MatchPairsOptions& options) {
   const MatchImage& image1 = images.images[pair.first];
   const MatchImage& image2 = images.images[pair.second];
   const ImageFeatures& features1 = *features.at(pair.first);
   const ImageFeatures& features2 = *features.at(pair.second);
-  const std::vector<Match> matches =
-      MatchDescriptors(features1.descriptors, features2.descriptors, options.matcher);
+  const std::vector<Match> matches = MatchDescriptors(features1.packed, features2.packed, options.matcher);
   PairResult result;
   result.num_putative = static_cast<int>(matches.size());
-  result.geometry = VerifyPair({&images.cameras.at(image1.camera_id), &features1.rays, image1.cam_from_world},
-                               {&images.cameras.at(image2.camera_id), &features2.rays, image2.cam_from_world},
-                               matches, options.verification);
+  result.geometry = VerifyPair(ForVerification(images, image1, features1),
+                               ForVerification(images, image2, features2), matches, options.verification);
   result.geometry.image_id1 = image1.image_id;
   result.geometry.image_id2 = image2.image_id;
   return result;
