@@ -34,7 +34,8 @@ std::vector<std::string> ListImages(const std::string& folder) {
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (it->is_regular_file(error) && HasImageSuffix(it->path())) {
-      names.push_back(fs::relative(it->path(), folder, error).generic_string());
+      // Not fs::relative: it would follow links.
+      names.push_back(it->path().lexically_relative(folder).generic_string());
     }
   }
   std::sort(names.begin(), names.end());

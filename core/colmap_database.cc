@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <string_view>
+#include <tuple>
+#include <unordered_map>
 
 namespace cairn {
 namespace {
 
 // COLMAP's Database::kMaxNumImages.
 constexpr int64_t kMaxNumImages = 2147483647;
+constexpr int64_t kMaxId = kMaxNumImages - 1;
 constexpr int kMaxKeypoints = 10000000;
+constexpr int kMaxTwoViewConfig = 8;  // WATERMARK = 7 and MULTIPLE = 8 come from COLMAP only
 
 void BindBlob(SQLite::Statement& statement, int index, const void* bytes, size_t num_bytes) {
   if (num_bytes == 0) {
@@ -33,19 +37,47 @@ Eigen::Matrix3d MatrixFromColumn(const SQLite::Column& column) {
 
 Error BadRow(const SQLite::Database& database, const std::string& table, int64_t row,
              const std::string& problem) {
-  return MakeError(ErrorCode::kCorrupt, "{}: table {}, row {}: {}", database.getFilename(), table, row,
+  return MakeError(ErrorCode::kCorrupt, "{}: table {}, row {}: {}", DatabasePath(database), table, row,
                    problem);
 }
 
-// Checks that a blob has rows x columns values of `value_size` bytes.
-std::string ShapeProblem(int64_t rows, int64_t columns, size_t value_size, size_t num_bytes) {
-  if (rows < 0 || rows > kMaxKeypoints) return fmt::format("{} rows, expected 0 to {}", rows, kMaxKeypoints);
-  if (num_bytes != static_cast<size_t>(rows * columns) * value_size) {
-    return fmt::format("blob of {} bytes, expected {} x {} values of {} bytes", num_bytes, rows, columns,
-                       value_size);
+// The columns of one row, and the first that cannot be.
+class RowReader {
+ public:
+  explicit RowReader(SQLite::Statement& statement) : statement_(statement) {}
+
+  int64_t Integer(int index, int64_t min, int64_t max) {
+    const SQLite::Column column = statement_.getColumn(index);
+    const int64_t value = column.getInt64();
+    if (column.isInteger() && value >= min && value <= max) return value;
+    Fail(fmt::format("{} is {}, expected {} to {}", column.getName(),
+                     column.isInteger() ? std::to_string(value) : "no integer", min, max));
+    return min;
   }
-  return "";
-}
+
+  // A blob of rows x columns values of `value_size` bytes, the counts in the columns before it.
+  std::string_view Matrix(int index, int64_t num_columns, size_t value_size) {
+    const int64_t rows = Integer(index - 2, 0, kMaxKeypoints);
+    const SQLite::Column blob = statement_.getColumn(index);
+    const auto num_bytes = static_cast<size_t>(blob.getBytes());
+    if (num_bytes != static_cast<size_t>(rows * num_columns) * value_size) {
+      Fail(fmt::format("blob of {} bytes, expected {} x {} values of {} bytes", num_bytes, rows, num_columns,
+                       value_size));
+    }
+    if (!ok()) return {};
+    return {static_cast<const char*>(blob.getBlob()), num_bytes};
+  }
+
+  void Fail(const std::string& problem) {
+    if (problem_.empty()) problem_ = problem;
+  }
+  bool ok() const { return problem_.empty(); }
+  const std::string& problem() const { return problem_; }
+
+ private:
+  SQLite::Statement& statement_;
+  std::string problem_;
+};
 
 }  // namespace
 
@@ -81,17 +113,23 @@ Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& databas
   SQLite::Statement query(
       database, "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras ORDER BY 1");
   while (query.executeStep()) {
+    RowReader row(query);
     Camera camera;
-    camera.camera_id = query.getColumn(0).getUInt();
-    const auto model = CameraModelFromId(query.getColumn(1).getInt());
-    if (!model.ok())
-      return MakeError(ErrorCode::kUnsupported, "{}: {}", database.getFilename(), model.error().message);
+    camera.camera_id = static_cast<CameraId>(row.Integer(0, 0, kMaxId));
+    const auto model = CameraModelFromId(static_cast<int>(row.Integer(1, INT32_MIN, INT32_MAX)));
+    camera.width = static_cast<int>(row.Integer(2, 1, INT32_MAX));
+    camera.height = static_cast<int>(row.Integer(3, 1, INT32_MAX));
+    camera.has_focal_prior = row.Integer(5, INT32_MIN, INT32_MAX) != 0;
+    if (!row.ok()) return BadRow(database, "cameras", query.getColumn(0).getInt64(), row.problem());
+    if (!model.ok()) {
+      return MakeError(ErrorCode::kUnsupported, "{}: table cameras, row {}: {}", DatabasePath(database),
+                       camera.camera_id, model.error().message);
+    }
     camera.model = *model;
-    camera.width = query.getColumn(2).getInt();
-    camera.height = query.getColumn(3).getInt();
-    CAIRN_ASSIGN_OR_RETURN(camera.params,
-                           BlobToVector<double>(query.getColumn(4), database.getFilename() + ": cameras"));
-    camera.has_focal_prior = query.getColumn(5).getInt() != 0;
+    CAIRN_ASSIGN_OR_RETURN(
+        camera.params,
+        BlobToVector<double>(query.getColumn(4), fmt::format("{}: table cameras, row {}",
+                                                             DatabasePath(database), camera.camera_id)));
     if (const Status status = CheckCamera(camera); !status.ok()) {
       return BadRow(database, "cameras", camera.camera_id, status.error().message);
     }
@@ -102,10 +140,19 @@ Result<std::map<CameraId, Camera>> ReadDatabaseCameras(SQLite::Database& databas
 
 Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database) {
   std::vector<DatabaseImage> images;
+  std::map<std::string, ImageId> names;
   SQLite::Statement query(database, "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
   while (query.executeStep()) {
-    images.push_back(
-        {query.getColumn(0).getUInt(), query.getColumn(1).getString(), query.getColumn(2).getUInt()});
+    RowReader row(query);
+    DatabaseImage image;
+    image.image_id = static_cast<ImageId>(row.Integer(0, 0, kMaxId));
+    image.name = query.getColumn(1).getString();
+    image.camera_id = static_cast<CameraId>(row.Integer(2, 0, kMaxId));
+    if (image.name.empty()) row.Fail("the image has no name");
+    const auto [named, is_new] = names.emplace(image.name, image.image_id);
+    if (!is_new) row.Fail(fmt::format("image {} has the same name, '{}'", named->second, image.name));
+    if (!row.ok()) return BadRow(database, "images", query.getColumn(0).getInt64(), row.problem());
+    images.push_back(std::move(image));
   }
   return images;
 }
@@ -115,28 +162,25 @@ Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, 
   query.bind(1, image_id);
   std::vector<Keypoint> keypoints;
   if (!query.executeStep()) return keypoints;
-  const int64_t rows = query.getColumn(0).getInt64();
-  const int64_t columns = query.getColumn(1).getInt64();
-  const SQLite::Column blob = query.getColumn(2);
-  std::string problem = ShapeProblem(rows, columns, sizeof(float), blob.getBytes());
+  RowReader row(query);
   // 2: x, y; 4: + scale, orientation; 6: x, y and an affine shape a11 a12 a21 a22 (COLMAP's FeatureKeypoint).
-  if (problem.empty() && columns != 2 && columns != 4 && columns != 6)
-    problem = fmt::format("{} columns, expected 2, 4 or 6", columns);
-  if (!problem.empty()) return BadRow(database, "keypoints", image_id, problem);
-  const auto* values = static_cast<const float*>(blob.getBlob());
-  keypoints.resize(rows);
-  for (int64_t i = 0; i < rows; ++i) {
-    const float* v = values + i * columns;
+  const int64_t columns = row.Integer(1, INT32_MIN, INT32_MAX);
+  if (row.ok() && columns != 2 && columns != 4 && columns != 6)
+    row.Fail(fmt::format("{} columns, expected 2, 4 or 6", columns));
+  const std::string_view blob = row.Matrix(2, row.ok() ? columns : 0, sizeof(float));
+  if (!row.ok()) return BadRow(database, "keypoints", image_id, row.problem());
+  keypoints.resize(blob.size() / (columns * sizeof(float)));
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    float v[6] = {0, 0, 1, 0, 0, 0};
+    std::memcpy(v, blob.data() + i * columns * sizeof(float), columns * sizeof(float));
     Keypoint& keypoint = keypoints[i];
-    keypoint = {v[0], v[1], 1, 0};
-    if (columns == 4) {
-      keypoint.scale = v[2];
-      keypoint.orientation = v[3];
-    } else if (columns == 6) {
+    keypoint = {v[0], v[1], v[2], v[3]};
+    if (columns == 6) {
       keypoint.scale = 0.5f * (std::hypot(v[2], v[4]) + std::hypot(v[3], v[5]));
       keypoint.orientation = std::atan2(v[4], v[2]);
     }
-    if (!std::isfinite(keypoint.x) || !std::isfinite(keypoint.y) || !std::isfinite(keypoint.scale)) {
+    if (!std::isfinite(keypoint.x) || !std::isfinite(keypoint.y) || !std::isfinite(keypoint.scale) ||
+        !std::isfinite(keypoint.orientation)) {
       return BadRow(database, "keypoints", image_id, fmt::format("keypoint {} is not finite", i));
     }
   }
@@ -144,42 +188,103 @@ Result<std::vector<Keypoint>> ReadDatabaseKeypoints(SQLite::Database& database, 
 }
 
 Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, ImageId image_id) {
-  SQLite::Statement query(database, "SELECT rows, cols, data FROM descriptors WHERE image_id = ?");
+  // COLMAP 4.0 says what extracted them: 0 is SIFT.
+  const bool has_type = HasColumn(database, "descriptors", "type");
+  SQLite::Statement query(database,
+                          fmt::format("SELECT rows, cols, data, {} FROM descriptors WHERE image_id = ?",
+                                      has_type ? "type" : "0"));
   query.bind(1, image_id);
   DescriptorMatrix descriptors(0, kDescriptorDim);
   if (!query.executeStep()) return descriptors;
-  const int64_t rows = query.getColumn(0).getInt64();
-  const int64_t columns = query.getColumn(1).getInt64();
-  const SQLite::Column blob = query.getColumn(2);
-  std::string problem = ShapeProblem(rows, columns, 1, blob.getBytes());
-  if (problem.empty() && rows > 0 && columns != kDescriptorDim)
-    problem = fmt::format("{} columns, expected {}", columns, kDescriptorDim);
-  if (!problem.empty()) return BadRow(database, "descriptors", image_id, problem);
+  RowReader row(query);
+  const int64_t type = row.Integer(3, INT32_MIN, INT32_MAX);
+  const int64_t columns = row.Integer(1, INT32_MIN, INT32_MAX);
+  const int64_t rows = row.Integer(0, 0, kMaxKeypoints);
+  if (row.ok() && rows > 0 && (type != 0 || columns == kDescriptorDim * int64_t{sizeof(float)})) {
+    return MakeError(
+        ErrorCode::kUnsupported,
+        "{}: table descriptors, row {}: {} bytes a descriptor{}: not SIFT's 128 bytes; learned and "
+        "float descriptors are not read, extract SIFT features",
+        DatabasePath(database), image_id, columns,
+        type != 0 ? fmt::format(", of extractor type {}", type) : "");
+  }
+  if (row.ok() && rows > 0 && columns != kDescriptorDim)
+    row.Fail(fmt::format("{} columns, expected {}", columns, kDescriptorDim));
+  const std::string_view blob = row.Matrix(2, kDescriptorDim, 1);
+  if (!row.ok()) return BadRow(database, "descriptors", image_id, row.problem());
   descriptors.resize(rows, kDescriptorDim);
-  if (rows > 0) std::memcpy(descriptors.data(), blob.getBlob(), blob.getBytes());
+  if (rows > 0) std::memcpy(descriptors.data(), blob.data(), blob.size());
   return descriptors;
 }
 
+namespace {
+
+// Number of keypoints of every image, by image_id.
+Result<std::unordered_map<ImageId, int64_t>> CountKeypoints(SQLite::Database& database) {
+  std::unordered_map<ImageId, int64_t> num_keypoints;
+  SQLite::Statement query(
+      database, "SELECT image_id, coalesce(rows, 0) FROM images LEFT JOIN keypoints USING (image_id)");
+  while (query.executeStep()) {
+    RowReader row(query);
+    const auto image_id = static_cast<ImageId>(row.Integer(0, 0, kMaxId));
+    num_keypoints[image_id] = row.Integer(1, 0, kMaxKeypoints);
+    if (!row.ok()) return BadRow(database, "keypoints", query.getColumn(0).getInt64(), row.problem());
+  }
+  return num_keypoints;
+}
+
+// What is wrong with the images and indices of a pair; empty when nothing is.
+std::string PairProblem(const TwoViewGeometry& geometry,
+                        const std::unordered_map<ImageId, int64_t>& num_keypoints) {
+  const auto image1 = num_keypoints.find(geometry.image_id1);
+  const auto image2 = num_keypoints.find(geometry.image_id2);
+  if (geometry.image_id1 >= geometry.image_id2 || image1 == num_keypoints.end() ||
+      image2 == num_keypoints.end()) {
+    return fmt::format(
+        "a pair of the images {} and {}: they must be two of the table images, the smaller first",
+        geometry.image_id1, geometry.image_id2);
+  }
+  for (const Match& match : geometry.inliers) {
+    if (match.idx1 < image1->second && match.idx2 < image2->second) continue;
+    return fmt::format("matches keypoints {} and {} of images with {} and {} keypoints", match.idx1,
+                       match.idx2, image1->second, image2->second);
+  }
+  return "";
+}
+
+}  // namespace
+
 Result<std::vector<TwoViewGeometry>> ReadDatabaseTwoViewGeometries(SQLite::Database& database,
                                                                    int min_num_inliers) {
+  CAIRN_ASSIGN_OR_RETURN(const auto num_keypoints, CountKeypoints(database));
+  const char* const table = "two_view_geometries";
+  const auto matrix_column = [&](const char* name) {
+    return HasColumn(database, table, name) ? name : "NULL";
+  };
+  SQLite::Statement query(
+      database, fmt::format("SELECT pair_id, rows, cols, data, config, {}, {}, {} FROM {} ORDER BY 1",
+                            matrix_column("F"), matrix_column("E"), matrix_column("H"), table));
   std::vector<TwoViewGeometry> geometries;
-  SQLite::Statement query(database,
-                          "SELECT pair_id, rows, cols, data, config, F, E, H FROM two_view_geometries "
-                          "WHERE rows >= ? ORDER BY pair_id");
-  query.bind(1, min_num_inliers);
   while (query.executeStep()) {
+    RowReader row(query);
     TwoViewGeometry geometry;
-    const int64_t pair_id = query.getColumn(0).getInt64();
+    const int64_t pair_id = row.Integer(0, 0, kMaxNumImages * kMaxNumImages);
     std::tie(geometry.image_id1, geometry.image_id2) = ImageIdsFromPairId(pair_id);
-    const int64_t rows = query.getColumn(1).getInt64();
-    const int64_t columns = query.getColumn(2).getInt64();
-    const SQLite::Column blob = query.getColumn(3);
-    std::string problem = ShapeProblem(rows, columns, sizeof(uint32_t), blob.getBytes());
-    if (problem.empty() && rows > 0 && columns != 2) problem = fmt::format("{} columns, expected 2", columns);
-    if (!problem.empty()) return BadRow(database, "two_view_geometries", pair_id, problem);
-    geometry.inliers.resize(rows);
-    if (rows > 0) std::memcpy(geometry.inliers.data(), blob.getBlob(), blob.getBytes());
-    geometry.config = static_cast<TwoViewConfig>(query.getColumn(4).getInt());
+    const int64_t rows = row.Integer(1, 0, kMaxKeypoints);
+    if (rows > 0) row.Integer(2, 2, 2);
+    const std::string_view blob = row.Matrix(3, 2, sizeof(uint32_t));
+    geometry.config = static_cast<TwoViewConfig>(row.Integer(4, 0, kMaxTwoViewConfig));
+    if (row.ok()) {
+      geometry.inliers.resize(rows);
+      if (rows > 0) std::memcpy(geometry.inliers.data(), blob.data(), blob.size());
+      if (const std::string problem = PairProblem(geometry, num_keypoints); !problem.empty())
+        row.Fail(problem);
+    }
+    if (!row.ok()) return BadRow(database, table, query.getColumn(0).getInt64(), row.problem());
+    if (rows < min_num_inliers) continue;
+    std::sort(geometry.inliers.begin(), geometry.inliers.end());
+    geometry.inliers.erase(std::unique(geometry.inliers.begin(), geometry.inliers.end()),
+                           geometry.inliers.end());
     geometry.F = MatrixFromColumn(query.getColumn(5));
     geometry.E = MatrixFromColumn(query.getColumn(6));
     geometry.H = MatrixFromColumn(query.getColumn(7));

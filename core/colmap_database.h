@@ -15,8 +15,9 @@
 
 namespace cairn {
 
-// COLMAP's database, schema of version 3.8 (src/base/database.cc there).  features.db and matches.db are such
-// files, with tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
+// COLMAP's database.  features.db and matches.db are such files, with the schema of version 3.8
+// (src/base/database.cc there) and tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
+// Those of COLMAP 3.0 to 4.0 are read: docs/colmap.md says what of them.
 
 struct DatabaseImage {
   ImageId image_id = 0;
@@ -54,6 +55,17 @@ std::pair<ImageId, ImageId> ImageIdsFromPairId(int64_t pair_id);
 
 // CREATE TABLE statements of COLMAP 3.8's schema (user_version 3800 set).
 extern const char* const kColmapSchema;
+
+// Opens a database of COLMAP, or of whoever writes its schema, without changing it: waits up to 5 s for a
+// program that writes to it, reads what lies in a write-ahead log, checks that the tables are there.  What
+// is read is one state of it, whatever others write meanwhile.  Errors: NotFound; Corrupt (not SQLite, not
+// COLMAP's, truncated); Unsupported (a version of the schema that is not known; names table and column);
+// Busy (another program writes to it, or died while it did).
+Result<SQLite::Database> OpenColmapDatabase(const std::string& path);
+
+// Copies an open database into a new file, in rollback-journal mode, with the columns of
+// two_view_geometries that versions before 3.8 lack.  Throws SQLite::Exception.
+void CopyColmapDatabase(SQLite::Database& source, const std::string& copy_path);
 
 // Readers.  Each checks lengths, counts and references; errors are Corrupt and name the file, table and row.
 // They throw SQLite::Exception: call them inside WithDatabaseErrors.

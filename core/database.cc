@@ -8,10 +8,20 @@ namespace {
 
 constexpr char kMagic[] = "SQLite format 3";  // 16 bytes with the terminating zero
 
-// Percent-encodes what has a meaning in a URI's path.
-std::string UriFromPath(const std::string& path) {
+// Bytes 16 and 17 of the header, big-endian, 1 for 65536; 0 where the file has none.
+uint64_t PageSize(const std::string& path) {
+  unsigned char head[18] = {};
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(head), sizeof(head))) return 0;
+  const uint64_t page_size = uint64_t{head[16]} << 8 | head[17];
+  return page_size == 1 ? 65536 : page_size;
+}
+
+}  // namespace
+
+std::string DatabaseUri(const std::string& path) {
   std::string uri = "file:";
-  for (const unsigned char c : path) {
+  for (const unsigned char c : path) {  // percent-encodes what has a meaning in a URI's path
     if (c == '%' || c == '?' || c == '#') {
       uri += fmt::format("%{:02x}", c);
     } else {
@@ -21,15 +31,13 @@ std::string UriFromPath(const std::string& path) {
   return uri;
 }
 
-}  // namespace
-
 bool IsSqliteFile(const std::string& path) {
   char head[sizeof(kMagic)] = {};
   std::ifstream file(path, std::ios::binary);
   return file.read(head, sizeof(head)) && std::memcmp(head, kMagic, sizeof(kMagic)) == 0;
 }
 
-Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
+Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
   if (!IsSqliteFile(path)) {
@@ -39,8 +47,18 @@ Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
         "or another kind of file?",
         path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
   }
+  const uint64_t page_size = PageSize(path), num_bytes = std::filesystem::file_size(path, error);
+  if (page_size == 0 || num_bytes % page_size == 0) return Ok();
+  return MakeError(
+      ErrorCode::kCorrupt,
+      "{}: a truncated SQLite database: {} bytes, which are not whole pages of {}; copy it again", path,
+      num_bytes, page_size);
+}
+
+Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckSqliteFile(path));
   return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
-    SQLite::Database database(UriFromPath(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
     database.execAndGet(
         "SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
     return database;
@@ -62,9 +80,22 @@ Status WriteDatabase(const std::string& path, const std::string& schema,
   });
 }
 
+std::string DatabasePath(const SQLite::Database& database) {
+  const char* const path = sqlite3_db_filename(database.getHandle(), "main");
+  return path != nullptr ? path : "";
+}
+
 bool HasTable(SQLite::Database& database, const std::string& table) {
   SQLite::Statement query(database, "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?");
   query.bind(1, table);
+  query.executeStep();
+  return query.getColumn(0).getInt() > 0;
+}
+
+bool HasColumn(SQLite::Database& database, const std::string& table, const std::string& column) {
+  SQLite::Statement query(database, "SELECT count(*) FROM pragma_table_info(?) WHERE name = ?");
+  query.bind(1, table);
+  query.bind(2, column);
   query.executeStep();
   return query.getColumn(0).getInt() > 0;
 }

@@ -30,6 +30,12 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
   }
 }
 
+// The file as SQLite's URI, to which "?mode=ro" or the like can be appended.
+std::string DatabaseUri(const std::string& path);
+
+// Errors: NotFound, Corrupt (empty, a folder, without SQLite's magic bytes, or not whole pages).
+Status CheckSqliteFile(const std::string& path);
+
 // Opens an existing database read-only and immutable (no locks, no -wal or -shm beside it).
 // Errors: NotFound, Corrupt (empty, truncated, or not SQLite).
 Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path);
@@ -42,7 +48,11 @@ Status WriteDatabase(const std::string& path, const std::string& schema,
 // Whether the file starts with SQLite's magic bytes.
 bool IsSqliteFile(const std::string& path);
 
+// The file's absolute path, for messages (getFilename() is the URI that it was opened with).
+std::string DatabasePath(const SQLite::Database& database);
+
 bool HasTable(SQLite::Database& database, const std::string& table);
+bool HasColumn(SQLite::Database& database, const std::string& table, const std::string& column);
 
 // A blob as a vector of T.  Errors: Corrupt when its length is not a multiple of sizeof(T).  `what` names it.
 template <typename T>

@@ -24,7 +24,7 @@ struct Arguments {
 // `survey`: names of the images to read; none: all.
 Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path,
                                                       const std::optional<std::set<std::string>>& survey) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<ImageDescriptors>> {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> database_images, ReadDatabaseImages(database));
     std::vector<ImageDescriptors> images;

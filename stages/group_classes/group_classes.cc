@@ -284,7 +284,7 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
 }
 
 Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(matches_path));
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<MatchedFeatures> {
     MatchedFeatures matched;
     CAIRN_ASSIGN_OR_RETURN(matched.cameras, ReadDatabaseCameras(database));

@@ -13,7 +13,7 @@ Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, con
   while (query.executeStep()) {
     const int64_t rows = query.getColumn(1).getInt64();
     if (rows < 0 || rows > std::numeric_limits<int>::max()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: table {}, row {}: {} rows", database.getFilename(), table,
+      return MakeError(ErrorCode::kCorrupt, "{}: table {}, row {}: {} rows", DatabasePath(database), table,
                        query.getColumn(0).getInt64(), rows);
     }
     counts[query.getColumn(0).getUInt()] = rows;
@@ -43,11 +43,11 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
   for (const DatabaseImage& image : images) {
     if (!result.cameras.contains(image.camera_id)) {
       return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
-                       database.getFilename(), image.name, image.camera_id);
+                       DatabasePath(database), image.name, image.camera_id);
     }
     if (num_keypoints[image.image_id] != num_descriptors[image.image_id]) {
       return MakeError(ErrorCode::kCorrupt, "{}: image {} has {} keypoints but {} descriptors",
-                       database.getFilename(), image.name, num_keypoints[image.image_id],
+                       DatabasePath(database), image.name, num_keypoints[image.image_id],
                        num_descriptors[image.image_id]);
     }
     if (num_keypoints[image.image_id] == 0) {

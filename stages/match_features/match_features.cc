@@ -1,7 +1,6 @@
 #include "stages/match_features/match_features.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -235,7 +234,7 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckRanges(options));
   const std::string& path = inputs.features_path;
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenDatabaseReadOnly(path));
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database features, OpenColmapDatabase(path));
   const auto images = WithDatabaseErrors(path, [&] { return ReadMatchImages(features, inputs.capture); });
   if (!images.ok()) return images.error();
   MatchFeaturesSummary summary;
@@ -252,11 +251,8 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
   if (!pairs.ok()) return pairs.error();
 
   CAIRN_RETURN_IF_ERROR(ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
-    std::error_code error;
-    if (!std::filesystem::copy_file(path, temporary, error)) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be copied to {}: {}", path, temporary, error.message());
-    }
     return WithDatabaseErrors(temporary, [&]() -> Status {
+      CopyColmapDatabase(features, temporary);
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
       database.exec(
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");

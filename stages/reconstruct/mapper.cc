@@ -131,7 +131,7 @@ Result<std::vector<ColmapModel>> ReadModels(const std::string& folder) {
 }  // namespace
 
 Result<MapperInput> ReadMapperInput(const std::string& matches_path) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(matches_path));
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<MapperInput> {
     MapperInput input;
     CAIRN_ASSIGN_OR_RETURN(input.cameras, ReadDatabaseCameras(database));
