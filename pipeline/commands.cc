@@ -1,6 +1,8 @@
 #include "pipeline/commands.h"
 
 #include "pipeline/compile_command.h"
+#include "pipeline/export_command.h"
+#include "pipeline/import_command.h"
 #include "pipeline/inspect_command.h"
 #include "pipeline/localize_command.h"
 #include "stages/build_vocabulary/command.h"
@@ -22,8 +24,8 @@ std::vector<Command> AllCommands() {
       SimulateCommand(),        ExtractFeaturesCommand(),  MatchFeaturesCommand(),    ReconstructCommand(),
       GroupClassesCommand(),    FilterVisibilityCommand(), DecomposeRegionsCommand(), CheckRegionsCommand(),
       BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
-      InspectCommand(),         SimulateWorldsCommand(),   CompileCommand(),          ConfigureCommand(),
-      RecipeReferenceCommand(),
+      ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
+      CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),
   };
 }
 
