@@ -120,7 +120,7 @@ TEST(LevelledFrame, FirstCameraIsTheOriginAndLooksAlongX) {
   // Two cameras that look along model x with their up (-y) along model -z: the model stands on its head.
   Pose pose;
   pose.rotation = Eigen::Quaterniond(
-      (Eigen::Matrix3d() << 0, -1, 0, 0, 0, 1, 1, 0, 0).finished());  // rows: camera axes in the model
+      (Eigen::Matrix3d() << 0, 1, 0, 0, 0, 1, 1, 0, 0).finished());  // rows: camera axes in the model
   pose.rotation = pose.rotation.normalized();
   Pose first = pose, second = pose;
   first.translation = -(pose.rotation * Eigen::Vector3d(5, 5, 5));

@@ -43,7 +43,7 @@ class MapperTest : public testing::Test {
   Result<std::vector<ColmapModel>> Run(const SyntheticSurvey& survey, const MapperOptions& options = {}) {
     SetUp();
     NoProgress progress;
-    return RunMapper(survey.input, "/nowhere", options, work_, progress);
+    return RunMapper(survey.input, work_, options, work_, progress);
   }
   Error RunError(const MapperOptions& options = {}) {
     const auto models = Run(MakeSyntheticSurvey(3, 1), options);

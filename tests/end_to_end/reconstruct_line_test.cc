@@ -1,0 +1,163 @@
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/capture.h"
+#include "core/file.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int kNumImages = 20;
+
+// A rendered drive whose poses are hidden: a flat folder of images, and where five of the cameras stood.
+class ReconstructLine : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder("reconstruct_line_test");
+    std::ofstream(Path("simulate.toml")) << R"(width_m = 5.5
+depth_m = 6
+num_rooms = 2
+survey = "driven"
+step_m = 0.25
+image_width_px = 320
+image_height_px = 240
+horizontal_fov_deg = 65
+texel_m = 0.008
+num_queries = 0
+)";
+    const ProgramRun run =
+        RunShell("cairn simulate " + Path("simulate.toml") + " -o " + Path("posed") + " --progress none");
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    fs::create_directories(Path("flat"));
+    std::vector<Reject> rejects;
+    std::vector<CaptureImage> images = *ReadImagesText(Path("posed/images.txt"), &rejects);
+    images.resize(kNumImages);
+    for (const CaptureImage& image : images) {
+      fs::copy_file(Path("posed/images/" + image.name), Path("flat/" + image.name));
+      truth_[image.name] = *image.cam_from_world;
+    }
+    std::ofstream control_points(Path("control_points.txt"));
+    for (int i = 0; i < kNumImages; i += 4) {
+      const Eigen::Vector3d centre = images[i].cam_from_world->Center();
+      control_points << fmt::format("{} {} {} {}\n", images[i].name, centre.x(), centre.y(), centre.z());
+    }
+    std::ofstream(Path("flat.toml")) << R"(name = "flat"
+[capture]
+path = "flat"
+[reconstruct]
+control_points = "../control_points.txt"
+min_registered_ratio = 0.8
+hold_out_every = 5
+)" << TinyStageOptions();
+    ReplaceInFile(Path("flat.toml"), "max_num_features = 300", "max_num_features = 800");
+    first_run_ = new ProgramRun(Compile());
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    delete first_run_;
+  }
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+  static ProgramRun Compile() {
+    return RunShell("cairn compile " + Path("flat.toml") + " -o " + Path("flat.cairn") +
+                    " --progress none --threads 2");
+  }
+
+  static TemporaryFolder* folder_;
+  static ProgramRun* first_run_;
+  static std::map<std::string, Pose> truth_;
+};
+TemporaryFolder* ReconstructLine::folder_ = nullptr;
+ProgramRun* ReconstructLine::first_run_ = nullptr;
+std::map<std::string, Pose> ReconstructLine::truth_;
+
+TEST_F(ReconstructLine, ImagesWithoutPosesBecomeAMapInTheFrameOfTheControlPoints) {
+  ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
+  const auto poses = ReadCapture(Path("flat.build/poses"));
+  ASSERT_TRUE(poses.ok()) << poses.error().message;
+  EXPECT_GE(poses->images.size() + poses->queries.size(), 0.8 * kNumImages);
+  for (const auto* list : {&poses->images, &poses->queries}) {
+    for (const CaptureImage& image : *list) {
+      EXPECT_LT(CenterErrorM(*image.cam_from_world, truth_.at(image.name)), 0.1) << image.name;
+      EXPECT_LT(RotationErrorDeg(*image.cam_from_world, truth_.at(image.name)), 1.5) << image.name;
+    }
+  }
+  const ProgramRun inspect = RunShell("cairn inspect " + Path("flat.cairn") + " --json");
+  const auto json = nlohmann::json::parse(inspect.out);
+  EXPECT_EQ(json["unit"], "metre");
+  EXPECT_EQ(json["frame_source"], "control_points");
+  EXPECT_GT(json["num_landmarks"].get<int>(), 100);
+  EXPECT_EQ(json["num_images"].get<size_t>(), poses->images.size()) << "held-out images are not in the map";
+  EXPECT_TRUE(json["stage_options"].contains("reconstruct"));
+}
+
+TEST_F(ReconstructLine, HeldOutImagesAreLocalized) {
+  ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
+  const ProgramRun run = RunShell("cairn check-map " + Path("flat.cairn") + " --json --queries " +
+                                  Path("flat.build/poses/queries.txt"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto json = nlohmann::json::parse(run.out);
+  EXPECT_GT(json["localized_ratio"].get<double>(), 0.5) << run.out;
+}
+
+TEST_F(ReconstructLine, SecondRunDoesNothingAndChangedControlPointsRunTheReconstruction) {
+  ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
+  EXPECT_THAT(Compile().out, HasSubstr("up to date"));
+  const std::string matches = HashFile(Path("flat.build/matches.db")).value();
+  const auto matched = fs::last_write_time(Path("flat.build/matches.db.stamp"));
+  const std::string images = ReadFile(Path("flat.build/poses/images.txt")).value();
+  // The same places in another order: the reconstruction runs again, to the same bytes, and nothing after it.
+  const auto grouped = fs::last_write_time(Path("flat.build/classes.db.stamp"));
+  const auto reconstructed = fs::last_write_time(Path("flat.build/poses.stamp"));
+  const std::string control_points = ReadFile(Path("control_points.txt")).value();
+  std::ofstream(Path("control_points.txt")) << "# again\n" << control_points;
+  const ProgramRun run = Compile();
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(fs::last_write_time(Path("flat.build/matches.db.stamp")), matched);
+  EXPECT_NE(fs::last_write_time(Path("flat.build/poses.stamp")), reconstructed);
+  EXPECT_EQ(fs::last_write_time(Path("flat.build/classes.db.stamp")), grouped);
+  EXPECT_EQ(ReadFile(Path("flat.build/poses/images.txt")).value(), images);
+  EXPECT_EQ(HashFile(Path("flat.build/matches.db")).value(), matches);
+}
+
+TEST_F(ReconstructLine, FailingColmapFailsTheCompileWithItsLastLines) {
+  fs::create_directories(Path("fake"));
+  std::ofstream(Path("fake/colmap")) << "#!/bin/sh\necho out of luck\nexit 9\n";
+  fs::permissions(Path("fake/colmap"), fs::perms::owner_all);
+  const ProgramRun run =
+      RunShell("PATH=" + Path("fake") + ":$PATH cairn reconstruct " + Path("flat.build/matches.db") +
+               " --capture " + Path("flat") + " -o " + Path("failed") + " --progress none");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.err, HasSubstr("exit code 9"));
+  EXPECT_THAT(run.err, HasSubstr("out of luck"));
+  for (const auto& entry : fs::directory_iterator(folder_->string()))
+    EXPECT_THAT(entry.path().filename().string(), testing::Not(HasSubstr("failed")))
+        << "nothing is left behind";
+}
+
+TEST_F(ReconstructLine, ReconstructOfAPosedCaptureIsNoGoal) {
+  std::ofstream(Path("posed.toml")) << "name = \"posed\"\n[capture]\npath = \"posed\"\n";
+  const ProgramRun run =
+      RunShell("cairn compile " + Path("posed.toml") + " -o " + Path("posed.cairn") + " --until reconstruct");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("has poses of its own"));
+}
+
+TEST_F(ReconstructLine, MissingFilesOfKnownPlacesAreNamed) {
+  std::ofstream(Path("missing.toml")) << "name = \"missing\"\n[capture]\npath = \"flat\"\n[reconstruct]\n"
+                                         "distances = \"nowhere.txt\"\n";
+  const ProgramRun run = RunShell("cairn compile " + Path("missing.toml") + " -o " + Path("missing.cairn"));
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.err, HasSubstr("flat/nowhere.txt (paths are relative to the capture)"));
+}
+
+}  // namespace
+}  // namespace cairn
