@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Compiles redkitchen with cairn and with the installed COLMAP in one run and prints both as a table: seconds, bytes,
-# registered queries and their errors.  COLMAP gets what cairn gets: known poses and intrinsics of the survey; its
+# Compiles redkitchen with cairn and with the installed COLMAP in one run and prints both as tables: seconds of every step,
+# keypoints an image, verified pairs and inliers under one test (count_inliers.cc), bytes, registered queries and their
+# errors.  Everything is computed anew.  COLMAP gets what cairn gets: known poses and intrinsics of the survey; its
 # queries are matched against every survey image and registered one after the other.
 #
 #   bench/redkitchen/compare_colmap.sh [CAPTURE] [WORK]      about 20 minutes on 2 cores, most of them COLMAP's matching
@@ -11,7 +12,12 @@ capture=$(realpath "${1:-$top/../shared/data/redkitchen}")
 work=${2:-$top/build/bench/redkitchen}
 cairn=${CAIRN:-$top/build/release/cairn}
 [ -f "$capture/images.txt" ] || { echo "$capture: no images.txt; the redkitchen capture is not part of this repository" >&2; exit 3; }
+count_inliers=${COUNT_INLIERS:-$top/build/release/count_inliers}
 [ -x "$cairn" ] || { echo "$cairn: not built; run 'make' first" >&2; exit 3; }
+if [ ! -x "$count_inliers" ]; then
+  cmake -S "$top" -B "$top/build/release" -DCAIRN_BUILD_BENCHMARKS=ON >/dev/null
+  cmake --build "$top/build/release" --target count_inliers >/dev/null
+fi
 export QT_QPA_PLATFORM=offscreen
 rm -rf "$work"
 mkdir -p "$work"/{known,triangulated,registered,text}
@@ -30,6 +36,15 @@ of() { cat "$work/$1.s"; }
 names() { awk '!/^#/ && NF >= 10 {print $10}' "$1"; }
 
 echo "== cairn: $("$cairn" --version)"
+# Step by step for the seconds of each, with the options of the recipe; then the whole line once more, for its sum.
+options=$work/cairn.build/options
+"$cairn" configure "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
+seconds cairn_extract "$cairn" extract-features "$capture" --options "$options/extract_features.toml" \
+  -o "$work/features.db" --progress none
+seconds cairn_match "$cairn" match-features "$work/features.db" --capture "$capture" \
+  --options "$options/match_features.toml" -o "$work/matches.db" --progress none
+seconds cairn_group "$cairn" group-classes "$work/matches.db" --capture "$capture" \
+  --options "$options/group_classes.toml" -o "$work/classes.db" --progress none
 seconds cairn_compile "$cairn" compile "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
 "$cairn" check-map "$work/cairn.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/cairn.txt"
 
@@ -47,6 +62,7 @@ extract() {
 }
 seconds colmap_extract extract "$work/survey.list"
 seconds colmap_match colmap exhaustive_matcher --database_path "$database" --SiftMatching.use_gpu 0
+sqlite3 "$database" ".backup $work/survey.db"  # before the queries join it
 database_bytes=$(stat -c %s "$database")
 echo "$camera" >"$work/known/cameras.txt"
 : >"$work/known/points3D.txt"
@@ -67,14 +83,22 @@ seconds colmap_register colmap image_registrator --database_path "$database" --i
 colmap model_converter --input_path "$work/registered" --output_path "$work/text" --output_type TXT >>"$log" 2>&1
 python3 "$here/pose_errors.py" "$capture/queries.txt" "$work/text/images.txt" | tee "$work/colmap.txt"
 
+echo
+echo "== verified matches under one test: those of each program within N px of the essential matrix fitted to them"
+"$count_inliers" "$work/matches.db" "$work/survey.db" | tee "$work/inliers.txt"
+
 num_queries=$(wc -l <"$work/queries.list")
 echo
 echo "== both, $(nproc) cores, $(wc -l <"$work/survey.list") survey images, $num_queries queries"
-echo "cairn : survey $(of cairn_compile) s; map $(stat -c %s "$work/cairn.cairn") bytes"
+echo "cairn : extract $(of cairn_extract) + match $(of cairn_match) + group and triangulate $(of cairn_group) s"
+echo "cairn : survey to map, all stages $(of cairn_compile) s; map $(stat -c %s "$work/cairn.cairn") bytes"
 echo "COLMAP: survey $(of colmap_extract) + $(of colmap_match) + $(of colmap_triangulate) s (extract + match + triangulate);" \
   "database $database_bytes + model $model_bytes bytes"
 echo "COLMAP: queries $(of colmap_query_extract) + $(of colmap_query_match) + $(of colmap_register) s," \
   "$(cat "$work"/colmap_query_extract.s "$work"/colmap_query_match.s "$work"/colmap_register.s |
     awk -v n="$num_queries" '{s += $1} END {printf "%.2f s a query", s / n}')"
-echo "survey, COLMAP over cairn: $(cat "$work"/colmap_extract.s "$work"/colmap_match.s "$work"/colmap_triangulate.s |
+steps_of() { awk '{s += $1} END {print s}' "${@/#/$work/}"; }
+echo "extract + match + triangulate, COLMAP over cairn: $(echo "$(steps_of colmap_extract.s colmap_match.s colmap_triangulate.s)" \
+  "$(steps_of cairn_extract.s cairn_match.s cairn_group.s)" | awk '{printf "%.1f x", $1 / $2}')"
+echo "survey, COLMAP over cairn's whole line: $(cat "$work"/colmap_extract.s "$work"/colmap_match.s "$work"/colmap_triangulate.s |
   awk -v c="$(of cairn_compile)" '{s += $1} END {printf "%.1f x", s / c}')"
