@@ -14,6 +14,18 @@ uint64_t HeapEntry(int32_t count, int32_t feature) {
          (std::numeric_limits<uint32_t>::max() - static_cast<uint32_t>(feature));
 }
 
+// Exchanges the largest entry of a heap for a smaller one.
+void ReplaceTop(uint64_t entry, std::vector<uint64_t>* heap) {
+  size_t hole = 0;
+  for (size_t child = 1; child < heap->size(); child = 2 * hole + 1) {
+    if (child + 1 < heap->size() && (*heap)[child + 1] > (*heap)[child]) ++child;
+    if ((*heap)[child] <= entry) break;
+    (*heap)[hole] = (*heap)[child];
+    hole = child;
+  }
+  (*heap)[hole] = entry;
+}
+
 }  // namespace
 
 Cover::Cover(const ReducedWorld& world, int rho, Progress* progress)
@@ -41,9 +53,13 @@ int32_t Cover::MostVisibleFeature() {
         static_cast<int32_t>(std::numeric_limits<uint32_t>::max() - static_cast<uint32_t>(top));
     const auto count = static_cast<int32_t>(top >> 32);
     if (count == open_counts_[feature] && count == heap_counts_[feature]) return feature;
-    std::pop_heap(heap_.begin(), heap_.end());
-    heap_.pop_back();
-    if (count == heap_counts_[feature]) PushFeature(feature);
+    if (count == heap_counts_[feature]) {
+      heap_counts_[feature] = open_counts_[feature];
+      ReplaceTop(HeapEntry(open_counts_[feature], feature), &heap_);
+    } else {
+      std::pop_heap(heap_.begin(), heap_.end());
+      heap_.pop_back();
+    }
   }
 }
 

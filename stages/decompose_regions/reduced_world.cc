@@ -1,6 +1,7 @@
 #include "stages/decompose_regions/reduced_world.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "core/random.h"
@@ -11,29 +12,52 @@ namespace {
 // Shrinks sets of stations hop by hop; keeps scratch memory of the graph's size between calls.
 class Shrinker {
  public:
-  explicit Shrinker(const IndexLists& neighbours) : neighbours_(neighbours), mark_(neighbours.size(), 0) {}
+  explicit Shrinker(const IndexLists& neighbours) : neighbours_(neighbours), mark_(neighbours.size(), 0) {
+    int degree = 0;
+    for (StationIdx station = 0; station < neighbours.size(); ++station) {
+      degree = std::max(degree, static_cast<int>(neighbours[station].size()));
+    }
+    if (degree > kWidth) return;
+    rows_.resize(neighbours.size());
+    for (StationIdx station = 0; station < neighbours.size(); ++station) {
+      rows_[station].fill(station);
+      std::copy(neighbours[station].begin(), neighbours[station].end(), rows_[station].begin());
+    }
+  }
 
   // Keeps the stations of which every station within tau hops is in the set.  The border of the graph does
   // not shrink a set [Sala06 fn 2].
   void Shrink(std::vector<StationIdx>* stations, int tau) {
     for (int hop = 0; hop < tau && !stations->empty(); ++hop) {
       for (const StationIdx station : *stations) mark_[station] = 1;
-      kept_.clear();
+      kept_.resize(stations->size());
+      size_t num_kept = 0;
       for (const StationIdx station : *stations) {
-        const auto neighbours = neighbours_[station];
-        if (std::all_of(neighbours.begin(), neighbours.end(), [&](StationIdx n) { return mark_[n] != 0; })) {
-          kept_.push_back(station);
-        }
+        kept_[num_kept] = station;
+        num_kept += rows_.empty() ? HasAllNeighbours(station) : HasWholeRow(station);
       }
       for (const StationIdx station : *stations) mark_[station] = 0;
-      if (kept_.size() == stations->size())
-        return;  // whole components of the graph: more hops change nothing
+      if (num_kept == stations->size()) return;  // whole components of the graph: more hops change nothing
+      kept_.resize(num_kept);
       stations->swap(kept_);
     }
   }
 
  private:
+  static constexpr int kWidth = 4;  // of a lattice
+
+  bool HasAllNeighbours(StationIdx station) const {
+    const auto neighbours = neighbours_[station];
+    return std::all_of(neighbours.begin(), neighbours.end(), [&](StationIdx n) { return mark_[n] != 0; });
+  }
+  bool HasWholeRow(StationIdx station) const {
+    const std::array<StationIdx, kWidth>& row = rows_[station];
+    return (mark_[row[0]] & mark_[row[1]] & mark_[row[2]] & mark_[row[3]]) != 0;
+  }
+
   const IndexLists& neighbours_;
+  // Where no station has more than kWidth neighbours: those, and the station itself in the places left over.
+  std::vector<std::array<StationIdx, kWidth>> rows_;
   std::vector<char> mark_;
   std::vector<StationIdx> kept_;
 };
@@ -62,34 +86,84 @@ IndexLists IndexLists::Transposed(int num_lists) const {
 }
 
 IndexLists NeighbourLists(const World& world) {
+  // Edges are ascending: those to smaller stations come first, and every list is ascending.
   IndexLists lists;
-  const std::vector<std::vector<StationIdx>> adjacency = AdjacencyLists(world);
-  lists.Reserve(2 * static_cast<int64_t>(world.edges.size()));
-  for (const std::vector<StationIdx>& neighbours : adjacency) lists.Append(neighbours);
+  lists.begins_.assign(world.num_stations() + 1, 0);
+  for (const auto& [u, v] : world.edges) ++lists.begins_[u + 1], ++lists.begins_[v + 1];
+  std::partial_sum(lists.begins_.begin(), lists.begins_.end(), lists.begins_.begin());
+  lists.values_.resize(2 * world.edges.size());
+  std::vector<int64_t> next(lists.begins_.begin(), lists.begins_.end() - 1);
+  for (const auto& [u, v] : world.edges) {
+    lists.values_[next[u]++] = v;
+    lists.values_[next[v]++] = u;
+  }
   return lists;
+}
+
+ComponentFinder::ComponentFinder(const IndexLists& neighbours)
+    : joined_to_previous_(neighbours.size(), 0), run_of_(neighbours.size(), -1) {
+  std::vector<StationIdx> earlier;
+  for (StationIdx station = 0; station < neighbours.size(); ++station) {
+    earlier.clear();
+    for (const StationIdx other : neighbours[station]) {
+      if (other == station - 1) joined_to_previous_[station] = 1;
+      if (other < station - 1) earlier.push_back(other);
+    }
+    earlier_.Append(earlier);
+  }
+}
+
+int32_t ComponentFinder::Root(int32_t run) {
+  while (parents_[run] != run) run = parents_[run] = parents_[parents_[run]];
+  return run;
+}
+
+int ComponentFinder::JoinRuns(std::span<const StationIdx> stations) {
+  parents_.clear();
+  int num_components = 0;
+  StationIdx previous = -2;
+  for (const StationIdx station : stations) {
+    if (previous != station - 1 || !joined_to_previous_[station]) {
+      parents_.push_back(static_cast<int32_t>(parents_.size()));
+      ++num_components;
+    }
+    previous = station;
+    const auto run = static_cast<int32_t>(parents_.size()) - 1;
+    run_of_[station] = run;
+    for (const StationIdx other : earlier_[station]) {
+      if (run_of_[other] < 0 || parents_[run] == parents_[run_of_[other]]) continue;
+      const int32_t a = Root(run_of_[other]), b = Root(run);
+      if (a == b) continue;
+      parents_[std::max(a, b)] = std::min(a, b);
+      --num_components;
+    }
+  }
+  return num_components;
+}
+
+int ComponentFinder::NumComponents(std::span<const StationIdx> stations) {
+  const int num_components = JoinRuns(stations);
+  for (const StationIdx station : stations) run_of_[station] = -1;
+  return num_components;
 }
 
 std::vector<std::vector<StationIdx>> ComponentFinder::Components(std::span<const StationIdx> stations) {
   std::vector<std::vector<StationIdx>> components;
-  for (const StationIdx station : stations) mark_[station] = 1;
-  for (const StationIdx start : stations) {
-    if (!mark_[start]) continue;
-    mark_[start] = 0;
-    std::vector<StationIdx>& component = components.emplace_back(1, start);
-    component.reserve(stations.size());
-    for (size_t i = 0; i < component.size(); ++i) {
-      for (const StationIdx next : neighbours_[component[i]]) {
-        if (!mark_[next]) continue;
-        mark_[next] = 0;
-        component.push_back(next);
+  if (const int num_components = JoinRuns(stations); num_components == 1) {  // the usual case
+    components.emplace_back(stations.begin(), stations.end());
+  } else {
+    components.reserve(num_components);
+    std::vector<int32_t> component_of(parents_.size(), -1);  // per run that is a root
+    for (const StationIdx station : stations) {
+      int32_t& component = component_of[Root(run_of_[station])];
+      if (component < 0) {
+        component = static_cast<int32_t>(components.size());
+        components.emplace_back();
       }
-    }
-    if (component.size() == stations.size()) {  // connected: the usual case
-      component.assign(stations.begin(), stations.end());
-    } else {
-      std::sort(component.begin(), component.end());
+      components[component].push_back(station);
     }
   }
+  for (const StationIdx station : stations) run_of_[station] = -1;
   return components;
 }
 
@@ -161,6 +235,11 @@ ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed) {
     area.clear();
     for (const StationIdx station : shrunk[static_cast<int>(i)]) {
       if (reduced.coverable[station]) area.push_back(station);
+    }
+    if (finder.NumComponents(area) == 1) {  // the usual case
+      reduced.areas.Append(area);
+      reduced.original.push_back(order[i]);
+      continue;
     }
     for (const std::vector<StationIdx>& component : finder.Components(area)) {
       reduced.areas.Append(component);

@@ -9,6 +9,10 @@
 
 namespace cairn {
 
+class IndexLists;
+// Neighbours of every station, ascending.
+IndexLists NeighbourLists(const World& world);
+
 // Lists of indices, one after the other in one array.
 class IndexLists {
  public:
@@ -24,6 +28,7 @@ class IndexLists {
   }
   // For each value v in [0, num_values): the lists that contain it, ascending.
   IndexLists Transposed(int num_lists) const;
+  friend IndexLists NeighbourLists(const World& world);
 
  private:
   std::vector<int64_t> begins_ = {0};
@@ -50,19 +55,26 @@ struct ReducedWorld {
 // O(incidences * degree * tau).
 ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed);
 
-IndexLists NeighbourLists(const World& world);
-
-// Finds connected parts of station sets; keeps scratch memory of the graph's size between calls.
+// Finds connected parts of station sets; keeps scratch memory of the graph's size between calls.  Joins runs
+// of stations with consecutive numbers, of which a lattice that is numbered row by row has few.
 class ComponentFinder {
  public:
-  explicit ComponentFinder(const IndexLists& neighbours)
-      : neighbours_(neighbours), mark_(neighbours.size(), 0) {}
+  explicit ComponentFinder(const IndexLists& neighbours);
   // Components of a set of stations, each ascending, ordered by their first station.  The set is ascending.
   std::vector<std::vector<StationIdx>> Components(std::span<const StationIdx> stations);
+  // Their number.
+  int NumComponents(std::span<const StationIdx> stations);
 
  private:
-  const IndexLists& neighbours_;
-  std::vector<char> mark_;
+  // Numbers the runs of the set in run_of_, and joins adjacent ones in parents_.  Returns the number of
+  // components.
+  int JoinRuns(std::span<const StationIdx> stations);
+  int32_t Root(int32_t run);
+
+  IndexLists earlier_;                    // neighbours with a smaller number, but for the one right before
+  std::vector<char> joined_to_previous_;  // an edge joins station s - 1 to s
+  std::vector<int32_t> run_of_;           // -1: not in the set
+  std::vector<int32_t> parents_;          // of runs: union-find, smaller numbers towards the root
 };
 
 // Stations within tau hops of a set, ascending: the inverse of the reduction, R' = union of N_tau(v)
