@@ -37,6 +37,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       DecomposeRegions(world, arguments.options, environment.seed, *environment.progress);
   if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
   const Decomposition& decomposition = *result;
+  if (arguments.options.algorithm == "best" && world.num_stations() > arguments.options.best_max_stations) {
+    spdlog::warn(
+        "{} stations are more than best_max_stations = {}: the regions are those of b2, the lower bound is "
+        "counted",
+        world.num_stations(), arguments.options.best_max_stations);
+  }
   *environment.out << fmt::format(
       "decompose_regions: {} stations, {} features, {} regions{}\n", world.num_stations(),
       world.num_features(), decomposition.regions.size(),

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "stages/decompose_regions/algorithm_best.h"
 #include "stages/decompose_regions/algorithms.h"
+#include "stages/decompose_regions/counting_bound.h"
 #include "stages/decompose_regions/cover.h"
 #include "stages/decompose_regions/reduced_world.h"
 
@@ -27,16 +29,28 @@ Error NothingCoverable(const World& world, const ReducedWorld& reduced,
       reduced.max_set_size);
 }
 
+int NumUncovered(const Cover& cover) {
+  int num = 0;
+  for (StationIdx station = 0; station < cover.world().num_stations(); ++station) {
+    num += cover.world().coverable[station] && cover.NumRegionsAt(station) == 0;
+  }
+  return num;
+}
+
 void RunAlgorithm(const DecomposeRegionsOptions& options, uint64_t seed, Cover* cover) {
   if (options.algorithm == "a1") AlgorithmA1(seed, cover);
   if (options.algorithm == "a2") AlgorithmA2(seed, cover);
   if (options.algorithm == "a3") AlgorithmA3(seed, cover);
   if (options.algorithm == "b1") AlgorithmB1(cover);
-  if (options.algorithm == "b2") AlgorithmB2(cover);
+  const bool is_b2 = options.algorithm == "b2" || options.algorithm == "best";
+  if (is_b2) AlgorithmB2(cover);
   if (options.algorithm == "c") AlgorithmC(options.alpha, cover);
-  const bool added = options.max_hole >= 0 && cover->num_open() == 0 && LimitHoles(options.max_hole, cover);
+  bool added = options.max_hole >= 0 && cover->num_open() == 0 && LimitHoles(options.max_hole, cover);
+  // `best` leaves as many stations uncovered as it is given, anywhere: no more in all than one hole may have.
+  if (options.algorithm == "best" && options.max_hole >= 0 && NumUncovered(*cover) > options.max_hole)
+    added |= LimitHoles(0, cover);
   // [Sala06 §V-D] B.2 leaves no redundant region.
-  if (options.algorithm != "b2" || added) DropRedundantRegions(cover);
+  if (!is_b2 || added) DropRedundantRegions(cover);
 }
 
 // [Theorem 4.2] Grows the regions back and names their features as the world does.
@@ -83,8 +97,8 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
   return {
       {.name = "algorithm",
        .value = &o->algorithm,
-       .help = "algorithm of Sala06 §V",
-       .choices = {"a1", "a2", "a3", "b1", "b2", "c"}},
+       .help = "best: fewest regions, by column generation from b2's; or an algorithm of Sala06 §V",
+       .choices = {"a1", "a2", "a3", "b1", "b2", "c", "best"}},
       {.name = "k",
        .value = &o->k,
        .help = "number of features visible everywhere in a region (Sala06: 4, 10)",
@@ -106,6 +120,19 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .help = "algorithm c: least share of a disc's stations that are open (Sala06: 0.85)",
        .min = 0,
        .max = 1},
+      {.name = "lower_bound",
+       .value = &o->lower_bound,
+       .help = "certified least number of regions: certified (column generation, seconds), counted (weaker, "
+               "cheap), none; auto: certified with algorithm best, else counted",
+       .choices = {"auto", "certified", "counted", "none"}},
+      {.name = "best_num_repairs",
+       .value = &o->best_num_repairs,
+       .help = "algorithm best: neighbourhoods that are covered anew; time grows with it",
+       .min = 0},
+      {.name = "best_max_stations",
+       .value = &o->best_max_stations,
+       .help = "largest world for column generation; beyond it, best is b2 and the bound is counted",
+       .min = 0},
   };
 }
 
@@ -143,6 +170,16 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
     if (reduced.coverable[station] && !covered[station]) decomposition.uncovered.push_back(station);
   }
   decomposition.uncovered_limit = static_cast<int>(decomposition.uncovered.size());
+
+  const bool is_small = world.num_stations() <= options.best_max_stations;
+  if (options.algorithm == "best" && is_small) {
+    decomposition = AlgorithmBest(world, decomposition, {.num_repairs = options.best_num_repairs}, seed);
+  } else if (options.lower_bound == "certified" && is_small) {
+    decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
+  } else {
+    decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
+  }
+  if (options.lower_bound == "none") decomposition.lower_bound.reset();
   return decomposition;
 }
 

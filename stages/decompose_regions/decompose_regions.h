@@ -28,8 +28,8 @@ namespace cairn {
 // | L     | CoreRegion::features                                                                        |
 // | rho   | a region must cover more than rho stations that nothing else covers                         |
 struct DecomposeRegionsOptions {
-  // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, V-C].
-  std::string algorithm = "b2";
+  // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, V-C], or "best" (algorithm_best.h).
+  std::string algorithm = "best";
   // Number of features that are visible everywhere in a region [Sala06: 4 and 10; here more, so that a
   // query may miss some].  REQUIRES: >= 1
   int k = 40;
@@ -44,6 +44,14 @@ struct DecomposeRegionsOptions {
   int max_hole = -1;
   // Algorithm C: least share of a disc's stations that are open [Sala06: 0.85].  REQUIRES: in [0, 1]
   double alpha = 0.85;
+  // Certified least number of regions: "certified" (column_generation.h), "counted" (counting_bound.h;
+  // weaker, cheap), "none", or "auto": certified with algorithm "best", else counted.
+  std::string lower_bound = "auto";
+  // Algorithm best: neighbourhoods that are covered anew (cover_search.h).  REQUIRES: >= 0
+  int best_num_repairs = 60;
+  // Column generation takes seconds for some thousand stations and memory for a few thousand regions: worlds
+  // larger than this get the regions of B.2 instead of best's, and the counted bound.  REQUIRES: >= 0
+  int best_max_stations = 20000;
 };
 OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 

@@ -62,6 +62,12 @@ class Shrinker {
   std::vector<StationIdx> kept_;
 };
 
+int64_t NumIncidences(const World& world) {
+  int64_t num = 0;
+  for (const std::vector<StationIdx>& area : world.areas) num += static_cast<int64_t>(area.size());
+  return num;
+}
+
 std::vector<FeatureIdx> ShuffledFeatures(int num_features, uint64_t seed) {
   std::vector<FeatureIdx> order(num_features);
   std::iota(order.begin(), order.end(), 0);
@@ -194,27 +200,40 @@ std::vector<StationIdx> ShrinkStations(const IndexLists& neighbours, std::vector
   return stations;
 }
 
-ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed) {
+ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed, AreaSplit split) {
   ReducedWorld reduced;
   reduced.k = k;
   reduced.neighbours = NeighbourLists(world);
   const int num_stations = world.num_stations();
 
   // [Sala06 §IV] F'_v = intersection of F_w over w in N_tau(v): v stays in a feature's area if all of
-  // N_tau(v) is in it.
+  // N_tau(v) is in it. (Shrinking the components of an area one by one gives the same stations as shrinking
+  // the area.)
   Shrinker shrinker(reduced.neighbours);
+  ComponentFinder finder(reduced.neighbours);
   IndexLists shrunk;
+  std::vector<FeatureIdx> original;
   std::vector<int> set_sizes(num_stations, 0);
-  const std::vector<FeatureIdx> order = ShuffledFeatures(world.num_features(), seed);
-  int64_t num_incidences = 0;
-  for (const std::vector<StationIdx>& area : world.areas) num_incidences += static_cast<int64_t>(area.size());
-  if (tau == 0) shrunk.Reserve(num_incidences);
+  if (tau == 0) shrunk.Reserve(NumIncidences(world));
   std::vector<StationIdx> area;
-  for (const FeatureIdx feature : order) {
-    area = world.areas[feature];
+  IndexLists whole;
+  const auto shrink = [&](FeatureIdx feature) {
     shrinker.Shrink(&area, tau);
     for (const StationIdx station : area) ++set_sizes[station];
     shrunk.Append(area);
+    original.push_back(feature);
+  };
+  for (const FeatureIdx feature : ShuffledFeatures(world.num_features(), seed)) {
+    if (split == AreaSplit::kAfterShrinking) {
+      area = world.areas[feature];
+      shrink(feature);
+      continue;
+    }
+    for (std::vector<StationIdx>& component : finder.Components(world.areas[feature])) {
+      whole.Append(component);
+      area.swap(component);
+      shrink(feature);
+    }
   }
 
   // [Sala06 §V-A] Only stations that see k features are to be covered; no region can contain another.
@@ -229,21 +248,27 @@ ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed) {
   }
 
   // [Sala06 §V-C] Each component of an area becomes the area of a feature of its own.
-  ComponentFinder finder(reduced.neighbours);
   reduced.areas.Reserve(shrunk.num_values());
-  for (size_t i = 0; i < order.size(); ++i) {
+  for (int i = 0; i < shrunk.size(); ++i) {
     area.clear();
-    for (const StationIdx station : shrunk[static_cast<int>(i)]) {
+    for (const StationIdx station : shrunk[i]) {
       if (reduced.coverable[station]) area.push_back(station);
+    }
+    if (split == AreaSplit::kBeforeShrinking) {
+      if (area.empty()) continue;
+      reduced.areas.Append(area);
+      reduced.whole_areas.Append(whole[i]);
+      reduced.original.push_back(original[i]);
+      continue;
     }
     if (finder.NumComponents(area) == 1) {  // the usual case
       reduced.areas.Append(area);
-      reduced.original.push_back(order[i]);
+      reduced.original.push_back(original[i]);
       continue;
     }
     for (const std::vector<StationIdx>& component : finder.Components(area)) {
       reduced.areas.Append(component);
-      reduced.original.push_back(order[i]);
+      reduced.original.push_back(original[i]);
     }
   }
   reduced.sets = reduced.areas.Transposed(num_stations);

@@ -48,12 +48,20 @@ struct ReducedWorld {
   std::vector<FeatureIdx> original;  // per reduced feature: the world's feature; several may share one
   std::vector<char> coverable;       // per station
   int num_coverable = 0;
-  int max_set_size = 0;             // largest |F'_v|, before uncoverable stations were removed,
+  IndexLists whole_areas;  // AreaSplit::kBeforeShrinking: per reduced feature, its area before it shrank
+  int max_set_size = 0;    // largest |F'_v|, before uncoverable stations were removed,
   StationIdx max_set_station = -1;  // and the station that has it
   int num_stations() const { return neighbours.size(); }
 };
+// When areas are split into components.  kAfterShrinking: every reduced area is connected.  kBeforeShrinking:
+// areas are split as they are and may fall apart when they shrink: then every connected region R whose
+// stations all see k features lies in the whole areas of k reduced features, and the stations it covers, { v
+// : N_tau(v) inside of R }, lie in their shrunk areas, also where these stations are not connected though R
+// is.
+enum class AreaSplit { kAfterShrinking, kBeforeShrinking };
 // O(incidences * degree * tau).
-ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed);
+ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed,
+                         AreaSplit split = AreaSplit::kAfterShrinking);
 
 // Finds connected parts of station sets; keeps scratch memory of the graph's size between calls.  Joins runs
 // of stations with consecutive numbers, of which a lattice that is numbered row by row has few.

@@ -13,7 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const char* const kAlgorithms[] = {"a1", "a2", "a3", "b1", "b2", "c"};
+const char* const kAlgorithms[] = {"a1", "a2", "a3", "b1", "b2", "c", "best"};
 
 // Seven stations in a row:        0 1 2 3 4 5 6
 // feature 0 is seen from          # # # # . . .
@@ -197,7 +197,8 @@ TEST(DecomposeRegions, EveryAlgorithmKeepsEveryPropertyOnRandomWorlds) {
     const World world = RandomWorld(12, 9, 60, seed % 2 == 1, seed);
     ASSERT_TRUE(CheckWorld(world).ok());
     for (const char* algorithm : kAlgorithms) {
-      DecomposeRegionsOptions options{.algorithm = algorithm, .k = 1 + static_cast<int>(seed % 4)};
+      if (algorithm == std::string("best") && seed % 7 > 1) continue;  // it takes longest
+      DecomposeRegionsOptions options{.algorithm = algorithm, .k = 1 + static_cast<int>(seed % 5 % 4)};
       options.tau = static_cast<int>(seed % 3);
       options.rho = seed % 5 == 0 ? 0 : 2;
       const Result<Decomposition> result = DecomposeRegions(world, options, seed);

@@ -1,0 +1,22 @@
+#include "stages/decompose_regions/region_pool.h"
+
+#include <utility>
+
+#include "core/random.h"
+
+namespace cairn {
+
+bool RegionPool::Add(CoreRegion region) {
+  uint64_t hash = 0;
+  for (const StationIdx station : region.stations) hash = MixSeed(hash, static_cast<uint64_t>(station));
+  const auto [begin, end] = by_hash_.equal_range(hash);
+  for (auto entry = begin; entry != end; ++entry) {
+    if (regions_[entry->second].stations == region.stations) return false;
+  }
+  by_hash_.emplace(hash, size());
+  for (const StationIdx station : region.stations) regions_at_[station].push_back(size());
+  regions_.push_back(std::move(region));
+  return true;
+}
+
+}  // namespace cairn

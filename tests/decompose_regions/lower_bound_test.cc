@@ -1,0 +1,191 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/random.h"
+#include "stages/decompose_regions/algorithm_best.h"
+#include "stages/decompose_regions/check_regions.h"
+#include "stages/decompose_regions/core_finder.h"
+#include "stages/decompose_regions/counting_bound.h"
+#include "stages/decompose_regions/decompose_regions.h"
+#include "stages/decompose_regions/pricing.h"
+#include "tests/decompose_regions/all_regions.h"
+#include "tests/decompose_regions/ascii_world.h"
+
+namespace cairn {
+namespace {
+
+using testing::IsEmpty;
+
+// Path, cycle, star, 3 x 3 grid, two separate paths, or a random graph, of nine stations.
+std::vector<std::pair<StationIdx, StationIdx>> Edges(int shape, Random* random) {
+  std::set<std::pair<StationIdx, StationIdx>> edges;
+  for (StationIdx v = 1; v < 9; ++v) {
+    if (shape == 2) edges.emplace(0, v);
+    if (shape == 3 && v % 3 != 0) edges.emplace(v - 1, v);
+    if (shape == 3 && v >= 3) edges.emplace(v - 3, v);
+    if (shape <= 1 || (shape == 4 && v != 5)) edges.emplace(v - 1, v);
+    if (shape == 5) edges.emplace(static_cast<StationIdx>(random->UniformInt(0, v - 1)), v);
+  }
+  if (shape == 1) edges.emplace(0, 8);
+  for (int i = 0; shape == 5 && i < 4; ++i) {
+    const auto u = static_cast<StationIdx>(random->UniformInt(0, 7));
+    edges.emplace(u, static_cast<StationIdx>(random->UniformInt(u + 1, 8)));
+  }
+  return {edges.begin(), edges.end()};
+}
+
+// Nine stations and seven features whose areas are intervals of station numbers with or without holes, or
+// anything.
+World SmallWorld(uint64_t seed) {
+  Random random(MixSeed(7, seed));
+  World world;
+  for (int v = 0; v < 9; ++v) world.positions.emplace_back(v % 3, v / 3);
+  world.edges = Edges(static_cast<int>(seed % 6), &random);
+  const double density = random.Uniform(0.5, 1.0);
+  for (int feature = 0; feature < 7; ++feature) {
+    std::vector<StationIdx>& area = world.areas.emplace_back();
+    const int64_t first = random.UniformInt(-4, 5), last = first + random.UniformInt(3, 9);
+    for (StationIdx v = 0; v < 9; ++v) {
+      const bool inside = seed % 2 == 0 || (v >= first && v <= last);
+      if (inside && random.Uniform() < density) area.push_back(v);
+    }
+  }
+  return world;
+}
+
+constexpr int kNumWorlds = 600;
+int KOf(uint64_t seed) { return 1 + static_cast<int>(seed / 6 % 4); }
+int TauOf(uint64_t seed) { return static_cast<int>(seed / 24 % 3); }
+int RhoOf(uint64_t seed) { return static_cast<int>(seed / 72 % 4); }
+
+TEST(LowerBound, NeverExceedsTheOptimumNorTheRegions) {
+  int num_results = 0, num_best = 0, num_best_optimal = 0, num_tight = 0;
+  for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
+    const World world = SmallWorld(seed);
+    ASSERT_TRUE(CheckWorld(world).ok());
+    const AllRegions all(world, KOf(seed), TauOf(seed));
+    for (const char* algorithm : {"a3", "b2", "best"}) {
+      for (const char* bound : {"certified", "counted"}) {
+        const DecomposeRegionsOptions options{.algorithm = algorithm,
+                                              .k = KOf(seed),
+                                              .tau = TauOf(seed),
+                                              .rho = RhoOf(seed),
+                                              .lower_bound = bound};
+        const Result<Decomposition> result = DecomposeRegions(world, options, seed);
+        if (!result.ok()) continue;
+        ASSERT_THAT(CheckRegions(world, *result).violations, IsEmpty()) << algorithm << " seed " << seed;
+        const int num_regions = static_cast<int>(result->regions.size());
+        const int optimum = all.Fewest(static_cast<int>(result->uncovered.size()));
+        ASSERT_LE(*result->lower_bound, optimum) << algorithm << " " << bound << " seed " << seed;
+        ASSERT_LE(optimum, num_regions) << algorithm << " seed " << seed;
+        ++num_results;
+        if (options.algorithm != "best" || options.lower_bound != "certified") continue;
+        ++num_best;
+        num_best_optimal += num_regions == optimum;
+        num_tight += *result->lower_bound == optimum;
+      }
+    }
+  }
+  RecordProperty("best", num_best);
+  RecordProperty("best_optimal", num_best_optimal);
+  RecordProperty("tight", num_tight);
+  EXPECT_GE(num_results, 1000);
+  EXPECT_GE(num_best_optimal, num_best * 95 / 100) << num_best;
+  EXPECT_GE(num_tight, num_best * 80 / 100) << num_best;
+}
+
+TEST(LowerBound, HoldsForEveryNumberOfUncoveredStations) {
+  for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
+    const World world = SmallWorld(seed);
+    const AllRegions all(world, KOf(seed), TauOf(seed));
+    const DecomposeRegionsOptions options{.algorithm = "b2", .k = KOf(seed), .tau = TauOf(seed), .rho = 0};
+    Result<Decomposition> result = DecomposeRegions(world, options, seed);
+    if (!result.ok()) continue;
+    const ReducedWorld reduced = ReduceWorld(world, options.k, options.tau, seed);
+    for (int max_uncovered = 0; max_uncovered <= 3; ++max_uncovered) {
+      result->uncovered.assign(max_uncovered, 0);
+      const int optimum = all.Fewest(max_uncovered);
+      ASSERT_LE(CertifiedLowerBound(world, *result), optimum) << "seed " << seed;
+      ASSERT_LE(CountingBound(reduced, max_uncovered), optimum) << "seed " << seed;
+    }
+  }
+}
+
+//   0 1 2 3 4 5 6    The row sees the feature, the niche 7 does not.  With tau = 1 station 3 is not
+//   coverable, but a
+//         7          region may pass through it: the row is one region, which covers 0 1 2 and 4 5 6.
+TEST(LowerBound, RegionMayCoverStationsThatAreNotConnected) {
+  const World world = AsciiWorld({"ooooooo", "...o..."}, {{"#######", "......."}});
+  for (const char* algorithm : {"b2", "best"}) {
+    const Result<Decomposition> result =
+        DecomposeRegions(world, {.algorithm = algorithm, .k = 1, .tau = 1, .rho = 0}, 0);
+    ASSERT_TRUE(result.ok());
+    ASSERT_THAT(CheckRegions(world, *result).violations, IsEmpty());
+    EXPECT_EQ(result->regions.size(), algorithm == std::string("best") ? 1 : 2);
+    EXPECT_EQ(*result->lower_bound, 1);
+  }
+}
+
+TEST(RegionPricer, FindsTheMostValuableRegionOfAll) {
+  for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
+    const World world = SmallWorld(seed);
+    const ReducedWorld wide = ReduceWorld(world, KOf(seed), TauOf(seed), seed, AreaSplit::kBeforeShrinking);
+    Random random(seed);
+    StationValues values(9, 0);
+    for (StationIdx v = 0; v < 9; ++v) {
+      if (wide.coverable[v]) values[v] = random.UniformInt(0, 5);
+    }
+    const AllRegions all(world, KOf(seed), TauOf(seed));
+    int64_t most = 0;
+    for (const uint32_t cover : all.covers()) {
+      int64_t value = 0;
+      for (int v = 0; v < 9; ++v) value += cover >> v & 1 ? values[v] : 0;
+      most = std::max(most, value);
+    }
+    RegionPricer pricer(wide);
+    std::vector<CoreRegion> found;
+    EXPECT_EQ(pricer.MaxValue(values, 0, 1000000, 1000, &found), most) << "seed " << seed;
+    int64_t most_found = 0;
+    for (const CoreRegion& region : found) {
+      int64_t value = 0;
+      for (const StationIdx station : region.stations) value += values[station];
+      most_found = std::max(most_found, value);
+    }
+    EXPECT_EQ(most_found, most) << "seed " << seed;
+    // Cut short it still is an upper bound.
+    for (const int64_t max_work : {0, 10, 30, 100}) {
+      EXPECT_GE(pricer.MaxValue(values, 0, max_work, 1000, &found), most) << "seed " << seed;
+    }
+    EXPECT_GE(pricer.MaxValue(values, most / 2, 1000000, 1000, &found), most) << "seed " << seed;
+  }
+}
+
+TEST(Best, NeedsNoMoreRegionsThanB2AndLeavesNoMoreUncovered) {
+  for (uint64_t seed = 0; seed < 12; ++seed) {
+    const World world = RandomWorld(12, 10, 50, seed % 3 == 0, seed);
+    DecomposeRegionsOptions options{.algorithm = "b2", .k = 1 + static_cast<int>(seed % 5)};
+    options.tau = static_cast<int>(seed % 3);
+    options.rho = static_cast<int>(seed % 4);
+    const Result<Decomposition> b2 = DecomposeRegions(world, options, seed);
+    if (!b2.ok()) continue;
+    options.algorithm = "best";
+    const Result<Decomposition> best = DecomposeRegions(world, options, seed);
+    ASSERT_TRUE(best.ok());
+    EXPECT_LE(best->regions.size(), b2->regions.size());
+    EXPECT_LE(best->uncovered.size(), b2->uncovered.size());
+    EXPECT_LE(*best->lower_bound, static_cast<int>(best->regions.size()));
+  }
+}
+
+TEST(Best, LargeWorldsGetB2AndTheCountedBound) {
+  const World world = RandomWorld(14, 12, 70, false, 1);
+  const Result<Decomposition> b2 = DecomposeRegions(world, {.algorithm = "b2", .k = 3, .tau = 0}, 1);
+  const Result<Decomposition> best =
+      DecomposeRegions(world, {.algorithm = "best", .k = 3, .tau = 0, .best_max_stations = 20}, 1);
+  ASSERT_TRUE(b2.ok() && best.ok());
+  ASSERT_EQ(best->regions.size(), b2->regions.size());
+  EXPECT_EQ(best->lower_bound, b2->lower_bound);
+}
+
+}  // namespace
+}  // namespace cairn
