@@ -9,7 +9,7 @@ PREFIX ?= /usr/local
 # Debian 12 packages: what the build needs, what the tests and benchmarks run beside it, what checks the style.
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
-    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev \
+    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev \
     libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap jq python3 clang-format clang-tidy
 # Turns the demo's picture into PNG; nothing fails without it.
 OPTIONAL_PACKAGES := librsvg2-bin

@@ -32,9 +32,10 @@ bool HasImageSuffix(const fs::path& path) {
 std::vector<std::string> ListImages(const std::string& folder) {
   std::vector<std::string> names;
   std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (it->is_regular_file(error) && HasImageSuffix(it->path())) {
-      // Not fs::relative: it would follow links.
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+  for (; !error && it != end; it.increment(error)) {
+    std::error_code type_error;  // a broken link does not end the list
+    if (it->is_regular_file(type_error) && HasImageSuffix(it->path())) {
       names.push_back(it->path().lexically_relative(folder).generic_string());
     }
   }
@@ -56,7 +57,7 @@ std::string StripCarriageReturn(std::string line) {
 
 // Fields MODEL WIDTH HEIGHT PARAMS... from words[first] on.
 Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t first) {
-  if (words.size() < first + 4) {
+  if (words.size() < first + 3) {
     return MakeError(ErrorCode::kCorrupt, "expected MODEL WIDTH HEIGHT PARAMS, found {} fields",
                      words.size() - first);
   }
@@ -76,6 +77,9 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
     }
     camera.params.push_back(param);
   }
+  // Some programs repeat a panorama's size as its parameters.
+  const bool repeats_size = camera.params == std::vector<double>{double(width), double(height)};
+  if (camera.model == CameraModel::kEquirectangular && repeats_size) camera.params.clear();
   CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
   return camera;
 }
@@ -114,11 +118,17 @@ Status ReadFlatFolder(Capture* capture) {
 }
 
 // Moves images without a file, or with a camera that cameras.txt lacks, to the rejects.
-void RejectUnusable(Capture* capture, const std::set<std::string>& files, std::vector<CaptureImage>* images) {
+void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
   std::erase_if(*images, [&](const CaptureImage& image) {
     std::string reason;
-    if (files.count(image.name) == 0) {
-      reason = fmt::format("{}: no such file, but the image list names it", capture->ImagePath(image));
+    std::error_code error;
+    const std::string path = capture->ImagePath(image);
+    if (!fs::exists(path, error)) {
+      reason = fs::is_symlink(fs::symlink_status(path, error))
+                   ? fmt::format("{}: a link to a file that does not exist", path)
+                   : fmt::format("{}: no such file, but the image list names it", path);
+    } else if (!fs::is_regular_file(path, error)) {
+      reason = fmt::format("{}: not a file, but the image list names it", path);
     } else if (capture->cameras.count(image.camera_id) == 0) {
       reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
     }
@@ -126,19 +136,6 @@ void RejectUnusable(Capture* capture, const std::set<std::string>& files, std::v
     capture->rejects.push_back({image.name, reason});
     return true;
   });
-}
-
-// Sorts by name and moves all but the first of equal names to the rejects.
-void SortByName(std::vector<CaptureImage>* images, std::vector<Reject>* rejects) {
-  std::stable_sort(images->begin(), images->end(),
-                   [](const auto& a, const auto& b) { return a.name < b.name; });
-  const auto end =
-      std::unique(images->begin(), images->end(), [&](const CaptureImage& a, const CaptureImage& b) {
-        if (a.name != b.name) return false;
-        rejects->push_back({b.name, "listed twice; the first entry is used"});
-        return true;
-      });
-  images->erase(end, images->end());
 }
 
 }  // namespace
@@ -214,7 +211,14 @@ Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::v
     }
     follows_image = true;
   }
-  SortByName(&images, rejects);
+  const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
+  std::stable_sort(images.begin(), images.end(), by_name);
+  const auto twice = std::adjacent_find(images.begin(), images.end(),
+                                        [](const auto& a, const auto& b) { return a.name == b.name; });
+  if (twice != images.end()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: lists '{}' twice; which pose is right? remove one", path,
+                     twice->name);
+  }
   return images;
 }
 
@@ -256,7 +260,6 @@ Result<Capture> ReadCapture(const std::string& root) {
     }
     const std::vector<std::string> names = ListImages(capture.images_folder);
     std::set<std::string> unlisted(names.begin(), names.end());
-    const std::set<std::string> files = unlisted;
     for (const CaptureImage& image : capture.images) unlisted.erase(image.name);
     for (const CaptureImage& image : capture.queries) unlisted.erase(image.name);
     for (const Reject& reject : capture.rejects) unlisted.erase(reject.name);
@@ -264,8 +267,8 @@ Result<Capture> ReadCapture(const std::string& root) {
       capture.warnings.push_back(
           fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture.images_folder, name));
     }
-    RejectUnusable(&capture, files, &capture.images);
-    RejectUnusable(&capture, files, &capture.queries);
+    RejectUnusable(&capture, &capture.images);
+    RejectUnusable(&capture, &capture.queries);
   }
   if (capture.images.empty()) {
     const std::string first = capture.rejects.empty()

@@ -1,11 +1,16 @@
 #include "core/image_file.h"
 
+#include <limits>
+
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
 
 namespace cairn {
 namespace {
+
+// OpenCV counts an image file's bytes in an int.
+constexpr size_t kMaxBytes = std::numeric_limits<int>::max();
 
 // Whether a JPEG's end-of-image marker follows its compressed data.  Walks the markers [ITU T.81 §B.1.1]: a
 // thumbnail's own end marker lies inside of an APP1 segment and does not count.
@@ -37,18 +42,45 @@ bool JpegIsComplete(std::string_view bytes) {
 
 bool PngIsComplete(std::string_view bytes) { return bytes.rfind("IEND") != std::string_view::npos; }
 
+// Little-endian length in the header of a RIFF file, which counts from its byte 8 on.
+size_t RiffLength(std::string_view bytes) {
+  size_t length = 0;
+  for (int i = 3; i >= 0; --i) length = length << 8 | static_cast<unsigned char>(bytes[4 + i]);
+  return length + 8;
+}
+
+// What is known to be wrong with a file before its decoder sees it; "" if nothing.
+std::string FindDefect(std::string_view bytes) {
+  if (bytes.empty()) return "zero bytes, expected an image";
+  if (bytes.size() > kMaxBytes) {
+    return fmt::format("{} bytes, at most {} are read; save it with compression", bytes.size(), kMaxBytes);
+  }
+  if (bytes.starts_with("\xFF\xD8") && !JpegIsComplete(bytes)) {
+    return fmt::format("truncated JPEG: {} bytes without an end-of-image marker; copy it again",
+                       bytes.size());
+  }
+  if (bytes.starts_with("\x89PNG") && !PngIsComplete(bytes)) {
+    return fmt::format("truncated PNG: {} bytes without an IEND chunk; copy it again", bytes.size());
+  }
+  if (bytes.starts_with("GIF8")) return "a GIF, which is not read; save its first frame as PNG";
+  if (bytes.size() >= 12 && bytes.starts_with("RIFF") && bytes.substr(8, 4) == "WEBP") {
+    if (RiffLength(bytes) > bytes.size()) {
+      return fmt::format("truncated WebP: {} of {} bytes; copy it again", bytes.size(), RiffLength(bytes));
+    }
+    constexpr size_t kFlags = 20;  // of the VP8X chunk
+    constexpr char kIsAnimated = 0x02;
+    if (bytes.size() > kFlags && bytes.substr(12, 4) == "VP8X" && (bytes[kFlags] & kIsAnimated) != 0) {
+      return "an animated WebP, which is not read; save its first frame as PNG";
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path) {
-  if (bytes.empty()) return MakeError(ErrorCode::kCorrupt, "{}: zero bytes, expected an image", path);
-  if (bytes.starts_with("\xFF\xD8") && !JpegIsComplete(bytes)) {
-    return MakeError(ErrorCode::kCorrupt,
-                     "{}: truncated JPEG: {} bytes without an end-of-image marker; copy it again", path,
-                     bytes.size());
-  }
-  if (bytes.starts_with("\x89PNG") && !PngIsComplete(bytes)) {
-    return MakeError(ErrorCode::kCorrupt, "{}: truncated PNG: {} bytes without an IEND chunk; copy it again",
-                     path, bytes.size());
+  if (const std::string defect = FindDefect(bytes); !defect.empty()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: {}", path, defect);
   }
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));

@@ -7,9 +7,13 @@
 #include <vector>
 
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace cairn {
 namespace {
+
+// OpenCV's SIFT keeps 5 pixels of the doubled image away from its border.
+constexpr int kMinImageSide = 6;
 
 // RootSIFT [Arandjelovic & Zisserman 2012], quantised as COLMAP's FeatureDescriptorsToUnsignedByte.
 void RootSiftRow(const float* sift, uint8_t* row) {
@@ -21,6 +25,25 @@ void RootSiftRow(const float* sift, uint8_t* row) {
   }
 }
 
+// Features of the image made smaller by `ratio`, in the pixels of the whole one.  With pixels counted from
+// the image's corner, a position in one is a multiple of that in the other.
+Result<Features> ExtractFromSmaller(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask,
+                                    double ratio) {
+  const cv::Size size(std::max(1, cvRound(ratio * grey.cols)), std::max(1, cvRound(ratio * grey.rows)));
+  cv::Mat small, small_mask;
+  cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
+  if (!mask.empty()) cv::resize(mask, small_mask, size, 0, 0, cv::INTER_NEAREST);
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(small, options, small_mask));
+  const float x_scale = static_cast<float>(grey.cols) / static_cast<float>(size.width);
+  const float y_scale = static_cast<float>(grey.rows) / static_cast<float>(size.height);
+  for (Keypoint& keypoint : features.keypoints) {
+    keypoint.x *= x_scale;
+    keypoint.y *= y_scale;
+    keypoint.scale *= std::sqrt(x_scale * y_scale);
+  }
+  return features;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(SiftOptions* options) {
@@ -29,6 +52,11 @@ OptionTable DescribeOptions(SiftOptions* options) {
            .help = "most features per image; the strongest are kept",
            .min = 1,
            .max = 1000000},
+          {.name = "max_image_side_px",
+           .value = &options->max_image_side_px,
+           .help = "images with a longer side are made smaller before features are sought, pixels",
+           .min = 64,
+           .max = 65536},
           {.name = "contrast_threshold",
            .value = &options->contrast_threshold,
            .help = "least contrast of an extremum, grey levels / 255",
@@ -63,6 +91,12 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   }
   Features features;
   features.descriptors.resize(0, kDescriptorDim);
+  if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
+  const int longer_side = std::max(grey.cols, grey.rows);
+  if (longer_side > options.max_image_side_px) {
+    return ExtractFromSmaller(grey, options, mask,
+                              static_cast<double>(options.max_image_side_px) / longer_side);
+  }
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   try {

@@ -63,6 +63,13 @@ Localization Failure(NoFix reason, std::string message) {
   return localization;
 }
 
+Status CheckQueryCamera(const Camera& camera) {
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  if (camera.model != CameraModel::kEquirectangular) return Ok();
+  return MakeError(ErrorCode::kUnsupported,
+                   "localize: a panorama is not localized as a whole; cut it into pinhole views first");
+}
+
 }  // namespace
 
 // A set of landmarks to match.
@@ -116,7 +123,7 @@ Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& opt
 
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
                                          const std::optional<PosePrior>& prior) {
-  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
   if (grey.cols != camera.width || grey.rows != camera.height) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
@@ -128,7 +135,7 @@ Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& came
 
 Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
                                                  const std::optional<PosePrior>& prior) {
-  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
   if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
     return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
                      features.keypoints.size(), features.descriptors.rows());

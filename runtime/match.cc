@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/descriptor_matcher.h"
+#include "core/pixel_ray.h"
 
 namespace cairn {
 namespace {
@@ -156,7 +157,7 @@ std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
     const uint8_t* descriptor = map.rows().descriptors.row(landmark_idx).data();
     std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
     grid.VisitNear(*pixel, options.guided_radius_px, [&](KeypointIdx i) {
-      if (!ScaleFits(query.features.keypoints[i], landmark, point.z(), focal_px,
+      if (!ScaleFits(query.features.keypoints[i], landmark, DepthOfScale(query.camera, point), focal_px,
                      options.guided_max_scale_ratio))
         return;
       const int32_t dot = Dot(query.features.descriptors.row(i).data(), descriptor);

@@ -5,6 +5,8 @@
 #include <map>
 #include <tuple>
 
+#include "core/pixel_ray.h"
+
 namespace cairn {
 namespace {
 
@@ -86,8 +88,10 @@ double MeanScaleM(const FeatureClass& feature_class, const std::map<ImageId, con
     const auto image = images.find(observation.image_id);
     if (image == images.end()) continue;
     const auto camera = cameras.find(image->second->camera_id);
-    const double depth = (image->second->cam_from_world * feature_class.position).z();
-    if (camera == cameras.end() || depth <= 0) continue;
+    if (camera == cameras.end()) continue;
+    const double depth =
+        DepthOfScale(*camera->second, image->second->cam_from_world * feature_class.position);
+    if (depth <= 0) continue;
     sum += static_cast<double>(observation.keypoint.scale) * depth / camera->second->MeanFocal();
     ++count;
   }

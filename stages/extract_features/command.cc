@@ -17,12 +17,23 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
+// A file name as Make reads it.
+std::string EscapeForMake(const std::string& name) {
+  std::string escaped;
+  for (const char c : name) {
+    if (c == ' ' || c == '#' || c == ':') escaped += '\\';
+    if (c == '$') escaped += '$';
+    escaped += c;
+  }
+  return escaped;
+}
+
 // A rule for Make: the output depends on every input; inputs that vanish do not stop it.
 std::string DependencyRule(const std::string& target, const std::vector<std::string>& inputs) {
   std::string rule = target + ":";
-  for (const std::string& input : inputs) rule += " \\\n  " + input;
+  for (const std::string& input : inputs) rule += " \\\n  " + EscapeForMake(input);
   rule += "\n";
-  for (const std::string& input : inputs) rule += input + ":\n";
+  for (const std::string& input : inputs) rule += EscapeForMake(input) + ":\n";
   return rule;
 }
 
@@ -40,8 +51,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.depfile, DependencyRule(target, summary.inputs)));
   }
   *environment.out << fmt::format(
-      "extract_features: {} images, {} keypoints ({:.0f} an image), {} rejected\n", summary.num_images,
-      summary.num_keypoints, static_cast<double>(summary.num_keypoints) / summary.num_images,
+      "extract_features: {} images, {} keypoints ({:.0f} an image), {} rejected\n", summary.num_views,
+      summary.num_keypoints, static_cast<double>(summary.num_keypoints) / summary.num_views,
       summary.rejects.size());
   return Ok();
 }

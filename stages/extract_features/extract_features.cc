@@ -23,10 +23,16 @@ CREATE TABLE cairn_images (image_id INTEGER PRIMARY KEY NOT NULL, content_hash T
 CREATE TABLE cairn_rejects (name TEXT NOT NULL, reason TEXT NOT NULL);
 )sql";
 
-// What one image gave: features, or the reason why not.
+// One image of the database.
+struct View {
+  std::string name;
+  Features features;
+};
+
+// What one image file gave: its views (several for a panorama), or the reason why not.
 struct Extraction {
   std::string content_hash;
-  Features features;
+  std::vector<View> views;
   std::optional<std::string> reject_reason;
 };
 
@@ -41,8 +47,29 @@ std::string FindMask(const std::string& masks, const std::string& name) {
   return "";
 }
 
-Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image, const SiftOptions& options,
-                                const std::string& mask_path) {
+Result<std::vector<View>> ExtractPanorama(const std::string& name, const cv::Mat& grey, const cv::Mat& mask,
+                                          const Camera& camera, const ExtractFeaturesOptions& options) {
+  if (!mask.empty() && mask.size() != grey.size()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "a mask of {} x {} px does not fit the panorama of {} x {} px", mask.cols, mask.rows,
+                     grey.cols, grey.rows);
+  }
+  const Camera view_camera = PanoramaViewCamera(camera, options.panorama);
+  const int num_views = options.panorama.num_panorama_views;
+  std::vector<View> views;
+  for (int view = 0; view < num_views; ++view) {
+    cv::Mat view_mask;
+    if (!mask.empty()) view_mask = CutPanoramaView(mask, view_camera, view, num_views) == 255;
+    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(CutPanoramaView(grey, view_camera, view, num_views),
+                                                          options.sift, view_mask));
+    KeepSectorOfView(view_camera, num_views, &features);
+    views.push_back({PanoramaViewName(name, view, num_views), std::move(features)});
+  }
+  return views;
+}
+
+Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
+                                const ExtractFeaturesOptions& options, const std::string& mask_path) {
   Extraction extraction;
   const std::string path = capture.ImagePath(image);
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
@@ -57,14 +84,22 @@ Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& imag
   if (!mask_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(mask, ReadGreyImage(mask_path));
   }
-  CAIRN_ASSIGN_OR_RETURN(extraction.features, ExtractSift(grey, options, mask));
+  if (camera.model == CameraModel::kEquirectangular) {
+    CAIRN_ASSIGN_OR_RETURN(extraction.views, ExtractPanorama(image.name, grey, mask, camera, options));
+  } else {
+    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options.sift, mask));
+    extraction.views.push_back({image.name, std::move(features)});
+  }
   return extraction;
 }
 
 Status WriteAll(const Capture& capture, const ExtractFeaturesOptions& options, const std::string& masks,
                 int num_threads, Progress& progress, ExtractFeaturesSummary* summary,
                 SQLite::Database& database) {
-  for (const auto& [camera_id, camera] : capture.cameras) WriteDatabaseCamera(database, camera);
+  for (const auto& [camera_id, camera] : capture.cameras) {
+    const bool is_panorama = camera.model == CameraModel::kEquirectangular;
+    WriteDatabaseCamera(database, is_panorama ? PanoramaViewCamera(camera, options.panorama) : camera);
+  }
   database.exec(kOwnSchema);
   SQLite::Statement hash_row(database, "INSERT INTO cairn_images VALUES (?, ?)");
   const auto num_images = static_cast<int64_t>(capture.images.size());
@@ -75,7 +110,7 @@ Status WriteAll(const Capture& capture, const ExtractFeaturesOptions& options, c
     ParallelFor(size, num_threads, [&](int64_t i) {
       if (progress.Cancelled()) return;
       const CaptureImage& image = capture.images[begin + i];
-      Result<Extraction> extraction = ExtractImage(capture, image, options.sift, FindMask(masks, image.name));
+      Result<Extraction> extraction = ExtractImage(capture, image, options, FindMask(masks, image.name));
       if (extraction.ok()) {
         batch[i] = std::move(*extraction);
       } else {
@@ -90,15 +125,18 @@ Status WriteAll(const Capture& capture, const ExtractFeaturesOptions& options, c
         summary->rejects.push_back({image.name, *batch[i].reject_reason});
         continue;
       }
-      const ImageId image_id = next_id++;
-      WriteDatabaseImage(database, {image_id, image.name, image.camera_id});
-      WriteDatabaseFeatures(database, image_id, batch[i].features);
-      hash_row.bind(1, image_id);
-      hash_row.bind(2, batch[i].content_hash);
-      hash_row.exec();
-      hash_row.reset();
+      for (const View& view : batch[i].views) {
+        const ImageId image_id = next_id++;
+        WriteDatabaseImage(database, {image_id, view.name, image.camera_id});
+        WriteDatabaseFeatures(database, image_id, view.features);
+        hash_row.bind(1, image_id);
+        hash_row.bind(2, batch[i].content_hash);
+        hash_row.exec();
+        hash_row.reset();
+        summary->num_views++;
+        summary->num_keypoints += static_cast<int64_t>(view.features.keypoints.size());
+      }
       summary->num_images++;
-      summary->num_keypoints += static_cast<int64_t>(batch[i].features.keypoints.size());
     }
   }
   std::stable_sort(summary->rejects.begin(), summary->rejects.end(),
@@ -121,6 +159,7 @@ Status WriteAll(const Capture& capture, const ExtractFeaturesOptions& options, c
 
 OptionTable DescribeOptions(ExtractFeaturesOptions* options) {
   OptionTable table = DescribeOptions(&options->sift);
+  for (OptionTable::value_type& option : DescribeOptions(&options->panorama)) table.push_back(option);
   table.push_back(
       {.name = "masks",
        .value = &options->masks,
@@ -134,6 +173,7 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
   const std::string masks = options.masks.empty() || fs::path(options.masks).is_absolute()
                                 ? options.masks
                                 : (fs::path(capture.root) / options.masks).string();
+  CAIRN_RETURN_IF_ERROR(CheckPanoramaOptions(options.panorama));
   std::error_code error;
   if (!masks.empty() && !fs::is_directory(masks, error)) {
     return MakeError(ErrorCode::kNotFound, "option masks: {} is not a folder", masks);

@@ -6,6 +6,7 @@
 #include "core/capture.h"
 #include "core/error.h"
 #include "core/options.h"
+#include "core/panorama.h"
 #include "core/progress.h"
 #include "core/sift.h"
 
@@ -17,15 +18,20 @@ namespace cairn {
 // Images get ids 1, 2, ... in the order of their names.  An image that cannot be read, or whose size is not
 // its camera's, is a listed reject; the rest goes on.  A mask MASKS/NAME.png (or MASKS/NAME with its suffix
 // replaced) of the image's size switches pixels off where it is zero.
+//
+// A panorama (camera EQUIRECTANGULAR) becomes pinhole views with the names NAME#0of6, NAME#1of6, ... and one
+// camera that bears the panorama's id; each keypoint is in the one view whose axis is nearest.
 struct ExtractFeaturesOptions {
   SiftOptions sift;
+  PanoramaOptions panorama;
   // Folder of masks, absolute or relative to the capture; empty: none.
   std::string masks;
 };
 OptionTable DescribeOptions(ExtractFeaturesOptions* options);
 
 struct ExtractFeaturesSummary {
-  int num_images = 0;
+  int num_images = 0;  // files that were read
+  int num_views = 0;   // images in the database: more where there are panoramas
   int64_t num_keypoints = 0;
   std::vector<Reject> rejects;  // those of the capture and those found here, ascending by name
   // Every file that was read, for a dependency file: images, masks, lists.
@@ -33,8 +39,9 @@ struct ExtractFeaturesSummary {
 };
 
 // Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
-// cairn_rejects. Memory: features of all images of one batch (64 images).  Same bytes for any number of
-// threads. Errors: NoData when no image is left; Io; Cancelled.
+// cairn_rejects. Memory: features of all images of one batch (64 images), and for each thread a pyramid of
+// SiftOptions::max_image_side_px.  Same bytes for any number of
+// threads. Errors: InvalidArgument for options, NoData when no image is left; Io; Cancelled.
 Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
                                                const std::string& features_path, int num_threads,
                                                Progress& progress);

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/database.h"
+#include "core/panorama.h"
 #include "core/parallel.h"
+#include "core/pixel_ray.h"
 #include "stages/group_classes/union_matches.h"
 
 namespace cairn {
@@ -15,8 +18,7 @@ struct PosedImages {
   std::vector<int> feature_idx;  // index into MatchedFeatures::images
   std::vector<const Camera*> cameras;
   std::vector<int> camera_idx;
-  std::vector<std::vector<Eigen::Vector2d>>
-      rays;  // per keypoint, by the unrefined camera; NaN where undefined
+  std::vector<std::vector<std::optional<PixelRay>>> rays;  // per keypoint, by the unrefined camera
   std::vector<Pose> stated;
   int num_images() const { return static_cast<int>(stated.size()); }
 };
@@ -28,19 +30,18 @@ PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& ca
   }
   PosedImages posed;
   for (size_t i = 0; i < matched.images.size(); ++i) {
-    const auto pose = poses.find(matched.images[i].name);
-    if (pose == poses.end()) continue;
+    const std::optional<Pose> pose = FindPose(poses, matched.images[i].name);
+    if (!pose) continue;
     posed.feature_idx.push_back(static_cast<int>(i));
     const auto camera = matched.cameras.find(matched.images[i].camera_id);
     posed.cameras.push_back(&camera->second);
     posed.camera_idx.push_back(static_cast<int>(std::distance(matched.cameras.begin(), camera)));
-    posed.stated.push_back(pose->second);
+    posed.stated.push_back(*pose);
   }
   posed.rays.resize(posed.num_images());
   ParallelFor(posed.num_images(), num_threads, [&](int64_t i) {
     for (const Keypoint& keypoint : matched.features[posed.feature_idx[i]].keypoints) {
-      const auto ray = CameraFromImage(*posed.cameras[i], Eigen::Vector2d(keypoint.x, keypoint.y));
-      posed.rays[i].push_back(ray.value_or(Eigen::Vector2d::Constant(std::nan(""))));
+      posed.rays[i].push_back(MakePixelRay(*posed.cameras[i], Eigen::Vector2d(keypoint.x, keypoint.y)));
     }
   });
   return posed;
@@ -63,6 +64,7 @@ std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages
     for (const Match& match : geometry.inliers) {
       const int32_t dot =
           descriptors1.row(match.idx1).cast<int32_t>().dot(descriptors2.row(match.idx2).cast<int32_t>());
+      if (!posed.rays[image1->second][match.idx1] || !posed.rays[image2->second][match.idx2]) continue;
       matches.push_back({{image1->second, match.idx1}, {image2->second, match.idx2}, dot});
     }
   }
@@ -81,8 +83,8 @@ std::vector<PosedRay> RaysOf(const Track& track, const PosedImages& posed, const
   for (const TrackElement& element : track) {
     const int i = element.image_idx;
     const double ratio = state.focal_ratios[posed.camera_idx[i]];
-    rays.push_back(
-        {state.poses[i], posed.rays[i][element.keypoint_idx] / ratio, posed.cameras[i]->MeanFocal() * ratio});
+    const PixelRay& ray = *posed.rays[i][element.keypoint_idx];
+    rays.push_back({state.poses[i], ratio == 1 ? ray : WithFocalRatio(ray, ratio)});
   }
   return rays;
 }
@@ -127,9 +129,8 @@ void Refine(const MatchedFeatures& matched, const std::vector<Track>& tracks,
     problem.points.push_back(triangulations[t].position);
     for (const int i : triangulations[t].inliers) {
       const TrackElement& element = tracks[t][i];
-      problem.observations.push_back({element.image_idx, point_idx,
-                                      posed.rays[element.image_idx][element.keypoint_idx],
-                                      posed.cameras[element.image_idx]->MeanFocal()});
+      problem.observations.push_back(
+          {element.image_idx, point_idx, *posed.rays[element.image_idx][element.keypoint_idx]});
     }
   }
   RefinePoses(options, &problem);

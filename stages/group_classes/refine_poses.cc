@@ -10,8 +10,8 @@ namespace {
 
 // Reprojection of a point, in units of the keypoint's standard deviation.
 struct ReprojectionCost {
-  Eigen::Vector2d ray;
-  double weight;  // focal length / sigma
+  PixelRay ray;
+  double weight;  // 1 / sigma
 
   template <typename T>
   bool operator()(const T* rotation, const T* translation, const T* point, const T* focal_ratio,
@@ -19,8 +19,10 @@ struct ReprojectionCost {
     const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
     const Eigen::Matrix<T, 3, 1> p = q * Eigen::Map<const Eigen::Matrix<T, 3, 1>>(point) +
                                      Eigen::Map<const Eigen::Matrix<T, 3, 1>>(translation);
-    residual[0] = (focal_ratio[0] * p.x() / p.z() - ray.x()) * weight;
-    residual[1] = (focal_ratio[0] * p.y() / p.z() - ray.y()) * weight;
+    const Eigen::Matrix<T, 3, 1> scaled(focal_ratio[0] * p.x(), focal_ratio[0] * p.y(), p.z());
+    const T depth = ray.normal.cast<T>().dot(scaled);
+    Eigen::Map<Eigen::Matrix<T, 2, 1>> out(residual);
+    out = ray.pixel_from_plane.cast<T>() * scaled * (T(weight) / depth);
     return true;
   }
 };
@@ -78,7 +80,7 @@ double RmsErrorPx(const PoseProblem& problem) {
   for (const PoseProblem::Observation& o : problem.observations) {
     const Eigen::Vector3d p = problem.poses[o.image_idx] * problem.points[o.point_idx];
     const double ratio = problem.focal_ratios[problem.camera_idx[o.image_idx]];
-    total += (ratio * p.hnormalized() - o.ray).squaredNorm() * o.focal_px * o.focal_px;
+    total += o.ray.Residual({ratio * p.x(), ratio * p.y(), p.z()}).squaredNorm();
   }
   return std::sqrt(total / static_cast<double>(std::max<size_t>(1, problem.observations.size())));
 }
@@ -94,7 +96,7 @@ RefinePosesSummary RefinePoses(const RefinePosesOptions& options, PoseProblem* p
   for (const PoseProblem::Observation& o : problem->observations) {
     Pose& pose = problem->poses[o.image_idx];
     ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ReprojectionCost, 2, 4, 3, 3, 1>(
-                                       new ReprojectionCost{o.ray, o.focal_px / options.keypoint_sigma_px}),
+                                       new ReprojectionCost{o.ray, 1 / options.keypoint_sigma_px}),
                                    new ceres::CauchyLoss(2.0), pose.rotation.coeffs().data(),
                                    pose.translation.data(), problem->points[o.point_idx].data(),
                                    &problem->focal_ratios[problem->camera_idx[o.image_idx]]);

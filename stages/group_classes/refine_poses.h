@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "core/error.h"
+#include "core/pixel_ray.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -35,8 +36,7 @@ struct PoseProblem {
   struct Observation {
     int image_idx = 0;
     int point_idx = 0;
-    Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // normalised coordinates, by the unrefined focal length
-    double focal_px = 1;                            // unrefined
+    PixelRay ray;  // by the unrefined focal length
   };
   std::vector<Pose> stated_poses;      // cam_from_world as the capture states them
   std::vector<int> camera_idx;         // per image
@@ -57,7 +57,8 @@ struct RefinePosesSummary {
 };
 
 // Minimises over poses T_i, points X_j, offset O and focal ratios s_c
-//   sum_ij rho( |s f pi(T_i X_j) - f x_ij|^2 / sigma_px^2 )             reprojection, Cauchy loss
+//   sum_ij rho( |residual_ij(diag(s, s, 1) T_i X_j)|^2 / sigma_px^2 )   reprojection (core/pixel_ray.h),
+//   Cauchy loss
 //   + sum_i |log(T_i (O G_i)^-1)|^2 weighted by the pose sigmas          stated poses G_i, trusted as far as
 //   they go
 //   + |log O|^2 weighted by the offset sigmas + ((s - 1) / sigma_s)^2.

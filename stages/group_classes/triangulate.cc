@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -30,11 +31,11 @@ std::optional<Eigen::Vector3d> Midpoint(const Line& a, const Line& b) {
   return 0.5 * (a.center + along_a * a.direction + b.center + along_b * b.direction);
 }
 
-// Squared reprojection error in pixels; infinite behind the camera.
+// Squared reprojection error in pixels; infinite where the point is not in front of the ray.
 double SquaredError(const PosedRay& ray, const Eigen::Vector3d& position) {
   const Eigen::Vector3d p = ray.cam_from_world * position;
-  if (p.z() <= 1e-6) return std::numeric_limits<double>::infinity();
-  return (p.hnormalized() - ray.ray).squaredNorm() * ray.focal_px * ray.focal_px;
+  if (ray.ray.normal.dot(p) <= 1e-6) return std::numeric_limits<double>::infinity();
+  return ray.ray.Residual(p).squaredNorm();
 }
 
 std::vector<int> RaysWithin(const std::vector<PosedRay>& rays, const Eigen::Vector3d& position,
@@ -55,11 +56,13 @@ void Accumulate(const PosedRay& ray, const Eigen::Vector3d& position, Eigen::Mat
                 Eigen::Vector3d* gradient) {
   const Eigen::Matrix3d R = ray.cam_from_world.rotation.toRotationMatrix();
   const Eigen::Vector3d p = R * position + ray.cam_from_world.translation;
-  Eigen::Matrix<double, 2, 3> projection;
-  projection << 1 / p.z(), 0, -p.x() / (p.z() * p.z()), 0, 1 / p.z(), -p.y() / (p.z() * p.z());
-  const Eigen::Matrix<double, 2, 3> jacobian = ray.focal_px * projection * R;
+  const Eigen::Vector3d& normal_axis = ray.ray.normal;
+  const double depth = normal_axis.dot(p);
+  const Eigen::Vector2d residual = ray.ray.pixel_from_plane * p / depth;
+  const Eigen::Matrix<double, 2, 3> jacobian =
+      (ray.ray.pixel_from_plane - residual * normal_axis.transpose()) / depth * R;
   *normal += jacobian.transpose() * jacobian;
-  *gradient += jacobian.transpose() * (ray.focal_px * (p.hnormalized() - ray.ray));
+  *gradient += jacobian.transpose() * residual;
 }
 
 // Pairs of indices below n that spread over the track: neighbours at growing distance.
@@ -82,8 +85,7 @@ Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOp
   if (static_cast<int>(rays.size()) < options.min_num_observations) return result;
   std::vector<Line> lines;
   for (const PosedRay& ray : rays) {
-    lines.push_back({ray.cam_from_world.Center(),
-                     (ray.cam_from_world.rotation.conjugate() * ray.ray.homogeneous()).normalized()});
+    lines.push_back({ray.cam_from_world.Center(), ray.cam_from_world.rotation.conjugate() * ray.ray.bearing});
   }
   double least_total = 0;
   for (const auto& [i, j] : SpreadPairs(static_cast<int>(rays.size()))) {

@@ -4,15 +4,15 @@
 
 #include <Eigen/Core>
 
+#include "core/pixel_ray.h"
 #include "core/pose.h"
 
 namespace cairn {
 
-// A ray to a scene point: from a posed camera, through normalised coordinates.
+// A ray to a scene point, from a posed camera of any model.
 struct PosedRay {
   Pose cam_from_world;
-  Eigen::Vector2d ray = Eigen::Vector2d::Zero();
-  double focal_px = 1;  // turns a distance in normalised coordinates into pixels
+  PixelRay ray;
 };
 
 struct TriangulateOptions {

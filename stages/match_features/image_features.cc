@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/panorama.h"
+
 namespace cairn {
 namespace {
 
@@ -55,8 +57,7 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
       continue;
     }
     MatchImage match_image{.image_id = image.image_id, .name = image.name, .camera_id = image.camera_id};
-    if (const auto pose = poses.find(image.name); pose != poses.end())
-      match_image.cam_from_world = pose->second;
+    match_image.cam_from_world = FindPose(poses, image.name);
     match_image.num_features = static_cast<int>(num_keypoints[image.image_id]);
     result.images.push_back(std::move(match_image));
   }

@@ -22,9 +22,16 @@ OptionTable DescribeOptions(SimulateOptions* o) {
       {"num_shared_textures", &o->num_shared_textures, "Textures in the shared set", 1, 100},
       {"texel_m", &o->texel_m, "Edge of a wall texel, metres; floor and ceiling have twice that", 0.001,
        0.05},
+      {.name = "camera_model",
+       .value = &o->camera_model,
+       .help = "Camera of the survey; panoramas (EQUIRECTANGULAR) have pinhole queries",
+       .choices = {"PINHOLE", "OPENCV_FISHEYE", "EQUIRECTANGULAR"}},
       {"image_width_px", &o->image_width_px, "Image width, pixels", 32, 8192},
       {"image_height_px", &o->image_height_px, "Image height, pixels", 32, 8192},
-      {"horizontal_fov_deg", &o->horizontal_fov_deg, "Horizontal field of view, degrees", 20, 140},
+      {"horizontal_fov_deg", &o->horizontal_fov_deg,
+       "Horizontal field of view, degrees; of a pinhole at most 140", 20, 200},
+      {"panorama_width_px", &o->panorama_width_px, "Width of panoramas, pixels; their height is half of it",
+       64, 16384},
       {"camera_height_m", &o->camera_height_m, "Camera above the floor, metres", 0.1, 5},
       {.name = "survey",
        .value = &o->survey,
@@ -56,6 +63,16 @@ OptionTable DescribeOptions(SimulateOptions* o) {
 Status CheckSimulateOptions(const SimulateOptions& options) {
   SimulateOptions copy = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&copy)));
+  if (options.camera_model != "OPENCV_FISHEYE" && options.horizontal_fov_deg > 140) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option horizontal_fov_deg = {:g}: a pinhole camera sees at most 140; use "
+                     "camera_model = OPENCV_FISHEYE",
+                     options.horizontal_fov_deg);
+  }
+  if (options.panorama_width_px % 2 != 0) {
+    return MakeError(ErrorCode::kInvalidArgument, "option panorama_width_px = {}: must be even",
+                     options.panorama_width_px);
+  }
   if (options.door_height_m >= options.height_m) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "option door_height_m = {:g}: must be below the ceiling (height_m = {:g})",

@@ -43,12 +43,16 @@ struct SimulateOptions {
   // Edge of a wall texel; floor and ceiling have twice that.  REQUIRES: in [0.001, 0.05]
   double texel_m = 0.003;
 
-  // --- The camera: an ideal pinhole
+  // --- The camera.  PINHOLE: an ideal one.  OPENCV_FISHEYE: a fisheye lens with some distortion.
+  // EQUIRECTANGULAR: panoramas for the survey (one a station, num_headings does not count), pinhole queries.
+  std::string camera_model = "PINHOLE";
   // REQUIRES: in [32, 8192]
   int image_width_px = 640;
   int image_height_px = 480;
-  // REQUIRES: in [20, 140]
+  // REQUIRES: in [20, 200]; of a pinhole at most 140
   double horizontal_fov_deg = 90;
+  // Width of panoramas; their height is half of it.  REQUIRES: in [64, 16384], even
+  int panorama_width_px = 2048;
   // Height of the camera above the floor.  REQUIRES: in [0.1, 5], below the ceiling
   double camera_height_m = 1.0;
 

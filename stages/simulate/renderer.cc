@@ -51,12 +51,17 @@ Shade TraceRay(const Building& building, const Eigen::Vector3d& origin, const Ei
 
 Renderer::Renderer(const Building& building, const Camera& camera)
     : building_(building), camera_(camera), rays_(static_cast<size_t>(camera.width) * camera.height) {
+  const bool sees_behind = camera.model == CameraModel::kOpenCvFisheye || camera.model >= CameraModel::kFov;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
-      const std::optional<Eigen::Vector2d> ray = CameraFromImage(camera, {x + 0.5, y + 0.5});
-      Eigen::Vector2f& out = rays_[static_cast<size_t>(y) * camera.width + x];
+      Eigen::Vector3f& out = rays_[static_cast<size_t>(y) * camera.width + x];
       out.setConstant(std::numeric_limits<float>::quiet_NaN());
-      if (ray) out = ray->cast<float>();
+      const Eigen::Vector2d pixel(x + 0.5, y + 0.5);
+      if (sees_behind) {
+        if (const auto bearing = BearingFromImage(camera, pixel)) out = bearing->cast<float>();
+      } else if (const auto ray = CameraFromImage(camera, pixel)) {
+        out = ray->cast<float>().homogeneous();
+      }
     }
   }
 }
@@ -67,29 +72,27 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
   const Eigen::Matrix3d world_from_cam = cam_from_world.rotation.toRotationMatrix().transpose();
   const auto ray_at = [&](int x, int y) { return rays_[static_cast<size_t>(y) * width + x]; };
   // Ray of a pixel and its change per pixel, in the world frame.
-  struct PixelRay {
+  struct SteppedRay {
     Eigen::Vector3d ray, step_x, step_y;
   };
   // To the next pixel in a direction; at the border, and beside pixels without a ray, from the one before.
   const auto step = [&](int x, int y, int dx, int dy) {
     const auto is_inside = [&](int px, int py) { return px >= 0 && py >= 0 && px < width && py < height; };
-    Eigen::Vector2f change = Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN());
+    Eigen::Vector3f change = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
     if (is_inside(x + dx, y + dy)) change = ray_at(x + dx, y + dy) - ray_at(x, y);
     if (!change.allFinite() && is_inside(x - dx, y - dy)) change = ray_at(x, y) - ray_at(x - dx, y - dy);
     if (!change.allFinite()) change.setZero();
-    return Eigen::Vector3d(world_from_cam.leftCols<2>() * change.cast<double>());
+    return Eigen::Vector3d(world_from_cam * change.cast<double>());
   };
   const auto pixel_ray = [&](int x, int y) {
-    const Eigen::Vector2f here = ray_at(x, y);
-    return PixelRay{world_from_cam * Eigen::Vector3d(here.x(), here.y(), 1), step(x, y, 1, 0),
-                    step(x, y, 0, 1)};
+    return SteppedRay{world_from_cam * ray_at(x, y).cast<double>(), step(x, y, 1, 0), step(x, y, 0, 1)};
   };
 
   cv::Mat image(height, width, CV_32FC1);
   cv::Mat faces(height, width, CV_32SC1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const PixelRay pixel = pixel_ray(x, y);
+      const SteppedRay pixel = pixel_ray(x, y);
       Shade shade;
       if (std::isfinite(pixel.ray.x()))
         shade = TraceRay(building_, origin, pixel.ray, pixel.step_x, pixel.step_y);
@@ -105,7 +108,7 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
           ((x > 0 && faces.at<int>(y, x - 1) != face) || (x + 1 < width && faces.at<int>(y, x + 1) != face) ||
            (y > 0 && faces.at<int>(y - 1, x) != face) || (y + 1 < height && faces.at<int>(y + 1, x) != face));
       if (!is_edge) continue;
-      const PixelRay pixel = pixel_ray(x, y);
+      const SteppedRay pixel = pixel_ray(x, y);
       const Eigen::Vector3d step_x = pixel.step_x / kEdgeSamples, step_y = pixel.step_y / kEdgeSamples;
       float sum = 0;
       for (int j = 0; j < kEdgeSamples; ++j) {

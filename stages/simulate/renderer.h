@@ -36,9 +36,9 @@ class Renderer {
  private:
   const Building& building_;
   const Camera camera_;
-  // Per pixel (row by row): the direction (x/z, y/z, 1) of its centre in the camera frame; NaN where there is
-  // none.
-  std::vector<Eigen::Vector2f> rays_;
+  // Per pixel (row by row): the direction of its centre in the camera frame, with z = 1 where the camera has
+  // forward rays only; NaN where there is none.
+  std::vector<Eigen::Vector3f> rays_;
 };
 
 }  // namespace cairn

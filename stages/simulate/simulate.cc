@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
@@ -37,8 +38,13 @@ Status WriteJpeg(const std::string& path, const cv::Mat& grey, int quality) {
 }
 
 // Renders and writes all images, of the survey and the queries.
-Status WriteImages(const Renderer& renderer, const Survey& survey, const SimulateOptions& options,
+Status WriteImages(const Building& building, const Survey& survey, const SimulateOptions& options,
                    uint64_t seed, const std::string& folder, int num_threads, Progress& progress) {
+  const Renderer survey_renderer(building, survey.camera);
+  const bool same_camera = survey.query_camera.camera_id == survey.camera.camera_id;
+  const std::optional<Renderer> own_query_renderer =
+      same_camera ? std::nullopt : std::optional<Renderer>(std::in_place, building, survey.query_camera);
+  const Renderer& query_renderer = same_camera ? survey_renderer : *own_query_renderer;
   const int64_t num_survey = static_cast<int64_t>(survey.images.size());
   const int64_t num_images = num_survey + static_cast<int64_t>(survey.queries.size());
   std::vector<Status> statuses(num_images);
@@ -49,6 +55,7 @@ Status WriteImages(const Renderer& renderer, const Survey& survey, const Simulat
       return;
     }
     const PlannedImage& image = i < num_survey ? survey.images[i] : survey.queries[i - num_survey];
+    const Renderer& renderer = i < num_survey ? survey_renderer : query_renderer;
     const cv::Mat grey = TakeImage(renderer, image, MixSeed(MixSeed(seed, 20), i));
     statuses[i] = WriteJpeg(folder + "/" + image.name, grey, options.jpeg_quality);
     progress.Advance();
@@ -71,7 +78,6 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
                                        int num_threads, Progress& progress) {
   CAIRN_ASSIGN_OR_RETURN(const Building building, MakeBuilding(options, seed, num_threads));
   CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, seed));
-  const Renderer renderer(building, survey.camera);
 
   CAIRN_RETURN_IF_ERROR(
       ReplaceFolderAtomically(path, "a capture", {"images.txt"}, [&](const std::string& folder) -> Status {
@@ -80,13 +86,14 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
           return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
         }
         CAIRN_RETURN_IF_ERROR(
-            WriteImages(renderer, survey, options, seed, folder + "/images", num_threads, progress));
-        const CameraId camera_id = survey.camera.camera_id;
-        CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", {{camera_id, survey.camera}}));
+            WriteImages(building, survey, options, seed, folder + "/images", num_threads, progress));
+        CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt",
+                                               {{survey.camera.camera_id, survey.camera},
+                                                {survey.query_camera.camera_id, survey.query_camera}}));
         CAIRN_RETURN_IF_ERROR(
-            WriteImagesText(folder + "/images.txt", StatedImages(survey.images, camera_id)));
-        CAIRN_RETURN_IF_ERROR(
-            WriteImagesText(folder + "/queries.txt", StatedImages(survey.queries, camera_id)));
+            WriteImagesText(folder + "/images.txt", StatedImages(survey.images, survey.camera.camera_id)));
+        CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt",
+                                              StatedImages(survey.queries, survey.query_camera.camera_id)));
         return WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
       }));
   return SimulateResult{static_cast<int>(survey.stations.size()), static_cast<int>(survey.images.size()),

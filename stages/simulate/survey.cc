@@ -88,7 +88,8 @@ Status AddSurveyImages(const Building& building, const SimulateOptions& options,
       headings->push_back(pose.heading_rad);
     }
   }
-  const int num_headings = lattice ? options.num_headings : 1;
+  const bool panoramas = survey->camera.model == CameraModel::kEquirectangular;
+  const int num_headings = lattice && !panoramas ? options.num_headings : 1;
   const int digits = NumDigits(survey->stations.size(), lattice ? 3 : 4);
   const int heading_digits = NumDigits(num_headings, 1);
   for (size_t s = 0; s < survey->stations.size(); ++s) {
@@ -115,7 +116,7 @@ Status AddQueries(const Building& building, const SimulateOptions& options, uint
   const double greatest_m = lattice ? kGreatestOffset * options.spacing_m : kGreatestDriveOffsetM;
   const Rect& bounds = building.layout.bounds;
   const int digits = NumDigits(options.num_queries, 3);
-  const double focal_px = survey->camera.MeanFocal();
+  const double focal_px = survey->query_camera.MeanFocal();
   for (int q = 0; q < options.num_queries; ++q) {
     Random random(MixSeed(MixSeed(seed, 11), q));
     Eigen::Vector2d place;
@@ -173,6 +174,32 @@ void AddGreyNoise(cv::Mat image, double sigma, uint64_t seed) {
   }
 }
 
+Camera MakePinhole(const SimulateOptions& options) {
+  Camera camera;
+  camera.model = CameraModel::kPinhole;
+  camera.width = options.image_width_px;
+  camera.height = options.image_height_px;
+  // Rounded to what cameras.txt can say in few digits: 90 degrees give 320, not 320.00000000000006.
+  const double exact = 0.5 * camera.width / std::tan(0.5 * RadFromDeg(options.horizontal_fov_deg));
+  const double focal = std::round(exact * 1e6) / 1e6;
+  camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
+  return camera;
+}
+
+Camera MakeFisheye(const SimulateOptions& options) {
+  // Of a usual lens, and monotone beyond 100 degrees off the axis.
+  constexpr double kK1 = -0.03, kK2 = 0.004;
+  Camera camera;
+  camera.model = CameraModel::kOpenCvFisheye;
+  camera.width = options.image_width_px;
+  camera.height = options.image_height_px;
+  const double half = 0.5 * RadFromDeg(options.horizontal_fov_deg);
+  const double radius = half * (1 + kK1 * half * half + kK2 * half * half * half * half);
+  const double focal = std::round(0.5 * camera.width / radius * 1e6) / 1e6;
+  camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height, kK1, kK2, 0, 0};
+  return camera;
+}
+
 }  // namespace
 
 Pose MakePose(const Eigen::Vector3d& centre, double heading_rad, double pitch_rad, double roll_rad) {
@@ -188,14 +215,19 @@ Pose MakePose(const Eigen::Vector3d& centre, double heading_rad, double pitch_ra
 }
 
 Camera MakeCamera(const SimulateOptions& options) {
+  if (options.camera_model == "OPENCV_FISHEYE") return MakeFisheye(options);
+  if (options.camera_model == "PINHOLE") return MakePinhole(options);
   Camera camera;
-  camera.model = CameraModel::kPinhole;
-  camera.width = options.image_width_px;
-  camera.height = options.image_height_px;
-  // Rounded to what cameras.txt can say in few digits: 90 degrees give 320, not 320.00000000000006.
-  const double exact = 0.5 * camera.width / std::tan(0.5 * RadFromDeg(options.horizontal_fov_deg));
-  const double focal = std::round(exact * 1e6) / 1e6;
-  camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
+  camera.model = CameraModel::kEquirectangular;
+  camera.width = options.panorama_width_px;
+  camera.height = options.panorama_width_px / 2;
+  return camera;
+}
+
+Camera MakeQueryCamera(const SimulateOptions& options) {
+  if (options.camera_model != "EQUIRECTANGULAR") return MakeCamera(options);
+  Camera camera = MakePinhole(options);
+  camera.camera_id = 2;
   return camera;
 }
 
@@ -210,6 +242,7 @@ Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& optio
   }
   Survey survey;
   survey.camera = MakeCamera(options);
+  survey.query_camera = MakeQueryCamera(options);
   std::vector<double> headings;  // of a driven survey's stations
   CAIRN_RETURN_IF_ERROR(AddSurveyImages(building, options, seed, &headings, &survey));
   CAIRN_RETURN_IF_ERROR(AddQueries(building, options, seed, headings, &survey));

@@ -26,7 +26,8 @@ struct PlannedImage {
 };
 
 struct Survey {
-  Camera camera;
+  Camera camera;                          // of the survey images
+  Camera query_camera;                    // the same but for panoramas
   std::vector<PlannedImage> images;       // the survey
   std::vector<PlannedImage> queries;      // held out
   std::vector<Eigen::Vector2d> stations;  // where survey images are taken, metres
@@ -36,8 +37,10 @@ struct Survey {
 // and rolled clockwise.
 Pose MakePose(const Eigen::Vector3d& centre, double heading_rad, double pitch_rad = 0, double roll_rad = 0);
 
-// The pinhole camera of the options.
+// The camera of survey images, and that of queries: the same (camera 1), except that queries of a panorama
+// survey are taken with a pinhole camera (camera 2).
 Camera MakeCamera(const SimulateOptions& options);
+Camera MakeQueryCamera(const SimulateOptions& options);
 
 // Decides where images are taken.  Lattice stations are the places ((i + 1/2) spacing_m, (j + 1/2) spacing_m)
 // with enough clearance, row by row; each has num_headings images.  Queries lie off the lattice, inside the

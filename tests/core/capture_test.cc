@@ -50,7 +50,7 @@ TEST_F(CaptureTest, BadPosesAndMissingFilesAreRejectsWithReasons) {
   Write("images.txt",
         "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 nan 0 0 0 0 0 0 1 b.jpg\n\n3 2 0 0 0 0 0 0 1 c.jpg\n\n4 1 0 0 0 0 0 0 "
         "9 d.jpg\n\n"
-        "5 1 0 0 0 0 0 0 1 e.jpg\n\n6 1 0 0 0 0 0 0 1 a.jpg\n");
+        "5 1 0 0 0 0 0 0 1 e.jpg\n");
   const auto capture = ReadCapture(root_);
   ASSERT_TRUE(capture.ok()) << capture.error().message;
   ASSERT_EQ(capture->images.size(), 1u);
@@ -60,7 +60,63 @@ TEST_F(CaptureTest, BadPosesAndMissingFilesAreRejectsWithReasons) {
   EXPECT_THAT(reasons["c.jpg"], HasSubstr("quaternion of norm 2, expected 1"));
   EXPECT_THAT(reasons["d.jpg"], HasSubstr("camera 9 is not in"));
   EXPECT_THAT(reasons["e.jpg"], HasSubstr("no such file"));
-  EXPECT_THAT(reasons["a.jpg"], HasSubstr("listed twice"));
+}
+
+TEST_F(CaptureTest, AnImageListedTwiceIsAnError) {
+  AddFiles({"a.jpg"});
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 1 0 0 1 a.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_FALSE(capture.ok());
+  EXPECT_EQ(capture.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(capture.error().message, HasSubstr("images.txt: lists 'a.jpg' twice"));
+}
+
+TEST_F(CaptureTest, NamesMayHaveBlanksOtherAlphabetsAndFolders) {
+  fs::create_directories(root_ + "/images/a");
+  fs::create_directories(root_ + "/images/b");
+  AddFiles({"a/1.jpg", "b/1.jpg", "kök  och rum.jpg", "図書館.jpg", "x.jpg"});
+  // The numbers before a name are the same ones again and again: the name must not be looked for by them.
+  Write("images.txt",
+        "1 1 0 0 0 0 0 0 1 a/1.jpg\n\n2 1 0 0 0 1 1 0 1 b/1.jpg\n\n3 1 0 0 0 0 0 0 1  kök  och rum.jpg \n\n"
+        "4 1 0 0 0 1 0 1 1 図書館.jpg\r\n\n5 1 0 0 0 1 1 0 1 x.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  std::vector<std::string> names;
+  for (const CaptureImage& image : capture->images) names.push_back(image.name);
+  EXPECT_THAT(names, testing::ElementsAre("a/1.jpg", "b/1.jpg", "kök  och rum.jpg", "x.jpg", "図書館.jpg"));
+  EXPECT_THAT(capture->rejects, testing::IsEmpty());
+}
+
+TEST_F(CaptureTest, LinksToFilesAreFollowedAndBrokenOnesAreRejected) {
+  AddFiles({"real.jpg"});
+  fs::create_symlink("real.jpg", root_ + "/images/link.jpg");
+  fs::create_symlink("nowhere.jpg", root_ + "/images/broken.jpg");
+  fs::create_directories(root_ + "/images/folder.jpg");
+  Write("images.txt",
+        "1 1 0 0 0 0 0 0 1 real.jpg\n\n2 1 0 0 0 0 0 0 1 link.jpg\n\n3 1 0 0 0 0 0 0 1 broken.jpg\n\n"
+        "4 1 0 0 0 0 0 0 1 folder.jpg\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_EQ(capture->images.size(), 2u);
+  EXPECT_THAT(capture->warnings, testing::IsEmpty());
+  std::map<std::string, std::string> reasons;
+  for (const Reject& reject : capture->rejects) reasons[reject.name] = reject.reason;
+  EXPECT_THAT(reasons["broken.jpg"], HasSubstr("a link to a file that does not exist"));
+  EXPECT_THAT(reasons["folder.jpg"], HasSubstr("not a file"));
+}
+
+TEST_F(CaptureTest, PanoramasNeedNoParametersAndMayRepeatTheirSize) {
+  AddFiles({"a.jpg"});
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n");
+  for (const char* line : {"1 EQUIRECTANGULAR 4096 2048\n", "1 EQUIRECTANGULAR 4096 2048 4096 2048\n"}) {
+    Write("cameras.txt", line);
+    const auto capture = ReadCapture(root_);
+    ASSERT_TRUE(capture.ok()) << capture.error().message;
+    EXPECT_EQ(capture->cameras.at(1).model, CameraModel::kEquirectangular);
+    EXPECT_TRUE(capture->cameras.at(1).params.empty());
+  }
+  Write("cameras.txt", "1 EQUIRECTANGULAR 4096 2048 500\n");
+  EXPECT_FALSE(ReadCapture(root_).ok());
 }
 
 TEST_F(CaptureTest, QueriesAreHeldOutAndStrayFilesAreWarnedOf) {

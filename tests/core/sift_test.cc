@@ -45,6 +45,32 @@ TEST(ExtractSift, BlankImageHasNoFeatures) {
   EXPECT_EQ(features->descriptors.rows(), 0);
 }
 
+TEST(ExtractSift, LargeImagesAreMadeSmallerAndTheirKeypointsLargerAgain) {
+  SiftOptions options;
+  options.max_image_side_px = 80;  // of 128 x 96: a factor of 1.6
+  const auto features = ExtractSift(Blob(61.0, 40.0, 6.0), options);
+  ASSERT_TRUE(features.ok());
+  double least = 1e9;
+  Keypoint nearest;
+  for (const Keypoint& keypoint : features->keypoints) {
+    if (const double distance = std::hypot(keypoint.x - 61.0, keypoint.y - 40.0); distance < least) {
+      least = distance;
+      nearest = keypoint;
+    }
+  }
+  EXPECT_LT(least, 0.15);
+  EXPECT_NEAR(nearest.scale, 6.0, 1.2);
+}
+
+TEST(ExtractSift, TinyImagesHaveNoFeatures) {
+  for (const cv::Size size :
+       {cv::Size(1, 1), cv::Size(1, 500), cv::Size(5, 5), cv::Size(6, 6), cv::Size(9, 300)}) {
+    const auto features = ExtractSift(cv::Mat(size, CV_8UC1, cv::Scalar(7)), {});
+    ASSERT_TRUE(features.ok()) << size.width << " x " << size.height;
+    EXPECT_TRUE(features->keypoints.empty());
+  }
+}
+
 TEST(ExtractSift, ColourImageIsAnError) {
   EXPECT_EQ(ExtractSift(cv::Mat(50, 50, CV_8UC3), {}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(ExtractSift(cv::Mat(), {}).error().code, ErrorCode::kInvalidArgument);

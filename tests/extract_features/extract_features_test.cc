@@ -1,5 +1,6 @@
 #include "stages/extract_features/extract_features.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -149,6 +150,78 @@ TEST_F(ExtractFeaturesTest, BlankImageHasNoFeaturesButIsKept) {
   const auto summary = Extract();
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->num_images, 2);
+}
+
+TEST_F(ExtractFeaturesTest, FoldersBlanksAndOtherAlphabetsInNamesWork) {
+  fs::create_directories(root_ + "/images/a");
+  fs::create_directories(root_ + "/images/b");
+  const std::vector<std::string> names = {"a/1.png", "b/1.png", "two words.png", "図書館.png"};
+  for (size_t i = 0; i < names.size(); ++i) AddImage(names[i], BlobImage(i));
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_TRUE(summary->rejects.empty());
+  auto database = OpenDatabaseReadOnly(root_ + "/features.db");
+  const auto images = ReadDatabaseImages(*database);
+  ASSERT_EQ(images->size(), names.size());
+  for (size_t i = 0; i < names.size(); ++i) EXPECT_EQ((*images)[i].name, names[i]);
+  EXPECT_NE(ReadDatabaseKeypoints(*database, 1)->front().x, ReadDatabaseKeypoints(*database, 2)->front().x)
+      << "two images, not one twice";
+}
+
+TEST_F(ExtractFeaturesTest, AnImageOfOnePixelIsKeptWithoutFeatures) {
+  Camera tiny;
+  tiny.width = tiny.height = 1;
+  tiny.params = {1, 0.5, 0.5};
+  ASSERT_TRUE(WriteCamerasText(root_ + "/cameras.txt", {{1, tiny}}).ok());
+  AddImage("tiny.png", cv::Mat(1, 1, CV_8UC1, cv::Scalar(9)));
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_keypoints, 0);
+}
+
+// A panorama of blobs: as a capture with one camera EQUIRECTANGULAR.
+TEST_F(ExtractFeaturesTest, PanoramasBecomePinholeViewsThatColmapReads) {
+  Camera panorama;
+  panorama.model = CameraModel::kEquirectangular;
+  panorama.width = 640;
+  panorama.height = 320;
+  ASSERT_TRUE(WriteCamerasText(root_ + "/cameras.txt", {{1, panorama}}).ok());
+  AddImage("p.png", BlobImage(1, 640, 320));
+  AddImage("q.png", BlobImage(2, 640, 320));
+  const auto summary = Extract();
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_images, 2);
+  EXPECT_EQ(summary->num_views, 12);
+  {
+    auto database = OpenDatabaseReadOnly(root_ + "/features.db");
+    const auto images = ReadDatabaseImages(*database);
+    ASSERT_EQ(images->size(), 12u);
+    EXPECT_EQ((*images)[0].name, "p.png#0of6");
+    EXPECT_EQ((*images)[11].name, "q.png#5of6");
+    const auto cameras = ReadDatabaseCameras(*database);
+    ASSERT_EQ(cameras->size(), 1u);
+    EXPECT_EQ(cameras->at(1).model, CameraModel::kPinhole);
+    EXPECT_NEAR(cameras->at(1).FocalX(), 640 / (2 * M_PI), 1e-9);
+    for (const DatabaseImage& image : *images) {
+      const auto keypoints = ReadDatabaseKeypoints(*database, image.image_id);
+      EXPECT_GT(keypoints->size(), 5u) << image.name;
+      for (const Keypoint& keypoint : *keypoints) {
+        const double angle =
+            std::atan((keypoint.x - cameras->at(1).PrincipalPoint().x()) / cameras->at(1).FocalX());
+        EXPECT_LE(std::abs(angle), M_PI / 6 + 1e-6) << "another view's sector";
+      }
+    }
+  }
+  const std::string copy = root_ + "/copy.db";
+  fs::copy_file(root_ + "/features.db", copy);
+  const std::string command =
+      "QT_QPA_PLATFORM=offscreen colmap exhaustive_matcher --SiftMatching.use_gpu 0 --database_path " + copy +
+      " > " + root_ + "/colmap.log 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << *ReadFile(root_ + "/colmap.log");
+
+  ExtractFeaturesOptions gaps;
+  gaps.panorama.num_panorama_views = 3;
+  EXPECT_EQ(Extract(1, gaps).error().code, ErrorCode::kInvalidArgument);
 }
 
 // The installed colmap reads what we wrote: the strictest check of the schema there is.
