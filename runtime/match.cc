@@ -66,6 +66,23 @@ bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double dep
   return ratio <= max_ratio && ratio * max_ratio >= 1;
 }
 
+// How far from its projection a landmark may show, px.
+double GuidedRadius(const MapLandmark& landmark, const Pose& cam_from_world, double focal_px,
+                    const MatchOptions& options) {
+  const Eigen::Vector3d point = cam_from_world * landmark.position;
+  if (point.z() <= 0) return options.guided_radius_px;  // beyond 90 degrees no keypoint has a ray
+  Eigen::Matrix<double, 2, 3> ray_from_point;
+  ray_from_point << 1, 0, -point.x() / point.z(), 0, 1, -point.y() / point.z();
+  const Eigen::Matrix<double, 2, 3> pixel_from_world =
+      focal_px / point.z() * ray_from_point * cam_from_world.rotation.toRotationMatrix();
+  const Eigen::Matrix2d covariance = pixel_from_world * landmark.covariance * pixel_from_world.transpose();
+  const double half_trace = 0.5 * covariance.trace();
+  const double largest =
+      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - covariance.determinant()));
+  return std::sqrt(options.guided_radius_px * options.guided_radius_px +
+                   options.guided_radius_sigmas * options.guided_radius_sigmas * largest);
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(MatchOptions* o) {
@@ -83,6 +100,10 @@ OptionTable DescribeOptions(MatchOptions* o) {
        .value = &o->guided_radius_px,
        .help = "a landmark is looked for this near to its projection, px",
        .min = 0.1},
+      {.name = "guided_radius_sigmas",
+       .value = &o->guided_radius_sigmas,
+       .help = "and this many standard deviations of its own position, projected",
+       .min = 0},
       {.name = "guided_max_angle_rad",
        .value = &o->guided_max_angle_rad,
        .help = "largest descriptor angle there, radians",
@@ -143,6 +164,7 @@ std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
                                         const MatchOptions& options) {
   const KeypointGrid grid(query, std::max(8.0, options.guided_radius_px));
   const double focal_px = query.camera.MeanFocal();
+  const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
   // An angle between RootSIFT vectors of norm 512 as a dot product.
   const double min_dot = 512.0 * 512.0 * std::cos(options.guided_max_angle_rad);
   std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
@@ -156,7 +178,8 @@ std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
     }
     const uint8_t* descriptor = map.rows().descriptors.row(landmark_idx).data();
     std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
-    grid.VisitNear(*pixel, options.guided_radius_px, [&](KeypointIdx i) {
+    const double radius_px = std::min(GuidedRadius(landmark, cam_from_world, focal_px, options), diagonal_px);
+    grid.VisitNear(*pixel, radius_px, [&](KeypointIdx i) {
       if (!ScaleFits(query.features.keypoints[i], landmark, DepthOfScale(query.camera, point), focal_px,
                      options.guided_max_scale_ratio))
         return;

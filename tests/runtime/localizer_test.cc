@@ -61,8 +61,9 @@ TEST(Localizer, StandsManyWrongMatches) {
 
 TEST(Localizer, CovarianceIsRight) {
   // Normalised estimation error squared over independent maps and queries: mean of a chi-square of 6 degrees
-  // of freedom, 6 +- 1.96 sqrt(12 / n).
-  constexpr int kNumTrials = 300;
+  // of freedom, variance 12 / n.  Processors round differently, so every kind of machine draws its own
+  // errors: the band is the one that a right covariance leaves once in 1000 such machines.
+  constexpr int kNumTrials = 900;
   double sum = 0;
   int num_fixes = 0;
   Random random(7);
@@ -76,8 +77,8 @@ TEST(Localizer, CovarianceIsRight) {
     const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
     sum += error.dot(found.covariance.inverse() * error);
   }
-  ASSERT_GT(num_fixes, 290);
-  const double band = 1.96 * std::sqrt(12.0 / num_fixes);
+  ASSERT_GT(num_fixes, 870);
+  const double band = 3.29 * std::sqrt(12.0 / num_fixes);
   EXPECT_NEAR(sum / num_fixes, 6, band);
 }
 
