@@ -75,6 +75,7 @@ Result<std::vector<KnownDistance>> ReadKnownDistances(const std::string& path, c
     distances.push_back(known);
     return Ok();
   }));
+  if (distances.empty()) return MakeError(ErrorCode::kNoData, "{}: no line IMAGE1 IMAGE2 METRES", path);
   return distances;
 }
 
@@ -95,6 +96,7 @@ Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::stri
       return MakeError(ErrorCode::kCorrupt, "image '{}' is listed twice", name);
     return Ok();
   }));
+  if (points.empty()) return MakeError(ErrorCode::kNoData, "{}: no line IMAGE X Y Z", path);
   return points;
 }
 

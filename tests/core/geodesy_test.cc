@@ -33,7 +33,9 @@ TEST(Geodesy, InverseIsExactOnAllHemispheresAndAtThePoles) {
         const GeodeticPosition again = GeodeticFromEcef(EcefFromGeodetic(position));
         EXPECT_NEAR(again.latitude_deg, latitude, 1e-9);
         EXPECT_NEAR(again.altitude_m, altitude, 1e-4);
-        if (latitude > -90) EXPECT_NEAR(again.longitude_deg, longitude, 1e-9);
+        if (latitude > -90) {
+          EXPECT_NEAR(again.longitude_deg, longitude, 1e-9);
+        }
       }
     }
   }

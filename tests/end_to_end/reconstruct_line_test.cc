@@ -51,6 +51,7 @@ num_queries = 0
       const Eigen::Vector3d centre = images[i].cam_from_world->Center();
       control_points << fmt::format("{} {} {} {}\n", images[i].name, centre.x(), centre.y(), centre.z());
     }
+    control_points.close();
     std::ofstream(Path("flat.toml")) << R"(name = "flat"
 [capture]
 path = "flat"

@@ -65,6 +65,7 @@ TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
 }
 
 TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
+  ASSERT_TRUE(WriteFileAtomically(recipe_.capture_path + "/images.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.capture_path + "\n"));
   EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \n"));

@@ -60,6 +60,11 @@ TEST_F(KnownPlacesTest, WrongControlPointsNameTheLine) {
   }
 }
 
+TEST_F(KnownPlacesTest, FilesThatSayNothingAreErrors) {
+  EXPECT_EQ(ReadControlPoints(Write("# nothing yet\n"), capture_).error().code, ErrorCode::kNoData);
+  EXPECT_EQ(ReadKnownDistances(Write(""), capture_).error().code, ErrorCode::kNoData);
+}
+
 TEST_F(KnownPlacesTest, AnchorIsTheMedianAlsoAcrossThe180thMeridian) {
   std::map<std::string, ExifTags> tags;
   const double longitudes[] = {179.9999, -179.9999, -179.9998, 170};  // the last is a wild fix
