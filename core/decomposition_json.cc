@@ -1,4 +1,6 @@
 #include <iterator>
+#include <limits>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
@@ -10,6 +12,23 @@ namespace {
 
 constexpr char kFormat[] = "cairn-regions";
 constexpr int kVersion = 1;
+
+// nlohmann::json would cut 1.5 and 99999999999 down to some int.
+int IntegerOf(const nlohmann::json& value) {
+  const bool fits =
+      value.is_number_unsigned()
+          ? value.get<uint64_t>() <= static_cast<uint64_t>(std::numeric_limits<int>::max())
+          : value.is_number_integer() && value.get<int64_t>() >= std::numeric_limits<int>::min();
+  if (!fits) throw std::domain_error(fmt::format("{} is not an integer of 32 bits", value.dump()));
+  return value.get<int>();
+}
+
+std::vector<int32_t> IndicesOf(const nlohmann::json& list) {
+  if (!list.is_array()) throw std::domain_error(fmt::format("found {}, expected a list", list.type_name()));
+  std::vector<int32_t> indices;
+  for (const nlohmann::json& value : list) indices.push_back(IntegerOf(value));
+  return indices;
+}
 
 }  // namespace
 
@@ -25,32 +44,33 @@ Result<Decomposition> ReadDecompositionJson(const std::string& path) {
     if (const std::string format = member(document, "format").get<std::string>(); format != kFormat) {
       return MakeError(ErrorCode::kCorrupt, "{}: \"format\" is '{}', expected '{}'", path, format, kFormat);
     }
-    if (const int version = member(document, "version").get<int>(); version != kVersion) {
+    if (const int version = IntegerOf(member(document, "version")); version != kVersion) {
       return MakeError(ErrorCode::kUnsupported, "{}: regions version {}, this program reads {}", path,
                        version, kVersion);
     }
     Decomposition decomposition;
     decomposition.algorithm = member(document, "algorithm").get<std::string>();
-    decomposition.k = member(document, "k").get<int>();
-    decomposition.tau = member(document, "tau").get<int>();
-    decomposition.rho = member(document, "rho").get<int>();
+    decomposition.k = IntegerOf(member(document, "k"));
+    decomposition.tau = IntegerOf(member(document, "tau"));
+    decomposition.rho = IntegerOf(member(document, "rho"));
     decomposition.seed = member(document, "seed").get<uint64_t>();
     if (document.contains("lower_bound") && !document["lower_bound"].is_null()) {
-      decomposition.lower_bound = member(document, "lower_bound").get<int>();
+      decomposition.lower_bound = IntegerOf(member(document, "lower_bound"));
     }
     if (document.contains("uncovered_limit")) {
-      decomposition.uncovered_limit = member(document, "uncovered_limit").get<int>();
+      decomposition.uncovered_limit = IntegerOf(member(document, "uncovered_limit"));
     }
     for (const nlohmann::json& region : member(document, "regions")) {
       where = fmt::format("regions[{}]", decomposition.regions.size());
-      decomposition.regions.push_back({region.at("features").get<std::vector<FeatureIdx>>(),
-                                       region.at("poses").get<std::vector<StationIdx>>()});
+      decomposition.regions.push_back({IndicesOf(region.at("features")), IndicesOf(region.at("poses"))});
     }
-    decomposition.uncovered = member(document, "uncovered").get<std::vector<StationIdx>>();
+    decomposition.uncovered = IndicesOf(member(document, "uncovered"));
     return decomposition;
   } catch (const nlohmann::json::parse_error& error) {
     return MakeError(ErrorCode::kCorrupt, "{}: byte {}: not JSON (is the file truncated?)", path, error.byte);
   } catch (const nlohmann::json::exception& error) {
+    return MakeError(ErrorCode::kCorrupt, "{}: {}: {}", path, where, error.what());
+  } catch (const std::domain_error& error) {
     return MakeError(ErrorCode::kCorrupt, "{}: {}: {}", path, where, error.what());
   }
 }

@@ -1,6 +1,7 @@
 // World JSON.  A million stations with a hundred features each are a file of 700 MB, so the reader is a
 // handler for a streaming parser: it never holds the document, only the world.
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -229,7 +230,8 @@ Status CheckDocument(const WorldHandler& handler) {
 
 Result<World> ReadWorldJson(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) return MakeError(ErrorCode::kNotFound, "{}: no such file, or not readable", path);
+  if (!file || std::filesystem::is_directory(path))
+    return MakeError(ErrorCode::kNotFound, "{}: no such file, or not a readable one", path);
   WorldHandler handler;
   const bool parsed = nlohmann::json::sax_parse(file, &handler);
   const Status status = parsed ? CheckDocument(handler) : Status(handler.error);

@@ -120,6 +120,18 @@ TEST(WorldJson, ErrorsNameTheElement) {
               HasSubstr("'features' is missing"));
 }
 
+TEST(WorldJson, NumbersThatAreNoneAndFilesThatAreNoneAreErrors) {
+  const auto message = [](const std::string& text) {
+    return ReadError(R"({"format":"cairn-world","version":1,"edges":[],"features":[],"poses":)" + text + "}")
+        .message;
+  };
+  EXPECT_THAT(message("[[0,NaN]]"), HasSubstr("invalid literal"));
+  EXPECT_THAT(message("[[0,1e999]]"), HasSubstr("1e999"));
+  EXPECT_THAT(message("[[0,true]]"), HasSubstr("poses[0]: found a boolean"));
+  EXPECT_EQ(ReadError("").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ReadWorld(testing::TempDir()).error().code, ErrorCode::kNotFound);
+}
+
 TEST(WorldJson, TruncationAnywhereIsCorruptAndNothingElse) {
   const std::string path = testing::TempDir() + "/whole.json";
   ASSERT_TRUE(WriteWorldJson(FullWorld(), path).ok());
@@ -163,6 +175,27 @@ TEST(Decomposition, SurvivesBothFormats) {
       EXPECT_TRUE(read->regions[1].stations.empty());
     }
   }
+}
+
+TEST(DecompositionJson, ErrorsNameTheElement) {
+  const auto message = [](const std::string& k, const std::string& regions, const std::string& uncovered) {
+    const Result<Decomposition> result = ReadDecompositionJson(TemporaryFile(
+        "regions_bad.json",
+        R"({"format":"cairn-regions","version":1,"algorithm":"b2","tau":0,"rho":0,"seed":0,"k":)" + k +
+            R"(,"regions":)" + regions + R"(,"uncovered":)" + uncovered + "}"));
+    EXPECT_FALSE(result.ok());
+    return result.ok() ? "" : result.error().message;
+  };
+  EXPECT_THAT(message("99999999999", "[]", "[]"), HasSubstr("k: 99999999999 is not an integer"));
+  EXPECT_THAT(message("1.5", "[]", "[]"), HasSubstr("k: 1.5 is not an integer"));
+  EXPECT_THAT(message("\"4\"", "[]", "[]"), HasSubstr("k: \"4\" is not an integer"));
+  EXPECT_THAT(message("4", "[]", "[0, -99999999999]"),
+              HasSubstr("uncovered: -99999999999 is not an integer"));
+  EXPECT_THAT(message("4", "[]", "7"), HasSubstr("uncovered: found number, expected a list"));
+  EXPECT_THAT(message("4", R"([{"features":[],"poses":[]},{"features":[4294967296],"poses":[0]}])", "[]"),
+              HasSubstr("regions[1]: 4294967296 is not an integer"));
+  EXPECT_THAT(message("4", R"([{"features":[1]}])", "[]"), HasSubstr("regions[0]"));
+  EXPECT_THAT(message("NaN", "[]", "[]"), HasSubstr("not JSON"));
 }
 
 TEST(DecompositionJson, TruncationIsCorrupt) {

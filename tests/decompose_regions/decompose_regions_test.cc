@@ -185,6 +185,36 @@ TEST(DecomposeRegions, NothingCoverableSaysWhichKWouldDo) {
   EXPECT_THAT(result.error().message, HasSubstr("station (3 at 3.00, 0.00) has 4; choose k <= 4"));
 }
 
+TEST(DecomposeRegions, WorldsWithNothingToCoverAreErrors) {
+  EXPECT_THAT(DecomposeRegions(World(), {}, 0).error().message, HasSubstr("no station"));
+  World blind = RowWorld();
+  blind.areas.clear();
+  EXPECT_THAT(DecomposeRegions(blind, {.k = 1}, 0).error().message, HasSubstr("no station is coverable"));
+}
+
+TEST(DecomposeRegions, NoRegionSpansUnconnectedPartsOfTheGraph) {
+  //   o o . o    one feature, seen everywhere; a triangle besides, so that the graph is no lattice
+  World world = AsciiWorld({"oo.o", "oo.o"}, {{"####", "####"}});
+  world.edges.emplace_back(0, 4);
+  std::sort(world.edges.begin(), world.edges.end());
+  for (const char* algorithm : kAlgorithms) {
+    const Decomposition d = Decompose(world, {.algorithm = algorithm, .k = 1, .tau = 1, .rho = 0});
+    EXPECT_EQ(d.regions.size(), 2) << algorithm;
+    EXPECT_THAT(CheckRegions(world, d).violations, IsEmpty()) << algorithm;
+  }
+}
+
+TEST(DecomposeRegions, StationsWithManyNeighboursShrinkAreasToo) {
+  // A hub joined to six stations; the feature is not seen from station 6: with tau = 1 only 1 to 5 keep it.
+  World world;
+  for (int i = 0; i < 7; ++i) world.positions.emplace_back(std::cos(i), i == 0 ? 5.0 : std::sin(i));
+  for (StationIdx i = 1; i < 7; ++i) world.edges.emplace_back(0, i);
+  world.areas = {{0, 1, 2, 3, 4, 5}};
+  EXPECT_THAT(CoverableStations(world, 1, 1), ElementsAre(1, 2, 3, 4, 5));
+  const Decomposition d = Decompose(world, {.algorithm = "b2", .k = 1, .tau = 1, .rho = 0});
+  EXPECT_EQ(d.regions.size(), 5);  // {0, 1} to {0, 5}: without the hub their cores are not connected
+}
+
 TEST(DecomposeRegions, NegativeKIsAnError) {
   const Result<Decomposition> result = DecomposeRegions(RowWorld(), {.k = -4}, 0);
   ASSERT_FALSE(result.ok());
