@@ -11,8 +11,9 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev \
     libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap jq python3 clang-format clang-tidy
-# Turns the demo's picture into PNG; nothing fails without it.
-OPTIONAL_PACKAGES := librsvg2-bin
+# Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
+# instructions emulated, an ARM compiler and emulator.
+OPTIONAL_PACKAGES := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
 
 # A clone elsewhere compiles the same files: let ccache see that.
 export CCACHE_BASEDIR := $(CURDIR)

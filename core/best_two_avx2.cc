@@ -10,7 +10,6 @@ namespace {
 struct Avx2 : Avx2Keys {
   static constexpr int kRowOffset = 0;
   static constexpr int kNumBias = 0;
-  static constexpr uint32_t kSumStart = 0;
   static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 4;
   static constexpr int kGroupBlock = 2;
@@ -23,6 +22,7 @@ struct Avx2 : Avx2Keys {
   }
   static Operand LoadColumn(const uint32_t* p) { return Split(Load(p)); }
   static Operand LoadRow(const uint32_t* p) { return Split(Set1(*p)); }
+  static Vector StartSum(const uint32_t*) { return _mm256_setzero_si256(); }
   static Vector DotAdd(Vector sum, Operand column, Operand row) {
     sum = _mm256_add_epi32(sum, _mm256_madd_epi16(column.even, row.even));
     return _mm256_add_epi32(sum, _mm256_madd_epi16(column.odd, row.odd));
@@ -43,8 +43,8 @@ struct Avx2Small : Avx2Keys {
   using Partial = Vector;
   static Operand LoadColumn(const uint32_t* p) { return Load(p); }
   static Operand LoadRow(const uint32_t* p) { return Set1(*p); }
-  static Partial LoadPartial(const uint32_t* p) { return Load(p); }
-  static Partial PartialDotAdd(Partial sum, Operand column, Operand row) {
+  static Partial StartPartial(const uint32_t* bias) { return Load(bias); }
+  static Partial DotAdd(Partial sum, Operand column, Operand row) {
     return _mm256_add_epi16(sum, _mm256_maddubs_epi16(column, row));
   }
   static Vector Widen(Vector sum, Partial partial) {

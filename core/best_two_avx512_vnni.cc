@@ -11,7 +11,6 @@ struct Avx512Vnni {
   static constexpr int kKeyBits = 32;
   static constexpr int kRowOffset = 128;
   static constexpr int kNumBias = 1;
-  static constexpr uint32_t kSumStart = 0;
   static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 4;
   static constexpr int kGroupBlock = 6;
@@ -29,11 +28,14 @@ struct Avx512Vnni {
   static Vector ShiftLeft(Vector a, int bits) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(bits)); }
   template <int kDistance>
   static Vector Rotate(Vector a) {
-    return _mm512_alignr_epi32(a, a, kDistance);
+    return _mm512_permutexvar_epi32(_mm512_and_si512(_mm512_add_epi32(Iota(), Set1(kDistance)), Set1(15)), a);
   }
-  static uint32_t First(Vector a) { return static_cast<uint32_t>(_mm512_cvtsi512_si32(a)); }
+  static uint32_t First(Vector a) {
+    return static_cast<uint32_t>(_mm_cvtsi128_si32(_mm512_castsi512_si128(a)));
+  }
   static Operand LoadColumn(const uint32_t* p) { return Load(p); }
   static Operand LoadRow(const uint32_t* p) { return Set1(*p); }
+  static Vector StartSum(const uint32_t* bias) { return Load(bias); }
   // Columns unsigned, rows signed.
   static Vector DotAdd(Vector sum, Operand column, Operand row) {
     return _mm512_dpbusd_epi32(sum, column, row);

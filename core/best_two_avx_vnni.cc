@@ -8,7 +8,6 @@ namespace {
 struct AvxVnni : Avx2Keys {
   static constexpr int kRowOffset = 128;
   static constexpr int kNumBias = 1;
-  static constexpr uint32_t kSumStart = 0;
   static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 4;
   static constexpr int kGroupBlock = 3;
@@ -16,6 +15,7 @@ struct AvxVnni : Avx2Keys {
   using Operand = Vector;
   static Operand LoadColumn(const uint32_t* p) { return Load(p); }
   static Operand LoadRow(const uint32_t* p) { return Set1(*p); }
+  static Vector StartSum(const uint32_t* bias) { return Load(bias); }
   // Columns unsigned, rows signed.
   static Vector DotAdd(Vector sum, Operand column, Operand row) {
     return _mm256_dpbusd_avx_epi32(sum, column, row);

@@ -11,7 +11,6 @@ struct NeonDot {
   static constexpr int kKeyBits = 32;
   static constexpr int kRowOffset = 0;
   static constexpr int kNumBias = 0;
-  static constexpr uint32_t kSumStart = 0;
   static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 4;
   static constexpr int kGroupBlock = 6;
@@ -34,6 +33,7 @@ struct NeonDot {
   static uint32_t First(Vector a) { return vgetq_lane_u32(a, 0); }
   static Operand LoadColumn(const uint32_t* p) { return vreinterpretq_u8_u32(vld1q_u32(p)); }
   static Operand LoadRow(const uint32_t* p) { return vreinterpretq_u8_u32(vld1q_dup_u32(p)); }
+  static Vector StartSum(const uint32_t*) { return vdupq_n_u32(0); }
   static Vector DotAdd(Vector sum, Operand column, Operand row) { return vdotq_u32(sum, column, row); }
 };
 

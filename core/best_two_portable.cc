@@ -56,6 +56,7 @@ struct Portable : PortableKeys {
   static constexpr bool kPartial = false;
   static constexpr int kRowBlock = 2;
   static constexpr int kGroupBlock = 2;
+  static Vector StartSum(const uint32_t*) { return Vector{}; }
   static Vector DotAdd(Vector sum, Operand column, Operand row) {
     return AddHalves(AddHalves(sum, column.even * row.even), column.odd * row.odd);
   }
@@ -66,7 +67,8 @@ struct PortableSmall : PortableKeys {
   static constexpr int kRowBlock = 4;
   static constexpr int kGroupBlock = 2;
   using Partial = Vector16;
-  static Partial PartialDotAdd(Partial sum, Operand column, Operand row) {
+  static Partial StartPartial(const uint32_t*) { return Partial{}; }
+  static Partial DotAdd(Partial sum, Operand column, Operand row) {
     return sum + column.even * row.even + column.odd * row.odd;
   }
   static Vector Widen(Vector sum, Partial partial) { return AddHalves(sum, partial); }

@@ -7,7 +7,10 @@
 //   Vector (of kLanes words), Load, Store, Set1, Iota, Sub, Or, Min, Max (of keys), ShiftLeft, Rotate<k>
 //   Operand, LoadColumn, LoadRow               one chunk, of kLanes columns or of one row in all lanes
 //   DotAdd(sum, column, row)                   sum + the four products of each lane
-// and, where kPartial, sums 8 chunks in narrower lanes: Partial, LoadPartial, PartialDotAdd, Widen.
+//   kPartial                                   whether 8 chunks are summed in narrower lanes first: then
+//     Partial, StartPartial(bias), Widen(sum, partial), kSumStart; else StartSum(bias)
+
+#include <utility>
 
 #include "core/best_two_kernel.h"
 
@@ -15,69 +18,72 @@ namespace cairn::best_two_internal {
 
 inline constexpr int kNumChunks = 32;
 
-// sums[r][g] = dot products of row r with the columns of group g.
-template <class V, int R, int G>
-[[gnu::always_inline]] inline void Dots(const uint32_t* rows, const uint32_t* columns, const uint32_t* bias,
-                                        typename V::Vector (&sums)[R][G]) {
-  constexpr int L = V::kLanes;
-#pragma GCC unroll 8
-  for (int g = 0; g < G; ++g) {
-    auto start = V::Set1(V::kSumStart);
-    if constexpr (V::kNumBias > 0) start = V::Load(bias + g * L);
-#pragma GCC unroll 8
-    for (int r = 0; r < R; ++r) sums[r][g] = start;
-  }
-#pragma GCC unroll 1
-  for (int chunk = 0; chunk < kNumChunks; ++chunk) {
-    typename V::Operand column[G];
-#pragma GCC unroll 8
-    for (int g = 0; g < G; ++g) column[g] = V::LoadColumn(columns + (g * kNumChunks + chunk) * L);
-#pragma GCC unroll 8
-    for (int r = 0; r < R; ++r) {
-      const auto row = V::LoadRow(rows + chunk * L + r);
-#pragma GCC unroll 8
-      for (int g = 0; g < G; ++g) sums[r][g] = V::DotAdd(sums[r][g], column[g], row);
-    }
-  }
+// The functions below name every element of `sums` by a constant, through folds over index packs, and never
+// through a closure: only so does g++ 12 keep the array in registers.
+template <int N>
+using Sequence = std::make_integer_sequence<int, N>;
+template <int... kIdx>
+using Indices = std::integer_sequence<int, kIdx...>;
+
+template <class T, int R, int G, int... kG, int... kR>
+[[gnu::always_inline]] inline void Fill(const T (&start)[G], T (&sums)[R][G], Indices<kG...>,
+                                        Indices<kR...>) {
+  const auto fill_row = [](const T(&from)[G], T(&to)[G]) __attribute__((always_inline)) {
+    ((to[kG] = from[kG]), ...);
+  };
+  (fill_row(start, sums[kR]), ...);
 }
 
-template <class V, int R, int G>
-[[gnu::always_inline]] inline void DotsOfSmall(const uint32_t* rows, const uint32_t* columns,
-                                               const uint32_t* bias, typename V::Vector (&sums)[R][G]) {
+template <class V, class Sum, int G, int... kG>
+[[gnu::always_inline]] inline void AddRow(const typename V::Operand (&columns)[G], typename V::Operand row,
+                                          Sum (&sums)[G], Indices<kG...>) {
+  ((sums[kG] = V::DotAdd(sums[kG], columns[kG], row)), ...);
+}
+
+// sums[r][g] += products of one chunk of row r with the columns of group g.
+template <class V, class Sum, int R, int G, int... kR, int... kG>
+[[gnu::always_inline]] inline void AddChunk(const uint32_t* rows, const uint32_t* columns, Sum (&sums)[R][G],
+                                            Indices<kR...>, Indices<kG...>) {
+  const typename V::Operand column[G] = {V::LoadColumn(columns + kG * kNumChunks * V::kLanes)...};
+  (AddRow<V, Sum, G>(column, V::LoadRow(rows + kR), sums[kR], Sequence<G>()), ...);
+}
+
+template <class V, int R, int G, int... kG>
+[[gnu::always_inline]] inline void WidenRow(const typename V::Partial (&partial)[G],
+                                            typename V::Vector (&sums)[G], Indices<kG...>) {
+  ((sums[kG] = V::Widen(sums[kG], partial[kG])), ...);
+}
+
+// sums[r][g] = dot products of row r with the columns of group g.
+template <class V, int R, int G, int... kR, int... kG>
+[[gnu::always_inline]] inline void Dots(const uint32_t* rows, const uint32_t* columns, const uint32_t* bias,
+                                        typename V::Vector (&sums)[R][G], Indices<kR...>, Indices<kG...>) {
+  using Vector = typename V::Vector;
   constexpr int L = V::kLanes;
-  constexpr int kNumSteps = kNumChunks / kBestTwoPartialChunks;
-#pragma GCC unroll 8
-  for (int r = 0; r < R; ++r) {
-#pragma GCC unroll 8
-    for (int g = 0; g < G; ++g) sums[r][g] = V::Set1(V::kSumStart);
-  }
+  if constexpr (V::kPartial) {
+    const Vector zero[G] = {(static_cast<void>(kG), V::Set1(V::kSumStart))...};
+    Fill<Vector, R, G>(zero, sums, Sequence<G>(), Sequence<R>());
 #pragma GCC unroll 1
-  for (int step = 0; step < kNumSteps; ++step) {
-    typename V::Partial partial[R][G];
+    for (int step = 0; step < kNumChunks / kBestTwoPartialChunks; ++step) {
+      const typename V::Partial start[G] = {V::StartPartial(bias + (kG * V::kNumBias + step) * L)...};
+      typename V::Partial partial[R][G];
+      Fill<typename V::Partial, R, G>(start, partial, Sequence<G>(), Sequence<R>());
 #pragma GCC unroll 8
-    for (int g = 0; g < G; ++g) {
-      typename V::Partial start{};
-      if constexpr (V::kNumBias > 0) start = V::LoadPartial(bias + (g * V::kNumBias + step) * L);
-#pragma GCC unroll 8
-      for (int r = 0; r < R; ++r) partial[r][g] = start;
-    }
-#pragma GCC unroll 8
-    for (int i = 0; i < kBestTwoPartialChunks; ++i) {
-      const int chunk = step * kBestTwoPartialChunks + i;
-      typename V::Operand column[G];
-#pragma GCC unroll 8
-      for (int g = 0; g < G; ++g) column[g] = V::LoadColumn(columns + (g * kNumChunks + chunk) * L);
-#pragma GCC unroll 8
-      for (int r = 0; r < R; ++r) {
-        const auto row = V::LoadRow(rows + chunk * L + r);
-#pragma GCC unroll 8
-        for (int g = 0; g < G; ++g) partial[r][g] = V::PartialDotAdd(partial[r][g], column[g], row);
+      for (int i = 0; i < kBestTwoPartialChunks; ++i) {
+        AddChunk<V, typename V::Partial, R, G>(rows, columns, partial, Sequence<R>(), Sequence<G>());
+        rows += L;
+        columns += L;
       }
+      (WidenRow<V, R, G>(partial[kR], sums[kR], Sequence<G>()), ...);
     }
-#pragma GCC unroll 8
-    for (int r = 0; r < R; ++r) {
-#pragma GCC unroll 8
-      for (int g = 0; g < G; ++g) sums[r][g] = V::Widen(sums[r][g], partial[r][g]);
+  } else {
+    const Vector start[G] = {V::StartSum(bias + kG * V::kNumBias * L)...};
+    Fill<Vector, R, G>(start, sums, Sequence<G>(), Sequence<R>());
+#pragma GCC unroll 1
+    for (int chunk = 0; chunk < kNumChunks; ++chunk) {
+      AddChunk<V, Vector, R, G>(rows, columns, sums, Sequence<R>(), Sequence<G>());
+      rows += L;
+      columns += L;
     }
   }
 }
@@ -90,44 +96,51 @@ template <class V>
   *best = V::Max(key, *best);
 }
 
+// The columns of group g with all rows, the first of which has key index `row_key`.
+template <class V, int R, int G, int... kR>
+[[gnu::always_inline]] inline void KeepColumns(const typename V::Vector (&dots)[R][G], int g,
+                                               uint32_t row_key, uint32_t* state, Indices<kR...>) {
+  auto best = V::Load(state), second = V::Load(state + V::kLanes);
+  (Keep<V>(V::Or(dots[kR][g], V::Set1(row_key - kR)), &best, &second), ...);
+  V::Store(state, best);
+  V::Store(state + V::kLanes, second);
+}
+
+template <class V, int G, int... kG>
+[[gnu::always_inline]] inline void KeepRow(const typename V::Vector (&dots)[G],
+                                           const typename V::Vector (&column_keys)[G], uint32_t* state,
+                                           Indices<kG...>) {
+  auto best = V::Load(state), second = V::Load(state + V::kLanes);
+  (Keep<V>(V::Or(dots[kG], column_keys[kG]), &best, &second), ...);
+  V::Store(state, best);
+  V::Store(state + V::kLanes, second);
+}
+
+template <class V, int G, int... kG>
+[[gnu::always_inline]] inline void ShiftRow(int bits, typename V::Vector (&sums)[G], Indices<kG...>) {
+  ((sums[kG] = V::ShiftLeft(sums[kG], bits)), ...);
+}
+
 // R rows from `row` of the block against the G column groups from `group`.
-template <class V, int R, int G>
-inline void SweepBlock(const BestTwoSweep& s, int row, int group) {
+template <class V, int R, int G, int... kR, int... kG>
+[[gnu::always_inline]] inline void SweepBlock(const BestTwoSweep& s, int row, int group, Indices<kR...>,
+                                              Indices<kG...>) {
   using Vector = typename V::Vector;
   constexpr int L = V::kLanes;
-  const uint32_t* rows = s.rows + static_cast<int64_t>(row / L) * kNumChunks * L + row % L;
-  const uint32_t* columns = s.columns + static_cast<int64_t>(group) * kNumChunks * L;
-  const uint32_t* bias = s.bias + static_cast<int64_t>(group) * V::kNumBias * L;
   Vector sums[R][G];
-  if constexpr (V::kPartial) {
-    DotsOfSmall<V, R, G>(rows, columns, bias, sums);
-  } else {
-    Dots<V, R, G>(rows, columns, bias, sums);
-  }
+  Dots<V, R, G>(s.rows + static_cast<int64_t>(row / L) * kNumChunks * L + row % L,
+                s.columns + static_cast<int64_t>(group) * kNumChunks * L,
+                s.bias + static_cast<int64_t>(group) * V::kNumBias * L, sums, Sequence<R>(), Sequence<G>());
+  (ShiftRow<V, G>(s.index_bits, sums[kR], Sequence<G>()), ...);
   const uint32_t last = (uint32_t{1} << s.index_bits) - 1;
-#pragma GCC unroll 8
-  for (int g = 0; g < G; ++g) {
-    uint32_t* column_state = s.column_keys + static_cast<int64_t>(group + g) * 2 * L;
-    const Vector column_idx = V::Sub(V::Set1(last - static_cast<uint32_t>((group + g) * L)), V::Iota());
-    Vector column_best = V::Load(column_state), column_second = V::Load(column_state + L);
-#pragma GCC unroll 8
-    for (int r = 0; r < R; ++r) {
-      const Vector dot = V::ShiftLeft(sums[r][g], s.index_bits);
-      Keep<V>(V::Or(dot, V::Set1(last - static_cast<uint32_t>(row + r))), &column_best, &column_second);
-      sums[r][g] = V::Or(dot, column_idx);
-    }
-    V::Store(column_state, column_best);
-    V::Store(column_state + L, column_second);
-  }
-#pragma GCC unroll 8
-  for (int r = 0; r < R; ++r) {
-    uint32_t* row_state = s.row_states + static_cast<int64_t>(row + r) * 2 * L;
-    Vector best = V::Load(row_state), second = V::Load(row_state + L);
-#pragma GCC unroll 8
-    for (int g = 0; g < G; ++g) Keep<V>(sums[r][g], &best, &second);
-    V::Store(row_state, best);
-    V::Store(row_state + L, second);
-  }
+  uint32_t* column_state = s.column_keys + static_cast<int64_t>(group) * 2 * L;
+  (KeepColumns<V, R, G>(sums, kG, last - static_cast<uint32_t>(row), column_state + kG * 2 * L,
+                        Sequence<R>()),
+   ...);
+  const Vector first = V::Sub(V::Set1(last - static_cast<uint32_t>(group * L)), V::Iota());
+  const Vector column_keys[G] = {V::Sub(first, V::Set1(kG * L))...};
+  uint32_t* row_state = s.row_states + static_cast<int64_t>(row) * 2 * L;
+  (KeepRow<V, G>(sums[kR], column_keys, row_state + kR * 2 * L, Sequence<G>()), ...);
 }
 
 // The last groups of a tile, fewer than kGroupBlock.
@@ -135,7 +148,7 @@ template <class V, int G>
 inline void SweepRemainder(const BestTwoSweep& s, int row, int group, int num_groups) {
   if constexpr (G > 0) {
     if (num_groups == G) {
-      SweepBlock<V, V::kRowBlock, G>(s, row, group);
+      SweepBlock<V, V::kRowBlock, G>(s, row, group, Sequence<V::kRowBlock>(), Sequence<G>());
     } else {
       SweepRemainder<V, G - 1>(s, row, group, num_groups);
     }
@@ -168,7 +181,8 @@ inline void SweepAll(const BestTwoSweep& s) {
     for (int row = 0; row < num_rows; row += V::kRowBlock) {
       int group = begin;
       for (; group + V::kGroupBlock <= end; group += V::kGroupBlock)
-        SweepBlock<V, V::kRowBlock, V::kGroupBlock>(s, row, group);
+        SweepBlock<V, V::kRowBlock, V::kGroupBlock>(s, row, group, Sequence<V::kRowBlock>(),
+                                                    Sequence<V::kGroupBlock>());
       SweepRemainder<V, V::kGroupBlock - 1>(s, row, group, end - group);
     }
   }

@@ -149,16 +149,17 @@ std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
   constexpr double kSquaredNorm = 512.0 * 512.0;
   const auto angle = [&](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
   const auto passes = [&](const BestTwo& b) {
-    if (b.idx < 0) return false;
     const double best = angle(b.best);
-    return best <= options.max_angle_rad && (b.second < 0 || best <= options.max_ratio * angle(b.second));
+    return best <= options.max_angle_rad && (b.second < 0 || best < options.max_ratio * angle(b.second));
   };
   std::vector<Match> matches;
   for (uint32_t row = 0; row < rows.size(); ++row) {
-    if (!passes(rows[row])) continue;
-    const BestTwo& column = columns[rows[row].idx];
-    if (options.mutual && (column.idx != static_cast<int32_t>(row) || !passes(column))) continue;
-    matches.push_back({row, static_cast<uint32_t>(rows[row].idx)});
+    const BestTwo& best = rows[row];
+    if (best.idx < 0) continue;
+    const BestTwo& column = columns[best.idx];
+    if (options.mutual && column.idx != static_cast<int32_t>(row)) continue;
+    if (passes(best) && (!options.mutual || passes(column)))
+      matches.push_back({row, static_cast<uint32_t>(best.idx)});
   }
   return matches;
 }

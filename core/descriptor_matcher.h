@@ -9,7 +9,7 @@
 namespace cairn {
 
 struct DescriptorMatcherOptions {
-  // A match's distance to its best over its second best must be at most this, as angles between RootSIFT
+  // The distance to the best over that to the second best must be less than this, as angles between RootSIFT
   // vectors, in both directions when `mutual`.  REQUIRES: in (0, 1]
   double max_ratio = 0.8;
   // Largest angle between matched descriptors, radians.  REQUIRES: > 0

@@ -42,10 +42,19 @@ void ExpectEqual(const std::vector<BestTwo>& found, const std::vector<BestTwo>& 
   }
 }
 
+// With emulated instructions (tests/core/emulated) every kernel of x86-64 runs.
+bool Runs(MatchKernel kernel) {
+#ifdef CAIRN_EMULATED_INTRINSICS
+  return kernel != MatchKernel::kNeonDot;
+#else
+  return IsKernelSupported(kernel);
+#endif
+}
+
 class FindBestTwoTest : public testing::TestWithParam<MatchKernel> {
  protected:
   void SetUp() override {
-    if (!IsKernelSupported(GetParam())) GTEST_SKIP() << "this processor lacks the instructions";
+    if (!Runs(GetParam())) GTEST_SKIP() << "this processor lacks the instructions";
   }
 };
 
@@ -74,6 +83,48 @@ TEST_P(FindBestTwoTest, SaturatedAndZeroDescriptorsDoNotOverflow) {
   FindBestTwo(d1, d2, GetParam(), &rows, &columns);
   ExpectEqual(rows, OracleRows(d1, d2));
   ExpectEqual(columns, OracleRows(d2, d1));
+}
+
+// Descriptors for the 16-bit kernels and others, mixed, with equal ones among both.
+TEST_P(FindBestTwoTest, SmallAndLargeValuesMixedFindTheSame) {
+  DescriptorMatrix d1 = RandomDescriptors(300, 60, 1), d2 = RandomDescriptors(200, 90, 2);
+  for (int i = 0; i < 300; i += 7) d1.row(i).head(3).setConstant(255);
+  for (int i = 0; i < 200; i += 5) d2.row(i).head(2).setConstant(200);
+  d2.row(6) = d2.row(60);
+  d2.row(5) = d2.row(50);
+  d1.bottomRows(40) = d1.topRows(40);
+  std::vector<BestTwo> rows, columns;
+  FindBestTwo(d1, d2, GetParam(), &rows, &columns);
+  ExpectEqual(rows, OracleRows(d1, d2));
+  ExpectEqual(columns, OracleRows(d2, d1));
+}
+
+// The largest sums that the 16-bit kernels take: the whole norm in one of their lanes, pairs up to 181.
+TEST_P(FindBestTwoTest, ConcentratedDescriptorsDoNotOverflow) {
+  DescriptorMatrix d1 = DescriptorMatrix::Zero(128 + 120, kDescriptorDim);
+  for (int i = 0; i < 128; ++i) d1(i, i) = static_cast<uint8_t>(120 + i);
+  for (int i = 128; i < d1.rows(); ++i) d1.row(i).setConstant(static_cast<uint8_t>(i - 80));
+  const DescriptorMatrix d2 = d1.colwise().reverse();
+  std::vector<BestTwo> rows, columns;
+  FindBestTwo(d1, d2, GetParam(), &rows, &columns);
+  ExpectEqual(rows, OracleRows(d1, d2));
+  ExpectEqual(columns, OracleRows(d2, d1));
+}
+
+// More rows and columns than a key can index: 255 or 511 of the largest, 8191 of RootSIFT's size.
+TEST_P(FindBestTwoTest, BlocksBeyondTheKeysIndexAreMerged) {
+  const DescriptorMatrix large1 = RandomDescriptors(1100, 255, 3), large2 = RandomDescriptors(600, 255, 4);
+  DescriptorMatrix saturated = DescriptorMatrix::Constant(600, kDescriptorDim, 255);
+  const DescriptorMatrix few = RandomDescriptors(20, 60, 5);
+  DescriptorMatrix many = RandomDescriptors(8500, 60, 6);
+  many.row(8400) = many.row(3);
+  for (const auto& [d1, d2] : {std::pair(large1, large2), std::pair(saturated, large1), std::pair(few, many),
+                               std::pair(many, few)}) {
+    std::vector<BestTwo> rows, columns;
+    FindBestTwo(d1, d2, GetParam(), &rows, &columns);
+    ExpectEqual(rows, OracleRows(d1, d2));
+    ExpectEqual(columns, OracleRows(d2, d1));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, FindBestTwoTest, testing::ValuesIn(kMatchKernels),
@@ -105,6 +156,16 @@ TEST(MatchDescriptors, RatioTestDropsAmbiguousAndDistantMatches) {
   EXPECT_EQ(matches[0], (Match{0, 0}));
 }
 
+TEST(MatchDescriptors, TwoCandidatesAtNoDistanceAreAmbiguous) {
+  DescriptorMatrix d1(1, kDescriptorDim), d2(2, kDescriptorDim);
+  SetDirection(&d1, 0, 0, 0.0);
+  d1.row(0).head(5).setConstant(255);  // beyond norm 512, as rounding makes them: an angle of 0
+  d2.row(0) = d1.row(0);
+  d2.row(1) = d1.row(0);
+  EXPECT_TRUE(MatchDescriptors(d1, d2, {}).empty());
+  EXPECT_EQ(MatchDescriptors(d1, d2.topRows(1), {}).size(), 1u);
+}
+
 TEST(MatchDescriptors, EmptySetsMatchNothing) {
   const DescriptorMatrix none(0, kDescriptorDim);
   EXPECT_TRUE(MatchDescriptors(none, RandomDescriptors(5, 255, 1), {}).empty());
@@ -112,8 +173,8 @@ TEST(MatchDescriptors, EmptySetsMatchNothing) {
 }
 
 TEST(PackedDescriptors, MatchLikeUnpackedOnesAndKeepToTheStatedMemory) {
-  const DescriptorMatrix d1 = RandomDescriptors(300, 90, 1);
-  DescriptorMatrix d2 = RandomDescriptors(200, 90, 2);
+  const DescriptorMatrix d1 = 66 * RandomDescriptors(300, 1, 1);  // norms near 512
+  DescriptorMatrix d2 = 66 * RandomDescriptors(200, 1, 2);
   d2.topRows(50) = d1.middleRows(100, 50);
   const PackedDescriptors packed1(d1), packed2(d2);
   EXPECT_EQ(packed1.size(), 300);

@@ -128,7 +128,7 @@ TEST_F(MatchFeaturesTest, RetrievalMatchesImagesThatShowTheSameWords) {
   const auto other_place = [](SQLite::Database& database) {
     Random random(11);
     std::string bytes(80 * kDescriptorDim, '\0');
-    for (char& byte : bytes) byte = static_cast<char>(200 * std::pow(random.Uniform(), 4));
+    for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
     SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 2");
     update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
     update.exec();
