@@ -7,6 +7,8 @@
 
 #include <Eigen/Dense>
 
+#include "core/camera.h"
+#include "core/pose.h"
 #include "stages/match_features/two_view_error.h"
 
 namespace cairn {
@@ -38,6 +40,48 @@ struct BestTwoCandidates {
   }
 };
 
+// How keypoints change from the first image to the second, from the inliers.
+class KeypointChange {
+ public:
+  KeypointChange(const GuidedView& view1, const GuidedView& view2, const std::vector<Match>& inliers,
+                 const GuidedMatchOptions& options)
+      : keypoints1_(*view1.keypoints),
+        keypoints2_(*view2.keypoints),
+        max_log_ratio_(std::log(options.max_scale_ratio)),
+        max_turn_(RadFromDeg(options.max_turn_deg)) {
+    if (inliers.empty()) return;
+    std::vector<double> log_ratios;
+    double sine = 0, cosine = 0;
+    for (const Match& match : inliers) {
+      log_ratios.push_back(LogRatio(match));
+      sine += std::sin(Turn(match));
+      cosine += std::cos(Turn(match));
+    }
+    const auto middle = log_ratios.begin() + static_cast<std::ptrdiff_t>(log_ratios.size() / 2);
+    std::nth_element(log_ratios.begin(), middle, log_ratios.end());
+    log_ratio_ = *middle;
+    turn_ = std::atan2(sine, cosine);
+  }
+
+  bool Explains(const Match& match) const {
+    return std::abs(LogRatio(match) - log_ratio_) <= max_log_ratio_ &&
+           std::abs(std::remainder(Turn(match) - turn_, 2 * std::numbers::pi)) <= max_turn_;
+  }
+
+ private:
+  double LogRatio(const Match& match) const {
+    return std::log(keypoints2_[match.idx2].scale / keypoints1_[match.idx1].scale);
+  }
+  double Turn(const Match& match) const {
+    return keypoints2_[match.idx2].orientation - keypoints1_[match.idx1].orientation;
+  }
+
+  const std::vector<Keypoint>& keypoints1_;
+  const std::vector<Keypoint>& keypoints2_;
+  const double max_log_ratio_, max_turn_;
+  double log_ratio_ = 0, turn_ = 0;
+};
+
 bool Passes(const BestTwoCandidates& candidates, const GuidedMatchOptions& options) {
   constexpr double kSquaredNorm = 512.0 * 512.0;
   const auto angle = [](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
@@ -50,8 +94,11 @@ bool Passes(const BestTwoCandidates& candidates, const GuidedMatchOptions& optio
 // Best two of every keypoint of both images over the pairs that are offered, and the matches that follow.
 class CandidateMatcher {
  public:
-  CandidateMatcher(const GuidedView& view1, const GuidedView& view2, const std::vector<Match>& inliers)
-      : descriptors1_(*view1.descriptors),
+  CandidateMatcher(const GuidedView& view1, const GuidedView& view2, const std::vector<Match>& inliers,
+                   const GuidedMatchOptions& options)
+      : options_(options),
+        change_(view1, view2, inliers, options),
+        descriptors1_(*view1.descriptors),
         descriptors2_(*view2.descriptors),
         is_matched1_(view1.bearings->size(), 0),
         is_matched2_(view2.bearings->size(), 0),
@@ -70,18 +117,20 @@ class CandidateMatcher {
     best2_[idx2].Offer(dot, idx1);
   }
 
-  std::vector<Match> Matches(const GuidedMatchOptions& options) && {
+  std::vector<Match> Matches() && {
     for (uint32_t idx1 = 0; idx1 < best1_.size(); ++idx1) {
-      if (is_matched1_[idx1] || !Passes(best1_[idx1], options)) continue;
+      if (is_matched1_[idx1] || !Passes(best1_[idx1], options_)) continue;
       const uint32_t idx2 = best1_[idx1].idx;
       if (is_matched2_[idx2] || best2_[idx2].idx != static_cast<int32_t>(idx1)) continue;
-      if (Passes(best2_[idx2], options)) matches_.push_back({idx1, idx2});
+      if (Passes(best2_[idx2], options_) && change_.Explains({idx1, idx2})) matches_.push_back({idx1, idx2});
     }
     std::sort(matches_.begin(), matches_.end());
     return std::move(matches_);
   }
 
  private:
+  const GuidedMatchOptions& options_;
+  const KeypointChange change_;
   const DescriptorMatrix& descriptors1_;
   const DescriptorMatrix& descriptors2_;
   std::vector<uint8_t> is_matched1_, is_matched2_;
@@ -157,7 +206,7 @@ std::vector<Match> GuideByEpipolarLines(const GuidedView& view1, const GuidedVie
   for (size_t j = 0; j < bearings2.size(); ++j)
     squared_norm1[j] = (M.transpose() * bearings2[j]).squaredNorm();
 
-  CandidateMatcher matcher(view1, view2, inliers);
+  CandidateMatcher matcher(view1, view2, inliers, options);
   const double max_error2 = max_error_rad * max_error_rad;
   for (int i = 0; i < static_cast<int>(bearings1.size()); ++i) {
     const Eigen::Vector3d normal = M * bearings1[i];
@@ -182,7 +231,7 @@ std::vector<Match> GuideByEpipolarLines(const GuidedView& view1, const GuidedVie
       VisitWindow(pencil[c], angle, sine < 1 ? std::asin(sine) : std::numbers::pi, visit);
     }
   }
-  return std::move(matcher).Matches(options);
+  return std::move(matcher).Matches();
 }
 
 std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& view2,
@@ -194,7 +243,7 @@ std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& 
     if (bearings2[j].allFinite()) by_height.push_back({bearings2[j].y(), j});
   }
   std::sort(by_height.begin(), by_height.end());
-  CandidateMatcher matcher(view1, view2, inliers);
+  CandidateMatcher matcher(view1, view2, inliers, options);
   for (int i = 0; i < static_cast<int>(bearings1.size()); ++i) {
     const Eigen::Vector3d predicted = (H * bearings1[i]).normalized();
     if (!predicted.allFinite()) continue;
@@ -207,7 +256,7 @@ std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& 
       }
     }
   }
-  return std::move(matcher).Matches(options);
+  return std::move(matcher).Matches();
 }
 
 }  // namespace cairn

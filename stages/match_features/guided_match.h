@@ -13,12 +13,17 @@ struct GuidedMatchOptions {
   // geometry allows, in both directions.  REQUIRES: in (0, 1]
   double max_ratio = 0.8;
   // Largest angle between matched descriptors, radians.  REQUIRES: > 0
-  double max_angle_rad = 0.7;
+  double max_angle_rad = 0.45;
+  // From one image to the other keypoints change scale and orientation, on the whole, as those of the inliers
+  // do: largest factor of the scale over, and angle off, their median and mean.  REQUIRES: >= 1, > 0
+  double max_scale_ratio = 1.5;
+  double max_turn_deg = 30;
 };
 
 // What guided matching reads of one image: row i of `descriptors` and bearing i (unit, NaN where there is
 // none) belong to keypoint i.
 struct GuidedView {
+  const std::vector<Keypoint>* keypoints = nullptr;
   const std::vector<Eigen::Vector3d>* bearings = nullptr;
   const DescriptorMatrix* descriptors = nullptr;
 };
@@ -26,6 +31,8 @@ struct GuidedView {
 // Matches again where the geometry of two views is known: each keypoint without a match looks for its best
 // descriptor among the keypoints near its epipolar line; mutual best and ratio test, as before.  The many
 // look-alikes elsewhere in the image, over which the ratio test of blind matching fails, no longer count.
+// With few candidates the ratio test proves little: a match must also change scale and orientation as the
+// inliers do.
 //
 // `M` is an essential or fundamental matrix on bearings (b2' M b1 = 0), `inliers` are matches that obey it.
 // Keypoints of the second image are sorted by the angle of their epipolar plane about the baseline, in

@@ -225,6 +225,16 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .help = "guided matching: largest angle between matched descriptors, radians",
        .min = 0,
        .max = 3.2},
+      {.name = "guided_max_scale_ratio",
+       .value = &o->matching.verification.guided.max_scale_ratio,
+       .help = "guided matching: largest factor of a match's change of scale over that of the inliers",
+       .min = 1},
+      {.name = "guided_max_turn_deg",
+       .value = &o->matching.verification.guided.max_turn_deg,
+       .help = "guided matching: largest angle of a match's change of orientation off that of the inliers, "
+               "degrees",
+       .min = 1e-3,
+       .max = 180},
   };
 }
 

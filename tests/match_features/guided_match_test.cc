@@ -32,8 +32,9 @@ Eigen::Matrix3d TrueEssential(const TwoViewScene& scene) {
 
 std::vector<Match> Guide(const TwoViewScene& scene, const Eigen::Matrix3d& M,
                          const std::vector<Match>& inliers) {
-  return GuideByEpipolarLines({&scene.bearings1, &scene.descriptors1},
-                              {&scene.bearings2, &scene.descriptors2}, M, kMaxError, inliers, {});
+  return GuideByEpipolarLines({&scene.keypoints1, &scene.bearings1, &scene.descriptors1},
+                              {&scene.keypoints2, &scene.bearings2, &scene.descriptors2}, M, kMaxError,
+                              inliers, {});
 }
 
 // Brute force over all pairs of keypoints: best two of both sides among the candidates.
@@ -109,6 +110,25 @@ TEST(GuidedMatch, AgreesWithBruteForceOverAllPairs) {
   }
 }
 
+TEST(GuidedMatch, MatchesChangeScaleAndOrientationAsTheInliersDo) {
+  TwoViewScene scene = RepeatedStructure(90);
+  for (Keypoint& keypoint : scene.keypoints2) {  // nearer, and the camera rolled
+    keypoint.scale *= 3;
+    keypoint.orientation += 2.8F;
+  }
+  const std::vector<Match> inliers(scene.matches.begin(), scene.matches.begin() + 10);
+  const std::vector<Match> all = Guide(scene, TrueEssential(scene), inliers);
+  EXPECT_GE(all.size(), 75u);
+  scene.keypoints2[all[20].idx2].scale *= 1.6F;
+  scene.keypoints2[all[30].idx2].scale /= 1.6F;
+  scene.keypoints2[all[40].idx2].orientation += 0.6F;
+  scene.keypoints2[all[50].idx2].orientation -= 0.6F;
+  scene.keypoints2[all[60].idx2].orientation += 6.3F;  // a whole turn
+  std::vector<Match> expected = all;
+  for (const int i : {50, 40, 30, 20}) expected.erase(expected.begin() + i);
+  EXPECT_EQ(Guide(scene, TrueEssential(scene), inliers), expected);
+}
+
 TEST(GuidedMatch, SignAndScaleOfTheMatrixDoNotMatter) {
   const TwoViewScene scene = RepeatedStructure(90);
   const std::vector<Match> inliers(scene.matches.begin(), scene.matches.begin() + 10);
@@ -124,9 +144,9 @@ TEST(GuidedMatch, HomographyAgreesWithBruteForce) {
   const auto is_candidate = [&](int i, int j) {
     return SquaredTransferError(H, scene.bearings1[i], scene.bearings2[j]) <= kMaxError * kMaxError;
   };
-  const std::vector<Match> matches =
-      GuideByHomography({&scene.bearings1, &scene.descriptors1}, {&scene.bearings2, &scene.descriptors2}, H,
-                        kMaxError, inliers, {});
+  const std::vector<Match> matches = GuideByHomography(
+      {&scene.keypoints1, &scene.bearings1, &scene.descriptors1},
+      {&scene.keypoints2, &scene.bearings2, &scene.descriptors2}, H, kMaxError, inliers, {});
   EXPECT_EQ(matches, GuideByBruteForce(scene, inliers, is_candidate));
   EXPECT_GE(matches.size(), 140u);
 }
