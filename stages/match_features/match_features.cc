@@ -182,6 +182,11 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .help =
            "with known poses: largest distance of a match to the epipolar line of the stated poses, pixels",
        .min = 1e-3},
+      {.name = "max_ray_angle_deg",
+       .value = &o->matching.verification.max_ray_angle_deg,
+       .help = "with known poses: rays that differ by more are no match, degrees",
+       .min = 1,
+       .max = 180},
       {.name = "min_num_inliers",
        .value = &o->matching.verification.min_num_inliers,
        .help = "fewest inliers of a verified pair",

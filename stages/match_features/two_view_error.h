@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <Eigen/Core>
@@ -32,6 +33,17 @@ inline double SquaredSampsonError(const Eigen::Matrix3d& E, const Eigen::Vector3
   // Both normals have the component `residual` along their bearing; the rest lies in the tangent plane.
   const double gradient2 = normal1.squaredNorm() + normal2.squaredNorm() - 2 * residual * residual;
   return residual * residual / std::max(gradient2, 1e-18);
+}
+
+// Whether two rays, unit vectors in one frame, come closest to each other in front of both: the first starts
+// at the origin, the second at `baseline`, not zero.  Rays that diverge by less than tolerance_rad may do so
+// because their directions are that wrong: they count.
+inline bool RaysConverge(const Eigen::Vector3d& ray1, const Eigen::Vector3d& ray2,
+                         const Eigen::Vector3d& baseline, double tolerance_rad) {
+  const Eigen::Vector3d axis = baseline.normalized();
+  const double angle1 = std::acos(std::clamp(ray1.dot(axis), -1.0, 1.0));
+  const double angle2 = std::acos(std::clamp(ray2.dot(axis), -1.0, 1.0));
+  return angle2 - angle1 >= -tolerance_rad;
 }
 
 // Distance of the second bearing from where the homography takes the first one, squared, rad^2 (as a chord).

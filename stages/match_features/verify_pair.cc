@@ -66,6 +66,16 @@ bool IsPart(size_t num, double ratio, size_t num_all) {
   return static_cast<double>(num) > ratio * static_cast<double>(num_all);
 }
 
+// Whether the rays of a match can show one thing, seen from the stated poses: from the same side, and meeting
+// in front of both cameras, up to the poses' error.
+bool CanMeet(const Pose& stated, const Eigen::Vector3d& bearing1, const Eigen::Vector3d& bearing2,
+             const Limits& limits, const VerifyPairOptions& options) {
+  const Eigen::Vector3d ray1 = stated.rotation * bearing1;
+  if (!(ray1.dot(bearing2) >= std::cos(RadFromDeg(options.max_ray_angle_deg)))) return false;
+  if (stated.translation.norm() < options.min_baseline_m) return true;
+  return RaysConverge(ray1, bearing2, -stated.translation, limits.prior);
+}
+
 // No baseline, no epipolar line: a match must lie where the rotation takes it.
 Model TurnedCamera(const Pose& stated, const Correspondences& c, const Limits& limits) {
   Model model;
@@ -237,12 +247,19 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
   const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
   const Limits limits{options.max_epipolar_error_px / focal_px, options.max_homography_error_px / focal_px,
                       options.max_prior_error_px / focal_px};
-  const Correspondences c = CollectCorrespondences(view1, view2, matches);
-  const Model model =
-      view1.cam_from_world && view2.cam_from_world
-          ? PosedCameras(*view2.cam_from_world * view1.cam_from_world->Inverse(), c, limits, options)
-          : UnposedCameras(view1.camera->has_focal_prior && view2.camera->has_focal_prior, c, limits,
-                           options);
+  std::optional<Pose> stated;  // camera 2 from camera 1
+  if (view1.cam_from_world && view2.cam_from_world)
+    stated = *view2.cam_from_world * view1.cam_from_world->Inverse();
+  const auto cannot_meet = [&](const Match& match) {
+    return stated &&
+           !CanMeet(*stated, (*view1.bearings)[match.idx1], (*view2.bearings)[match.idx2], limits, options);
+  };
+  std::vector<Match> candidates = matches;
+  std::erase_if(candidates, cannot_meet);
+  const Correspondences c = CollectCorrespondences(view1, view2, candidates);
+  const Model model = stated ? PosedCameras(*stated, c, limits, options)
+                             : UnposedCameras(view1.camera->has_focal_prior && view2.camera->has_focal_prior,
+                                              c, limits, options);
 
   TwoViewGeometry geometry;
   geometry.config = TwoViewConfig::kDegenerate;
@@ -251,14 +268,16 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
     return geometry;
   }
   std::vector<Match> inliers;
-  for (const int i : model.inliers) inliers.push_back(matches[c.match_idx[i]]);
+  for (const int i : model.inliers) inliers.push_back(candidates[c.match_idx[i]]);
   if (IsWatermark(view1, view2, inliers, options)) {
     geometry.config = TwoViewConfig::kWatermark;
     return geometry;
   }
-  geometry.config = model.config;
   if (options.guided_matching && view1.descriptors != nullptr && view2.descriptors != nullptr)
     inliers = GuidedInliers(view1, view2, model, limits, inliers, options);
+  std::erase_if(inliers, cannot_meet);
+  if (static_cast<int>(inliers.size()) < options.min_num_inliers) return geometry;
+  geometry.config = model.config;
   std::sort(inliers.begin(), inliers.end());
   geometry.inliers = std::move(inliers);
   const Eigen::Matrix3d K1_inverse = Calibration(*view1.camera).inverse(), K2 = Calibration(*view2.camera);

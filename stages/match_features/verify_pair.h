@@ -22,6 +22,9 @@ struct VerifyPairOptions {
   // With known poses: matches farther than this from the epipolar line of the stated poses are dropped before
   // the relative pose is refined, pixels; as wide as the poses are wrong.  REQUIRES: >= max_epipolar_error_px
   double max_prior_error_px = 16.0;
+  // With known poses: rays that differ by more are no match, degrees; a surface is not seen from both sides,
+  // and SIFT does not match beyond.  REQUIRES: in (0, 180]
+  double max_ray_angle_deg = 90;
   // With known poses: a shorter baseline is none, metres.  REQUIRES: > 0
   double min_baseline_m = 1e-3;
   // Fewest inliers of a verified pair.  REQUIRES: >= 8
@@ -54,7 +57,9 @@ struct ViewForVerification {
 
 // Keeps the putative matches that one geometry explains, on bearings, hence for any field of view:
 // - both poses known: essential matrix refined from the stated relative pose by iteratively reweighted
-//   Gauss-Newton on the Sampson distance (no sampling), after dropping what the stated pose excludes.
+//   Gauss-Newton on the Sampson distance (no sampling), after dropping what the stated pose excludes: matches
+//   off the epipolar lines, seen from more than max_ray_angle_deg apart, or that meet behind a camera.  The
+//   last two are what looks alike in different places: views back to back have epipolar lines, too.
 //   kPanoramic where no baseline is stated or a rotation alone explains the inliers, kPlanar where a
 //   homography does.
 // - poses unknown, intrinsics known (Camera::has_focal_prior of both): essential matrix by USAC, refined;

@@ -51,6 +51,36 @@ TEST(VerifyPair, AliasedMatchesThatContradictTheStatedPosesAreRefused) {
   EXPECT_TRUE(geometry.inliers.empty());
 }
 
+TEST(VerifyPair, MatchesThatMeetBehindTheCamerasAreRefused) {
+  // The stated baseline points the other way: the same epipolar lines, but rays that diverge by 8 degrees.
+  const TwoViewScene scene = MakeTwoViewScene({.turn_rad = 0});
+  Pose stated = scene.cam2_from_world;
+  EXPECT_EQ(Verify(scene, scene.cam1_from_world, stated).config, TwoViewConfig::kCalibrated);
+  stated.translation *= -1;
+  EXPECT_EQ(Verify(scene, scene.cam1_from_world, stated).config, TwoViewConfig::kDegenerate);
+}
+
+TEST(VerifyPair, LookAlikesOfViewsBackToBackAreRefused) {
+  //   ===========      Both walls have the same frieze at the height of the cameras, which stand side by side
+  //        ^ 1         back to back: all of it lies on one epipolar line of the stated poses.
+  //          2 v
+  //   ===========
+  TwoViewScene scene = MakeTwoViewScene({.is_flat = true, .turn_rad = 0});
+  scene.cam2_from_world.translation = {-0.5, 0, 0};
+  for (size_t i = 0; i < scene.matches.size(); ++i) {
+    scene.keypoints1[i].y = scene.keypoints2[i].y = 239.0F + static_cast<float>(i % 3);
+    scene.bearings1[i] = BearingOf(scene.camera, scene.keypoints1[i]);
+    scene.bearings2[i] = BearingOf(scene.camera, scene.keypoints2[i]);
+  }
+  Pose turn;
+  turn.rotation = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY());
+  const Pose stated = turn * scene.cam2_from_world;
+  VerifyPairOptions options;
+  EXPECT_EQ(Verify(scene, scene.cam1_from_world, stated, options).config, TwoViewConfig::kDegenerate);
+  options.max_ray_angle_deg = 180;
+  EXPECT_NE(Verify(scene, scene.cam1_from_world, stated, options).config, TwoViewConfig::kDegenerate);
+}
+
 TEST(VerifyPair, WithoutPosesTheFivePointEstimatorFindsTheInliers) {
   const TwoViewScene scene = MakeTwoViewScene({.num_outliers = 60});
   const TwoViewGeometry geometry = VerifyUnposed(scene);
