@@ -23,6 +23,16 @@ Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, con
   return counts;
 }
 
+std::vector<Eigen::Vector3d> BearingsOf(const std::vector<Keypoint>& keypoints, const Camera& camera) {
+  std::vector<Eigen::Vector3d> bearings;
+  bearings.reserve(keypoints.size());
+  for (const Keypoint& keypoint : keypoints) {
+    const auto bearing = BearingFromImage(camera, Eigen::Vector2d(keypoint.x, keypoint.y));
+    bearings.push_back(bearing.value_or(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())));
+  }
+  return bearings;
+}
+
 }  // namespace
 
 bool MatchImages::AllPosed() const {
@@ -75,13 +85,15 @@ Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchI
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
   features.packed = PackedDescriptors(features.descriptors);
-  features.bearings.reserve(features.keypoints.size());
-  for (const Keypoint& keypoint : features.keypoints) {
-    const auto bearing = BearingFromImage(camera, Eigen::Vector2d(keypoint.x, keypoint.y));
-    features.bearings.push_back(
-        bearing.value_or(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())));
-  }
+  features.bearings = BearingsOf(features.keypoints, camera);
   return features;
+}
+
+Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
+                                                       const Camera& camera) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+                         ReadDatabaseKeypoints(database, image.image_id));
+  return BearingsOf(keypoints, camera);
 }
 
 }  // namespace cairn

@@ -53,4 +53,8 @@ struct ImageFeatures {
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
                                         const Camera& camera);
 
+// Only the bearings of ImageFeatures.  Errors: Corrupt.  Throws like ReadMatchImages.
+Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
+                                                       const Camera& camera);
+
 }  // namespace cairn

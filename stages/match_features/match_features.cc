@@ -1,6 +1,7 @@
 #include "stages/match_features/match_features.h"
 
 #include <algorithm>
+#include <unordered_map>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -8,6 +9,7 @@
 #include "core/colmap_database.h"
 #include "core/file.h"
 #include "stages/match_features/pair_list.h"
+#include "stages/match_features/predict_pairs.h"
 #include "stages/match_features/retrieve_pairs.h"
 
 namespace cairn {
@@ -21,8 +23,7 @@ std::string ChooseMethod(const MatchImages& images, const MatchFeaturesOptions& 
   return num_images <= options.max_num_exhaustive_images ? "exhaustive" : "retrieval";
 }
 
-Result<IndexPairs> SelectFrustumPairs(const MatchImages& images, const MatchFeaturesOptions& options,
-                                      int num_threads) {
+Result<std::vector<PosedCamera>> PosedCameras(const MatchImages& images) {
   std::vector<PosedCamera> posed;
   for (const MatchImage& image : images.images) {
     if (!image.cam_from_world) {
@@ -33,7 +34,7 @@ Result<IndexPairs> SelectFrustumPairs(const MatchImages& images, const MatchFeat
     }
     posed.push_back({images.cameras.at(image.camera_id), *image.cam_from_world});
   }
-  return FrustumPairs(posed, options.frustum, num_threads);
+  return posed;
 }
 
 Result<IndexPairs> SelectSequencePairs(SQLite::Database& features, const MatchImages& images,
@@ -54,30 +55,32 @@ Result<IndexPairs> SelectSequencePairs(SQLite::Database& features, const MatchIm
   return pairs;
 }
 
+// Pairs by every method but frustum.
 Result<IndexPairs> SelectPairs(SQLite::Database& features, const MatchImages& images,
                                const MatchFeaturesInputs& inputs, const MatchFeaturesOptions& options,
-                               uint64_t seed, int num_threads, Progress& progress, std::string* chosen) {
-  if (!inputs.pair_list_path.empty()) {
-    *chosen = "list";
+                               const std::string& method, uint64_t seed, int num_threads,
+                               Progress& progress) {
+  if (method == "list") {
     CAIRN_ASSIGN_OR_RETURN(PairList list, ReadPairList(inputs.pair_list_path, images));
     return std::move(list.pairs);
   }
-  *chosen = ChooseMethod(images, options);
   const int num_images = static_cast<int>(images.images.size());
-  if (*chosen == "exhaustive") return ExhaustivePairs(num_images);
-  if (*chosen == "sequence")
+  if (method == "exhaustive") return ExhaustivePairs(num_images);
+  if (method == "sequence")
     return SelectSequencePairs(features, images, inputs, options, seed, num_threads, progress);
-  if (*chosen == "frustum") return SelectFrustumPairs(images, options, num_threads);
   CAIRN_ASSIGN_OR_RETURN(
       const ImageSimilarity similarity,
       MeasureSimilarity(features, images, inputs.vocabulary_path, seed, num_threads, progress));
   return RetrievedPairs(similarity, num_images, options.num_retrieved, num_threads);
 }
 
-// Matches the chosen pairs and adds the verified ones to the database.
+// Matches `pairs`, adds the verified ones to the database and tells them to `predictor` (may be null).
 Status MatchInto(SQLite::Database& features, const MatchImages& images, const IndexPairs& pairs,
                  const MatchFeaturesOptions& options, int num_threads, Progress& progress,
-                 MatchFeaturesSummary* summary, SQLite::Database& database) {
+                 MatchFeaturesSummary* summary, PairPredictor* predictor, SQLite::Database& database) {
+  std::unordered_map<ImageId, int> idx_of_image;
+  for (size_t i = 0; i < images.images.size(); ++i)
+    idx_of_image[images.images[i].image_id] = static_cast<int>(i);
   const auto take = [&](const TwoViewGeometry& geometry, int num_putative) {
     ++summary->num_pairs_tried;
     summary->num_putative += num_putative;
@@ -85,10 +88,62 @@ Status MatchInto(SQLite::Database& features, const MatchImages& images, const In
     WriteDatabaseTwoViewGeometry(database, geometry);
     ++summary->num_pairs_verified;
     summary->num_inliers += static_cast<int64_t>(geometry.inliers.size());
+    if (predictor != nullptr) {
+      predictor->Add(idx_of_image.at(geometry.image_id1), idx_of_image.at(geometry.image_id2),
+                     geometry.inliers);
+    }
   };
   progress.Begin("match features", static_cast<int64_t>(pairs.size()), "pairs");
   CAIRN_RETURN_IF_ERROR(MatchPairs(features, images, pairs, options.matching, num_threads, progress, take));
   progress.End();
+  return Ok();
+}
+
+// What the predictor knows of the images, in the world frame.
+Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, const MatchImages& images,
+                                                   const Progress& progress) {
+  std::vector<PairPredictor::View> views;
+  for (const MatchImage& image : images.images) {
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
+    const Camera& camera = images.cameras.at(image.camera_id);
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> bearings,
+                           ReadImageBearings(features, image, camera));
+    PairPredictor::View& view = views.emplace_back();
+    view.center = image.cam_from_world->Center();
+    view.focal_px = camera.MeanFocal();
+    const Eigen::Quaterniond world_from_cam = image.cam_from_world->rotation.conjugate();
+    for (const Eigen::Vector3d& bearing : bearings)
+      view.rays.push_back((world_from_cam * bearing).cast<float>());
+  }
+  return views;
+}
+
+// Matches the pairs of largest overlap, then again and again those that the matches so far predict.
+Status MatchFrustumInto(SQLite::Database& features, const MatchImages& images,
+                        const MatchFeaturesOptions& options, int num_threads, Progress& progress,
+                        MatchFeaturesSummary* summary, SQLite::Database& database) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<PosedCamera> posed, PosedCameras(images));
+  CAIRN_ASSIGN_OR_RETURN(OverlapRanking ranking, RankOverlaps(posed, options.frustum, num_threads, progress));
+  if (options.num_frustum_seeds == 0) {
+    return MatchInto(features, images, FrustumPairs(ranking), options, num_threads, progress, summary,
+                     nullptr, database);
+  }
+  IndexPairs next = FrustumSeeds(ranking, options.num_frustum_seeds, options.num_frustum_scouts);
+  ranking = {};
+  CAIRN_ASSIGN_OR_RETURN(std::vector<PairPredictor::View> views, ReadViews(features, images, progress));
+  PairPredictor predictor(std::move(views));
+  const PredictPairsOptions prediction = {
+      .min_num_expected_matches = options.min_num_expected_matches,
+      .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
+      .max_prior_error_px = options.matching.verification.max_prior_error_px};
+  IndexPairs tried;
+  while (!next.empty()) {
+    CAIRN_RETURN_IF_ERROR(
+        MatchInto(features, images, next, options, num_threads, progress, summary, &predictor, database));
+    tried.insert(tried.end(), next.begin(), next.end());
+    std::sort(tried.begin(), tried.end());
+    CAIRN_ASSIGN_OR_RETURN(next, predictor.Predict(tried, prediction, num_threads, progress));
+  }
   return Ok();
 }
 
@@ -150,6 +205,21 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .help = "pairs = frustum: least part of either frustum that the other camera sees",
        .min = 0,
        .max = 1},
+      {.name = "num_frustum_seeds",
+       .value = &o->num_frustum_seeds,
+       .help = "pairs = frustum: images of largest overlap that each image is matched with at first, before "
+               "the pairs that these matches predict; 0: match every pair whose frusta overlap",
+       .min = 0},
+      {.name = "num_frustum_scouts",
+       .value = &o->num_frustum_scouts,
+       .help = "pairs = frustum: images spread over those of smaller overlap that each is matched with at "
+               "first",
+       .min = 0},
+      {.name = "min_num_expected_matches",
+       .value = &o->min_num_expected_matches,
+       .help = "pairs = frustum: fewest matches that a pair must promise, by the matches of both images with "
+               "others, to be matched after the seeds",
+       .min = 1},
       {.name = "max_view_angle_deg",
        .value = &o->frustum.max_view_angle_deg,
        .help = "pairs = frustum: largest angle between two views of a point, degrees",
@@ -260,10 +330,15 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                      path, summary.num_images);
   }
   cv::setNumThreads(1);  // pairs are the unit of parallel work
-  const auto pairs = WithDatabaseErrors(path, [&] {
-    return SelectPairs(features, *images, inputs, options, seed, num_threads, progress, &summary.pairs);
-  });
-  if (!pairs.ok()) return pairs.error();
+  summary.pairs = inputs.pair_list_path.empty() ? ChooseMethod(*images, options) : "list";
+  IndexPairs pairs;
+  if (summary.pairs != "frustum") {
+    auto selected = WithDatabaseErrors(path, [&] {
+      return SelectPairs(features, *images, inputs, options, summary.pairs, seed, num_threads, progress);
+    });
+    if (!selected.ok()) return selected.error();
+    pairs = std::move(selected).value();
+  }
 
   CAIRN_RETURN_IF_ERROR(ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
     return WithDatabaseErrors(temporary, [&]() -> Status {
@@ -272,7 +347,10 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
       database.exec(
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");
       CAIRN_RETURN_IF_ERROR(
-          MatchInto(features, *images, *pairs, options, num_threads, progress, &summary, database));
+          summary.pairs == "frustum"
+              ? MatchFrustumInto(features, *images, options, num_threads, progress, &summary, database)
+              : MatchInto(features, *images, pairs, options, num_threads, progress, &summary, nullptr,
+                          database));
       if (summary.num_pairs_verified == 0) {
         return MakeError(
             ErrorCode::kNoData,

@@ -15,11 +15,11 @@ namespace cairn {
 // confirms [Booij06 §III: a link means that the local space can be reconstructed from the two images].
 // Before: extract_features.  After: group_classes, link_appearance.
 //
-// Pairs of images are chosen first: all of them; those whose view frusta overlap in the known poses; those
-// that look alike (retrieve_pairs.h); neighbours in the natural order of names and loop candidates, which
-// look alike without being neighbours; or those of a list.  Descriptors are matched exactly (mutual nearest
-// neighbours, ratio test), then verified with the known intrinsics (verify_pair.h), with a bounded part of
-// the features in memory (match_pairs.h).
+// Pairs of images are chosen first: all of them; those whose view frusta overlap most in the known poses, and
+// then those that the verified ones predict (predict_pairs.h); those that look alike (retrieve_pairs.h);
+// neighbours in the natural order of names and loop candidates, which look alike without being neighbours; or
+// those of a list.  Descriptors are matched exactly (mutual nearest neighbours, ratio test), then verified
+// with the known intrinsics (verify_pair.h), with a bounded part of the features in memory (match_pairs.h).
 struct MatchFeaturesOptions {
   // "auto": frustum where all images have poses, else exhaustive for few images, else retrieval.
   std::string pairs = "auto";
@@ -33,6 +33,15 @@ struct MatchFeaturesOptions {
   // Sequence: how many images most like it, but no neighbours, each image is matched with.  REQUIRES: >= 0
   int num_loop_candidates = 10;
   FrustumOverlapOptions frustum;
+  // Frustum: how many images of largest overlap each image is matched with at first; then pairs are matched
+  // that these matches predict (predict_pairs.h).  0: every pair whose frusta overlap is matched.
+  // REQUIRES: >= 0
+  int num_frustum_seeds = 20;
+  // Frustum: how many images, spread evenly over those of smaller overlap, each is matched with at first.
+  // REQUIRES: >= 0
+  int num_frustum_scouts = 5;
+  // Frustum: fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
+  int min_num_expected_matches = 20;
   MatchPairsOptions matching;
 };
 // Without matching.memory_budget_mib, which like the number of threads changes no result.

@@ -55,17 +55,6 @@ Result<Vocabulary> TreeFor(SQLite::Database& database, const MatchImages& images
   return GrowVocabulary(sample, num_descriptors, kTreeOptions, seed, num_threads, progress);
 }
 
-// Pairs (i, j) of which one is among the partners of the other, i < j, ascending, each once.
-IndexPairs PairsFromPartners(const std::vector<std::vector<int>>& partners) {
-  IndexPairs pairs;
-  for (int i = 0; i < static_cast<int>(partners.size()); ++i) {
-    for (const int j : partners[i]) pairs.emplace_back(std::min(i, j), std::max(i, j));
-  }
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  return pairs;
-}
-
 }  // namespace
 
 ImageSimilarity::ImageSimilarity(const std::vector<std::vector<WordIdx>>& words, int num_words)

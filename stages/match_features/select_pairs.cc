@@ -122,24 +122,72 @@ IndexPairs SequencePairs(const std::vector<int>& order, int window) {
   return pairs;
 }
 
-IndexPairs FrustumPairs(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,
-                        int num_threads) {
+Result<OverlapRanking> RankOverlaps(const std::vector<PosedCamera>& images,
+                                    const FrustumOverlapOptions& options, int num_threads,
+                                    Progress& progress) {
   const int num_images = static_cast<int>(images.size());
   std::vector<FrustumSamples> samples(num_images);
   ParallelFor(num_images, num_threads, [&](int64_t i) { samples[i] = SampleFrustum(images[i], options); });
-  std::vector<std::vector<int>> partners(num_images);
+  OverlapRanking ranking(num_images);
+  progress.Begin("rank overlaps", num_images, "images");
   ParallelFor(num_images, num_threads, [&](int64_t i) {
-    for (int j = static_cast<int>(i) + 1; j < num_images; ++j) {
-      if (Overlap(samples[i], images[i], images[j], options) >= options.min_overlap_ratio ||
-          Overlap(samples[j], images[j], images[i], options) >= options.min_overlap_ratio) {
-        partners[i].push_back(j);
-      }
+    if (progress.Cancelled()) return;
+    for (int other = static_cast<int>(i) + 1; other < num_images; ++other) {
+      const double forward = Overlap(samples[i], images[i], images[other], options);
+      const double backward = Overlap(samples[other], images[other], images[i], options);
+      if (std::max(forward, backward) >= options.min_overlap_ratio)
+        ranking[i].push_back({other, static_cast<float>(0.5 * (forward + backward))});
     }
+    progress.Advance();
   });
-  IndexPairs pairs;
-  for (int i = 0; i < num_images; ++i) {
-    for (const int j : partners[i]) pairs.emplace_back(i, j);
+  progress.End();
+  if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while ranking overlaps");
+  for (int idx = 0; idx < num_images; ++idx) {
+    for (const auto [other, overlap] : ranking[idx]) {
+      if (other > idx) ranking[other].push_back({idx, overlap});
+    }
   }
+  ParallelFor(num_images, num_threads, [&](int64_t i) {
+    std::sort(ranking[i].begin(), ranking[i].end(), [](const OverlapPartner& a, const OverlapPartner& b) {
+      return std::pair(-a.overlap, a.idx) < std::pair(-b.overlap, b.idx);
+    });
+  });
+  return ranking;
+}
+
+IndexPairs FrustumPairs(const OverlapRanking& ranking) {
+  IndexPairs pairs;
+  for (int idx = 0; idx < static_cast<int>(ranking.size()); ++idx) {
+    for (const OverlapPartner& partner : ranking[idx]) {
+      if (partner.idx > idx) pairs.emplace_back(idx, partner.idx);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+IndexPairs FrustumSeeds(const OverlapRanking& ranking, int num_best, int num_spread) {
+  std::vector<std::vector<int>> partners(ranking.size());
+  for (size_t idx = 0; idx < ranking.size(); ++idx) {
+    const auto num_ranked = static_cast<int64_t>(ranking[idx].size());
+    const int64_t num_first = std::min<int64_t>(num_best, num_ranked);
+    const int64_t num_others = std::min<int64_t>(num_spread, num_ranked - num_first);
+    for (int64_t rank = 0; rank < num_first; ++rank) partners[idx].push_back(ranking[idx][rank].idx);
+    for (int64_t k = 0; k < num_others; ++k) {
+      const int64_t rank = num_first + (2 * k + 1) * (num_ranked - num_first) / (2 * num_others);
+      partners[idx].push_back(ranking[idx][rank].idx);
+    }
+  }
+  return PairsFromPartners(partners);
+}
+
+IndexPairs PairsFromPartners(const std::vector<std::vector<int>>& partners) {
+  IndexPairs pairs;
+  for (int i = 0; i < static_cast<int>(partners.size()); ++i) {
+    for (const int j : partners[i]) pairs.emplace_back(std::min(i, j), std::max(i, j));
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;
 }
 

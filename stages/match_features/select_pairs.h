@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "core/error.h"
 #include "core/pose.h"
+#include "core/progress.h"
 
 namespace cairn {
 
@@ -40,9 +42,26 @@ IndexPairs ExhaustivePairs(int num_images);
 std::vector<int> NaturalOrder(const std::vector<std::string>& names);
 // Each image with its `window` successors in `order`, a permutation of the image indices.
 IndexPairs SequencePairs(const std::vector<int>& order, int window);
-// Pairs of which either frustum overlaps the other by min_overlap_ratio.  O(images^2), on `num_threads`
-// threads.
-IndexPairs FrustumPairs(const std::vector<PosedCamera>& images, const FrustumOverlapOptions& options,
-                        int num_threads);
+
+// An image that another one's frustum overlaps; the overlap is the mean of both directions, in [0, 1].
+struct OverlapPartner {
+  int idx;
+  float overlap;
+};
+using OverlapRanking = std::vector<std::vector<OverlapPartner>>;  // of each image
+// The images that each image overlaps by min_overlap_ratio in either direction, largest mean overlap first,
+// ties to the smaller index.  O(images^2) on `num_threads` threads.  Errors: Cancelled.
+Result<OverlapRanking> RankOverlaps(const std::vector<PosedCamera>& images,
+                                    const FrustumOverlapOptions& options, int num_threads,
+                                    Progress& progress);
+
+// Each image with all its partners.
+IndexPairs FrustumPairs(const OverlapRanking& ranking);
+// Each image with the `num_best` first of its partners and with `num_spread` at even distances in the ranks
+// of the others: the first may all be of one pass along a path, the others find the passes before and after.
+IndexPairs FrustumSeeds(const OverlapRanking& ranking, int num_best, int num_spread);
+
+// Pairs (i, j) of which one is among the partners of the other, i < j, ascending, each once.
+IndexPairs PairsFromPartners(const std::vector<std::vector<int>>& partners);
 
 }  // namespace cairn

@@ -114,6 +114,36 @@ TEST_F(MatchFeaturesTest, SameBytesForAnyMemoryBudget) {
   EXPECT_EQ(*HashFile(folder_ + "/matches.db"), all_in_memory);
 }
 
+TEST_F(MatchFeaturesTest, FrustumGoesOnFromSeedsToThePairsTheyPredict) {
+  // Each image with its two nearest first.  All see the same points, so that these pairs carry tracks from
+  // the first image to the last.
+  WriteFeatures(6);
+  options_.num_frustum_seeds = 2;
+  options_.num_frustum_scouts = 0;
+  options_.min_num_expected_matches = 1000;
+  const auto seeds = Match(true);
+  ASSERT_TRUE(seeds.ok()) << seeds.error().message;
+  EXPECT_EQ(seeds->pairs, "frustum");
+  EXPECT_LT(seeds->num_pairs_tried, 12);
+  options_.min_num_expected_matches = 10;
+  const auto predicted = Match(true);
+  ASSERT_TRUE(predicted.ok()) << predicted.error().message;
+  EXPECT_EQ(predicted->num_pairs_verified, 15);
+  auto database = OpenDatabaseReadOnly(folder_ + "/matches.db");
+  EXPECT_EQ(ReadDatabaseTwoViewGeometries(*database, 15)->size(), 15u);
+}
+
+TEST_F(MatchFeaturesTest, PredictedPairsAreTheSameForAnyMemoryBudgetAndNumberOfThreads) {
+  WriteFeatures(20);
+  options_.num_frustum_seeds = 2;
+  options_.num_frustum_scouts = 1;
+  ASSERT_TRUE(Match(true, 1).ok());
+  const std::string one = *HashFile(folder_ + "/matches.db");
+  options_.matching.memory_budget_mib = 1;
+  ASSERT_TRUE(Match(true, 4).ok());
+  EXPECT_EQ(*HashFile(folder_ + "/matches.db"), one);
+}
+
 TEST_F(MatchFeaturesTest, SequenceWithLoopsAndAllImagesAgreeOnFewImages) {
   WriteFeatures(5);
   ASSERT_TRUE(Match(false).ok());

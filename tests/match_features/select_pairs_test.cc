@@ -35,10 +35,38 @@ TEST(SelectPairs, SequenceFollowsNumbersInNames) {
               ElementsAre(Pair(0, 2), Pair(1, 2)));
 }
 
+OverlapRanking Rank(const std::vector<PosedCamera>& images) {
+  NoProgress progress;
+  return *RankOverlaps(images, {}, 2, progress);
+}
+
 TEST(SelectPairs, FrustaThatShareSceneAreMatchedOthersAreNot) {
   //  0 and 1 side by side, both ahead; 2 looks backwards; 3 is far away
   const std::vector<PosedCamera> images = {At(0, 0), At(0.3, 0), At(0, 180), At(50, 0)};
-  EXPECT_THAT(FrustumPairs(images, {}, 2), ElementsAre(Pair(0, 1)));
+  EXPECT_THAT(FrustumPairs(Rank(images)), ElementsAre(Pair(0, 1)));
+}
+
+TEST(SelectPairs, SeedsAreThePartnersOfLargestOverlap) {
+  //  0 . 1 2 . . 3    all look ahead, 0.2 m a mark: the nearest is the one of largest overlap
+  const std::vector<PosedCamera> images = {At(0, 0), At(0.4, 0), At(0.6, 0), At(1.2, 0)};
+  const OverlapRanking ranking = Rank(images);
+  ASSERT_EQ(ranking[1].size(), 3u);
+  EXPECT_EQ(ranking[1][0].idx, 2);
+  EXPECT_GT(ranking[1][0].overlap, ranking[1][1].overlap);
+  EXPECT_THAT(FrustumSeeds(ranking, 1, 0), ElementsAre(Pair(0, 1), Pair(1, 2), Pair(2, 3)));
+  EXPECT_TRUE(FrustumSeeds(ranking, 0, 0).empty());
+}
+
+TEST(SelectPairs, ScoutsStandAtEvenDistancesInTheOtherRanks) {
+  //  partners of image 0 by rank    1 2 | 3 4 5 6 7 8
+  //  two seeds, two scouts          # # |   #     #       the middles of both halves of the rest
+  //  two seeds, one scout           # # |       #
+  OverlapRanking ranking(9);
+  for (int i = 1; i < 9; ++i) ranking[0].push_back({i, 1.0F / static_cast<float>(i)});
+  EXPECT_THAT(FrustumSeeds(ranking, 2, 2), ElementsAre(Pair(0, 1), Pair(0, 2), Pair(0, 4), Pair(0, 7)));
+  EXPECT_THAT(FrustumSeeds(ranking, 2, 1), ElementsAre(Pair(0, 1), Pair(0, 2), Pair(0, 6)));
+  EXPECT_EQ(FrustumSeeds(ranking, 2, 100).size(), 8u);
+  EXPECT_EQ(FrustumSeeds(ranking, 100, 2).size(), 8u);
 }
 
 TEST(SelectPairs, OverlapOfAnImageWithItselfIsFull) {

@@ -1,0 +1,86 @@
+#include "stages/match_features/predict_pairs.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/pose.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::Pair;
+
+// Ten points on a wall at z = 3; feature i of every view is the ray to point i.
+PairPredictor::View At(const Eigen::Vector3d& center) {
+  PairPredictor::View view;
+  view.center = center;
+  view.focal_px = 500;
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector3d point(0.05 * i, 0.3 * (i % 3) - 0.3, 3);
+    view.rays.emplace_back((point - center).normalized().cast<float>());
+  }
+  return view;
+}
+PairPredictor::View At(double x) { return At(Eigen::Vector3d(x, 0, 0)); }
+
+// Matches i - i of the features [begin, end).
+std::vector<Match> Same(uint32_t begin, uint32_t end) {
+  std::vector<Match> matches;
+  for (uint32_t i = begin; i < end; ++i) matches.push_back({i, i});
+  return matches;
+}
+
+IndexPairs Predict(const PairPredictor& predictor, int min_num_expected, const IndexPairs& tried,
+                   double max_ray_angle_deg = 90, int num_threads = 2) {
+  NoProgress progress;
+  return *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16}, num_threads, progress);
+}
+
+TEST(PredictPairs, ImagesThatMatchAThirdAreExpectedToMatch) {
+  //   features 0 .. 9      0 - 1: 0 .. 5, 1 - 2: 4 .. 9, so 4 and 5 go from 0 to 2; 3 matches nothing
+  PairPredictor predictor({At(0), At(0.01), At(0.02), At(0.03)});
+  predictor.Add(0, 1, Same(0, 6));
+  predictor.Add(1, 2, Same(4, 10));
+  const IndexPairs tried = {{0, 1}, {1, 2}};
+  EXPECT_THAT(Predict(predictor, 2, tried), ElementsAre(Pair(0, 2)));
+  EXPECT_THAT(Predict(predictor, 3, tried), IsEmpty());
+  EXPECT_THAT(Predict(predictor, 1, {{0, 1}, {0, 2}, {1, 2}}), IsEmpty());
+}
+
+TEST(PredictPairs, RaysTooFarApartDoNotCount) {
+  // From 3 m aside the rays to the wall at 3 m differ by 45 degrees, 49 at its far end.
+  PairPredictor predictor({At(0), At(0.01), At(3)});
+  predictor.Add(0, 1, Same(0, 10));
+  predictor.Add(1, 2, Same(0, 10));
+  const IndexPairs tried = {{0, 1}, {1, 2}};
+  EXPECT_THAT(Predict(predictor, 10, tried, 50), ElementsAre(Pair(0, 2)));
+  EXPECT_THAT(Predict(predictor, 1, tried, 40), IsEmpty());
+}
+
+TEST(PredictPairs, ChainsThatThePosesContradictDoNotCount) {
+  // Image 1 matches points i of image 0 and points i + 5 of image 2, which lie elsewhere on the wall.
+  PairPredictor predictor({At(0), At(0.01), At(0.5), At(Eigen::Vector3d(0.3, 0, 6))});
+  predictor.Add(0, 1, Same(0, 10));
+  std::vector<Match> shifted;
+  for (uint32_t i = 0; i < 5; ++i) shifted.push_back({i, i + 5});
+  predictor.Add(1, 2, shifted);
+  // Image 3 sees the wall from behind.
+  predictor.Add(1, 3, Same(0, 10));
+  EXPECT_THAT(Predict(predictor, 1, {{0, 1}, {1, 2}, {1, 3}}), IsEmpty());
+}
+
+TEST(PredictPairs, AFeatureCountsOnceAndTheOrderOfMatchesDoesNotMatter) {
+  // Point 0 goes from image 0 to image 3 by way of 1 and of 2.
+  PairPredictor there({At(0), At(0.01), At(0.02), At(0.03)}), back = there;
+  const std::vector<std::pair<int, int>> pairs = {{0, 1}, {0, 2}, {1, 3}, {2, 3}};
+  for (const auto& [i, j] : pairs) there.Add(i, j, Same(0, 1));
+  for (size_t k = pairs.size(); k-- > 0;) back.Add(pairs[k].first, pairs[k].second, Same(0, 1));
+  EXPECT_THAT(Predict(there, 1, pairs), ElementsAre(Pair(0, 3), Pair(1, 2)));
+  EXPECT_THAT(Predict(there, 2, pairs), IsEmpty());
+  EXPECT_EQ(Predict(back, 1, pairs, 90, 1), Predict(there, 1, pairs, 90, 4));
+}
+
+}  // namespace
+}  // namespace cairn
