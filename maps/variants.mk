@@ -15,7 +15,7 @@ $(OUT):
 	mkdir -p $@
 
 $(OUT)/regions%.db: $(BUILD)/world.db $(BUILD)/options/decompose_regions.toml $(CAIRN) | $(OUT)
-	$(CAIRN) decompose-regions $< $(REGIONS) --k $* -o $@ --log-level error > /dev/null
+	$(CAIRN) decompose-regions $< --classes $(BUILD)/classes.db $(REGIONS) --k $* -o $@ --log-level error > /dev/null
 	touch $@
 
 MAP_INPUTS := $(BUILD)/classes.db $(BUILD)/vocabulary.db

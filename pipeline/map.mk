@@ -133,9 +133,10 @@ $(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.
 	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
-$(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/options/decompose_regions.toml $(BUILD)/options/seed $(CAIRN)
+$(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/options/decompose_regions.toml \
+    $(BUILD)/options/seed $(CAIRN)
 	touch $@.begun
-	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db \
+	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db --classes $(@D)/classes.db \
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 

@@ -12,6 +12,7 @@ namespace {
 
 struct Arguments {
   std::string world;
+  std::string classes;
   std::string output;
   std::string svg;
   DecomposeRegionsOptions options;
@@ -36,6 +37,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   Result<Decomposition> result =
       DecomposeRegions(world, arguments.options, environment.seed, *environment.progress);
   if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
+  if (!arguments.classes.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
+    result = ChooseFeatures(world, classes, *result, arguments.options.choose_features);
+    if (!result.ok()) {
+      return MakeError(result.error().code, "{}, {}: {}", arguments.world, arguments.classes,
+                       result.error().message);
+    }
+  }
   const Decomposition& decomposition = *result;
   if (arguments.options.algorithm == "best" && world.num_stations() > arguments.options.best_max_stations) {
     spdlog::warn(
@@ -68,6 +77,10 @@ Command DecomposeRegionsCommand() {
   command.add_arguments = [arguments](CLI::App& app) {
     app.add_option("world", arguments->world, "world: database (world.db) or JSON")
         ->required()
+        ->type_name("FILE");
+    app.add_option("--classes", arguments->classes,
+                   "feature classes that the world was made from (classes.db): regions then keep "
+                   "the features that fix poses best (--feature-choice)")
         ->type_name("FILE");
     app.add_option("-o,--output", arguments->output, "regions to write: .json, or else a database")
         ->required()

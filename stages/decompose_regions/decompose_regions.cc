@@ -94,7 +94,7 @@ std::vector<CoreRegion> RegionsAfterGrowth(const Cover& cover, int tau) {
 }  // namespace
 
 OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "algorithm",
        .value = &o->algorithm,
        .help = "best: fewest regions, by column generation from b2's; or an algorithm of Sala06 §V",
@@ -134,6 +134,9 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .help = "largest world for column generation; beyond it, best is b2 and the bound is counted",
        .min = 0},
   };
+  const OptionTable choose_features = DescribeOptions(&o->choose_features);
+  table.insert(table.end(), choose_features.begin(), choose_features.end());
+  return table;
 }
 
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,

@@ -9,6 +9,7 @@
 #include "core/options.h"
 #include "core/progress.h"
 #include "core/world.h"
+#include "stages/decompose_regions/choose_features.h"
 
 namespace cairn {
 
@@ -52,6 +53,9 @@ struct DecomposeRegionsOptions {
   // Column generation takes seconds for some thousand stations and memory for a few thousand regions: worlds
   // larger than this get the regions of B.2 instead of best's, and the counted bound.  REQUIRES: >= 0
   int best_max_stations = 20000;
+  // Which features regions keep: for ChooseFeatures, once the regions are made and where the classes are
+  // known.
+  ChooseFeaturesOptions choose_features;
 };
 OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/feature_class.h"
+#include "stages/decompose_regions/choose_features.h"
+
+namespace cairn {
+
+// A landmark as one survey image sees it.
+struct Sight {
+  size_t image = 0;                  // position in Classes::images
+  Eigen::Matrix<double, 2, 6> root;  // I_lv = root' root (choose_features.h)
+};
+
+// The sights of a class with weight p_l = `distinctiveness`, in [0, 1].  An image in which the class lies at
+// the camera's own centre is left out.  Errors: InvalidArgument, naming an image or camera that is not there.
+Result<std::vector<Sight>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
+                                    const Classes& classes, const ChooseFeaturesOptions& options);
+
+// What every survey image knows of its pose from the landmarks taken so far.
+class PoseInformation {
+ public:
+  PoseInformation(size_t num_images, const ChooseFeaturesOptions& options);
+  // What a landmark would add to the sum over images of log det; >= 0.
+  double Gain(const std::vector<Sight>& sights) const;
+  void Add(const std::vector<Sight>& sights);
+
+ private:
+  using Matrix6d = Eigen::Matrix<double, 6, 6>;
+  struct View {
+    Matrix6d information;  // A_0 + sum of I_lv
+    Matrix6d covariance;   // its inverse
+  };
+  std::vector<View> views_;
+};
+
+}  // namespace cairn
