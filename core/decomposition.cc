@@ -81,6 +81,14 @@ bool HasJsonSuffix(const std::string& path) {
 
 }  // namespace
 
+std::string NumRegionsText(size_t num_regions, std::optional<int> lower_bound) {
+  std::string text = fmt::format("{} {}", num_regions, num_regions == 1 ? "region" : "regions");
+  if (lower_bound) {
+    text += fmt::format(", at least {} {} needed", *lower_bound, *lower_bound == 1 ? "is" : "are");
+  }
+  return text;
+}
+
 Result<Decomposition> ReadDecompositionDatabase(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<Decomposition> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ struct Decomposition {
   std::vector<Region> regions;
   std::vector<StationIdx> uncovered;  // coverable stations whose neighbourhood no region contains, ascending
 };
+
+// "9 regions, at least 8 are needed"; "9 regions" where no bound is known.
+std::string NumRegionsText(size_t num_regions, std::optional<int> lower_bound);
 
 // Decomposition JSON (docs: schemas/regions.md).
 Result<Decomposition> ReadDecompositionJson(const std::string& path);

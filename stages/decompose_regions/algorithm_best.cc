@@ -33,7 +33,9 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
   std::vector<int> cover(generation.pool().size());
   std::iota(cover.begin(), cover.end(), 0);
   generation.Run();
-  cover = SearchCover(&generation, wide, cover, seed, {.num_repairs = options.num_repairs});
+  cover = SearchCover(
+      &generation, wide, cover, seed,
+      {.exchanges_per_station = options.exchanges_per_station, .num_repairs = options.num_repairs});
 
   Decomposition fewest = start;
   fewest.regions.clear();
@@ -51,6 +53,7 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
     if (open[station]) fewest.uncovered.push_back(station);
   }
   fewest.uncovered_limit = static_cast<int>(fewest.uncovered.size());
+  generation.LowerMaxUncovered(fewest.uncovered_limit);
   fewest.lower_bound = generation.lower_bound();
   return fewest;
 }

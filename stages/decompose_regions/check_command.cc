@@ -19,10 +19,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions));
   const RegionCheck check = CheckRegions(world, decomposition, arguments.max_hole);
   std::ostream& out = *environment.out;
-  out << fmt::format(
-      "algorithm {}, k = {}, tau = {}, rho = {}: {} regions{}\n", decomposition.algorithm, decomposition.k,
-      decomposition.tau, decomposition.rho, decomposition.regions.size(),
-      decomposition.lower_bound ? fmt::format(", at least {} needed", *decomposition.lower_bound) : "");
+  out << fmt::format("algorithm {}, k = {}, tau = {}, rho = {}: {}\n", decomposition.algorithm,
+                     decomposition.k, decomposition.tau, decomposition.rho,
+                     NumRegionsText(decomposition.regions.size(), decomposition.lower_bound));
   out << fmt::format("{} of {} coverable stations uncovered, largest connected hole {}\n",
                      check.num_uncovered, check.num_coverable, check.largest_hole);
   for (size_t i = 0; i < std::min(kMaxShown, check.violations.size()); ++i)

@@ -11,7 +11,11 @@ namespace {
 constexpr double kValueUnit = 0x1p-32;
 // A region joins the pool when it is worth this much more than every region in it, relatively; for exact
 // pricing this is also what the bound loses at most.
-constexpr int64_t kGreedyMargin = 500, kExactMargin = 1000;
+constexpr int64_t kGreedyMargin = 500, kExactMargin = 20000;
+// Integer covers also use regions that are worth less: this share of the most valuable ones of the pool, the
+// values being changed at random by up to this ratio.
+constexpr int64_t kNearlyPercent = 85;
+constexpr double kValueSpread = 0.2;
 
 // What station values certify, but for the largest value of a region.
 struct DualValues {
@@ -35,9 +39,11 @@ DualValues RoundedDual(const std::vector<double>& station_values, const RegionPo
     dual.covered += value;
   }
   dual.covered -= z * max_uncovered;
+  std::vector<int64_t> partial_sums = {0};
+  for (const int64_t value : dual.values) partial_sums.push_back(partial_sums.back() + value);
   for (int region = 0; region < pool.size(); ++region) {
     int64_t value = 0;
-    for (const StationIdx station : pool[region].stations) value += dual.values[station];
+    for (const auto& [begin, end] : pool.Runs(region)) value += partial_sums[end] - partial_sums[begin];
     dual.most = std::max(dual.most, value);
   }
   return dual;
@@ -57,7 +63,6 @@ ColumnGeneration::ColumnGeneration(const ReducedWorld& wide, int max_uncovered,
       options_(options),
       max_new_regions_(
           std::max(options.min_new_regions, static_cast<int>(options.max_new_ratio * wide.num_coverable))),
-      pool_(wide.num_stations()),
       pricer_(wide),
       lp_(pool_, wide.coverable, max_uncovered) {}
 
@@ -85,15 +90,35 @@ int ColumnGeneration::Price(const CoverLp& lp) {
   return AddMostValuable(dual.values, std::move(found));
 }
 
+void ColumnGeneration::AddNearlyAsValuable(Random* random) {
+  std::vector<double> values = lp_.station_values();
+  for (double& value : values) value *= random->Uniform(1 - kValueSpread, 1 + kValueSpread);
+  const DualValues dual = RoundedDual(values, pool_, max_uncovered_);
+  std::vector<CoreRegion> found;
+  pricer_.Greedy(dual.values, dual.most / 100 * kNearlyPercent, &found);
+  for (CoreRegion& region : found) pool_.Add(std::move(region));
+}
+
 void ColumnGeneration::Run() {
   if (pool_.size() == 0) return;
   for (int round = 0; round < options_.num_rounds; ++round) {
     lp_.Iterate(options_.num_lp_iterations);
     if (Price(lp_) < 5) break;
   }
+  RunExactRounds();
+}
+
+void ColumnGeneration::LowerMaxUncovered(int max_uncovered) {
+  if (max_uncovered >= max_uncovered_) return;
+  max_uncovered_ = max_uncovered;
+  lp_.set_max_uncovered(max_uncovered);
+  RunExactRounds();
+}
+
+void ColumnGeneration::RunExactRounds() {
   const int64_t max_work = options_.max_work_ratio * wide_.areas.num_values();
   for (int round = 0; round < options_.num_exact_rounds; ++round) {
-    lp_.Iterate(4 * options_.num_lp_iterations);
+    lp_.Iterate(options_.num_exact_iterations);
     const DualValues dual = RoundedDual(lp_.station_values(), pool_, max_uncovered_);
     std::vector<CoreRegion> found;
     const int64_t max_value = pricer_.MaxValue(dual.values, dual.most + dual.most / kExactMargin, max_work,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/random.h"
 #include "stages/decompose_regions/cover_lp.h"
 #include "stages/decompose_regions/pricing.h"
 #include "stages/decompose_regions/region_pool.h"
@@ -11,12 +12,13 @@ namespace cairn {
 
 // Effort of column generation; counts, not times, so that the result does not depend on the machine.
 struct ColumnGenerationOptions {
-  int num_rounds = 30;           // of greedy pricing, at most
-  int num_exact_rounds = 6;      // of exact pricing, at most
-  int num_lp_iterations = 150;   // between two greedy pricings; four times as many between two exact ones
-  int min_new_regions = 20;      // a round adds at most this many regions, or the following share of the
-  double max_new_ratio = 0.125;  // coverable stations if that is more
-  int64_t max_work_ratio = 200;  // of the incidences that one exact pricing looks at to those of the world
+  int num_rounds = 30;              // of greedy pricing, at most
+  int num_exact_rounds = 24;        // of exact pricing, at most
+  int num_lp_iterations = 150;      // between two greedy pricings
+  int num_exact_iterations = 1000;  // of the linear program, between two exact pricings
+  int min_new_regions = 20;         // a round adds at most this many regions, or the following share of the
+  double max_new_ratio = 0.125;     // coverable stations if that is more
+  int64_t max_work_ratio = 200;     // of the incidences that one exact pricing looks at to those of the world
 };
 
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
@@ -44,16 +46,21 @@ class ColumnGeneration {
 
   // Solves the relaxation.  REQUIRES: the pool's regions cover all but H coverable stations
   void Run();
+  // Solves it for a smaller H, with exact pricing: the bound can only grow.  REQUIRES: Run
+  void LowerMaxUncovered(int max_uncovered);
   // Certified least number of regions; 0 before Run.
   int lower_bound() const { return lower_bound_; }
   // Adds regions to the pool that the values of another program over it make worthwhile; returns how many.
   int Price(const CoverLp& lp);
+  // Adds regions to the pool that the relaxation leaves out by little.
+  void AddNearlyAsValuable(Random* random);
 
  private:
+  void RunExactRounds();
   int AddMostValuable(const StationValues& values, std::vector<CoreRegion> found);
 
   const ReducedWorld& wide_;
-  const int max_uncovered_;
+  int max_uncovered_;
   const ColumnGenerationOptions options_;
   const int max_new_regions_;
   RegionPool pool_;

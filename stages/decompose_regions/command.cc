@@ -52,10 +52,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
         "counted",
         world.num_stations(), arguments.options.best_max_stations);
   }
-  *environment.out << fmt::format(
-      "decompose_regions: {} stations, {} features, {} regions{}\n", world.num_stations(),
-      world.num_features(), decomposition.regions.size(),
-      decomposition.lower_bound ? fmt::format(", at least {} needed", *decomposition.lower_bound) : "");
+  *environment.out << fmt::format("decompose_regions: {} stations, {} features; {}\n", world.num_stations(),
+                                  world.num_features(),
+                                  NumRegionsText(decomposition.regions.size(), decomposition.lower_bound));
   if (!decomposition.uncovered.empty()) {
     spdlog::warn(
         "{} coverable stations are in no region (rho = {} lets small remainders go); first: station {}",

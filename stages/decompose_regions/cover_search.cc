@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "core/random.h"
+#include "stages/decompose_regions/cover_annealing.h"
 
 namespace cairn {
 namespace {
@@ -14,6 +16,8 @@ constexpr double kNearlyOne = 0.9;
 constexpr size_t kMaxFixedTogether = 8;
 // Regions of a neighbourhood that is covered anew.
 constexpr int kMinOpened = 6, kMaxOpened = 20;
+// Times that the pool gets nearly as valuable regions before annealing.
+constexpr int kNumEnrichments = 2;
 
 class CoverSearch {
  public:
@@ -68,24 +72,21 @@ class CoverSearch {
 
   // Drops the region that covers the fewest stations alone as long as the others suffice.
   void DropSuperfluous(std::vector<int>* cover) const {
-    std::vector<int> counts = CoverCounts(*cover);
-    int num_uncovered = NumUncovered(*cover);
-    for (;;) {
-      int least = -1, least_loss = max_uncovered_ - num_uncovered + 1;
-      for (size_t i = 0; i < cover->size(); ++i) {
-        int loss = 0;
-        for (const StationIdx station : generation_.pool()[(*cover)[i]].stations)
-          loss += counts[station] == 1;
-        if (loss < least_loss) {
-          least = static_cast<int>(i);
-          least_loss = loss;
-        }
-      }
-      if (least < 0) return;
-      for (const StationIdx station : generation_.pool()[(*cover)[least]].stations) --counts[station];
-      num_uncovered += least_loss;
-      cover->erase(cover->begin() + least);
+    while (!cover->empty()) {
+      std::vector<int> fewer = WithoutLeastUseful(*cover);
+      if (NumUncovered(fewer) > max_uncovered_) return;
+      *cover = std::move(fewer);
     }
+  }
+
+  // Exchanges regions so that fewer stations are uncovered (cover_annealing.h), and drops what that makes
+  // superfluous.
+  void Anneal(std::vector<int>* cover, Random* random) {
+    const int64_t num_exchanges = int64_t{options_.exchanges_per_station} * wide_.num_coverable;
+    if (num_exchanges == 0) return;
+    for (int i = 0; i < kNumEnrichments; ++i) generation_.AddNearlyAsValuable(random);
+    *cover = CoverAnnealing(generation_.pool(), wide_.coverable).Search(*cover, num_exchanges, random);
+    DropSuperfluous(cover);
   }
 
  private:
@@ -121,6 +122,24 @@ class CoverSearch {
     return best;
   }
 
+  // A cover without the region that covers the fewest stations alone.  REQUIRES: not empty
+  std::vector<int> WithoutLeastUseful(std::vector<int> cover) const {
+    const std::vector<int> counts = CoverCounts(cover);
+    size_t least = 0;
+    ptrdiff_t least_loss = std::numeric_limits<ptrdiff_t>::max();
+    for (size_t i = 0; i < cover.size(); ++i) {
+      const std::vector<StationIdx>& stations = generation_.pool()[cover[i]].stations;
+      const ptrdiff_t loss = std::count_if(stations.begin(), stations.end(),
+                                           [&](StationIdx station) { return counts[station] == 1; });
+      if (loss < least_loss) {
+        least = i;
+        least_loss = loss;
+      }
+    }
+    cover.erase(cover.begin() + static_cast<ptrdiff_t>(least));
+    return cover;
+  }
+
   std::vector<int> CoverCounts(const std::vector<int>& cover) const {
     std::vector<int> counts(wide_.num_stations(), 0);
     for (const int region : cover) {
@@ -151,8 +170,8 @@ std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& w
   std::vector<int> best = std::move(start);
   search.DropSuperfluous(&best);
   if (std::vector<int> cover = search.Dive({}, best.size(), true); !cover.empty()) best = std::move(cover);
-  int num_uncovered = search.NumUncovered(best);
   Random random(seed);
+  int num_uncovered = search.NumUncovered(best);
   std::vector<StationIdx> centers;
   for (StationIdx station = 0; station < wide.num_stations(); ++station) {
     if (wide.coverable[station]) centers.push_back(station);
@@ -168,6 +187,7 @@ std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& w
     best = std::move(cover);
     num_uncovered = now;
   }
+  search.Anneal(&best, &random);
   std::sort(best.begin(), best.end());
   return best;
 }

@@ -125,6 +125,10 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .help = "certified least number of regions: certified (column generation, seconds), counted (weaker, "
                "cheap), none; auto: certified with algorithm best, else counted",
        .choices = {"auto", "certified", "counted", "none"}},
+      {.name = "best_exchanges_per_station",
+       .value = &o->best_exchanges_per_station,
+       .help = "algorithm best: exchanges of regions, per station, that leave fewer stations uncovered",
+       .min = 0},
       {.name = "best_num_repairs",
        .value = &o->best_num_repairs,
        .help = "algorithm best: neighbourhoods that are covered anew; time grows with it",
@@ -176,7 +180,10 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
 
   const bool is_small = world.num_stations() <= options.best_max_stations;
   if (options.algorithm == "best" && is_small) {
-    decomposition = AlgorithmBest(world, decomposition, {.num_repairs = options.best_num_repairs}, seed);
+    decomposition = AlgorithmBest(world, decomposition,
+                                  {.exchanges_per_station = options.best_exchanges_per_station,
+                                   .num_repairs = options.best_num_repairs},
+                                  seed);
   } else if (options.lower_bound == "certified" && is_small) {
     decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
   } else {

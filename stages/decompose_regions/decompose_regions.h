@@ -48,6 +48,9 @@ struct DecomposeRegionsOptions {
   // Certified least number of regions: "certified" (column_generation.h), "counted" (counting_bound.h;
   // weaker, cheap), "none", or "auto": certified with algorithm "best", else counted.
   std::string lower_bound = "auto";
+  // Algorithm best: exchanges of a region for another, per coverable station, so that fewer stations are
+  // uncovered (cover_annealing.h).  REQUIRES: >= 0
+  int best_exchanges_per_station = 400;
   // Algorithm best: neighbourhoods that are covered anew (cover_search.h).  REQUIRES: >= 0
   int best_num_repairs = 60;
   // Column generation takes seconds for some thousand stations and memory for a few thousand regions: worlds

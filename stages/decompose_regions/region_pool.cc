@@ -14,7 +14,12 @@ bool RegionPool::Add(CoreRegion region) {
     if (regions_[entry->second].stations == region.stations) return false;
   }
   by_hash_.emplace(hash, size());
-  for (const StationIdx station : region.stations) regions_at_[station].push_back(size());
+  for (size_t i = 0; i < region.stations.size(); ++i) {
+    const StationIdx station = region.stations[i];
+    if (i == 0 || region.stations[i - 1] != station - 1) runs_.push_back({station, station});
+    runs_.back().end = station + 1;
+  }
+  run_begins_.push_back(runs_.size());
   regions_.push_back(std::move(region));
   return true;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -12,19 +13,24 @@ namespace cairn {
 // Candidate regions of a set cover problem, each station set once.
 class RegionPool {
  public:
-  explicit RegionPool(int num_stations) : regions_at_(num_stations) {}
+  // Stations with consecutive numbers, begin to end - 1.  A lattice that is numbered row by row has few of
+  // them in a region, and the sum over a run is a difference of two partial sums.
+  struct Run {
+    StationIdx begin, end;
+  };
 
   // False if a region with these stations is there already.
   bool Add(CoreRegion region);
   int size() const { return static_cast<int>(regions_.size()); }
   const CoreRegion& operator[](int region) const { return regions_[region]; }
-  // Regions that contain a station, ascending.
-  const std::vector<int32_t>& At(StationIdx station) const { return regions_at_[station]; }
-  int num_stations() const { return static_cast<int>(regions_at_.size()); }
+  std::span<const Run> Runs(int region) const {
+    return {runs_.data() + run_begins_[region], runs_.data() + run_begins_[region + 1]};
+  }
 
  private:
   std::vector<CoreRegion> regions_;
-  std::vector<std::vector<int32_t>> regions_at_;
+  std::vector<Run> runs_;  // of all regions, one after the other
+  std::vector<size_t> run_begins_ = {0};
   std::unordered_multimap<uint64_t, int32_t> by_hash_;
 };
 

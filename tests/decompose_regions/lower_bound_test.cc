@@ -6,6 +6,7 @@
 #include "stages/decompose_regions/check_regions.h"
 #include "stages/decompose_regions/core_finder.h"
 #include "stages/decompose_regions/counting_bound.h"
+#include "stages/decompose_regions/cover_annealing.h"
 #include "stages/decompose_regions/decompose_regions.h"
 #include "stages/decompose_regions/pricing.h"
 #include "tests/decompose_regions/all_regions.h"
@@ -102,7 +103,8 @@ TEST(LowerBound, HoldsForEveryNumberOfUncoveredStations) {
     Result<Decomposition> result = DecomposeRegions(world, options, seed);
     if (!result.ok()) continue;
     const ReducedWorld reduced = ReduceWorld(world, options.k, options.tau, seed);
-    for (int max_uncovered = 0; max_uncovered <= 3; ++max_uncovered) {
+    const int num_coverable = static_cast<int>(CoverableStations(world, options.k, options.tau).size());
+    for (int max_uncovered = 0; max_uncovered <= num_coverable; ++max_uncovered) {
       result->uncovered.assign(max_uncovered, 0);
       const int optimum = all.Fewest(max_uncovered);
       ASSERT_LE(CertifiedLowerBound(world, *result), optimum) << "seed " << seed;
@@ -174,6 +176,48 @@ TEST(Best, NeedsNoMoreRegionsThanB2AndLeavesNoMoreUncovered) {
     EXPECT_LE(best->regions.size(), b2->regions.size());
     EXPECT_LE(best->uncovered.size(), b2->uncovered.size());
     EXPECT_LE(*best->lower_bound, static_cast<int>(best->regions.size()));
+  }
+}
+
+TEST(LowerBound, HoldsForTheHolesThatMaxHoleLeaves) {
+  int num_results = 0;
+  for (uint64_t seed = 0; seed < kNumWorlds; seed += 3) {
+    const World world = SmallWorld(seed);
+    const AllRegions all(world, KOf(seed), TauOf(seed));
+    for (int max_hole = 0; max_hole <= 2; ++max_hole) {
+      const DecomposeRegionsOptions options{.algorithm = "best",
+                                            .k = KOf(seed),
+                                            .tau = TauOf(seed),
+                                            .rho = 1 + RhoOf(seed),
+                                            .max_hole = max_hole};
+      const Result<Decomposition> best = DecomposeRegions(world, options, seed);
+      if (!best.ok()) continue;
+      ASSERT_THAT(CheckRegions(world, *best, max_hole).violations, IsEmpty()) << "seed " << seed;
+      const int optimum = all.Fewest(static_cast<int>(best->uncovered.size()));
+      ASSERT_LE(*best->lower_bound, optimum) << "seed " << seed;
+      ASSERT_LE(optimum, static_cast<int>(best->regions.size())) << "seed " << seed;
+      ++num_results;
+    }
+  }
+  EXPECT_GE(num_results, 200);
+}
+
+// 3 x 3 stations, each seen by one feature of its own, and by those of a row and a column; three regions are
+// needed, and one covers all but six stations.
+TEST(CoverAnnealing, FindsTheCoverThatLeavesFewestStationsUncovered) {
+  RegionPool pool;
+  for (StationIdx v = 0; v < 9; ++v) pool.Add({{}, {v}});
+  for (StationIdx row = 0; row < 9; row += 3) pool.Add({{}, {row, row + 1, row + 2}});
+  for (StationIdx column = 0; column < 3; ++column) pool.Add({{}, {column, column + 3, column + 6}});
+  CoverAnnealing annealing(pool, std::vector<char>(9, 1));
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    const std::vector<int> three = annealing.Search({0, 4, 8}, 2000, &random);
+    std::set<StationIdx> covered;
+    for (const int region : three) covered.insert(pool[region].stations.begin(), pool[region].stations.end());
+    EXPECT_EQ(three.size(), 3);
+    EXPECT_EQ(covered.size(), 9) << "seed " << seed;
+    EXPECT_EQ(pool[annealing.Search({0}, 2000, &random)[0]].stations.size(), 3) << "seed " << seed;
   }
 }
 
