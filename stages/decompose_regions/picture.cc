@@ -19,7 +19,8 @@ namespace {
 // Okabe and Ito's colours without black and yellow, then Paul Tol's muted ones.
 constexpr std::array kColours = {"#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00",
                                  "#332288", "#999933", "#882255", "#44aa99", "#ddcc77", "#117733"};
-constexpr double kPixelsPerCell = 16;
+// The longer side of the picture, while a cell of the grid is neither tiny nor huge.
+constexpr double kLongSidePx = 1000, kMinCellPx = 8, kMaxCellPx = 56;
 constexpr int kMaxLegendRegions = 30;
 
 using Cell = std::pair<int, int>;
@@ -141,7 +142,9 @@ class Picture {
       high = high.cwiseMax(position);
     }
     const double margin = 1.5 * grid_.side_m;
-    canvas_.scale = kPixelsPerCell / grid_.side_m;
+    const double long_side = (high - low).maxCoeff() + 2 * margin;
+    cell_px_ = std::clamp(kLongSidePx * grid_.side_m / long_side, kMinCellPx, kMaxCellPx);
+    canvas_.scale = cell_px_ / grid_.side_m;
     canvas_.left = low.x() - margin;
     canvas_.top = high.y() + margin;
     width_ = (high.x() - low.x() + 2 * margin) * canvas_.scale;
@@ -257,7 +260,7 @@ class Picture {
     for (const double next : {0.5, 1.0, 2.0, 5.0, 10.0, 50.0, 100.0}) {
       if (next * canvas_.scale <= 0.4 * width_) length_m = next;
     }
-    const double x = 1.5 * kPixelsPerCell, y = height_ + 20;
+    const double x = 1.5 * cell_px_, y = height_ + 20;
     Write(
         "<path d=\"M{0:.1f} {1:.1f}v8h{2:.1f}v-8\" fill=\"none\" stroke=\"black\"/>"
         "<text x=\"{0:.1f}\" y=\"{3:.1f}\">{4:g} m</text>\n",
@@ -267,15 +270,12 @@ class Picture {
   void DrawLegend() {
     double y = 24;
     const double x = width_ + 10;
-    Write(
-        "<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">algorithm {}, k = {}, tau = {}, rho = "
-        "{}</text>\n",
-        x, y, decomposition_.algorithm, decomposition_.k, decomposition_.tau, decomposition_.rho);
+    Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{}</text>\n", x, y,
+          NumRegionsText(decomposition_.regions.size(), decomposition_.lower_bound));
     y += 18;
-    Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{} regions{}, {} uncovered</text>\n", x, y,
-          decomposition_.regions.size(),
-          decomposition_.lower_bound ? fmt::format(" (at least {} needed)", *decomposition_.lower_bound) : "",
-          decomposition_.uncovered.size());
+    Write("<text x=\"{:.0f}\" y=\"{:.0f}\">algorithm {}, k = {}, tau = {}, rho = {}</text>\n", x, y,
+          decomposition_.algorithm, decomposition_.k, decomposition_.tau, decomposition_.rho);
+    y += 6;
     for (size_t i = 0; i < decomposition_.regions.size() && i < kMaxLegendRegions; ++i) {
       y += 18;
       Write(
@@ -292,8 +292,8 @@ class Picture {
     y += 18;
     Write(
         "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"10\" height=\"10\" fill=\"white\" stroke=\"black\"/>"
-        "<text x=\"{2:.0f}\" y=\"{3:.0f}\">in no region</text>\n",
-        x + 1, y - 9, x + 20, y);
+        "<text x=\"{2:.0f}\" y=\"{3:.0f}\">in no region: {4} coverable stations</text>\n",
+        x + 1, y - 9, x + 20, y, decomposition_.uncovered.size());
     y += 18;
     Write(
         "<circle cx=\"{0:.0f}\" cy=\"{1:.0f}\" r=\"1.5\" fill=\"#888\"/>"
@@ -305,7 +305,7 @@ class Picture {
   const Decomposition& decomposition_;
   const Grid grid_;
   Canvas canvas_;
-  double width_ = 0, height_ = 0;
+  double width_ = 0, height_ = 0, cell_px_ = 0;
   std::vector<Cell> station_cells_;
   std::vector<std::set<Cell>> region_cells_;
   std::vector<Vec2> centres_;
