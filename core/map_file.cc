@@ -65,6 +65,11 @@ std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
 
 void WriteHead(SQLite::Database& database, const MapRows& rows) {
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", FrameTexts(rows.frame));
+  if (rows.lower_bound) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+               {{"lower_bound", std::to_string(*rows.lower_bound)},
+                {"uncovered_limit", std::to_string(rows.uncovered_limit)}});
+  }
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
              {{"name", rows.name},
               {"writer", rows.writer},
@@ -249,6 +254,14 @@ Status ReadHead(SQLite::Database& database, const std::string& path, MapRows* ro
       !ParseNumber(meta["tau"], &rows->tau) || !ParseNumber(meta["rho"], &rows->rho)) {
     return Corrupt(path, "table meta: seed '{}', k '{}', tau '{}' or rho '{}' is not an integer",
                    meta["seed"], meta["k"], meta["tau"], meta["rho"]);
+  }
+  if (meta.count("lower_bound")) {
+    rows->lower_bound.emplace();
+    if (!ParseNumber(meta["lower_bound"], &*rows->lower_bound) ||
+        !ParseNumber(meta["uncovered_limit"], &rows->uncovered_limit)) {
+      return Corrupt(path, "table meta: lower_bound '{}' or uncovered_limit '{}' is not an integer",
+                     meta["lower_bound"], meta["uncovered_limit"]);
+    }
   }
   if (!ParseNumber(meta["stated_pose_sigma_m"], &rows->stated_pose_sigma_m) ||
       !ParseNumber(meta["stated_pose_sigma_deg"], &rows->stated_pose_sigma_deg)) {

@@ -63,6 +63,11 @@ Status CheckRegions(const MapRows& rows) {
       return Invalid("edge {}: stations {} and {} of {}", i, u, v, rows.stations.size());
     }
   }
+  if (rows.uncovered_limit < 0 || rows.lower_bound.value_or(0) < 0 ||
+      rows.lower_bound.value_or(0) > static_cast<int64_t>(rows.regions.size())) {
+    return Invalid("{} regions with a lower bound of {}, {} stations uncovered", rows.regions.size(),
+                   rows.lower_bound.value_or(0), rows.uncovered_limit);
+  }
   for (size_t i = 0; i < rows.regions.size(); ++i) {
     if (!IsAscending(rows.regions[i].stations, rows.stations.size()) ||
         !IsAscending(rows.regions[i].landmarks, rows.landmarks.size())) {

@@ -64,6 +64,10 @@ struct MapRows {
   int k = 0;
   int tau = 0;
   int rho = 0;
+  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable
+  // stations uncovered; nothing where none is known.
+  std::optional<int> lower_bound;
+  int uncovered_limit = 0;
   std::map<std::string, std::string> stage_options;  // stage -> TOML
   std::map<std::string, std::string> input_hashes;   // file -> XXH3
   std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/decomposition.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -239,10 +240,10 @@ std::string FloorSvg(const MapRows& rows) {
   for (const MapStation& station : rows.stations) places.emplace(station.position.x(), station.position.y());
   svg += fmt::format(
       "<text x=\"24\" y=\"34\" font-size=\"20\" font-weight=\"bold\">{}</text>\n"
-      "<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{} landmarks, {} regions, {} stations at {} "
+      "<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{}; {} landmarks; {} stations at {} "
       "places</text>\n",
-      Escape(rows.name), kWidthPx - 24, rows.landmarks.size(), rows.regions.size(), rows.stations.size(),
-      places.size());
+      Escape(rows.name), kWidthPx - 24, NumRegionsText(rows.regions.size(), rows.lower_bound),
+      rows.landmarks.size(), rows.stations.size(), places.size());
 
   svg += fmt::format(
       "<clipPath id=\"floor\"><rect x=\"0\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n"

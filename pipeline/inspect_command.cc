@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/database.h"
+#include "core/decomposition.h"
 #include "core/file.h"
 #include "core/map_rows.h"
 #include "pipeline/floor_svg.h"
@@ -55,6 +57,8 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
                                  {"num_landmarks", rows.landmarks.size()},
                                  {"landmarks", rows.landmark_choice},
                                  {"num_regions", rows.regions.size()},
+                                 {"lower_bound", nullptr},
+                                 {"uncovered_limit", rows.uncovered_limit},
                                  {"num_region_landmarks", num_region_landmarks},
                                  {"algorithm", rows.algorithm},
                                  {"k", rows.k},
@@ -73,6 +77,7 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
                       {"longitude_deg", rows.frame.anchor->longitude_deg},
                       {"altitude_m", rows.frame.anchor->altitude_m}};
   }
+  if (rows.lower_bound) json["lower_bound"] = *rows.lower_bound;
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;
@@ -81,15 +86,28 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
   return json;
 }
 
+std::string RegionsLine(const nlohmann::ordered_json& json) {
+  std::optional<int> lower_bound;
+  if (!json["lower_bound"].is_null()) lower_bound = json["lower_bound"].get<int>();
+  std::string line =
+      fmt::format("{:<24} {}", "regions", NumRegionsText(json["num_regions"].get<size_t>(), lower_bound));
+  if (const int limit = json["uncovered_limit"].get<int>(); lower_bound && limit > 0) {
+    line += fmt::format(" (where up to {} coverable stations may be in none)", limit);
+  }
+  return line + "\n";
+}
+
 // The same values for people: a line each, options as they stand in the recipe.
 std::string MapText(const nlohmann::ordered_json& json) {
   std::string text;
   for (const auto& [key, value] : json.items()) {
-    if (!value.is_object()) {
+    if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before
+    if (key == "num_regions") {
+      text += RegionsLine(json);
+    } else if (!value.is_object()) {
       text += fmt::format("{:<24} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
-      continue;
     }
-    if (value.empty()) continue;
+    if (!value.is_object() || value.empty()) continue;
     text += fmt::format("\n{}\n", key);
     for (const auto& [name, entry] : value.items()) {
       if (key == "stage_options") {

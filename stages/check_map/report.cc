@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/decomposition.h"
+
 namespace cairn {
 namespace {
 
@@ -59,7 +61,8 @@ std::string ReportText(const PrintedReport& report) {
   line("map", fmt::format("{}{}", report.rows->name, report.rows->sealed ? "" : " (unsealed)"));
   line("landmarks", fmt::format("{} ({})", report.rows->landmarks.size(), report.rows->landmark_choice));
   line("regions",
-       fmt::format("{} ({}, k = {})", report.rows->regions.size(), report.rows->algorithm, report.rows->k));
+       fmt::format("{} ({}, k = {})", NumRegionsText(report.rows->regions.size(), report.rows->lower_bound),
+                   report.rows->algorithm, report.rows->k));
   line("MB", fmt::format("{:.2f}", static_cast<double>(report.map_bytes) / 1e6));
   if (report.held_out != nullptr && !report.held_out->images.empty()) {
     const CheckMapReport& held_out = *report.held_out;
@@ -94,9 +97,11 @@ std::string ReportJson(const PrintedReport& report) {
                          {"num_landmarks", report.rows->landmarks.size()},
                          {"landmarks", report.rows->landmark_choice},
                          {"num_regions", report.rows->regions.size()},
+                         {"lower_bound", nullptr},
                          {"algorithm", report.rows->algorithm},
                          {"k", report.rows->k},
                          {"map_bytes", report.map_bytes}};
+  if (report.rows->lower_bound) json["lower_bound"] = *report.rows->lower_bound;
   if (report.held_out != nullptr && !report.held_out->images.empty()) {
     for (const auto& [name, value] : report.held_out->figures) json[name] = value;
     json["mean_total_ms"] = report.held_out->mean_total_ms;

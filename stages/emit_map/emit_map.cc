@@ -216,6 +216,8 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   rows.k = decomposition.k;
   rows.tau = decomposition.tau;
   rows.rho = decomposition.rho;
+  rows.lower_bound = decomposition.lower_bound;
+  rows.uncovered_limit = decomposition.uncovered_limit;
   rows.floor_from_world = world.floor_from_world;
   rows.camera_from_given = classes.camera_from_given;
   rows.stated_pose_sigma_m = classes.stated_pose_sigma_m;

@@ -57,6 +57,8 @@ inline EmitExample MakeEmitExample() {
   example.world.class_ids = {10, 12, 13};
   example.world.station_images = {{1}, {2}, {4}};
   example.decomposition.algorithm = "b2";
+  example.decomposition.lower_bound = 2;
+  example.decomposition.uncovered_limit = 1;
   example.decomposition.k = 2;
   example.decomposition.regions = {{.features = {1, 2}, .stations = {1, 2}},
                                    {.features = {0, 1}, .stations = {0, 1}}};

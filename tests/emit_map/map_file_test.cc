@@ -40,6 +40,8 @@ TEST(MapFile, RoundTripKeepsEverything) {
   EXPECT_EQ(read->seed, written.seed);
   EXPECT_EQ(read->k, 2);
   EXPECT_EQ(read->algorithm, "b2");
+  EXPECT_EQ(read->lower_bound, 2);
+  EXPECT_EQ(read->uncovered_limit, 1);
   EXPECT_EQ(read->stage_options, written.stage_options);
   EXPECT_EQ(read->input_hashes, written.input_hashes);
   EXPECT_EQ(read->self_test, written.self_test);
@@ -54,6 +56,13 @@ TEST(MapFile, RoundTripKeepsEverything) {
   EXPECT_EQ(read->descriptors, written.descriptors);
   EXPECT_EQ(read->vocabulary.inverted_files, written.vocabulary.inverted_files);
   EXPECT_NEAR(read->landmarks[0].covariance(1, 1), 2e-4, 1e-10);
+}
+
+TEST(MapFile, MapWithoutALowerBoundHasNone) {
+  MapRows rows = ExampleRows();
+  rows.lower_bound.reset();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("unbounded.cairn")).ok());
+  EXPECT_FALSE(ReadMapRows(MapPath("unbounded.cairn"))->lower_bound.has_value());
 }
 
 TEST(MapFile, PositionsAreQuantisedToATenthOfAMillimetre) {
@@ -144,6 +153,10 @@ TEST(MapFile, DamagedRowsAreRefused) {
                           "DELETE FROM frames",
                           "DELETE FROM meta",
                           "UPDATE meta SET value = 'x'",
+                          "UPDATE meta SET value = 'x' WHERE key = 'lower_bound'",
+                          "UPDATE meta SET value = 3 WHERE key = 'lower_bound'",
+                          "UPDATE meta SET value = -1 WHERE key = 'uncovered_limit'",
+                          "DELETE FROM meta WHERE key = 'uncovered_limit'",
                           "DELETE FROM images WHERE image_id = 2",
                           "DROP TABLE landmarks",
                           "DROP TABLE vocabulary_words"}) {

@@ -11,9 +11,12 @@ namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ContainsRegex;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+
+constexpr char kRegionsLine[] = "[0-9]+ regions?, at least [0-9]+ (is|are) needed";
 
 // One map, compiled with two threads, that all tests of the suite look at; each leaves it as it was.
 class Compile : public testing::Test {
@@ -24,6 +27,7 @@ class Compile : public testing::Test {
     const ProgramRun run = CompileTiny();
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_THAT(run.out, HasSubstr("tiny.cairn: compiled\n"));
+    EXPECT_THAT(run.out, ContainsRegex(kRegionsLine));
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -174,6 +178,7 @@ TEST_F(Compile, MapLocalizesItsQueries) {
   const ProgramRun inspect = RunShell("cairn inspect " + Path("tiny.cairn"));
   ASSERT_EQ(inspect.exit_code, 0) << inspect.err;
   EXPECT_THAT(inspect.out, HasSubstr("tiny"));
+  EXPECT_THAT(inspect.out, ContainsRegex(kRegionsLine));
   const std::string images = Path("tiny.build/capture/images/");
   const std::string names =
       RunShell("awk 'NF == 10 && !/^#/ {print $10}' " + Path("tiny.build/capture/queries.txt")).out;
