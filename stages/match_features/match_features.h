@@ -41,7 +41,7 @@ struct MatchFeaturesOptions {
   // REQUIRES: >= 0
   int num_frustum_scouts = 5;
   // Frustum: fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
-  int min_num_expected_matches = 20;
+  int min_num_expected_matches = 25;
   MatchPairsOptions matching;
 };
 // Without matching.memory_budget_mib, which like the number of threads changes no result.
