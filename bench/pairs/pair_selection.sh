@@ -60,7 +60,7 @@ row() {
       p = $2 / $1; z = 1.96; d = 1 + z * z / $1; m = (p + z * z / 2 / $1) / d
       h = z / d * sqrt(p * (1 - p) / $1 + z * z / 4 / $1 / $1)
       printf "| %s | %d | %.1f %% | %.2f | %.2f %%%s | %d |\n", method, tried, 100 * tried / num_all, tried / ($1 * n),
-        100 * p, n > 1 ? sprintf(" (%.2f to %.2f)", 100 * (m - h), 100 * (m + h)) : "", seconds }'
+        100 * p, (n > 1 ? sprintf(" (%.2f to %.2f)", 100 * (m - h), 100 * (m + h)) : ""), seconds }'
 }
 
 for name in "${@:-redkitchen demo corridor}"; do
