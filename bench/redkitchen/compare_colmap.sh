@@ -36,13 +36,14 @@ of() { cat "$work/$1.s"; }
 names() { awk '!/^#/ && NF >= 10 {print $10}' "$1"; }
 
 echo "== cairn: $("$cairn" --version)"
-# Step by step for the seconds of each, with the options of the recipe; then the whole line once more, for its sum.
+# Step by step for the seconds of each, with the options of the recipe, but all pairs, as COLMAP matches them; then the
+# whole line once more, for its sum, with the pairs that it chooses.
 options=$work/cairn.build/options
 "$cairn" configure "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
 seconds cairn_extract "$cairn" extract-features "$capture" --options "$options/extract_features.toml" \
   -o "$work/features.db" --progress none
 seconds cairn_match "$cairn" match-features "$work/features.db" --capture "$capture" \
-  --options "$options/match_features.toml" -o "$work/matches.db" --progress none
+  --options "$options/match_features.toml" --pairs exhaustive -o "$work/matches.db" --progress none
 seconds cairn_group "$cairn" group-classes "$work/matches.db" --capture "$capture" \
   --options "$options/group_classes.toml" -o "$work/classes.db" --progress none
 seconds cairn_compile "$cairn" compile "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
