@@ -289,7 +289,9 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .max = 0.5},
       {.name = "guided_matching",
        .value = &o->matching.verification.guided_matching,
-       .help = "match keypoints again along the epipolar lines of the geometry found"},
+       .help = "which pairs are matched again along the epipolar lines of the geometry found: those whose "
+               "poses are known, all, or none",
+       .choices = {"posed", "all", "none"}},
       {.name = "guided_max_ratio",
        .value = &o->matching.verification.guided.max_ratio,
        .help = "guided matching: largest ratio of the angles to the best and second best candidate",

@@ -273,7 +273,8 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
     geometry.config = TwoViewConfig::kWatermark;
     return geometry;
   }
-  if (options.guided_matching && view1.descriptors != nullptr && view2.descriptors != nullptr)
+  const bool is_guided = options.guided_matching == "all" || (options.guided_matching == "posed" && stated);
+  if (is_guided && view1.descriptors != nullptr && view2.descriptors != nullptr)
     inliers = GuidedInliers(view1, view2, model, limits, inliers, options);
   std::erase_if(inliers, cannot_meet);
   if (static_cast<int>(inliers.size()) < options.min_num_inliers) return geometry;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,8 +40,10 @@ struct VerifyPairOptions {
   double min_watermark_ratio = 0.7;
   // ... the border being as wide as this part of the diagonal (COLMAP: 0.1).
   double watermark_border_ratio = 0.1;
-  // Match again along the epipolar lines of what was found.
-  bool guided_matching = true;
+  // Which pairs are matched again along the epipolar lines of what was found: "posed": those whose stated
+  // poses bear the geometry out, "all", or "none".  A wrong geometry found from matches alone gains more of
+  // them.
+  std::string guided_matching = "posed";
   GuidedMatchOptions guided;
 };
 

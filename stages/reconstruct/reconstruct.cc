@@ -139,6 +139,42 @@ Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
   return WithoutScale(model, options, result);
 }
 
+size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
+  return models.ok() ? models->front().images.size() : 0;
+}
+
+// The mapper's models.  From two images nobody can tell distortion from shape: where too few images are
+// registered with it, once more without.
+Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
+                                           const ReconstructOptions& options, const std::string& work_folder,
+                                           Progress& progress, ReconstructResult* result) {
+  const auto run = [&](const MapperOptions& mapper, const char* name) -> Result<std::vector<ColmapModel>> {
+    const std::string folder = work_folder + "/" + name;
+    std::error_code error;
+    if (!std::filesystem::create_directory(folder, error))
+      return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
+    return RunMapper(input, capture.images_folder, mapper, folder, progress);
+  };
+  Result<std::vector<ColmapModel>> models = run(options.mapper, "first");
+  const bool may_help = models.ok() || models.error().code == ErrorCode::kNoData;
+  const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
+  if (!options.mapper.refine_distortion || !may_help ||
+      (models.ok() && static_cast<double>(NumRegistered(models)) >= num_wanted)) {
+    return models;
+  }
+  MapperOptions simpler = options.mapper;
+  simpler.refine_distortion = false;
+  Result<std::vector<ColmapModel>> without = run(simpler, "without_distortion");
+  if (!without.ok() && without.error().code == ErrorCode::kCancelled) return without;
+  const bool is_better = NumRegistered(without) > NumRegistered(models);
+  result->warnings.push_back(fmt::format(
+      "{} of {} images were registered with the cameras' distortion refined, {} without; taken is "
+      "the reconstruction {}",
+      NumRegistered(models), input.images.size(), NumRegistered(without),
+      is_better ? "without: refine_distortion = false saves the first attempt" : "with"));
+  return is_better ? std::move(without) : std::move(models);
+}
+
 // Why an image is not in the model kept.
 std::string RejectReason(ImageId image_id, const MapperInput& input, const std::vector<ColmapModel>& models,
                          const std::set<ImageId>& registered) {
@@ -294,10 +330,10 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<ColmapModel> models,
-                         RunMapper(input, capture.images_folder, options.mapper, work_folder, progress));
-  const ColmapModel& model = models[0];
   ReconstructResult result;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ColmapModel> models,
+                         MapImages(input, capture, options, work_folder, progress, &result));
+  const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;
   for (const ColmapModel& m : models) result.model_sizes.push_back(static_cast<int>(m.images.size()));
   result.num_points = static_cast<int>(model.points.size());

@@ -15,8 +15,9 @@
 namespace cairn {
 
 // Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
-// (mapper.h), which GPS, known positions or known distances then fix (align.h).  Before: match_features.
-// After: group_classes and all that reads poses.
+// (mapper.h), which GPS, known positions or known distances then fix (align.h).  Where too few images are
+// registered with the cameras' distortion refined, the mapper runs once more without.  Before:
+// match_features. After: group_classes and all that reads poses.
 struct ReconstructOptions {
   MapperOptions mapper;
   // Least part of the capture's images that the largest model must have; below, there is no result.

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
+#include "tests/reconstruct/fake_colmap.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
 namespace cairn {
@@ -15,23 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
-
-// A program named colmap first on PATH, for as long as the object lives.
-class FakeColmap {
- public:
-  explicit FakeColmap(const std::string& script) : path_(std::getenv("PATH")) {
-    const std::string folder = testing::TempDir() + "/fake_colmap";
-    fs::remove_all(folder);
-    fs::create_directories(folder);
-    EXPECT_TRUE(WriteFileAtomically(folder + "/colmap", "#!/bin/sh\n" + script + "\n").ok());
-    fs::permissions(folder + "/colmap", fs::perms::owner_all);
-    setenv("PATH", (folder + ":" + path_).c_str(), 1);
-  }
-  ~FakeColmap() { setenv("PATH", path_.c_str(), 1); }
-
- private:
-  std::string path_;
-};
 
 class MapperTest : public testing::Test {
  protected:

@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "tests/core/exif_jpeg.h"
+#include "tests/reconstruct/fake_colmap.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
 namespace cairn {
@@ -183,6 +184,25 @@ TEST_F(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
   EXPECT_THAT(
       too_few.error().message,
       AllOf(HasSubstr("only 9 of 15"), HasSubstr("min_registered_ratio = 0.61"), HasSubstr("other00.jpg: ")));
+}
+
+TEST_F(ReconstructTest, WithoutAStartTheMapperRunsOnceMoreWithoutDistortion) {
+  const FakeColmap colmap(R"(case "$*" in
+*"ba_refine_extra_params 1"*) echo "ERROR: failed to create sparse model"; exit 1;;
+esac
+exec /usr/bin/colmap "$@")");
+  const SyntheticSurvey survey = MakeSyntheticSurvey(12, 11);
+  WriteControlPoints(survey);
+  const auto result = Run(survey, {.control_points = "control_points.txt"});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->images, SizeIs(12));
+  EXPECT_EQ(result->cameras.at(1).model, CameraModel::kSimplePinhole);
+  ASSERT_FALSE(result->warnings.empty());
+  EXPECT_THAT(result->warnings[0], HasSubstr("0 of 12 images were registered with the cameras' distortion "
+                                             "refined, 12 without"));
+  ReconstructOptions only_with{.control_points = "control_points.txt"};
+  only_with.mapper.refine_distortion = false;
+  EXPECT_THAT(Run(survey, only_with)->warnings, SizeIs(0));
 }
 
 TEST_F(ReconstructTest, BadOptionsAreRefused) {
