@@ -178,6 +178,11 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
   }
   decomposition.uncovered_limit = static_cast<int>(decomposition.uncovered.size());
 
+  if (decomposition.regions.empty()) {
+    return MakeError(ErrorCode::kNoData,
+                     "no region covers more than rho = {} of the {} coverable stations; choose a smaller rho",
+                     options.rho, reduced.num_coverable);
+  }
   const bool is_small = world.num_stations() <= options.best_max_stations;
   if (options.algorithm == "best" && is_small) {
     decomposition = AlgorithmBest(world, decomposition,

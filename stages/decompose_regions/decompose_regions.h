@@ -65,7 +65,7 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 // Pure: same world, options and seed, same result.  B.2 costs O(incidences) per reading of the world plus,
 // for each region, O(k) passes over the incidences of the region's stations; memory is proportional to the
 // incidences. REQUIRES: CheckWorld(world) is ok. Errors: InvalidArgument for a bad option, NoData when no
-// station is coverable (says what k the best one allows), Cancelled.
+// station is coverable (says what k the best one allows) or no region covers more than rho, Cancelled.
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed, Progress& progress);
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,

@@ -215,6 +215,16 @@ TEST(DecomposeRegions, StationsWithManyNeighboursShrinkAreasToo) {
   EXPECT_EQ(d.regions.size(), 5);  // {0, 1} to {0, 5}: without the hub their cores are not connected
 }
 
+TEST(DecomposeRegions, NoRegionLargeEnoughIsAnErrorNotAnEmptyResult) {
+  for (const char* algorithm : kAlgorithms) {
+    const Result<Decomposition> result =
+        DecomposeRegions(RowWorld(), {.algorithm = algorithm, .k = 2, .tau = 0, .rho = 2000000000}, 0);
+    ASSERT_FALSE(result.ok()) << algorithm;
+    EXPECT_EQ(result.error().code, ErrorCode::kNoData);
+    EXPECT_THAT(result.error().message, HasSubstr("rho = 2000000000 of the 7 coverable stations"));
+  }
+}
+
 TEST(DecomposeRegions, NegativeKIsAnError) {
   const Result<Decomposition> result = DecomposeRegions(RowWorld(), {.k = -4}, 0);
   ASSERT_FALSE(result.ok());

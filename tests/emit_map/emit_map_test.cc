@@ -85,6 +85,7 @@ TEST(EmitMap, RegionsOfAnotherWorldAreAnError) {
 TEST(EmitMap, NoRegionsMeansNoMapUnlessAllAreKept) {
   EmitExample example = MakeEmitExample();
   example.decomposition.regions.clear();
+  example.decomposition.lower_bound.reset();
   EXPECT_EQ(Emit(example).error().code, ErrorCode::kNoData);
   EXPECT_TRUE(Emit(example, "all").ok());
 }
