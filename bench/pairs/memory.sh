@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Prints the memory that matching takes for 2,000 synthetic images of 2,000 features (synthetic_survey.cc), by budget:
-# pairs chosen by poses, neighbours with loop candidates, and pairs scattered over all images, one in 200 of all, where
+# pairs chosen by poses, neighbours with loop candidates, and pairs scattered over all images, one in 2,000 of all, where
 # every stretch of pairs wants other images.
 #
 #   bench/pairs/memory.sh [IMAGES] [FEATURES]      a few minutes on 2 cores, 2 GB on the disk in WORK [build/bench/pairs]
@@ -22,7 +22,7 @@ features=$survey/features.db
 list=$work/scattered_$images.txt
 sqlite3 -separator ' ' "file:$features?immutable=1" "
   SELECT a.name, b.name FROM images a JOIN images b ON a.image_id < b.image_id
-  WHERE ((a.image_id * 7919 + b.image_id) * 2654435761 >> 16) % 200 = 0 OR b.image_id = a.image_id + 1" > "$list"
+  WHERE ((a.image_id * 7919 + b.image_id) * 2654435761 >> 16) % 2000 = 0 OR b.image_id = a.image_id + 1" > "$list"
 
 # row LABEL BUDGET OPTION...
 row() {
