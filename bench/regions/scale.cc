@@ -141,7 +141,8 @@ void MeasureLargeWorlds(const std::vector<int64_t>& sizes, const std::filesystem
 
 int main(int argc, char** argv) {
   CLI::App app("Time and memory of algorithm B.2, from 5,000 stations to a million");
-  cairn::DecomposeRegionsOptions options{.algorithm = "b2", .k = 4, .tau = 1, .rho = 9};
+  cairn::DecomposeRegionsOptions options{
+      .algorithm = "b2", .k = 4, .tau = 1, .rho = 9, .lower_bound = "none"};
   std::vector<int64_t> sizes = {100000, 300000, 1000000};
   std::string folder = std::filesystem::temp_directory_path();
   int num_runs = 50;

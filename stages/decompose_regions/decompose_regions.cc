@@ -191,7 +191,7 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
                                   seed);
   } else if (options.lower_bound == "certified" && is_small) {
     decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
-  } else {
+  } else if (options.lower_bound != "none") {
     decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   }
   if (options.lower_bound == "none") decomposition.lower_bound.reset();
