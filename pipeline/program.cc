@@ -24,16 +24,30 @@ namespace {
 constexpr int kUsageExitCode = 2;
 
 std::atomic<bool> stop_requested = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "the signal handler must not lock");
+std::atomic<int64_t> stop_requested_ms = 0;  // of the monotonic clock
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int64_t>::is_always_lock_free,
+              "the signal handler must not lock");
 
-void RequestStop(int) { stop_requested = true; }
+// The first signal asks for a stop, the second one ends the process.  What comes within a second is the same
+// request: timeout(1) signals a process and then its group.
+void RequestStop(int signal) {
+  constexpr int64_t kSameRequestMs = 1000;
+  timespec now = {};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  const int64_t now_ms = int64_t{1000} * now.tv_sec + now.tv_nsec / 1000000;
+  if (!stop_requested) {
+    stop_requested_ms = now_ms;
+    stop_requested = true;
+  } else if (now_ms - stop_requested_ms > kSameRequestMs) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+}
 
-// The first signal asks for a stop; it also restores the default, so that the second one ends the process.
 void CatchStopSignals() {
   stop_requested = false;
   struct sigaction action = {};
   action.sa_handler = RequestStop;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
