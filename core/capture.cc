@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
-#include <sstream>
 #include <tuple>
 
 #include "core/colmap_model.h"
@@ -48,11 +47,6 @@ bool IsPointsLine(const std::vector<std::string>& words) {
   return words.size() % 3 == 0 && std::all_of(words.begin(), words.end(), [&](const std::string& word) {
            return ParseNumber(word, &value);
          });
-}
-
-std::string StripCarriageReturn(std::string line) {
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  return line;
 }
 
 // Fields MODEL WIDTH HEIGHT PARAMS... from words[first] on.
@@ -152,9 +146,8 @@ Result<Camera> ParseCamera(const std::string& text) {
 Result<std::map<CameraId, Camera>> ReadCamerasText(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   std::map<CameraId, Camera> cameras;
-  std::istringstream stream(contents);
   int line_number = 0;
-  for (std::string line; std::getline(stream, line);) {
+  for (const std::string_view line : SplitLines(contents)) {
     ++line_number;
     const std::vector<std::string> words = SplitWords(line);
     if (words.empty() || words[0][0] == '#') continue;
@@ -188,12 +181,10 @@ Status WriteCamerasText(const std::string& path, const std::map<CameraId, Camera
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   std::vector<CaptureImage> images;
-  std::istringstream stream(contents);
   int line_number = 0;
   bool follows_image = false;
-  for (std::string line; std::getline(stream, line);) {
+  for (const std::string_view line : SplitLines(contents)) {
     ++line_number;
-    line = StripCarriageReturn(line);
     const std::vector<std::string> words = SplitWords(line);
     // The line after an image's holds POINTS2D[] (triples of numbers) or nothing; files without it are read
     // too.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/best_two_kernel.h"
+#include "core/descriptor_distance.h"
 
 namespace cairn {
 namespace {
@@ -146,11 +147,10 @@ std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
                                     const DescriptorMatcherOptions& options) {
   std::vector<BestTwo> rows, columns;
   FindBestTwo(descriptors1, descriptors2, &rows, &columns);
-  constexpr double kSquaredNorm = 512.0 * 512.0;
-  const auto angle = [&](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
   const auto passes = [&](const BestTwo& b) {
-    const double best = angle(b.best);
-    return best <= options.max_angle_rad && (b.second < 0 || best < options.max_ratio * angle(b.second));
+    const double best = DescriptorAngleRad(b.best);
+    return best <= options.max_angle_rad &&
+           (b.second < 0 || best < options.max_ratio * DescriptorAngleRad(b.second));
   };
   std::vector<Match> matches;
   for (uint32_t row = 0; row < rows.size(); ++row) {

@@ -7,16 +7,11 @@
 #include <sstream>
 
 #include "core/file.h"
+#include "core/text.h"
 #include "core/toml_options.h"
 
 namespace cairn {
 namespace {
-
-template <typename T>
-bool ParseNumber(const std::string& text, T* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
-}
 
 std::string RangeText(const Option& option) {
   if (std::isinf(option.max)) return fmt::format("at least {:g}", option.min);

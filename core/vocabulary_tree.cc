@@ -4,16 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/descriptor_distance.h"
+
 namespace cairn {
-namespace {
-
-int32_t Dot(const uint8_t* a, const uint8_t* b) {
-  int32_t sum = 0;
-  for (int i = 0; i < kDescriptorDim; ++i) sum += static_cast<int32_t>(a[i]) * static_cast<int32_t>(b[i]);
-  return sum;
-}
-
-}  // namespace
 
 Status NumberVocabularyNodes(Vocabulary* vocabulary) {
   const int64_t num_nodes = static_cast<int64_t>(vocabulary->nodes.size());
@@ -65,7 +58,7 @@ int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descri
   int nearest = 0;
   int32_t largest = -1;
   for (int i = 0; i < num_centres; ++i) {
-    const int32_t dot = Dot(centres + static_cast<size_t>(i) * kDescriptorDim, descriptor);
+    const int32_t dot = DescriptorDot(centres + static_cast<size_t>(i) * kDescriptorDim, descriptor);
     if (dot > largest) {
       largest = dot;
       nearest = i;

@@ -37,6 +37,12 @@ struct World {
 
   int num_stations() const { return static_cast<int>(positions.size()); }
   int num_features() const { return static_cast<int>(areas.size()); }
+  // Pairs of a feature and a station that sees it.
+  int64_t num_incidences() const {
+    int64_t num = 0;
+    for (const std::vector<StationIdx>& area : areas) num += static_cast<int64_t>(area.size());
+    return num;
+  }
 };
 
 // F_v for every station: the features seen from it, ascending.

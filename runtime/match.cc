@@ -5,17 +5,12 @@
 #include <map>
 #include <utility>
 
+#include "core/descriptor_distance.h"
 #include "core/descriptor_matcher.h"
 #include "core/pixel_ray.h"
 
 namespace cairn {
 namespace {
-
-int32_t Dot(const uint8_t* a, const uint8_t* b) {
-  int32_t sum = 0;
-  for (int i = 0; i < kDescriptorDim; ++i) sum += static_cast<int32_t>(a[i]) * static_cast<int32_t>(b[i]);
-  return sum;
-}
 
 // Keypoints of the query in square cells, for those near a pixel.
 class KeypointGrid {
@@ -66,10 +61,9 @@ bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double dep
   return ratio <= max_ratio && ratio * max_ratio >= 1;
 }
 
-// How far from its projection a landmark may show, px.
-double GuidedRadius(const MapLandmark& landmark, const Pose& cam_from_world, double focal_px,
-                    const MatchOptions& options) {
-  const Eigen::Vector3d point = cam_from_world * landmark.position;
+// How far from its projection a landmark, at `point` in the camera's frame, may show, px.
+double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, const Pose& cam_from_world,
+                    double focal_px, const MatchOptions& options) {
   if (point.z() <= 0) return options.guided_radius_px;  // beyond 90 degrees no keypoint has a ray
   Eigen::Matrix<double, 2, 3> ray_from_point;
   ray_from_point << 1, 0, -point.x() / point.z(), 0, 1, -point.y() / point.z();
@@ -166,7 +160,7 @@ std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
   const double focal_px = query.camera.MeanFocal();
   const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
   // An angle between RootSIFT vectors of norm 512 as a dot product.
-  const double min_dot = 512.0 * 512.0 * std::cos(options.guided_max_angle_rad);
+  const double min_dot = kSquaredDescriptorNorm * std::cos(options.guided_max_angle_rad);
   std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
   for (const LandmarkIdx landmark_idx : landmarks) {
     const MapLandmark& landmark = map.rows().landmarks[landmark_idx];
@@ -178,12 +172,13 @@ std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
     }
     const uint8_t* descriptor = map.rows().descriptors.row(landmark_idx).data();
     std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
-    const double radius_px = std::min(GuidedRadius(landmark, cam_from_world, focal_px, options), diagonal_px);
+    const double radius_px =
+        std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px);
     grid.VisitNear(*pixel, radius_px, [&](KeypointIdx i) {
       if (!ScaleFits(query.features.keypoints[i], landmark, DepthOfScale(query.camera, point), focal_px,
                      options.guided_max_scale_ratio))
         return;
-      const int32_t dot = Dot(query.features.descriptors.row(i).data(), descriptor);
+      const int32_t dot = DescriptorDot(query.features.descriptors.row(i).data(), descriptor);
       if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
     });
     if (best.second < 0 || best.first < min_dot) continue;

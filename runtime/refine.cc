@@ -8,17 +8,13 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
 // Least depth of a point in front of the camera, metres.
 constexpr double kMinDepthM = 1e-3;
-
-Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
 
 Eigen::Quaterniond Exp(const Eigen::Vector3d& rotation) {
   const double angle = rotation.norm();
@@ -50,7 +46,7 @@ std::optional<Linearised> Linearise(const PoseMeasurement& measurement, const Po
   pixel_from_point = measurement.ray.pixel_from_ray * pixel_from_point;
   Linearised linearised;
   linearised.residual = measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray);
-  linearised.jacobian.leftCols<3>() = -pixel_from_point * Cross(x);
+  linearised.jacobian.leftCols<3>() = -pixel_from_point * CrossMatrix(x);
   linearised.jacobian.rightCols<3>() = pixel_from_point;
   const Eigen::Matrix<double, 2, 3> pixel_from_landmark = pixel_from_point * pose.rotation.toRotationMatrix();
   linearised.covariance =
@@ -179,7 +175,7 @@ Matrix6d Adjoint(const Pose& b_from_a) {
   const Eigen::Matrix3d rotation = b_from_a.rotation.toRotationMatrix();
   Matrix6d adjoint = Matrix6d::Zero();
   adjoint.topLeftCorner<3, 3>() = rotation;
-  adjoint.bottomLeftCorner<3, 3>() = Cross(b_from_a.translation) * rotation;
+  adjoint.bottomLeftCorner<3, 3>() = CrossMatrix(b_from_a.translation) * rotation;
   adjoint.bottomRightCorner<3, 3>() = rotation;
   return adjoint;
 }

@@ -7,7 +7,7 @@
 set -euo pipefail
 top=$(cd "$(dirname "$0")/../.." && pwd)
 cairn=${CAIRN:-$top/build/release/cairn}
-synthetic_survey=${SYNTHETIC_FEATURES:-$top/build/release/synthetic_survey}
+synthetic_survey=${SYNTHETIC_SURVEY:-$top/build/release/synthetic_survey}
 work=${WORK:-$top/build/bench/pairs}
 images=${1:-2000} num_features=${2:-2000}
 [[ -x $cairn ]] || { echo "$cairn: not built; run 'make' first" >&2; exit 3; }

@@ -40,12 +40,6 @@ double ProcessorSeconds(const rusage& usage) {
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-int64_t NumIncidences(const World& world) {
-  int64_t num = 0;
-  for (const auto& area : world.areas) num += static_cast<int64_t>(area.size());
-  return num;
-}
-
 void MeasureSmallWorlds(const DecomposeRegionsOptions& options, int num_runs) {
   fmt::print("{:>8}{:>10}{:>10}{:>9}{:>10}{:>14}{:>11}\n", "setting", "stations", "visible", "regions",
              "best, ms", "median, ms", "slowest");
@@ -68,7 +62,7 @@ void MeasureSmallWorlds(const DecomposeRegionsOptions& options, int num_runs) {
     }
     std::sort(milliseconds.begin(), milliseconds.end());
     fmt::print("{:>8}{:>10}{:>10.1f}{:>9}{:>10.1f}{:>14.1f}{:>11.1f}\n", setting, nearest.num_stations(),
-               static_cast<double>(NumIncidences(nearest)) / nearest.num_stations(), num_regions,
+               static_cast<double>(nearest.num_incidences()) / nearest.num_stations(), num_regions,
                milliseconds.front(), milliseconds[milliseconds.size() / 2], milliseconds.back());
     std::fflush(stdout);
   }
@@ -112,7 +106,8 @@ bool DecomposeFile(const std::string& path, const DecomposeRegionsOptions& optio
   const Result<Decomposition> result = DecomposeRegions(*world, options, 0);
   if (!result.ok()) return false;
   fmt::print("{:>10}{:>12.3g}{:>9}{:>12.2f}{:>14.2f}", world->num_stations(),
-             static_cast<double>(NumIncidences(*world)), result->regions.size(), reading, SecondsSince(read));
+             static_cast<double>(world->num_incidences()), result->regions.size(), reading,
+             SecondsSince(read));
   return true;
 }
 

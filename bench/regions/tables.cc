@@ -74,10 +74,8 @@ WorldRow RunWorld(const SimulateWorldsOptions& simulation, DecomposeRegionsOptio
   const Result<World> world = SimulateWorld(simulation, seed);
   if (!world.ok()) return row;
   const IndexLists neighbours = NeighbourLists(*world);
-  int64_t num_incidences = 0;
-  for (const auto& area : world->areas) num_incidences += static_cast<int64_t>(area.size());
   row.num_stations = world->num_stations();
-  row.num_visible = static_cast<double>(num_incidences) / world->num_stations();
+  row.num_visible = static_cast<double>(world->num_incidences()) / world->num_stations();
   row.num_coverable = static_cast<double>(CoverableStations(*world, options.k, options.tau).size());
   for (size_t a = 0; a < kAlgorithms.size(); ++a) {
     options.algorithm = kAlgorithms[a];

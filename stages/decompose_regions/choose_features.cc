@@ -7,14 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "core/descriptor_distance.h"
 #include "core/descriptor_matcher.h"
 #include "stages/decompose_regions/pose_information.h"
 #include "stages/decompose_regions/reduced_world.h"
 
 namespace cairn {
 namespace {
-
-constexpr double kSquaredNorm = 512.0 * 512.0;  // of a descriptor
 
 // The stations that a region still has: as it takes features, those that see all of them.
 class ShrinkingRegion {
@@ -141,7 +140,7 @@ class Chooser {
     FindBestTwo(descriptors, descriptors, FastestKernel(), &nearest, &columns);
     std::vector<Candidate> candidates;
     for (size_t i = 0; i < common.size(); ++i) {
-      const double angle = std::acos(std::clamp(nearest[i].second / kSquaredNorm, 0.0, 1.0));
+      const double angle = DescriptorAngleRad(nearest[i].second);
       const double distinctiveness =
           angle * angle / (angle * angle + options_.confusion_angle_rad * options_.confusion_angle_rad);
       CAIRN_ASSIGN_OR_RETURN(std::vector<Sight> sights,

@@ -7,31 +7,15 @@ namespace cairn {
 
 CoreFinder::CoreFinder(const ReducedWorld& wide) : wide_(wide), finder_(wide.neighbours) {}
 
-std::vector<StationIdx> CoreFinder::Common(const IndexLists& areas, std::span<const int32_t> features) const {
-  std::vector<StationIdx> stations(areas[features[0]].begin(), areas[features[0]].end());
-  for (const int32_t feature : features.subspan(1)) {
-    const auto area = areas[feature];
-    auto seen = area.begin();
-    std::erase_if(stations, [&](StationIdx station) {
-      while (seen != area.end() && *seen < station) ++seen;
-      return seen == area.end() || *seen != station;
-    });
-  }
-  return stations;
-}
-
-std::vector<StationIdx> CoreFinder::CommonStations(std::span<const int32_t> features) const {
-  return Common(wide_.areas, features);
-}
-
-std::vector<std::vector<StationIdx>> CoreFinder::Cores(std::span<const int32_t> features,
-                                                       std::vector<StationIdx> stations) {
+std::vector<std::vector<StationIdx>> CoreFinder::Cores(std::span<const int32_t> features) {
+  std::vector<StationIdx> stations = CommonStations(wide_.areas, features);
   std::vector<std::vector<StationIdx>> cores;
   if (finder_.Components(stations).size() < 2) {  // paths inside of X are paths inside of Q
     if (!stations.empty()) cores.push_back(std::move(stations));
     return cores;
   }
-  for (const std::vector<StationIdx>& region : finder_.Components(Common(wide_.whole_areas, features))) {
+  for (const std::vector<StationIdx>& region :
+       finder_.Components(CommonStations(wide_.whole_areas, features))) {
     std::vector<StationIdx> core;
     std::set_intersection(stations.begin(), stations.end(), region.begin(), region.end(),
                           std::back_inserter(core));
@@ -49,7 +33,7 @@ CoreRegion CoreFinder::Widened(const std::vector<FeatureIdx>& world_features,
       widened.features.push_back(feature);
     }
   }
-  for (std::vector<StationIdx>& core : Cores(widened.features, CommonStations(widened.features))) {
+  for (std::vector<StationIdx>& core : Cores(widened.features)) {
     if (std::binary_search(core.begin(), core.end(), stations[0])) widened.stations = std::move(core);
   }
   return widened;
@@ -58,7 +42,8 @@ CoreRegion CoreFinder::Widened(const std::vector<FeatureIdx>& world_features,
 std::vector<StationIdx> CoreFinder::RegionOf(const CoreRegion& core, int tau) {
   std::vector<StationIdx> grown = GrowStations(wide_.neighbours, core.stations, tau);
   if (finder_.Components(grown).size() == 1) return grown;
-  for (std::vector<StationIdx>& region : finder_.Components(Common(wide_.whole_areas, core.features))) {
+  for (std::vector<StationIdx>& region :
+       finder_.Components(CommonStations(wide_.whole_areas, core.features))) {
     if (std::binary_search(region.begin(), region.end(), core.stations[0])) return std::move(region);
   }
   return grown;  // not reached: a core lies in one of them

@@ -19,11 +19,8 @@ class CoreFinder {
  public:
   explicit CoreFinder(const ReducedWorld& wide);
 
-  // X: the stations that see all of some reduced features, ascending.
-  std::vector<StationIdx> CommonStations(std::span<const int32_t> features) const;
-  // X n Q for each Q that X meets.  REQUIRES: `stations` is X
-  std::vector<std::vector<StationIdx>> Cores(std::span<const int32_t> features,
-                                             std::vector<StationIdx> stations);
+  // X n Q for each Q that X meets.
+  std::vector<std::vector<StationIdx>> Cores(std::span<const int32_t> features);
   // The core, seen in this world, of a region that is given by the world's features and some stations that it
   // covers; a superset of them.
   CoreRegion Widened(const std::vector<FeatureIdx>& world_features, const std::vector<StationIdx>& stations);
@@ -31,8 +28,6 @@ class CoreFinder {
   std::vector<StationIdx> RegionOf(const CoreRegion& core, int tau);
 
  private:
-  std::vector<StationIdx> Common(const IndexLists& areas, std::span<const int32_t> features) const;
-
   const ReducedWorld& wide_;
   ComponentFinder finder_;
 };

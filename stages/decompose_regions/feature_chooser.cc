@@ -57,14 +57,7 @@ CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
     if (counts_[feature] == static_cast<int32_t>(stations.size())) continue;  // R stays
     // [line 6] R = {v in R : f in F_v}
     removed.clear();
-    const auto area = world.areas[feature];
-    auto seen = area.begin();
-    std::erase_if(stations, [&](StationIdx station) {
-      while (seen != area.end() && *seen < station) ++seen;
-      if (seen != area.end() && *seen == station) return false;
-      removed.push_back(station);
-      return true;
-    });
+    KeepCommon(world.areas[feature], &stations, &removed);
     if (removed.size() <= stations.size()) {
       Uncount(removed);
     } else {
@@ -77,15 +70,7 @@ CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
   counted_.clear();
 
   // [line 9] R = {v in V : L is a subset of F_v}
-  region.stations.assign(world.areas[region.features[0]].begin(), world.areas[region.features[0]].end());
-  for (size_t i = 1; i < region.features.size(); ++i) {
-    const auto area = world.areas[region.features[i]];
-    auto seen = area.begin();
-    std::erase_if(region.stations, [&](StationIdx station) {
-      while (seen != area.end() && *seen < station) ++seen;
-      return seen == area.end() || *seen != station;
-    });
-  }
+  region.stations = CommonStations(world.areas, region.features);
   return region;
 }
 

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "core/camera.h"
+#include "core/vector_geometry.h"
 
 namespace cairn {
 namespace {
@@ -18,29 +19,15 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 // Nearer than this a landmark has no bearing, metres.
 constexpr double kMinDistanceM = 1e-6;
 
-// B': two unit vectors at right angles to a unit vector, as rows.
-Matrix23d TangentBasis(const Eigen::Vector3d& bearing) {
-  const Eigen::Vector3d first = bearing.unitOrthogonal();
-  Matrix23d basis;
-  basis << first.transpose(), bearing.cross(first).transpose();
-  return basis;
-}
-
-Eigen::Matrix3d CrossProductMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 // S^(-1/2) J, up to a rotation of its rows.
 std::optional<Matrix26d> WhitenedJacobian(const FeatureClass& feature_class, const Pose& cam_from_world,
                                           double keypoint_sigma_rad) {
   const Eigen::Vector3d point = cam_from_world * feature_class.position;
   const double distance = point.norm();
   if (distance < kMinDistanceM) return std::nullopt;
-  const Matrix23d basis = TangentBasis(point / distance) / distance;
+  const Matrix23d basis = TangentBasis(point / distance).transpose() / distance;
   Matrix26d jacobian;
-  jacobian << -basis * CrossProductMatrix(point), basis;
+  jacobian << -basis * CrossMatrix(point), basis;
   const Matrix23d basis_in_world = basis * cam_from_world.rotation.toRotationMatrix();
   const Eigen::Matrix2d noise = keypoint_sigma_rad * keypoint_sigma_rad * Eigen::Matrix2d::Identity() +
                                 basis_in_world * feature_class.covariance * basis_in_world.transpose();

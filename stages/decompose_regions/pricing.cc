@@ -65,15 +65,8 @@ void RegionPricer::Greedy(const StationValues& values, int64_t threshold, std::v
       features.push_back(best);
       if (sums_[best] == value) continue;
       value = sums_[best];
-      const auto area = live_areas_[best];
-      auto seen = area.begin();
       removed.clear();
-      std::erase_if(stations, [&](StationIdx station) {
-        while (seen != area.end() && *seen < station) ++seen;
-        if (seen != area.end() && *seen == station) return false;
-        removed.push_back(station);
-        return true;
-      });
+      KeepCommon(live_areas_[best], &stations, &removed);
       for (const StationIdx station : removed) {
         for (const int32_t feature : live_sets_[station]) sums_[feature] -= values[station];
       }
@@ -82,7 +75,7 @@ void RegionPricer::Greedy(const StationValues& values, int64_t threshold, std::v
     touched_.clear();
     if (static_cast<int>(features.size()) < wide_.k) continue;
     std::sort(features.begin(), features.end());
-    for (std::vector<StationIdx>& core : finder_.Cores(features, finder_.CommonStations(features))) {
+    for (std::vector<StationIdx>& core : finder_.Cores(features)) {
       if (Value(core) > threshold) found->push_back({features, std::move(core)});
     }
   }
@@ -162,7 +155,7 @@ void RegionPricer::Search(const std::vector<StationIdx>& stations, const std::ve
 void RegionPricer::CloseLeaf(std::vector<int32_t> features) {
   std::sort(features.begin(), features.end());
   for (const int32_t feature : features) work_left_ -= static_cast<int64_t>(wide_.areas[feature].size());
-  for (std::vector<StationIdx>& core : finder_.Cores(features, finder_.CommonStations(features))) {
+  for (std::vector<StationIdx>& core : finder_.Cores(features)) {
     const int64_t value = Value(core);
     if (value <= threshold_) continue;
     max_value_ = std::max(max_value_, value);

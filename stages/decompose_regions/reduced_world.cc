@@ -62,12 +62,6 @@ class Shrinker {
   std::vector<StationIdx> kept_;
 };
 
-int64_t NumIncidences(const World& world) {
-  int64_t num = 0;
-  for (const std::vector<StationIdx>& area : world.areas) num += static_cast<int64_t>(area.size());
-  return num;
-}
-
 std::vector<FeatureIdx> ShuffledFeatures(int num_features, uint64_t seed) {
   std::vector<FeatureIdx> order(num_features);
   std::iota(order.begin(), order.end(), 0);
@@ -89,6 +83,23 @@ IndexLists IndexLists::Transposed(int num_lists) const {
     for (const int32_t value : (*this)[list]) transposed.values_[next[value]++] = list;
   }
   return transposed;
+}
+
+void KeepCommon(std::span<const StationIdx> area, std::vector<StationIdx>* stations,
+                std::vector<StationIdx>* removed) {
+  auto seen = area.begin();
+  std::erase_if(*stations, [&](StationIdx station) {
+    while (seen != area.end() && *seen < station) ++seen;
+    if (seen != area.end() && *seen == station) return false;
+    if (removed) removed->push_back(station);
+    return true;
+  });
+}
+
+std::vector<StationIdx> CommonStations(const IndexLists& areas, std::span<const int32_t> features) {
+  std::vector<StationIdx> stations(areas[features[0]].begin(), areas[features[0]].end());
+  for (const int32_t feature : features.subspan(1)) KeepCommon(areas[feature], &stations);
+  return stations;
 }
 
 IndexLists NeighbourLists(const World& world) {
@@ -214,7 +225,7 @@ ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed, Area
   IndexLists shrunk;
   std::vector<FeatureIdx> original;
   std::vector<int> set_sizes(num_stations, 0);
-  if (tau == 0) shrunk.Reserve(NumIncidences(world));
+  if (tau == 0) shrunk.Reserve(world.num_incidences());
   std::vector<StationIdx> area;
   IndexLists whole;
   const auto shrink = [&](FeatureIdx feature) {

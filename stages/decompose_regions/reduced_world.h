@@ -35,6 +35,13 @@ class IndexLists {
   std::vector<int32_t> values_;
 };
 
+// Keeps those of `stations` that are in `area`; the others are appended to `removed`, if it is given.  All
+// ascending.
+void KeepCommon(std::span<const StationIdx> area, std::vector<StationIdx>* stations,
+                std::vector<StationIdx>* removed = nullptr);
+// The stations in the areas of all of some features, ascending.  REQUIRES: at least one feature
+std::vector<StationIdx> CommonStations(const IndexLists& areas, std::span<const int32_t> features);
+
 // The 0-overlapping problem that a world is reduced to [Sala06 §IV, Theorem 4.1]:
 //   F'_v = intersection of F_w over w in N_tau(v),
 // which shrinks every feature's area by tau hops; then only coverable stations (|F'_v| >= k, §V-A) stay, and

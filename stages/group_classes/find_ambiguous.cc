@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/descriptor_distance.h"
 #include "core/descriptor_matcher.h"
 
 namespace cairn {
 namespace {
 
-constexpr double kSquaredNorm = 512.0 * 512.0;
 constexpr int kSmallRange = 64;
-
-double AngleRad(int32_t dot_product) { return std::acos(std::clamp(dot_product / kSquaredNorm, 0.0, 1.0)); }
 
 struct Nearest {
   int32_t idx = -1;
@@ -31,7 +29,7 @@ void FindNearest(const DescriptorMatrix& centres, int begin, int end, std::vecto
   if (end - begin <= kSmallRange) {
     for (int i = begin; i < end; ++i) {
       for (int j = i + 1; j < end; ++j) {
-        const int32_t dot = centres.row(i).cast<int32_t>().dot(centres.row(j).cast<int32_t>());
+        const int32_t dot = DescriptorDot(centres.row(i).data(), centres.row(j).data());
         Offer(&(*nearest)[i], j, dot);
         Offer(&(*nearest)[j], i, dot);
       }
@@ -62,9 +60,7 @@ void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearan
   appearance->centre = sum.array().round().cwiseMin(255.0).cast<uint8_t>();
   double squared_sum = 0;
   for (const uint8_t* descriptor : descriptors) {
-    const double angle = AngleRad(Eigen::Map<const Eigen::Matrix<uint8_t, 1, kDescriptorDim>>(descriptor)
-                                      .cast<int32_t>()
-                                      .dot(appearance->centre.cast<int32_t>()));
+    const double angle = DescriptorAngleRad(DescriptorDot(descriptor, appearance->centre.data()));
     squared_sum += angle * angle;
   }
   appearance->radius_rad =
@@ -87,7 +83,7 @@ std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes
     const int j = nearest[i].idx;
     if (j < 0) continue;
     const double radius = std::max(classes[i].radius_rad, classes[j].radius_rad);
-    if (AngleRad(nearest[i].dot_product) > options.min_separation_ratio * radius) continue;
+    if (DescriptorAngleRad(nearest[i].dot_product) > options.min_separation_ratio * radius) continue;
     if ((classes[i].position - classes[j].position).norm() <= options.max_duplicate_distance_m) {
       const bool i_stays = classes[i].num_observations > classes[j].num_observations ||
                            (classes[i].num_observations == classes[j].num_observations && i < j);

@@ -7,23 +7,13 @@
 
 #include <Eigen/Dense>
 
-#include "core/camera.h"
+#include "core/descriptor_distance.h"
 #include "core/pose.h"
+#include "core/vector_geometry.h"
 #include "stages/match_features/two_view_error.h"
 
 namespace cairn {
 namespace {
-
-// Compiled twice where the processor may know wider integers; the sum is the same.
-#if defined(__x86_64__) && defined(__GNUC__)
-__attribute__((target_clones("avx2", "default")))
-#endif
-int32_t
-Dot(const uint8_t* a, const uint8_t* b) {
-  int32_t dot = 0;
-  for (int d = 0; d < kDescriptorDim; ++d) dot += static_cast<int32_t>(a[d]) * b[d];
-  return dot;
-}
 
 // The two best candidates seen so far; equal dot products go to the smaller index, whatever the order.
 struct BestTwoCandidates {
@@ -83,12 +73,10 @@ class KeypointChange {
 };
 
 bool Passes(const BestTwoCandidates& candidates, const GuidedMatchOptions& options) {
-  constexpr double kSquaredNorm = 512.0 * 512.0;
-  const auto angle = [](int32_t dot) { return std::acos(std::clamp(dot / kSquaredNorm, 0.0, 1.0)); };
   if (candidates.idx < 0) return false;
-  const double best = angle(candidates.best);
+  const double best = DescriptorAngleRad(candidates.best);
   return best <= options.max_angle_rad &&
-         (candidates.second < 0 || best <= options.max_ratio * angle(candidates.second));
+         (candidates.second < 0 || best <= options.max_ratio * DescriptorAngleRad(candidates.second));
 }
 
 // Best two of every keypoint of both images over the pairs that are offered, and the matches that follow.
@@ -112,7 +100,7 @@ class CandidateMatcher {
   bool IsNeeded(int idx1, int idx2) const { return !(is_matched1_[idx1] && is_matched2_[idx2]); }
 
   void Offer(int idx1, int idx2) {
-    const int32_t dot = Dot(descriptors1_.row(idx1).data(), descriptors2_.row(idx2).data());
+    const int32_t dot = DescriptorDot(descriptors1_.row(idx1).data(), descriptors2_.row(idx2).data());
     best1_[idx1].Offer(dot, idx2);
     best2_[idx2].Offer(dot, idx1);
   }

@@ -135,7 +135,8 @@ Status MatchFrustumInto(SQLite::Database& features, const MatchImages& images,
   const PredictPairsOptions prediction = {
       .min_num_expected_matches = options.min_num_expected_matches,
       .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
-      .max_prior_error_px = options.matching.verification.max_prior_error_px};
+      .max_prior_error_px = options.matching.verification.max_prior_error_px,
+      .min_baseline_m = options.matching.verification.min_baseline_m};
   IndexPairs tried;
   while (!next.empty()) {
     CAIRN_RETURN_IF_ERROR(

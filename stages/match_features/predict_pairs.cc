@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/pose.h"
+#include "core/vector_geometry.h"
 #include "stages/match_features/two_view_error.h"
 
 namespace cairn {
@@ -39,16 +40,13 @@ PairPredictor::Links PairPredictor::CollectLinks() const {
   return links;
 }
 
-bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, double max_prior_error_px) const {
+bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const {
   const View &view1 = views_[view_of_[feature1]], &view2 = views_[view_of_[feature2]];
   const Eigen::Vector3d ray1 = Ray(feature1).cast<double>(), ray2 = Ray(feature2).cast<double>();
   const Eigen::Vector3d baseline = view2.center - view1.center;
-  const double tolerance_rad = max_prior_error_px / (0.5 * (view1.focal_px + view2.focal_px));
-  constexpr double kMinBaseline_m = 1e-3;
-  if (baseline.norm() < kMinBaseline_m) return (ray1 - ray2).norm() <= tolerance_rad;
-  Eigen::Matrix3d E;  // of the baseline: [baseline]x
-  E << 0, -baseline.z(), baseline.y(), baseline.z(), 0, -baseline.x(), -baseline.y(), baseline.x(), 0;
-  return SquaredSampsonError(E, ray1, ray2) <= tolerance_rad * tolerance_rad &&
+  const double tolerance_rad = options.max_prior_error_px / (0.5 * (view1.focal_px + view2.focal_px));
+  if (baseline.norm() < options.min_baseline_m) return (ray1 - ray2).norm() <= tolerance_rad;
+  return SquaredSampsonError(CrossMatrix(baseline), ray1, ray2) <= tolerance_rad * tolerance_rad &&
          RaysConverge(ray1, ray2, baseline, tolerance_rad);
 }
 
@@ -65,7 +63,7 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
         const uint32_t h = links.feature[k];
         const int other = view_of_[h];
         if (other <= idx || tried[other] || counted[other] == f + 1) continue;
-        if (ray.dot(Ray(h)) < min_cosine || !CanMeet(f, h, options.max_prior_error_px)) continue;
+        if (ray.dot(Ray(h)) < min_cosine || !CanMeet(f, h, options)) continue;
         counted[other] = f + 1;
         ++expected[other];
       }

@@ -20,6 +20,8 @@ struct PredictPairsOptions {
   // Largest distance of a ray to the epipolar plane of another that shows the same thing, pixels; as wide as
   // the poses are wrong.  REQUIRES: > 0
   double max_prior_error_px;
+  // A shorter baseline is none, metres.  REQUIRES: > 0
+  double min_baseline_m;
 };
 
 // Predicts which posed images show the same scene from the pairs that are matched already.  View frusta do
@@ -56,7 +58,7 @@ class PairPredictor {
   // Expected matches with every later image that is not in `tried`, flags per image.
   std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<bool>& tried,
                                    const PredictPairsOptions& options) const;
-  bool CanMeet(uint32_t feature1, uint32_t feature2, double max_prior_error_px) const;
+  bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
   const Eigen::Vector3f& Ray(uint32_t feature) const {
     const int idx = view_of_[feature];
     return views_[idx].rays[feature - first_feature_[idx]];

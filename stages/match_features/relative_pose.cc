@@ -4,24 +4,20 @@
 
 #include <Eigen/Dense>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
-
-Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d skew;
-  skew << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return skew;
-}
 
 // Derivatives of vec(E), column by column, by rotation (left perturbation) and direction of the translation.
 Eigen::Matrix<double, 9, 5> EssentialMatrixDerivatives(const Pose& pose,
                                                        const Eigen::Matrix<double, 3, 2>& tangent) {
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
-  const Eigen::Matrix3d T = Skew(pose.translation);
+  const Eigen::Matrix3d T = CrossMatrix(pose.translation);
   Eigen::Matrix<double, 9, 5> derivatives;
   for (int p = 0; p < 5; ++p) {
-    const Eigen::Matrix3d dE =
-        p < 3 ? Eigen::Matrix3d(T * Skew(Eigen::Vector3d::Unit(p)) * R) : Skew(tangent.col(p - 3)) * R;
+    const Eigen::Matrix3d dE = p < 3 ? Eigen::Matrix3d(T * CrossMatrix(Eigen::Vector3d::Unit(p)) * R)
+                                     : CrossMatrix(tangent.col(p - 3)) * R;
     derivatives.col(p) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dE.data());
   }
   return derivatives;
@@ -76,7 +72,7 @@ int CountInFront(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Corre
 }  // namespace
 
 Eigen::Matrix3d EssentialMatrix(const Pose& cam2_from_cam1) {
-  return Skew(cam2_from_cam1.translation.normalized()) * cam2_from_cam1.rotation.toRotationMatrix();
+  return CrossMatrix(cam2_from_cam1.translation.normalized()) * cam2_from_cam1.rotation.toRotationMatrix();
 }
 
 Pose RefineRelativePose(const Pose& cam2_from_cam1, const Correspondences& correspondences, double scale_rad,

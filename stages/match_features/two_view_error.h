@@ -52,13 +52,4 @@ inline double SquaredTransferError(const Eigen::Matrix3d& H, const Eigen::Vector
   return ((H * bearing1).normalized() - bearing2).squaredNorm();
 }
 
-// Two unit vectors that span the plane orthogonal to the unit vector v.
-inline Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
-  const Eigen::Vector3d axis = std::abs(v.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = v.cross(axis).normalized();
-  basis.col(1) = v.cross(basis.col(0)).normalized();
-  return basis;
-}
-
 }  // namespace cairn

@@ -16,10 +16,8 @@ struct Arguments {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const World world, SimulateWorld(arguments.options, environment.seed));
-  int64_t num_incidences = 0;
-  for (const std::vector<StationIdx>& area : world.areas) num_incidences += static_cast<int64_t>(area.size());
   spdlog::info("{} stations, {} features, {:.1f} visible from a station", world.num_stations(),
-               world.num_features(), static_cast<double>(num_incidences) / world.num_stations());
+               world.num_features(), static_cast<double>(world.num_incidences()) / world.num_stations());
   const bool json = arguments.output.ends_with(".json");
   return json ? WriteWorldJson(world, arguments.output) : WriteWorldDatabase(world, arguments.output);
 }

@@ -35,7 +35,7 @@ std::vector<Match> Same(uint32_t begin, uint32_t end) {
 IndexPairs Predict(const PairPredictor& predictor, int min_num_expected, const IndexPairs& tried,
                    double max_ray_angle_deg = 90, int num_threads = 2) {
   NoProgress progress;
-  return *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16}, num_threads, progress);
+  return *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16, 1e-3}, num_threads, progress);
 }
 
 TEST(PredictPairs, ImagesThatMatchAThirdAreExpectedToMatch) {

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace cairn {
+
+// [v]x: CrossMatrix(v) * w = v x w.
+inline Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+// Two unit vectors, at right angles to each other, that span the plane orthogonal to the unit vector v.
+inline Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
+  const Eigen::Vector3d axis = std::abs(v.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = v.cross(axis).normalized();
+  basis.col(1) = v.cross(basis.col(0)).normalized();
+  return basis;
+}
+
+}  // namespace cairn
