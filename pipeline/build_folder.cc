@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -29,6 +30,13 @@ std::string Absolute(const std::string& path) {
   std::string text = fs::absolute(path).lexically_normal().string();
   while (text.size() > 1 && text.back() == '/') text.pop_back();
   return text;
+}
+
+// Tells programs apart without reading them, as map.mk does: bytes and seconds since 1970.
+std::string SizeAndDate(const std::string& path) {
+  struct stat status = {};
+  if (stat(path.c_str(), &status) != 0) return "";
+  return fmt::format("{}-{}", status.st_size, status.st_mtim.tv_sec);
 }
 
 // The value of an option of [reconstruct].
@@ -108,6 +116,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/capture", capture + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
+  CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));
   std::string known_places;
   if (IsReconstructed(recipe)) {
     CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
@@ -115,9 +125,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string config = fmt::format(
       "# Written by cairn from the recipe; edit that instead.\n"
       "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
-      "NAME := {}\nSEED := {}\n",
+      "NAME := {}\nSEED := {}\nPROGRAM := {}\n",
       paths.map, capture, recipe.simulated ? "yes" : "no", IsReconstructed(recipe) ? "yes" : "no",
-      known_places, queries, recipe.name, seed);
+      known_places, queries, recipe.name, seed, SizeAndDate(paths.program));
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 

@@ -24,8 +24,9 @@ bool IsReconstructed(const Recipe& recipe);
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
 //   options/seed, name, capture, queries    one value each
-//   config.mk             MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED for
-//   map.mk
+//   options/program       hash of the program: another one redoes every stage, whatever its date
+//   config.mk             MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and
+//                         PROGRAM for map.mk
 // Errors: InvalidArgument (CheckMakePath), NotFound (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
 

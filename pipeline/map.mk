@@ -13,6 +13,9 @@
 # prerequisites are compared with the stamp: an input that changes during the run is seen by the next one.  What is
 # downstream compares itself with X, whose date a run that gives the same bytes leaves alone: then nothing downstream
 # runs.  Recipes only use variables that are set for the build folder of their target.
+#
+# Every rule that runs says first what changed.  `make -n` shows all that could run: what follows a stage runs only if
+# that stage's result differs.
 
 CAIRN ?= $(shell command -v cairn)
 # Put before every command, for example a cluster's `srun`.
@@ -23,18 +26,41 @@ MEMORY ?=
 PROGRESS ?= auto
 LOG_LEVEL ?= info
 
+# What changed, of a rule's prerequisites: the first, and how many more.
+CAIRN_CHANGED = $(patsubst $(@D)/%,%,$(patsubst $(CAPTURE)/%,%,$(filter-out cairn-missing,$?)))
+CAIRN_REASON = $(if $(wildcard $@),$(if $(filter cairn-missing,$?),is missing,$(patsubst options/program,the \
+    program,$(firstword $(CAIRN_CHANGED))) changed$(if $(word 2,$(CAIRN_CHANGED)),$(,) $(words $(wordlist \
+    2,$(words $(CAIRN_CHANGED)),$(CAIRN_CHANGED))) more)),not made yet)
+, := ,
+CAIRN_RESULT = $(notdir $(if $(filter map.stamp,$(@F)),$(MAP),$(@:.stamp=)))
+CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@echo '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
+    "run"$(,) "file": "$(CAIRN_RESULT)"$(,) "reason": "$(subst ",\",$(subst \,\\,$(CAIRN_REASON)))"},$(CAIRN_RESULT): \
+    $(CAIRN_REASON)))' >&2)
+define CAIRN_BEGIN
+$(CAIRN_WHY)
+touch $@.begun
+endef
+
 ifdef RECIPE
+# The first target: what `make` without one makes.
+$(MAP):
 CAIRN_MAP := $(MAP)
-$(BUILD)/config.mk: MAP := $(MAP)
-$(BUILD)/config.mk: $(RECIPE) $(CAIRN)
-	$(CAIRN) configure $< -o $(MAP) --build-dir $(@D)
+# Once per make: a recipe dated in the future would have it start over for ever.
+$(BUILD)/config.mk: CONFIGURE := $(RECIPE) -o $(MAP) --build-dir $(BUILD)
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
+	$(CAIRN) configure $(CONFIGURE)
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME and SEED; `cairn configure` writes it beside the options.
+# Sets MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and PROGRAM; `cairn configure` writes
+# it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
+# Another program may be dated before it, as installed ones are.
+ifneq ($(PROGRAM),$(shell stat -L -c %s-%Y $(CAIRN)))
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,cairn-missing)
+endif
 # As the including Makefile spells it.
 MAP := $(CAIRN_MAP)
 endif
@@ -51,15 +77,24 @@ CAIRN_OUTPUTS += $(BUILD)/poses
 endif
 # Poses, cameras and frame, read by the stages that know the capture.
 CAPTURE_LISTS := $(wildcard $(CAPTURE)/cameras.txt $(CAPTURE)/images.txt $(CAPTURE)/frame.json)
-# The images of the last run, from the dependency file that extract-features writes, and their folders: a new or a
-# removed image changes its folder's date.  One that is gone is no prerequisite any more.
-CAPTURE_IMAGES := $(wildcard $(filter-out \ %:,$(file <$(BUILD)/features.d)))
-CAPTURE_FOLDERS := $(wildcard $(sort $(dir $(CAPTURE_IMAGES)) $(CAPTURE)/images))
+# The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
+# removed image changes its folder's date.
+CAPTURE_IMAGES :=
+-include $(BUILD)/images.d
+# Held-out images that exist, with a backslash before what Make would take for more than a name.
 QUERY_LIST := $(firstword $(wildcard $(QUERIES) $(CAPTURE)/queries.txt))
-QUERY_IMAGES := $(if $(QUERY_LIST),$(wildcard $(addprefix $(CAPTURE)/images/,$(shell awk 'NF == 10 && !/^#/ {print $$10}' $(QUERY_LIST)))))
+QUERY_IMAGES := $(if $(QUERY_LIST),$(shell awk '/^\#/ || NF < 10 || $$10 ~ /^[-+.0-9eE]+$$/ {next} \
+    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); path = "$(CAPTURE)/images/" $$0} \
+    (getline line < path) >= 0 {close(path); gsub(/[ \t:;|*?[\#]/, "\\\\&", path); print path}' $(QUERY_LIST)))
 
 .DELETE_ON_ERROR:
 .PHONY: cairn-missing
+
+# A clock that was ahead has left dates in the future, to which later changes would seem old.
+CAIRN_FUTURE := $(shell find $(BUILD) -maxdepth 2 -type f -newermt '10 seconds' -print \
+    \( -name '*.stamp' -exec touch -d @0 {} \; -o -exec touch {} \; \))
+$(if $(CAIRN_FUTURE),$(warning $(words $(CAIRN_FUTURE)) files of $(BUILD) were dated in the future, $(firstword \
+    $(CAIRN_FUTURE)) the first: is the clock right? What they belong to is made again))
 
 # The default goal of `make -f map.mk`.
 $(MAP): $(BUILD)/map.stamp ;
@@ -74,6 +109,9 @@ $(UNCHANGED): %: %.stamp
 $(foreach output,$(CAIRN_OUTPUTS),$(if $(wildcard $(output)),,$(eval $(output).stamp: cairn-missing)))
 $(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
 
+# Changes with the program's bytes, whatever its date.
+PROGRAM_HASH := $(BUILD)/options/program
+
 # X.txt keeps what the stage printed about X, for summaries of runs that had nothing to do.
 CAIRN_FLAGS = --results $(@:.stamp=.txt) --seed $(SEED) --threads $(THREADS) --progress $(PROGRESS) \
     --log-level $(LOG_LEVEL)
@@ -81,8 +119,8 @@ CAIRN_FLAGS = --results $(@:.stamp=.txt) --seed $(SEED) --threads $(THREADS) --p
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
-$(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(CAIRN)
-	touch $@.begun
+$(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(PROGRAM_HASH)
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
 	mv $@.begun $@
 else
@@ -93,57 +131,57 @@ endif
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
 $(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(wildcard $(CAPTURE)/frame.json))
 
-$(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(CAIRN) \
-    $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_FOLDERS) $(CAPTURE_IMAGES)
-	touch $@.begun
+$(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) \
+    $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml \
-	    --depfile $(@D)/features.d -o $(@:.stamp=) $(CAIRN_FLAGS)
+	    --depfile $(@D)/images.d -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 # Matching wants the visual words first where it looks for images that look alike.
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
     $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
 $(BUILD)/matches.db.stamp: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
-$(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(CAIRN) \
+$(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) $(addprefix --memory ,$(MEMORY)) \
 	    $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) --options $(@D)/options/match_features.toml -o $(@:.stamp=) \
 	    $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 # Captures without poses only.  The folder's date is that of its last change.
-$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(CAIRN) \
+$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_IMAGES) $(KNOWN_PLACES)
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
 	    --options $(@D)/options/reconstruct.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
-$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(CAIRN) \
+$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(POSES_READY)
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
-$(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(CAIRN)
-	touch $@.begun
+$(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(PROGRAM_HASH)
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
 	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/options/decompose_regions.toml \
-    $(BUILD)/options/seed $(CAIRN)
-	touch $@.begun
+    $(BUILD)/options/seed $(PROGRAM_HASH)
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db --classes $(@D)/classes.db \
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 	mv $@.begun $@
 
 # Held-out images of a reconstructed capture have features too, but no words.
-$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(CAIRN) \
+$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
@@ -155,7 +193,7 @@ STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCT
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
     $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN) $(POSES_READY)
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
@@ -164,7 +202,7 @@ $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/re
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(BUILD)/options/seed $(CAIRN) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
-	touch $@.begun
+	$(CAIRN_BEGIN)
 	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
 	mv $@.begun $@

@@ -1,40 +1,36 @@
 #include "stages/extract_features/command.h"
 
+#include <algorithm>
+#include <filesystem>
+
 #include <spdlog/spdlog.h>
 
 #include "core/file.h"
+#include "stages/extract_features/dependency_file.h"
 #include "stages/extract_features/extract_features.h"
 
 namespace cairn {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Arguments {
   std::string capture;
   std::string output;
   std::string depfile;
-  std::string depfile_target;
   ExtractFeaturesOptions options;
   OptionArguments option_arguments;
 };
 
-// A file name as Make reads it.
-std::string EscapeForMake(const std::string& name) {
-  std::string escaped;
-  for (const char c : name) {
-    if (c == ' ' || c == '#' || c == ':') escaped += '\\';
-    if (c == '$') escaped += '$';
-    escaped += c;
+Status WriteDependencyFile(const std::string& path, const Capture& capture, std::vector<std::string> inputs) {
+  std::vector<std::string> roots = {capture.root};
+  for (std::string& folder : FoldersOf(inputs, capture.images_folder)) inputs.push_back(std::move(folder));
+  for (const std::string& input : inputs) {
+    if (!input.starts_with(capture.root + "/")) roots.push_back(fs::path(input).parent_path());
   }
-  return escaped;
-}
-
-// A rule for Make: the output depends on every input; inputs that vanish do not stop it.
-std::string DependencyRule(const std::string& target, const std::vector<std::string>& inputs) {
-  std::string rule = target + ":";
-  for (const std::string& input : inputs) rule += " \\\n  " + EscapeForMake(input);
-  rule += "\n";
-  for (const std::string& input : inputs) rule += EscapeForMake(input) + ":\n";
-  return rule;
+  std::sort(roots.begin() + 1, roots.end());
+  roots.erase(std::unique(roots.begin() + 1, roots.end()), roots.end());
+  return WriteFileAtomically(path, DependencyFile(inputs, roots));
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -46,9 +42,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                                          environment.num_threads, *environment.progress));
   for (const Reject& reject : summary.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
   if (!arguments.depfile.empty()) {
-    const std::string& target =
-        arguments.depfile_target.empty() ? arguments.output : arguments.depfile_target;
-    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.depfile, DependencyRule(target, summary.inputs)));
+    CAIRN_RETURN_IF_ERROR(WriteDependencyFile(arguments.depfile, capture, summary.inputs));
   }
   *environment.out << fmt::format(
       "extract_features: {} images, {} keypoints ({:.0f} an image), {} rejected\n", summary.num_views,
@@ -72,10 +66,9 @@ Command ExtractFeaturesCommand() {
                     ->required()
                     ->type_name("features.db");
                 app.add_option("--depfile", arguments->depfile,
-                               "Also write a Make rule that names every file read")
+                               "Also write a fragment for Make: the variable CAPTURE_IMAGES gets every file "
+                               "read and its folder")
                     ->type_name("FILE.d");
-                app.add_option("--depfile-target", arguments->depfile_target,
-                               "Target of that rule [the output]");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

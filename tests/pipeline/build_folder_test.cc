@@ -29,7 +29,7 @@ class BuildFolderTest : public testing::Test {
     recipe_.stages = TestStages();
     paths_ = {.build_dir = (folder_ / "kitchen.build").string(),
               .map = (folder_ / "kitchen.cairn").string(),
-              .program = "/usr/bin/cairn"};
+              .program = "/proc/self/exe"};
   }
   void TearDown() override { fs::remove_all(folder_); }
 
