@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/file.h"
+#include "core/reuse_arguments.h"
 #include "stages/extract_features/dependency_file.h"
 #include "stages/extract_features/extract_features.h"
 
@@ -20,6 +21,7 @@ struct Arguments {
   std::string depfile;
   ExtractFeaturesOptions options;
   OptionArguments option_arguments;
+  ReuseArguments reuse;
 };
 
 Status WriteDependencyFile(const std::string& path, const Capture& capture, std::vector<std::string> inputs) {
@@ -35,19 +37,23 @@ Status WriteDependencyFile(const std::string& path, const Capture& capture, std:
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   for (const std::string& warning : capture.warnings) spdlog::warn("{}", warning);
   CAIRN_ASSIGN_OR_RETURN(const ExtractFeaturesSummary summary,
                          ExtractFeatures(capture, arguments.options, arguments.output,
-                                         environment.num_threads, *environment.progress));
+                                         environment.num_threads, *environment.progress, reuse));
+  for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
   for (const Reject& reject : summary.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
   if (!arguments.depfile.empty()) {
     CAIRN_RETURN_IF_ERROR(WriteDependencyFile(arguments.depfile, capture, summary.inputs));
   }
   *environment.out << fmt::format(
-      "extract_features: {} images, {} keypoints ({:.0f} an image), {} rejected\n", summary.num_views,
-      summary.num_keypoints, static_cast<double>(summary.num_keypoints) / summary.num_views,
-      summary.rejects.size());
+      "extract_features: {}{} images, {} keypoints ({:.0f} an image), {} rejected, {} taken over\n",
+      reuse.shard ? fmt::format("shard {}/{}: ", reuse.shard->index, reuse.shard->count) : "",
+      summary.num_views, summary.num_keypoints,
+      static_cast<double>(summary.num_keypoints) / std::max(1, summary.num_views), summary.rejects.size(),
+      summary.num_taken_over);
   return Ok();
 }
 
@@ -69,6 +75,7 @@ Command ExtractFeaturesCommand() {
                                "Also write a fragment for Make: the variable CAPTURE_IMAGES gets every file "
                                "read and its folder")
                     ->type_name("FILE.d");
+                arguments->reuse.Add(app, "images");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

@@ -8,6 +8,7 @@
 #include "core/options.h"
 #include "core/panorama.h"
 #include "core/progress.h"
+#include "core/reuse.h"
 #include "core/sift.h"
 
 namespace cairn {
@@ -33,17 +34,23 @@ struct ExtractFeaturesSummary {
   int num_images = 0;  // files that were read
   int num_views = 0;   // images in the database: more where there are panoramas
   int64_t num_keypoints = 0;
+  int num_taken_over = 0;       // of num_images: unchanged since an earlier run
   std::vector<Reject> rejects;  // those of the capture and those found here, ascending by name
   // Every file that was read, for a dependency file: images, masks, lists.
   std::vector<std::string> inputs;
+  std::vector<std::string> not_reused;  // why earlier outputs gave nothing
 };
 
 // Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
-// cairn_rejects. Memory: features of all images of one batch (64 images), and for each thread a pyramid of
-// SiftOptions::max_image_side_px.  Same bytes for any number of
-// threads. Errors: InvalidArgument for options, NoData when no image is left; Io; Cancelled.
+// cairn_rejects; and its ReuseFile (core/reuse.h).  An image's features are taken over from `reuse` where an
+// earlier run of this program found them in the same image file, with the same mask, camera size and options
+// (the name does not matter): same bytes as without.  A shard has every n-th image, those that `reuse.files`
+// have left out; it may have none.  Memory: features of all images of one batch (64 images), and for each
+// thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads. Errors:
+// InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files` NotFound,
+// Corrupt.
 Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
                                                const std::string& features_path, int num_threads,
-                                               Progress& progress);
+                                               Progress& progress, const ReuseOptions& reuse = {});
 
 }  // namespace cairn

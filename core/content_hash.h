@@ -1,0 +1,36 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/blob.h"
+#include "core/features.h"
+
+namespace cairn {
+
+// XXH3, 128 bits.  Not cryptographic.
+struct ContentHash {
+  uint64_t high = 0;
+  uint64_t low = 0;
+  friend auto operator<=>(const ContentHash&, const ContentHash&) = default;
+};
+ContentHash HashContents(std::string_view bytes);
+ContentHash HashFeatures(const std::vector<Keypoint>& keypoints, const DescriptorMatrix& descriptors);
+
+// The hash of several things in turn.
+class ContentHasher {
+ public:
+  ContentHasher& Text(std::string_view text);  // its length too
+  ContentHasher& Hash(const ContentHash& hash);
+  ContentHasher& UInt(uint64_t value);
+  ContentHasher& Double(double value);  // its bits
+  ContentHash Finish() { return HashContents(bytes_.Take()); }
+
+ private:
+  BlobWriter bytes_;
+};
+
+}  // namespace cairn
