@@ -4,6 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/reuse_arguments.h"
 #include "stages/match_features/match_features.h"
 
 namespace cairn {
@@ -15,10 +16,32 @@ struct Arguments {
   std::string output;
   MatchFeaturesOptions options;
   OptionArguments option_arguments;
+  ReuseArguments reuse;
 };
+
+void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::ostream& out) {
+  if (!reuse.shard) {
+    out << fmt::format(
+        "match_features: {} images, {} pairs tried ({}), {} verified, {} of {} matches, {} taken over\n",
+        summary.num_images, summary.num_pairs_tried, summary.pairs, summary.num_pairs_verified,
+        summary.num_inliers, summary.num_putative, summary.num_taken_over);
+    return;
+  }
+  const std::string shard = fmt::format("shard {}/{}", reuse.shard->index, reuse.shard->count);
+  if (summary.num_pairs_tried + summary.num_left_to_others == 0) {
+    out << fmt::format("match_features: {}: nothing to do, all pairs ({}) are known\n", shard, summary.pairs);
+    return;
+  }
+  out << fmt::format(
+      "match_features: {}: round {} of pairs ({}): {} tried, {} verified, {} taken over; {} left to other "
+      "shards\n",
+      shard, summary.num_rounds, summary.pairs, summary.num_pairs_tried, summary.num_pairs_verified,
+      summary.num_taken_over, summary.num_left_to_others);
+}
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
@@ -27,15 +50,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (capture) inputs.capture = &*capture;
   CAIRN_ASSIGN_OR_RETURN(const MatchFeaturesSummary summary,
                          MatchFeatures(inputs, arguments.options, arguments.output, environment.seed,
-                                       environment.num_threads, *environment.progress));
+                                       environment.num_threads, *environment.progress, reuse));
+  for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
   if (summary.num_without_features > 0) {
     spdlog::warn("{}: {} of {} images without features are skipped", inputs.features_path,
                  summary.num_without_features, summary.num_images + summary.num_without_features);
   }
-  *environment.out << fmt::format(
-      "match_features: {} images, {} pairs tried ({}), {} verified, {} of {} matches\n", summary.num_images,
-      summary.num_pairs_tried, summary.pairs, summary.num_pairs_verified, summary.num_inliers,
-      summary.num_putative);
+  Print(summary, reuse, *environment.out);
   return Ok();
 }
 
@@ -65,6 +86,7 @@ Command MatchFeaturesCommand() {
                 app.add_option("-o,--output", arguments->output, "COLMAP database to write")
                     ->required()
                     ->type_name("matches.db");
+                arguments->reuse.Add(app, "pairs");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

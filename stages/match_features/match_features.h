@@ -1,11 +1,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/capture.h"
 #include "core/error.h"
 #include "core/options.h"
 #include "core/progress.h"
+#include "core/reuse.h"
 #include "stages/match_features/match_pairs.h"
 #include "stages/match_features/select_pairs.h"
 
@@ -44,7 +46,6 @@ struct MatchFeaturesOptions {
   int min_num_expected_matches = 25;
   MatchPairsOptions matching;
 };
-// Without matching.memory_budget_mib, which like the number of threads changes no result.
 OptionTable DescribeOptions(MatchFeaturesOptions* options);
 
 struct MatchFeaturesInputs {
@@ -61,16 +62,29 @@ struct MatchFeaturesSummary {
   int64_t num_pairs_verified = 0;
   int64_t num_putative = 0;  // matches before verification
   int64_t num_inliers = 0;
-  std::string pairs;  // how pairs were chosen
+  std::string pairs;           // how pairs were chosen
+  int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
+  int num_rounds = 0;          // of pairs; after a shard's last one the pairs of the next are not known yet
+  int64_t num_left_to_others = 0;       // pairs of a shard's last round that other shards match
+  std::vector<std::string> not_reused;  // why earlier outputs gave nothing
 };
 
 // Reads a COLMAP database with features, writes `matches_path`: its contents and the verified pairs as
-// two_view_geometries.  Same bytes for any number of threads and any memory budget.  O(pairs * features^2).
+// two_view_geometries; and its reuse file (core/reuse.h).  A pair is taken over from `reuse` where an earlier
+// run of this program matched images with the same features and cameras, in the same relative pose, with the
+// same options: same bytes as without.  Same bytes for any number of threads and any memory budget.  O(pairs
+// * features^2).
+//
+// A shard goes through the rounds of pairs with what `reuse.files` know; of the first round that these do not
+// know whole it matches its share of what is missing, a contiguous stretch of the order in which pairs are
+// matched, and writes a database with these pairs alone; it may have none.
+//
 // Errors: Corrupt (a database), NoData (fewer than two images with features, no pair verified, a vocabulary
-// without words), InvalidArgument (options; a line of the pair list), Io, Cancelled.
+// without words), InvalidArgument (options; a line of the pair list), Io, Cancelled; of `reuse.files`
+// NotFound.
 Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const MatchFeaturesOptions& options,
                                            const std::string& matches_path, uint64_t seed, int num_threads,
-                                           Progress& progress);
+                                           Progress& progress, const ReuseOptions& reuse = {});
 
 }  // namespace cairn

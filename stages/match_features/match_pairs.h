@@ -6,6 +6,7 @@
 
 #include "core/descriptor_matcher.h"
 #include "core/error.h"
+#include "core/options.h"
 #include "core/progress.h"
 #include "stages/match_features/image_features.h"
 #include "stages/match_features/select_pairs.h"
@@ -20,6 +21,8 @@ struct MatchPairsOptions {
   DescriptorMatcherOptions matcher;
   VerifyPairOptions verification;
 };
+// Without memory_budget_mib, which like the number of threads changes no result.
+OptionTable DescribeOptions(MatchPairsOptions* options);
 
 // Pairs in the order in which they are matched: along a Z-order curve through the (idx1, idx2) square
 // [Morton 1966].  Any stretch of the curve touches few images, whatever the length of the stretch, so that

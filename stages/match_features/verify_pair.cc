@@ -242,14 +242,18 @@ Eigen::Matrix3d Calibration(const Camera& camera) {
 
 }  // namespace
 
+std::optional<Pose> StatedRelativePose(const std::optional<Pose>& cam1_from_world,
+                                       const std::optional<Pose>& cam2_from_world) {
+  if (!cam1_from_world || !cam2_from_world) return std::nullopt;
+  return *cam2_from_world * cam1_from_world->Inverse();
+}
+
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
                            const std::vector<Match>& matches, const VerifyPairOptions& options) {
   const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
   const Limits limits{options.max_epipolar_error_px / focal_px, options.max_homography_error_px / focal_px,
                       options.max_prior_error_px / focal_px};
-  std::optional<Pose> stated;  // camera 2 from camera 1
-  if (view1.cam_from_world && view2.cam_from_world)
-    stated = *view2.cam_from_world * view1.cam_from_world->Inverse();
+  const std::optional<Pose> stated = StatedRelativePose(view1.cam_from_world, view2.cam_from_world);
   const auto cannot_meet = [&](const Match& match) {
     return stated &&
            !CanMeet(*stated, (*view1.bearings)[match.idx1], (*view2.bearings)[match.idx2], limits, options);

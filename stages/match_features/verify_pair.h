@@ -47,6 +47,11 @@ struct VerifyPairOptions {
   GuidedMatchOptions guided;
 };
 
+// Pose of camera 2 in the frame of camera 1, where both are stated.  Verification reads poses only through
+// it.
+std::optional<Pose> StatedRelativePose(const std::optional<Pose>& cam1_from_world,
+                                       const std::optional<Pose>& cam2_from_world);
+
 // One image of the pair: camera, keypoints, and its stated pose if there is one.
 struct ViewForVerification {
   const Camera* camera = nullptr;

@@ -1,0 +1,123 @@
+#include "stages/match_features/match_round.h"
+
+#include <utility>
+
+namespace cairn {
+namespace {
+
+Error Stopped() { return MakeError(ErrorCode::kCancelled, "stopped while taking over matches"); }
+
+std::optional<PairResult> FindIn(const std::vector<ReuseSources*>& sources, const ContentHash& key,
+                                 const std::pair<int, int>& pair, const MatchRun& run) {
+  for (ReuseSources* const source : sources) {
+    auto result = FindPairResult(key, run.images.images[pair.first], run.images.images[pair.second], source);
+    if (result) return result;
+  }
+  return std::nullopt;
+}
+
+// Indices of the pairs that no source has.
+Result<std::vector<size_t>> FindMissing(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources,
+                                        MatchRun* run) {
+  std::vector<size_t> missing;
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    if (run->progress.Cancelled()) return Stopped();
+    CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pairs[i]));
+    if (!FindIn(sources, key, pairs[i], *run)) missing.push_back(i);
+  }
+  return missing;
+}
+
+void TellPredictor(const std::pair<int, int>& pair, const PairResult& result, PairPredictor* predictor) {
+  if (predictor != nullptr) predictor->Add(pair.first, pair.second, result.geometry.inliers);
+}
+
+Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, PairPredictor* predictor,
+                  SQLite::Database& database, MatchRun* run) {
+  CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pair));
+  run->entries.push_back(EntryOf(key, result));
+  MatchFeaturesSummary& summary = run->summary;
+  ++summary.num_pairs_tried;
+  summary.num_putative += result.num_putative;
+  if (result.geometry.inliers.empty()) return Ok();
+  WriteDatabaseTwoViewGeometry(database, result.geometry);
+  ++summary.num_pairs_verified;
+  summary.num_inliers += static_cast<int64_t>(result.geometry.inliers.size());
+  TellPredictor(pair, result, predictor);
+  return Ok();
+}
+
+// Hands pairs [begin, end), which the sources have, to `take`.
+template <typename Take>
+Status TakeOver(const IndexPairs& pairs, size_t begin, size_t end, const std::vector<ReuseSources*>& sources,
+                MatchRun* run, const Take& take) {
+  for (size_t i = begin; i < end; ++i) {
+    if (run->progress.Cancelled()) return Stopped();
+    CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pairs[i]));
+    const auto result = FindIn(sources, key, pairs[i], *run);
+    if (!result) {
+      return MakeError(ErrorCode::kIo,
+                       "an earlier output changed while its matches were taken over; run it again");
+    }
+    CAIRN_RETURN_IF_ERROR(take(pairs[i], *result));
+  }
+  return Ok();
+}
+
+// All results go to the database in the order of `pairs`, so that its bytes do not tell which were taken
+// over.
+Status WritePairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources,
+                  PairPredictor* predictor, SQLite::Database& database, MatchRun* run) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<size_t> missing, FindMissing(pairs, sources, run));
+  run->summary.num_taken_over += static_cast<int64_t>(pairs.size() - missing.size());
+  const auto take_result = [&](const std::pair<int, int>& pair, const PairResult& result) {
+    return TakeResult(pair, result, predictor, database, run);
+  };
+  size_t num_taken = 0, num_computed = 0;
+  if (!missing.empty()) {
+    IndexPairs to_match;
+    for (const size_t i : missing) to_match.push_back(pairs[i]);
+    Status status;
+    const auto take = [&](const TwoViewGeometry& geometry, int num_putative) {
+      const size_t i = missing[num_computed++];
+      if (status.ok()) status = TakeOver(pairs, num_taken, i, sources, run, take_result);
+      if (status.ok()) status = take_result(pairs[i], {geometry, num_putative});
+      num_taken = i + 1;
+    };
+    run->progress.Begin("match features", static_cast<int64_t>(to_match.size()), "pairs");
+    CAIRN_RETURN_IF_ERROR(MatchPairs(run->features, run->images, std::move(to_match), run->options.matching,
+                                     run->num_threads, run->progress, take));
+    run->progress.End();
+    CAIRN_RETURN_IF_ERROR(status);
+  }
+  return TakeOver(pairs, num_taken, pairs.size(), sources, run, take_result);
+}
+
+}  // namespace
+
+Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Database& database,
+                        MatchRun* run) {
+  SortAlongCurve(&pairs);
+  ++run->summary.num_rounds;
+  if (!run->reuse.shard) {
+    CAIRN_RETURN_IF_ERROR(WritePairs(pairs, {&run->named, &run->previous}, predictor, database, run));
+    return true;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<size_t> missing, FindMissing(pairs, {&run->named}, run));
+  if (missing.empty()) {
+    CAIRN_RETURN_IF_ERROR(TakeOver(pairs, 0, pairs.size(), {&run->named}, run,
+                                   [&](const std::pair<int, int>& pair, const PairResult& result) {
+                                     TellPredictor(pair, result, predictor);
+                                     return Ok();
+                                   }));
+    return true;
+  }
+  const auto [begin, end] = ShareOf(*run->reuse.shard, static_cast<int64_t>(missing.size()));
+  IndexPairs share;
+  for (int64_t i = begin; i < end; ++i) share.push_back(pairs[missing[i]]);
+  run->summary.num_left_to_others = static_cast<int64_t>(missing.size() - share.size());
+  CAIRN_RETURN_IF_ERROR(WritePairs(share, {&run->previous}, nullptr, database, run));
+  return false;
+}
+
+}  // namespace cairn

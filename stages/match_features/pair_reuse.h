@@ -1,0 +1,47 @@
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/colmap_database.h"
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/reuse.h"
+#include "stages/match_features/image_features.h"
+#include "stages/match_features/match_pairs.h"
+
+namespace cairn {
+
+// What matching and verifying a pair gives.
+struct PairResult {
+  TwoViewGeometry geometry;  // no inliers: not verified
+  int num_putative = 0;
+};
+
+// Keys of pairs: hashes of all that a pair's result depends on (core/reuse.h): the features and cameras of
+// both images, their relative pose as stated, and the options.  Not their names, ids, or places in the world.
+class PairKeys {
+ public:
+  PairKeys(SQLite::Database& features, const MatchImages& images, const MatchPairsOptions& options);
+
+  // Of a pair of indices into images.images.  Reads the features of an image when it is first named.  Errors:
+  // Corrupt; throws SQLite::Exception as the readers do.
+  Result<ContentHash> Of(const std::pair<int, int>& pair);
+
+ private:
+  SQLite::Database& features_;
+  const MatchImages& images_;
+  ContentHash options_;
+  std::vector<std::optional<ContentHash>> image_keys_;  // by index
+};
+
+// The result of a pair of images as an earlier run has it, if one does.
+std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImage& image1,
+                                         const MatchImage& image2, ReuseSources* sources);
+
+// Where a later run finds a result: `row` is the pair_id, `count` the number of putative matches; the
+// contents of a pair that was not verified, which has no row, are the zero hash.
+ReuseEntry EntryOf(const ContentHash& key, const PairResult& result);
+
+}  // namespace cairn
