@@ -12,18 +12,22 @@
 #include "core/error.h"
 #include "core/options.h"
 #include "core/progress.h"
+#include "core/stage_report.h"
 
 namespace cairn {
 
-// What every subcommand gets from the program: --threads, --seed, --progress, and where results go.
+// What every subcommand gets from the program: --threads, --memory, --seed, --progress, and where results go.
 struct CommandEnvironment {
   int num_threads = 0;  // 0 = all cores
   uint64_t seed = 0;
   bool seed_given = false;              // --seed is on the command line
   std::string progress_style = "auto";  // --progress and --log-level as given, for commands that start others
   std::string log_level = "info";
-  Progress* progress = nullptr;  // never null when a command runs
-  std::ostream* out = nullptr;   // results; messages go to spdlog (stderr)
+  int64_t memory_mib = 0;  // most memory to take: --memory, or most of the machine's; > 0 when a command runs
+  bool memory_given = false;      // --memory is on the command line
+  Progress* progress = nullptr;   // never null when a command runs
+  StageReport* report = nullptr;  // likewise: what the command tells about its run, for --report
+  std::ostream* out = nullptr;    // results; messages go to spdlog (stderr)
 };
 
 // A subcommand of `cairn`: argv and files only; the work is a library call.

@@ -12,6 +12,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/temporary.h"
+
 namespace cairn {
 namespace {
 
@@ -71,7 +73,7 @@ Status ReplaceFileAtomically(const std::string& path,
   }
   if (fs::is_directory(target, error))
     return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
-  const std::string temporary = fmt::format("{}.tmp-{}", path, getpid());
+  const std::string temporary = TemporaryPath(path);
   fs::remove(temporary, error);
   Status status = write(temporary);
   if (status.ok() && SameBytes(temporary, path)) {

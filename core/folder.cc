@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+
+#include "core/temporary.h"
 
 namespace cairn {
 namespace {
@@ -43,18 +45,14 @@ Status ReplaceFolder(const std::string& temporary, const std::string& path) {
 // Removes the temporary folders beside `path` of processes that were killed.
 void RemoveLeftovers(const std::string& path) {
   const fs::path target(path);
-  const std::string prefix = target.filename().string() + ".tmp-";
   std::vector<fs::path> leftovers;
   std::error_code error;
   const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
   for (const fs::directory_entry& entry : fs::directory_iterator(parent, error)) {
     const std::string name = entry.path().filename().string();
-    if (name.compare(0, prefix.size(), prefix) != 0) continue;
-    pid_t process = 0;
-    const char* end = name.data() + name.size();
-    const auto [rest, parse_error] = std::from_chars(name.data() + prefix.size(), end, process);
-    const bool is_ours = parse_error == std::errc() && process > 0 && (rest == end || *rest == '-');
-    if (is_ours && kill(process, 0) != 0 && errno == ESRCH) leftovers.push_back(entry.path());
+    if (!IsTemporaryName(name, target.filename().string())) continue;
+    const auto process = static_cast<pid_t>(std::strtol(name.c_str() + name.rfind(".tmp-") + 5, nullptr, 10));
+    if (process > 0 && kill(process, 0) != 0 && errno == ESRCH) leftovers.push_back(entry.path());
   }
   for (const fs::path& leftover : leftovers) fs::remove_all(leftover, error);
 }
@@ -90,7 +88,7 @@ Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
   while (target.size() > 1 && target.back() == '/') target.pop_back();
   CAIRN_RETURN_IF_ERROR(CheckTarget(target, kind, marks));
   RemoveLeftovers(target);
-  const std::string temporary = fmt::format("{}.tmp-{}", target, getpid());
+  const std::string temporary = TemporaryPath(target);
   std::error_code error;
   fs::remove_all(temporary, error);
   if (!fs::create_directories(temporary, error)) {

@@ -1,14 +1,8 @@
 #include "pipeline/build_folder.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <utility>
 
 #include "core/file.h"
 
@@ -17,7 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kLockFile = "/lock";
+constexpr std::string_view kConfigHead = "# Written by cairn from ";
+constexpr std::string_view kConfigHeadEnd = "; edit that instead.";
 
 Status CreateFolder(const std::string& path) {
   std::error_code error;
@@ -37,6 +32,15 @@ std::string SizeAndDate(const std::string& path) {
   struct stat status = {};
   if (stat(path.c_str(), &status) != 0) return "";
   return fmt::format("{}-{}", status.st_size, status.st_mtim.tv_sec);
+}
+
+// What stands between two texts in a build folder's config.mk; empty where it has them not.
+std::string TextAfter(const std::string& build_dir, std::string_view before, std::string_view after) {
+  const auto config = ReadFile(build_dir + "/config.mk");
+  const size_t found = config.ok() ? config->find(before) : std::string::npos;
+  if (found == std::string::npos) return "";
+  const size_t begin = found + before.size();
+  return config->substr(begin, config->find(after, begin) - begin);
 }
 
 // The value of an option of [reconstruct].
@@ -123,57 +127,19 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
     CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
   }
   const std::string config = fmt::format(
-      "# Written by cairn from the recipe; edit that instead.\n"
+      "{}{}{}\n"
       "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
       "NAME := {}\nSEED := {}\nPROGRAM := {}\n",
-      paths.map, capture, recipe.simulated ? "yes" : "no", IsReconstructed(recipe) ? "yes" : "no",
-      known_places, queries, recipe.name, seed, SizeAndDate(paths.program));
+      kConfigHead, paths.recipe, kConfigHeadEnd, paths.map, capture, recipe.simulated ? "yes" : "no",
+      IsReconstructed(recipe) ? "yes" : "no", known_places, queries, recipe.name, seed,
+      SizeAndDate(paths.program));
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 
-void RemoveStaleTemporaries(const std::string& build_dir) {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(build_dir, error)) {
-    const bool is_stale = entry.path().filename().string().find(".tmp-") != std::string::npos ||
-                          entry.path().extension() == ".begun";  // the stamp of a rule that did not end
-    if (!is_stale) continue;
-    std::error_code remove_error;  // one that cannot be removed only takes room
-    fs::remove(entry.path(), remove_error);
-  }
-}
+std::string ConfiguredMap(const std::string& build_dir) { return TextAfter(build_dir, "\nMAP := ", "\n"); }
 
-Result<FolderLock> FolderLock::Acquire(const std::string& build_dir) {
-  CAIRN_RETURN_IF_ERROR(CreateFolder(build_dir));
-  const std::string path = build_dir + kLockFile;
-  const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0666);
-  if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
-  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    const int reason = errno;
-    close(fd);
-    if (reason != EWOULDBLOCK) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be locked: {}", path, std::strerror(reason));
-    }
-    std::string owner = ReadFile(path).ok() ? ReadFile(path).value() : "";
-    while (!owner.empty() && owner.back() == '\n') owner.pop_back();
-    return MakeError(
-        ErrorCode::kBusy,
-        "{}: another compile (process {}) is at work in this build folder; wait for it, or give another "
-        "--build-dir",
-        build_dir, owner.empty() ? "unknown" : owner);
-  }
-  const std::string owner = fmt::format("{}\n", getpid());
-  if (ftruncate(fd, 0) != 0 || write(fd, owner.data(), owner.size()) != static_cast<ssize_t>(owner.size())) {
-    const int reason = errno;
-    close(fd);
-    return MakeError(ErrorCode::kIo, "{}: cannot be written: {}", path, std::strerror(reason));
-  }
-  return FolderLock(fd);
-}
-
-FolderLock::FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-
-FolderLock::~FolderLock() {
-  if (fd_ >= 0) close(fd_);
+std::string ConfiguredRecipe(const std::string& build_dir) {
+  return TextAfter(build_dir, kConfigHead, kConfigHeadEnd);
 }
 
 }  // namespace cairn

@@ -12,6 +12,7 @@ struct BuildPaths {
   std::string build_dir;  // the build folder: options, stage files, stamps
   std::string map;        // NAME.cairn
   std::string program;    // cairn
+  std::string recipe;     // as an absolute path
 };
 
 // Errors: InvalidArgument when a path has characters that Make cannot carry: white space and
@@ -30,22 +31,8 @@ bool IsReconstructed(const Recipe& recipe);
 // Errors: InvalidArgument (CheckMakePath), NotFound (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
 
-// Removes temporary files that killed runs left in the folder.  REQUIRES: the folder is locked.
-void RemoveStaleTemporaries(const std::string& build_dir);
-
-// Holds a folder for one compile at a time, as long as the object lives.  Child processes inherit the lock:
-// it also lasts as long as a stage that a killed compile left behind.
-class FolderLock {
- public:
-  // Errors: Busy (says which process has it), Io.
-  static Result<FolderLock> Acquire(const std::string& build_dir);
-  FolderLock(FolderLock&& other) noexcept;
-  FolderLock& operator=(FolderLock&&) = delete;
-  ~FolderLock();
-
- private:
-  explicit FolderLock(int fd) : fd_(fd) {}
-  int fd_;
-};
+// The map and the recipe that a folder was last configured for; empty where it is no build folder.
+std::string ConfiguredMap(const std::string& build_dir);
+std::string ConfiguredRecipe(const std::string& build_dir);
 
 }  // namespace cairn

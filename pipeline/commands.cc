@@ -1,5 +1,6 @@
 #include "pipeline/commands.h"
 
+#include "pipeline/clean_command.h"
 #include "pipeline/compile_command.h"
 #include "pipeline/export_command.h"
 #include "pipeline/import_command.h"
@@ -25,7 +26,7 @@ std::vector<Command> AllCommands() {
       GroupClassesCommand(),    FilterVisibilityCommand(), DecomposeRegionsCommand(), CheckRegionsCommand(),
       BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
       ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
-      CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),
+      CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
   };
 }
 

@@ -6,15 +6,20 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
 #include "pipeline/build_folder.h"
-#include "pipeline/program.h"
+#include "pipeline/build_report.h"
+#include "pipeline/build_step.h"
+#include "pipeline/folder_lock.h"
 #include "pipeline/recipe.h"
 
 namespace cairn {
@@ -75,7 +80,10 @@ Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
   if (!arguments.build_dir.empty()) build_dir = fs::absolute(arguments.build_dir).lexically_normal();
   if (!build_dir.has_filename()) build_dir = build_dir.parent_path();  // a trailing '/'
   CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
-  return BuildPaths{.build_dir = build_dir.string(), .map = map.string(), .program = program};
+  return BuildPaths{.build_dir = build_dir.string(),
+                    .map = map.string(),
+                    .program = program,
+                    .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
 }
 
 Result<Recipe> ReadRecipeWithSeed(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -125,7 +133,7 @@ Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::
   for (char** entry = environ; *entry != nullptr; ++entry) {
     // An outer make's flags are not meant for this one.
     if (std::strncmp(*entry, "MAKEFLAGS=", 10) != 0 && std::strncmp(*entry, "MAKELEVEL=", 10) != 0 &&
-        std::strncmp(*entry, kErrorFileVariable, std::strlen(kErrorFileVariable)) != 0) {
+        std::strncmp(*entry, kBuildSessionVariable, std::strlen(kBuildSessionVariable)) != 0) {
       envp.push_back(*entry);
     }
   }
@@ -146,57 +154,91 @@ Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::
   return wait_status;
 }
 
-// What the failed stage left in error.json; the stage has printed its message already.
-Error StageError(const std::string& error_file, const BuildPaths& paths) {
-  const auto text = ReadFile(error_file);
-  const auto document = nlohmann::json::parse(text.ok() ? text.value() : "", nullptr, false);
-  if (document.is_discarded() || !document.contains("code") || !document.contains("stage")) {
-    return MakeError(ErrorCode::kFailed, "a stage ended without saying why; {} was not written", paths.map);
+// The stage has printed its message already.
+Error StageError(const BuildPaths& paths) {
+  const std::optional<StageFailure> failure = ReadErrorFile(paths.build_dir);
+  if (failure) return MakeError(failure->code, "{} failed; {} was not written", failure->stage, paths.map);
+  return MakeError(
+      ErrorCode::kFailed,
+      "a stage was ended before it could say why (for want of memory? see --memory); {} was not written",
+      paths.map);
+}
+
+// Names of the outputs whose rules ran since.
+std::set<std::string> RanSince(const std::map<std::string, fs::file_time_type>& before,
+                               const std::string& build_dir) {
+  std::set<std::string> ran;
+  for (const auto& [path, date] : StampDates(build_dir)) {
+    const auto old = before.find(path);
+    if (old == before.end() || old->second != date) ran.insert(fs::path(path).stem().string());
   }
-  return MakeError(static_cast<ErrorCode>(document["code"].get<int>()), "{} failed; {} was not written",
-                   document["stage"].get<std::string>(), paths.map);
+  return ran;
+}
+
+// Writes the build report beside the map; prints it as a table where something was done.
+Status TellOfRun(const BuildRun& run, const BuildPaths& paths, std::ostream& out) {
+  CAIRN_ASSIGN_OR_RETURN(const nlohmann::ordered_json report, MakeBuildReport(run));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+      ReportPath(paths.map),
+      report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"));
+  if (!run.ran.empty()) out << BuildReportTable(report);
+  return Ok();
 }
 
 Status Compile(const Arguments& arguments, const CommandEnvironment& environment) {
+  const auto begin = std::chrono::steady_clock::now();
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
   CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, recipe, paths));
   CAIRN_ASSIGN_OR_RETURN(const std::string rules, RulesPath(paths.program));
-  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir));
-  RemoveStaleTemporaries(paths.build_dir);
+  const std::string session = NewBuildSession();
+  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, session));
   CAIRN_RETURN_IF_ERROR(WriteBuildFolder(recipe, paths));
+  CAIRN_RETURN_IF_ERROR(ReserveErrorFile(paths.build_dir));
 
-  const std::string error_file = paths.build_dir + "/error.json";
-  std::error_code ignored;
-  fs::remove(error_file, ignored);
   const auto dates_before = StampDates(paths.build_dir);
   // Bars of stages that run side by side would overwrite each other.
   const bool collides = arguments.num_jobs > 1 && environment.progress_style == "auto";
-  const std::vector<std::string> words = {"make",
-                                          "--silent",
-                                          "--no-print-directory",
-                                          "--no-builtin-rules",
-                                          "--jobs=" + std::to_string(arguments.num_jobs),
-                                          "--file=" + rules,
-                                          "BUILD=" + paths.build_dir,
-                                          "CAIRN=" + paths.program,
-                                          "THREADS=" + std::to_string(environment.num_threads),
-                                          "PROGRESS=" + (collides ? "lines" : environment.progress_style),
-                                          "LOG_LEVEL=" + environment.log_level,
-                                          goal};
+  const std::vector<std::string> words = {
+      "make",
+      "--silent",
+      "--no-print-directory",
+      "--no-builtin-rules",
+      "--jobs=" + std::to_string(arguments.num_jobs),
+      "--file=" + rules,
+      "BUILD=" + paths.build_dir,
+      "CAIRN=" + paths.program,
+      "THREADS=" + std::to_string(environment.num_threads),
+      "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
+      "PROGRESS=" + (collides ? "lines" : environment.progress_style),
+      "LOG_LEVEL=" + environment.log_level,
+      goal};
   CAIRN_ASSIGN_OR_RETURN(
       const int wait_status,
-      RunProgramAndWait(words, std::string(kErrorFileVariable) + "=" + error_file, *environment.progress));
-  if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) return StageError(error_file, paths);
-  const bool nothing_ran = StampDates(paths.build_dir) == dates_before;
+      RunProgramAndWait(words, std::string(kBuildSessionVariable) + "=" + session, *environment.progress));
+  BuildRun run = {.build_dir = paths.build_dir,
+                  .recipe = arguments.recipe,
+                  .map = arguments.output,
+                  .seed = recipe.seed,
+                  .simulated = recipe.simulated,
+                  .reconstructed = IsReconstructed(recipe),
+                  .whole_line = goal == paths.map,
+                  .ran = RanSince(dates_before, paths.build_dir)};
+  if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths);
+  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const Status told = TellOfRun(run, paths, *environment.out);
+  if (run.error) return *run.error;
+  CAIRN_RETURN_IF_ERROR(told);
+  fs::remove(paths.build_dir + kErrorFile);
   *environment.out << fmt::format("{}: {}\n", goal == paths.map ? arguments.output : goal,
-                                  nothing_ran ? "up to date" : "compiled");
+                                  run.ran.empty() ? "up to date" : "compiled");
   return Ok();
 }
 
 Status Configure(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
+  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, BuildSession()));
   return WriteBuildFolder(recipe, paths);
 }
 

@@ -21,7 +21,7 @@ CAIRN ?= $(shell command -v cairn)
 # Put before every command, for example a cluster's `srun`.
 LAUNCH ?=
 THREADS ?= 0
-# Most memory for the features that match-features holds at a time, MiB; empty: its default.
+# Most memory for a stage, MiB; empty: most of the machine's.
 MEMORY ?=
 PROGRESS ?= auto
 LOG_LEVEL ?= info
@@ -36,10 +36,12 @@ CAIRN_RESULT = $(notdir $(if $(filter map.stamp,$(@F)),$(MAP),$(@:.stamp=)))
 CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@echo '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
     "run"$(,) "file": "$(CAIRN_RESULT)"$(,) "reason": "$(subst ",\",$(subst \,\\,$(CAIRN_REASON)))"},$(CAIRN_RESULT): \
     $(CAIRN_REASON)))' >&2)
-define CAIRN_BEGIN
-$(CAIRN_WHY)
-touch $@.begun
-endef
+
+# Stages of one run of make share their build folders; another run is refused.
+ifndef CAIRN_BUILD_SESSION
+CAIRN_BUILD_SESSION := $(shell echo $$PPID@$$(uname -n))
+endif
+export CAIRN_BUILD_SESSION
 
 ifdef RECIPE
 # The first target: what `make` without one makes.
@@ -112,17 +114,17 @@ $(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
 # Changes with the program's bytes, whatever its date.
 PROGRAM_HASH := $(BUILD)/options/program
 
-# X.txt keeps what the stage printed about X, for summaries of runs that had nothing to do.
-CAIRN_FLAGS = --results $(@:.stamp=.txt) --seed $(SEED) --threads $(THREADS) --progress $(PROGRESS) \
+# The stage holds the build folder, leaves X.report.json and then the stamp, with the date at which it began; where it
+# fails, error.json.
+CAIRN_FLAGS = --stamp $@ --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) \
     --log-level $(LOG_LEVEL)
 
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
 $(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(PROGRAM_HASH)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
-	mv $@.begun $@
 else
 CAPTURE_STAMP :=
 endif
@@ -133,10 +135,9 @@ $(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.js
 
 $(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml \
 	    --depfile $(@D)/images.d -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 # Matching wants the visual words first where it looks for images that look alike.
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
@@ -144,48 +145,42 @@ PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pair
 $(BUILD)/matches.db.stamp: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
 $(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)
-	$(CAIRN_BEGIN)
-	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) $(addprefix --memory ,$(MEMORY)) \
+	$(CAIRN_WHY)
+	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) \
 	    $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) --options $(@D)/options/match_features.toml -o $(@:.stamp=) \
 	    $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 # Captures without poses only.  The folder's date is that of its last change.
 $(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_IMAGES) $(KNOWN_PLACES)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
 	    --options $(@D)/options/reconstruct.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 $(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(POSES_READY)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 $(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(PROGRAM_HASH)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
 	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/options/decompose_regions.toml \
     $(BUILD)/options/seed $(PROGRAM_HASH)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db --classes $(@D)/classes.db \
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 # Held-out images of a reconstructed capture have features too, but no words.
 $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 # The map notes the options of every stage that made it.
 STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCTED)),reconstruct) group_classes \
@@ -193,16 +188,14 @@ STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCT
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
     $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN) $(POSES_READY)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
-	mv $@.begun $@
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(BUILD)/options/seed $(CAIRN) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
-	$(CAIRN_BEGIN)
+	$(CAIRN_WHY)
 	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
-	mv $@.begun $@

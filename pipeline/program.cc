@@ -2,20 +2,25 @@
 
 #include <unistd.h>
 #include <csignal>
-#include <cstdlib>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <new>
+#include <optional>
 #include <sstream>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "core/file.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "pipeline/build_step.h"
 #include "pipeline/progress.h"
 
 namespace cairn {
@@ -57,7 +62,9 @@ struct CommonArguments {
   uint64_t seed = 0;
   std::string progress = "auto";
   std::string log_level = "info";
-  std::string results_file;
+  int64_t memory_mib = 0;
+  std::string report_file;
+  std::string stamp;
 };
 
 void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
@@ -77,9 +84,20 @@ void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
       ->type_name("LEVEL")
       ->group("Common options");
-  app.add_option("--results", arguments->results_file,
-                 "Also write what is printed on standard output to this file")
-      ->type_name("FILE")
+  app.add_option("--memory", arguments->memory_mib,
+                 "Most memory to use, MiB [4/5 of the machine's or the control group's]")
+      ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
+      ->type_name("MIB")
+      ->group("Common options");
+  app.add_option("--report", arguments->report_file,
+                 "Also write counts, rejects, times and memory of this run (docs/build_report.md)")
+      ->type_name("FILE.json")
+      ->group("Common options");
+  app.add_option(
+         "--stamp", arguments->stamp,
+         "For Makefiles: hold DIR, leave DIR/NAME.report.json and the stamp there, dated when the command "
+         "began; a failure leaves DIR/error.json")
+      ->type_name("DIR/NAME.stamp")
       ->group("Common options");
   app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
 }
@@ -104,35 +122,79 @@ void ConfigureLog(const std::string& level, ProgressStyle style) {
   spdlog::set_default_logger(logger);
 }
 
+Error OutOfMemory(const CommandEnvironment& environment) {
+  return MakeError(
+      ErrorCode::kFailed,
+      "out of memory, with --memory {} (MiB) and {} threads; give it more, or use fewer --threads",
+      environment.memory_mib, NumThreads(environment.num_threads));
+}
+
 Status RunCaught(const Command& command, const CommandEnvironment& environment) {
   try {
     Status status = command.run(environment);
     if (!status.ok() && stop_requested) return MakeError(ErrorCode::kCancelled, "stopped on request");
     return status;
   } catch (const std::bad_alloc&) {
-    return MakeError(ErrorCode::kFailed, "out of memory; use fewer --threads, or a machine with more memory");
+    return OutOfMemory(environment);
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) return OutOfMemory(environment);
+    return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
+                     exception.what());
   } catch (const std::exception& exception) {
     return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
                      exception.what());
   }
 }
 
-void WriteErrorFile(const std::string& stage, const Error& error) {
-  const char* path = std::getenv(kErrorFileVariable);
-  if (path == nullptr || *path == '\0') return;
-  const nlohmann::ordered_json document = {{"code", static_cast<int>(error.code)},
-                                           {"name", ErrorCodeName(error.code)},
-                                           {"stage", stage},
-                                           {"message", error.message}};
-  const Status status = WriteFileAtomically(
-      path, document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
-  if (!status.ok()) spdlog::warn("{}", status.error().message);
+int Report(const std::string& command, const CommonArguments& arguments, const Error& error,
+           std::ostream& err) {
+  err << "cairn " << command << ": " << error.message << std::endl;
+  if (!arguments.stamp.empty()) {
+    const std::string folder = std::filesystem::absolute(arguments.stamp).parent_path().string();
+    if (const Status status = WriteErrorFile(folder, command, error); !status.ok())
+      spdlog::warn("{}", status.error().message);
+  }
+  return static_cast<int>(error.code);
 }
 
-int Report(const std::string& stage, const Error& error, std::ostream& err) {
-  err << "cairn " << stage << ": " << error.message << std::endl;
-  WriteErrorFile(stage, error);
-  return static_cast<int>(error.code);
+// "match_features": what a stage's folder, its table in a recipe and its part of a report are called.
+std::string StageName(std::string command) {
+  std::replace(command.begin(), command.end(), '-', '_');
+  return command;
+}
+
+// Runs the command; what it printed and reported goes to the files that were asked for.
+Status RunCommand(const Command& command, const CommonArguments& arguments, CommandEnvironment environment,
+                  std::ostream& out) {
+  const auto begin = std::chrono::steady_clock::now();
+  std::optional<BuildStep> step;
+  if (!arguments.stamp.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(BuildStep begun, BuildStep::Begin(arguments.stamp));
+    step.emplace(std::move(begun));
+  }
+  const std::string report_file =
+      arguments.report_file.empty() && step ? step->ReportPath() : arguments.report_file;
+  StageReport report;
+  std::ostringstream printed;
+  environment.report = &report;
+  environment.out = report_file.empty() ? &out : &printed;
+  Status status = RunCaught(command, environment);
+  if (!report_file.empty()) {
+    out << printed.str();
+    if (!status.ok()) return status;
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    const nlohmann::ordered_json run = StageRunJson({.stage = StageName(command.name),
+                                                     .seconds = seconds.count(),
+                                                     .num_threads = environment.num_threads,
+                                                     .memory_mib = environment.memory_mib,
+                                                     .seed = environment.seed,
+                                                     .printed = printed.str(),
+                                                     .report = &report});
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+        report_file, run.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"));
+  }
+  if (status.ok() && step) status = step->End();
+  return status;
 }
 
 // Usage errors as one line that says where help is.
@@ -170,29 +232,26 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
 
   const std::string name = app.get_subcommands().front()->get_name();
   const auto style = ParseProgressStyle(arguments.progress, isatty(STDERR_FILENO) != 0);
-  if (!style.ok()) return Report(name, style.error(), err);
+  if (!style.ok()) return Report(name, arguments, style.error(), err);
   ConfigureLog(arguments.log_level, *style);
   CatchStopSignals();
   const std::unique_ptr<Progress> progress = MakeTerminalProgress(*style);
-  std::ostringstream results;  // where --results asks for them
-  const CommandEnvironment environment = {.num_threads = arguments.num_threads,
-                                          .seed = arguments.seed,
-                                          .seed_given = app.get_subcommands().front()->count("--seed") > 0,
-                                          .progress_style = arguments.progress,
-                                          .log_level = arguments.log_level,
-                                          .progress = progress.get(),
-                                          .out = arguments.results_file.empty() ? &out : &results};
+  const CommandEnvironment environment = {
+      .num_threads = arguments.num_threads,
+      .seed = arguments.seed,
+      .seed_given = app.get_subcommands().front()->count("--seed") > 0,
+      .progress_style = arguments.progress,
+      .log_level = arguments.log_level,
+      .memory_mib = arguments.memory_mib > 0 ? arguments.memory_mib : DefaultMemoryMib(),
+      .memory_given = arguments.memory_mib > 0,
+      .progress = progress.get()};
   const auto command =
       std::find_if(commands.begin(), commands.end(), [&](const Command& c) { return c.name == name; });
-  Status status = RunCaught(*command, environment);
-  if (!arguments.results_file.empty()) {
-    out << results.str();
-    if (status.ok()) status = WriteFileAtomically(arguments.results_file, results.str());
-  }
+  Status status = RunCommand(*command, arguments, environment, out);
   out.flush();
   if (status.ok() && !out)
     status = MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?");
-  if (!status.ok()) return Report(name, status.error(), err);
+  if (!status.ok()) return Report(name, arguments, status.error(), err);
   return 0;
 }
 

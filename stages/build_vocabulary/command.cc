@@ -51,6 +51,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                          BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
                                          *environment.progress));
   CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
+  environment.report->in = {{"images", static_cast<int64_t>(images.size())}};
+  environment.report->out = {{"words", vocabulary.num_words()}};
   *environment.out << fmt::format("build_vocabulary: {} words of depth {} over {} images\n",
                                   vocabulary.num_words(), vocabulary.depth, vocabulary.document_ids.size());
   return Ok();

@@ -85,6 +85,18 @@ void WarnOfRejects(const CheckMapReport& report) {
   }
 }
 
+void ReportHeldOut(const CheckMapReport& held_out, StageReport* report) {
+  report->in = {{"held-out images", static_cast<int64_t>(held_out.images.size())}};
+  const auto localized = held_out.figures.find("num_localized");
+  if (localized != held_out.figures.end())
+    report->out = {{"localized", static_cast<int64_t>(localized->second)}};
+  std::vector<Reject> rejects;
+  for (const HeldOutResult& image : held_out.images) {
+    if (!image.rejected.empty()) rejects.push_back({image.name, image.rejected});
+  }
+  AddRejects("images", rejects, report);
+}
+
 Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& checked,
             const std::string& path) {
   CheckMapOptions options = checked;
@@ -122,6 +134,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                              .held_out = &held_out,
                              .foreign = foreign ? &*foreign : nullptr};
   *environment.out << (arguments.json ? ReportJson(report) : ReportText(report));
+  ReportHeldOut(held_out, environment.report);
   if (!held_out.images.empty()) CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
   if (arguments.output_path.empty()) return Ok();
   return Seal(map->rows(), held_out, arguments.options, arguments.output_path);

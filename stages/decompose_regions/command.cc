@@ -52,6 +52,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
         "counted",
         world.num_stations(), arguments.options.best_max_stations);
   }
+  environment.report->in = {{"stations", world.num_stations()}, {"classes", world.num_features()}};
+  environment.report->out = {{"regions", static_cast<int64_t>(decomposition.regions.size())}};
+  AddDropped("stations", {{"in no region", static_cast<int64_t>(decomposition.uncovered.size())}},
+             environment.report);
   *environment.out << fmt::format("decompose_regions: {} stations, {} features; {}\n", world.num_stations(),
                                   world.num_features(),
                                   NumRegionsText(decomposition.regions.size(), decomposition.lower_bound));

@@ -59,6 +59,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
+  environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
+  environment.report->out = {
+      {"landmarks", static_cast<int64_t>(rows.landmarks.size())},
+      {"regions", static_cast<int64_t>(rows.regions.size())},
+      {"bytes", static_cast<int64_t>(std::filesystem::file_size(arguments.output_path))}};
   *environment.out << fmt::format(
       "emit_map: {} landmarks of {} classes in {} regions, {} images, {} words, {:.2f} MB\n",
       rows.landmarks.size(), classes.classes.size(), rows.regions.size(), rows.images.size(),

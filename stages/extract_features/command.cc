@@ -48,6 +48,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.depfile.empty()) {
     CAIRN_RETURN_IF_ERROR(WriteDependencyFile(arguments.depfile, capture, summary.inputs));
   }
+  environment.report->in = {{"images", static_cast<int64_t>(summary.num_images + summary.rejects.size())}};
+  environment.report->out = {{"images", summary.num_views}, {"keypoints", summary.num_keypoints}};
+  environment.report->taken_over = {{"images", summary.num_taken_over}};
+  AddRejects("images", summary.rejects, environment.report);
   *environment.out << fmt::format(
       "extract_features: {}{} images, {} keypoints ({:.0f} an image), {} rejected, {} taken over\n",
       reuse.shard ? fmt::format("shard {}/{}: ", reuse.shard->index, reuse.shard->count) : "",

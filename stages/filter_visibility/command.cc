@@ -17,6 +17,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
   CAIRN_ASSIGN_OR_RETURN(const FilterVisibilityResult result, FilterVisibility(classes, arguments.options));
   const World& world = result.world;
+  environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
+  environment.report->out = {{"classes", world.num_features()}, {"stations", world.num_stations()}};
+  AddDropped("classes", result.dropped, environment.report);
   *environment.out << fmt::format("filter_visibility: {} survey, {} stations, {} of {} classes kept\n",
                                   result.is_lattice ? "lattice" : "driven", world.num_stations(),
                                   world.num_features(), classes.classes.size());

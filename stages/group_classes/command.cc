@@ -26,6 +26,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       GroupClasses(matched, capture, arguments.options, environment.num_threads, *environment.progress));
   CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output));
   const Classes& classes = result.classes;
+  environment.report->in = {{"images", static_cast<int64_t>(classes.images.size())},
+                            {"tracks", result.num_tracks}};
+  environment.report->out = {{"classes", static_cast<int64_t>(classes.classes.size())}};
+  AddDropped("classes", classes.dropped, environment.report);
   std::string dropped;
   for (const auto& [reason, count] : classes.dropped)
     dropped += fmt::format("{}{} {}", dropped.empty() ? "" : ", ", count, reason);

@@ -1,5 +1,6 @@
 #include "stages/match_features/command.h"
 
+#include <algorithm>
 #include <optional>
 
 #include <spdlog/spdlog.h>
@@ -47,15 +48,26 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
   MatchFeaturesInputs inputs = arguments.inputs;
+  MatchFeaturesOptions options = arguments.options;
+  int& budget_mib = options.matching.memory_budget_mib;
+  const auto share_mib = static_cast<int>(std::min<int64_t>(environment.memory_mib * 3 / 4, 1 << 24));
+  budget_mib = std::max(1, environment.memory_given ? share_mib : std::min(share_mib, budget_mib));
   if (capture) inputs.capture = &*capture;
   CAIRN_ASSIGN_OR_RETURN(const MatchFeaturesSummary summary,
-                         MatchFeatures(inputs, arguments.options, arguments.output, environment.seed,
+                         MatchFeatures(inputs, options, arguments.output, environment.seed,
                                        environment.num_threads, *environment.progress, reuse));
   for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
   if (summary.num_without_features > 0) {
     spdlog::warn("{}: {} of {} images without features are skipped", inputs.features_path,
                  summary.num_without_features, summary.num_images + summary.num_without_features);
   }
+  environment.report->in = {{"images", summary.num_images}, {"pairs", summary.num_pairs_tried}};
+  environment.report->out = {{"verified pairs", summary.num_pairs_verified},
+                             {"matches", summary.num_inliers}};
+  environment.report->taken_over = {{"pairs", summary.num_taken_over}};
+  AddDropped("images", {{"no features", summary.num_without_features}}, environment.report);
+  AddDropped("pairs", {{"not verified", summary.num_pairs_tried - summary.num_pairs_verified}},
+             environment.report);
   Print(summary, reuse, *environment.out);
   return Ok();
 }
@@ -79,10 +91,6 @@ Command MatchFeaturesCommand() {
                 app.add_option("--pair-list", arguments->inputs.pair_list_path,
                                "Match these pairs instead: a line has the names of two images, as in COLMAP")
                     ->type_name("FILE");
-                app.add_option("--memory", arguments->options.matching.memory_budget_mib,
-                               "Most memory for features of images at a time, MiB [1024]")
-                    ->check(CLI::Range(1, 1 << 24))
-                    ->type_name("MIB");
                 app.add_option("-o,--output", arguments->output, "COLMAP database to write")
                     ->required()
                     ->type_name("matches.db");

@@ -148,6 +148,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       }));
   for (const std::string& warning : result.warnings) spdlog::warn("{}", warning);
   for (const Reject& reject : result.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
+  const auto num_posed = static_cast<int64_t>(result.images.size() + result.queries.size());
+  environment.report->in = {{"images", num_posed + static_cast<int64_t>(result.rejects.size())}};
+  environment.report->out = {{"images", static_cast<int64_t>(result.images.size())},
+                             {"held out", static_cast<int64_t>(result.queries.size())}};
+  AddRejects("images", result.rejects, environment.report);
   *environment.out << ResultText(result);
   return Ok();
 }

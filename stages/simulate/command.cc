@@ -52,6 +52,7 @@ Status Run(const Arguments& given, const CommandEnvironment& environment, Simula
   CAIRN_ASSIGN_OR_RETURN(
       const SimulateResult result,
       SimulateCapture(*options, given.output_path, seed, environment.num_threads, *environment.progress));
+  environment.report->out = {{"images", result.num_images}, {"queries", result.num_queries}};
   *environment.out << fmt::format("simulate: {} images from {} stations and {} queries, {} x {} pixels\n",
                                   result.num_images, result.num_stations, result.num_queries,
                                   options->image_width_px, options->image_height_px);

@@ -93,37 +93,5 @@ TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
   EXPECT_TRUE(CheckMakePath("the map", "/maps/Küche+Flur_2,b-1~@.cairn").ok());
 }
 
-TEST_F(BuildFolderTest, StaleTemporariesAreRemovedAndNothingElse) {
-  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
-  for (const char* name : {"/features.db.tmp-123", "/features.db.stamp.begun", "/features.db"}) {
-    ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + name, "x").ok());
-  }
-  RemoveStaleTemporaries(paths_.build_dir);
-  EXPECT_FALSE(fs::exists(paths_.build_dir + "/features.db.tmp-123"));
-  EXPECT_FALSE(fs::exists(paths_.build_dir + "/features.db.stamp.begun"));
-  EXPECT_TRUE(fs::exists(paths_.build_dir + "/features.db"));
-}
-
-TEST_F(BuildFolderTest, SecondCompileInAFolderIsRefusedAndNamesTheFirst) {
-  {
-    const auto lock = FolderLock::Acquire(paths_.build_dir);
-    ASSERT_TRUE(lock.ok()) << lock.error().message;
-    const auto second = FolderLock::Acquire(paths_.build_dir);
-    ASSERT_FALSE(second.ok());
-    EXPECT_EQ(second.error().code, ErrorCode::kBusy);
-    EXPECT_THAT(second.error().message, HasSubstr(fmt::format("(process {})", getpid())));
-  }
-  EXPECT_TRUE(FolderLock::Acquire(paths_.build_dir).ok());
-}
-
-TEST_F(BuildFolderTest, LockOfADeadProcessIsNone) {
-  const pid_t child = fork();
-  if (child == 0) _exit(FolderLock::Acquire(paths_.build_dir).ok() ? 0 : 1);  // dies with the file in place
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  ASSERT_EQ(status, 0);
-  EXPECT_TRUE(FolderLock::Acquire(paths_.build_dir).ok());
-}
-
 }  // namespace
 }  // namespace cairn

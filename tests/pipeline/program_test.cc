@@ -2,22 +2,30 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <new>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/temporary.h"
+#include "pipeline/build_step.h"
+#include "pipeline/folder_lock.h"
 
 namespace cairn {
 namespace {
 
+namespace fs = std::filesystem;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 struct Outcome {
@@ -85,36 +93,107 @@ TEST(Program, CommonOptionsReachTheCommand) {
 }
 
 TEST(Program, ExceptionsEndWithAMessage) {
-  EXPECT_THAT(RunStage({"stage"}, [](const CommandEnvironment&) -> Status { throw std::bad_alloc(); }).err,
-              HasSubstr("out of memory"));
+  const Outcome out_of_memory = RunStage({"stage", "--memory", "77"},
+                                         [](const CommandEnvironment&) -> Status { throw std::bad_alloc(); });
+  EXPECT_EQ(out_of_memory.exit_code, 1);
+  EXPECT_THAT(out_of_memory.err, HasSubstr("out of memory, with --memory 77"));
   const Outcome outcome =
       RunStage({"stage"}, [](const CommandEnvironment&) -> Status { throw std::runtime_error("oops"); });
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("oops"));
 }
 
-TEST(Program, ErrorFileKeepsTheCodeForWhoeverStartedTheStage) {
-  const std::string path = fmt::format("{}/error_{}.json", testing::TempDir(), getpid());
-  setenv(kErrorFileVariable, path.c_str(), 1);
-  RunStage({"stage"}, [](const CommandEnvironment&) -> Status {
+// A folder with the stamp DIR/x.db.stamp that stages are asked to leave.
+class StampTest : public testing::Test {
+ protected:
+  StampTest() : folder_(fmt::format("{}/stamp_{}", testing::TempDir(), getpid())) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~StampTest() override { fs::remove_all(folder_); }
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  std::vector<std::string> Names() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  fs::path folder_;
+};
+
+TEST_F(StampTest, FailureLeavesItsCodeForWhoeverStartedTheStageAndNoStamp) {
+  RunStage({"stage", "--stamp", Path("x.db.stamp")}, [](const CommandEnvironment&) -> Status {
     return Error{ErrorCode::kNoData, "no \"pairs\""};
   });
-  unsetenv(kErrorFileVariable);
-  const auto document = nlohmann::json::parse(ReadFile(path).value());
+  const auto document = nlohmann::json::parse(ReadFile(Path("error.json")).value());
   EXPECT_EQ(document["code"], 6);
   EXPECT_EQ(document["name"], "no_data");
   EXPECT_EQ(document["stage"], "stage");
   EXPECT_EQ(document["message"], "no \"pairs\"");
+  EXPECT_THAT(Names(), ElementsAre("error.json", "lock"));
 }
 
-TEST(Program, ResultsAreAlsoWrittenToAFile) {
-  const std::string path = fmt::format("{}/results_{}.txt", testing::TempDir(), getpid());
-  const Outcome outcome = RunStage({"stage", "--results", path}, [](const CommandEnvironment& environment) {
-    *environment.out << "12 images\n";
-    return Ok();
-  });
+TEST_F(StampTest, StampIsDatedWhenTheStageBeganAndTheReportLiesBesideIt) {
+  const Outcome outcome =
+      RunStage({"stage", "--stamp", Path("x.db.stamp"), "--threads", "3", "--memory", "512", "--seed", "7"},
+               [this](const CommandEnvironment& environment) -> Status {
+                 std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                 CAIRN_RETURN_IF_ERROR(WriteFileAtomically(Path("input"), "changed while the stage ran"));
+                 *environment.out << "12 images\n";
+                 environment.report->in = {{"images", 14}};
+                 environment.report->out = {{"keypoints", 100}};
+                 AddRejects("images", {{"a.jpg", "/x/a.jpg: truncated"}, {"b.jpg", "b.jpg: truncated"}},
+                            environment.report);
+                 return Ok();
+               });
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.out, "12 images\n");
-  EXPECT_EQ(ReadFile(path).value(), "12 images\n");
+  EXPECT_THAT(Names(), ElementsAre("input", "lock", "x.db.report.json", "x.db.stamp"));
+  EXPECT_LT(fs::last_write_time(Path("x.db.stamp")), fs::last_write_time(Path("input")));
+  const auto report = nlohmann::ordered_json::parse(ReadFile(Path("x.db.report.json")).value());
+  EXPECT_EQ(report["stage"], "stage");
+  EXPECT_GE(report["seconds"], 0.05);
+  EXPECT_GT(report["peak_memory_bytes"], 1 << 20);
+  EXPECT_EQ(report["threads"], 3);
+  EXPECT_EQ(report["memory_limit_mib"], 512);
+  EXPECT_EQ(report["seed"], 7);
+  EXPECT_EQ(report["printed"], "12 images\n");
+  EXPECT_EQ(report["in"].dump() + report["out"].dump() + report["taken_over"].dump(),
+            R"({"images":14}{"keypoints":100}{})");
+  EXPECT_EQ(report["rejected"].dump(),
+            R"([{"what":"images","reason":"truncated","count":2,"names":["a.jpg","b.jpg"]}])");
+}
+
+TEST_F(StampTest, ReportAlsoGoesToAGivenFileWithoutAnyStamp) {
+  const Outcome outcome = RunStage({"stage", "--report", Path("mine.json")}, Nothing);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(Names(), ElementsAre("mine.json"));
+  EXPECT_EQ(nlohmann::json::parse(ReadFile(Path("mine.json")).value())["stage"], "stage");
+}
+
+TEST_F(StampTest, StageOfAnotherBuildIsRefusedWithTheOthersName) {
+  const auto lock = FolderLock::Acquire(folder_.string(), "4711@elsewhere");
+  ASSERT_TRUE(lock.ok()) << lock.error().message;
+  const Outcome outcome = RunStage(
+      {"stage", "--stamp", Path("x.db.stamp")},
+      [](const CommandEnvironment&) -> Status { return MakeError(ErrorCode::kFailed, "must not run"); });
+  EXPECT_EQ(outcome.exit_code, 9);
+  EXPECT_THAT(outcome.err, HasSubstr("another build (process 4711@elsewhere) is at work"));
+  setenv(kBuildSessionVariable, "4711@elsewhere", 1);
+  EXPECT_EQ(RunStage({"stage", "--stamp", Path("x.db.stamp")}, Nothing).exit_code, 0);
+  unsetenv(kBuildSessionVariable);
+}
+
+TEST_F(StampTest, FullDiskStillLetsAReservedErrorFileSayWhy) {
+  ASSERT_TRUE(ReserveErrorFile(folder_.string()).ok());
+  EXPECT_FALSE(ReadErrorFile(folder_.string()).has_value());
+  // A folder in the place of the temporary stands for a disk without room for it.
+  fs::create_directories(TemporaryPath(Path("error.json")) + "/in the way");
+  ASSERT_TRUE(WriteErrorFile(folder_.string(), "stage", {ErrorCode::kIo, "full"}).ok());
+  const auto failure = ReadErrorFile(folder_.string());
+  ASSERT_TRUE(failure.has_value());
+  EXPECT_EQ(failure->code, ErrorCode::kIo);
+  EXPECT_EQ(failure->message, "full");
 }
 
 TEST(Program, InterruptEndsTheCommandWithTheCodeOfCancelled) {

@@ -1,0 +1,157 @@
+#include "pipeline/folder_lock.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <climits>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "core/file.h"
+#include "core/temporary.h"
+#include "pipeline/build_folder.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLockFile = "/lock";
+// Others of the own session hold the folder alone only while they remove stale temporaries.
+constexpr std::chrono::seconds kWaitForOwnSession{30};
+// Another session may be on its way out, or look at the lock and be refused as well.
+constexpr std::chrono::milliseconds kWaitForOtherSession{300};
+
+enum class Claim { kHeld, kTaken, kNoLocks };
+
+void RemoveTemporariesIn(const fs::path& folder, const std::string& target) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (!IsTemporaryName(entry.path().filename().string(), target)) continue;
+    std::error_code remove_error;  // one that cannot be removed only takes room
+    fs::remove_all(entry.path(), remove_error);
+  }
+}
+
+std::string ReadSession(int fd) {
+  char text[HOST_NAME_MAX + 32] = {};
+  const ssize_t size = pread(fd, text, sizeof(text) - 1, 0);
+  std::string session(text, size > 0 ? size : 0);
+  return session.substr(0, session.find('\n'));
+}
+
+bool WriteSession(int fd, const std::string& session) {
+  const std::string line = session + "\n";
+  return ftruncate(fd, 0) == 0 &&
+         pwrite(fd, line.data(), line.size(), 0) == static_cast<ssize_t>(line.size());
+}
+
+// Makes the folder and opens its lock file, instead of `old_fd`.
+Result<int> OpenLockFile(const std::string& build_dir, int old_fd) {
+  std::error_code error;
+  fs::create_directories(build_dir, error);
+  if (error)
+    return MakeError(ErrorCode::kIo, "{}: the folder cannot be made: {}", build_dir, error.message());
+  const std::string path = build_dir + kLockFile;
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0666);
+  if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
+  if (old_fd >= 0) close(old_fd);
+  return fd;
+}
+
+bool IsRemoved(int fd) {
+  struct stat status = {};
+  return fstat(fd, &status) == 0 && status.st_nlink == 0;
+}
+
+// One try.  Turning an exclusive lock into a shared one lets go of it for a moment: whoever's name stands in
+// the file afterwards has it.
+Result<Claim> TryToClaim(int fd, const std::string& build_dir, const std::string& session) {
+  if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+    RemoveStaleTemporaries(build_dir);
+    if (!WriteSession(fd, session)) {
+      return MakeError(ErrorCode::kIo, "{}{}: cannot be written: {}", build_dir, kLockFile,
+                       std::strerror(errno));
+    }
+    while (flock(fd, LOCK_SH) != 0 && errno == EINTR) continue;
+  } else if (errno != EWOULDBLOCK && errno != EINTR) {
+    return Claim::kNoLocks;
+  } else if (flock(fd, LOCK_SH | LOCK_NB) != 0) {
+    return Claim::kTaken;
+  }
+  if (ReadSession(fd) == session) return Claim::kHeld;
+  flock(fd, LOCK_UN);
+  return Claim::kTaken;
+}
+
+}  // namespace
+
+std::string NewBuildSession() {
+  char host[HOST_NAME_MAX + 1] = {};
+  gethostname(host, sizeof(host) - 1);
+  return fmt::format("{}@{}", getpid(), host);
+}
+
+std::string BuildSession() {
+  const char* session = std::getenv(kBuildSessionVariable);
+  return session != nullptr && *session != '\0' ? session : NewBuildSession();
+}
+
+std::string ReportPath(const std::string& map) {
+  return fs::path(map).replace_extension().string() + kReportSuffix;
+}
+
+void RemoveStaleTemporaries(const std::string& build_dir) {
+  RemoveTemporariesIn(build_dir, "");
+  RemoveTemporariesIn(build_dir + "/options", "");
+  const fs::path map = ConfiguredMap(build_dir);
+  if (map.empty()) return;
+  RemoveTemporariesIn(map.parent_path(), map.filename().string());
+  RemoveTemporariesIn(map.parent_path(), fs::path(ReportPath(map.string())).filename().string());
+}
+
+Result<FolderLock> FolderLock::Acquire(const std::string& build_dir, const std::string& session) {
+  CAIRN_ASSIGN_OR_RETURN(const int fd, OpenLockFile(build_dir, -1));
+  FolderLock lock(fd);
+  const auto begin = std::chrono::steady_clock::now();
+  while (true) {
+    CAIRN_ASSIGN_OR_RETURN(const Claim claim, TryToClaim(lock.fd_, build_dir, session));
+    if (claim == Claim::kHeld && !IsRemoved(lock.fd_)) return lock;
+    if (claim == Claim::kHeld) {  // `cairn clean` has been there in between
+      CAIRN_ASSIGN_OR_RETURN(lock.fd_, OpenLockFile(build_dir, lock.fd_));
+      continue;
+    }
+    if (claim == Claim::kNoLocks) {
+      spdlog::warn(
+          "{}: this file system has no locks; see to it yourself that one build at a time works there",
+          build_dir);
+      return lock;
+    }
+    const std::string owner = ReadSession(lock.fd_);
+    const auto waited = std::chrono::steady_clock::now() - begin;
+    if (owner == session ? waited > kWaitForOwnSession : waited > kWaitForOtherSession) {
+      return MakeError(ErrorCode::kBusy,
+                       "{}: another build (process {}) is at work in this build folder; wait for it, or give "
+                       "another --build-dir",
+                       build_dir, owner.empty() ? "unknown" : owner);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+FolderLock::FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+
+FolderLock::~FolderLock() {
+  if (fd_ >= 0) close(fd_);
+}
+
+}  // namespace cairn
