@@ -49,8 +49,8 @@ const std::vector<Stage>& Line() {
 void WriteSmallRecipe(const std::string& path) {
   std::ofstream(path) << R"(name = "small"
 [simulate]
-width_m = 4
-depth_m = 4
+width_m = 5.5
+depth_m = 6
 num_rooms = 2
 spacing_m = 1
 image_width_px = 240
