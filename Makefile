@@ -10,7 +10,7 @@ PREFIX ?= /usr/local
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev \
-    libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap jq python3 time clang-format clang-tidy
+    libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap slurmctld slurmd slurm-client munge procps jq python3 time clang-format clang-tidy
 # Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
 # instructions emulated, an ARM compiler and emulator.
 OPTIONAL_PACKAGES := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
@@ -22,7 +22,7 @@ export CCACHE_NOHASHDIR := true
 SOURCES = $(shell git ls-files '*.h' '*.cc')
 
 .DEFAULT_GOAL := all
-.PHONY: all help deps demo test bench maps install format format-check tidy docs clean
+.PHONY: all help deps demo test bench maps compile install format format-check tidy docs clean
 # Verbs run one after the other, whatever MAKEFLAGS says; the steps inside of them run in parallel.
 .NOTPARALLEL:
 
@@ -52,6 +52,11 @@ bench: deps  ## Build and run the benchmarks
 
 maps: deps all  ## Compile every recipe under maps/ whose capture is here
 	@CAIRN=$(CAIRN) scripts/compile_maps maps
+
+compile: deps all  ## Compile MAP=RECIPE.toml or MAP=maps/NAME; in SHARDS=N parts, on a cluster with LAUNCH='srun -n1 -c2'
+	@$(if $(MAP),,$(error which map? make compile MAP=maps/demo, or MAP=RECIPE.toml))
+	@$(CAIRN) compile $(if $(filter %.toml,$(MAP)),$(MAP),$(MAP)/recipe.toml) -o $(MAP:.toml=).cairn \
+	    $(addprefix --shards ,$(SHARDS)) $(if $(LAUNCH),--launch '$(LAUNCH)')
 
 install: all  ## Install the program and its rules under PREFIX [/usr/local]
 	@cmake --install build/$(PRESET) --prefix $(PREFIX)

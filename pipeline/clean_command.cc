@@ -35,7 +35,7 @@ struct Removal {
 bool IsStageFileName(const std::string& name) {
   static const std::regex kStageFile(
       "(capture|images|features|matches|poses|classes|world|regions|vocabulary|appearance|views|unsealed|map)"
-      "([-.][0-9]+(of[0-9]+)?)?(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.report\\.json)*");
+      "([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
   return std::regex_match(name, kStageFile);
 }
 

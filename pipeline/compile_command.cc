@@ -32,7 +32,9 @@ struct Arguments {
   std::string output;
   std::string build_dir;
   std::string until;
-  int num_jobs = 1;
+  int num_shards = 1;
+  int num_jobs = 0;  // 0: as many as shards
+  std::string launcher;
 };
 
 // Stage -> the file that it writes.
@@ -197,14 +199,15 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
   CAIRN_RETURN_IF_ERROR(ReserveErrorFile(paths.build_dir));
 
   const auto dates_before = StampDates(paths.build_dir);
+  const int num_jobs = arguments.num_jobs > 0 ? arguments.num_jobs : arguments.num_shards;
   // Bars of stages that run side by side would overwrite each other.
-  const bool collides = arguments.num_jobs > 1 && environment.progress_style == "auto";
-  const std::vector<std::string> words = {
+  const bool collides = num_jobs > 1 && environment.progress_style == "auto";
+  std::vector<std::string> words = {
       "make",
       "--silent",
       "--no-print-directory",
       "--no-builtin-rules",
-      "--jobs=" + std::to_string(arguments.num_jobs),
+      "--jobs=" + std::to_string(num_jobs),
       "--file=" + rules,
       "BUILD=" + paths.build_dir,
       "CAIRN=" + paths.program,
@@ -212,7 +215,9 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
       "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
       "PROGRESS=" + (collides ? "lines" : environment.progress_style),
       "LOG_LEVEL=" + environment.log_level,
+      "SHARDS=" + std::to_string(arguments.num_shards),
       goal};
+  if (!arguments.launcher.empty()) words.push_back("LAUNCH=" + arguments.launcher);
   CAIRN_ASSIGN_OR_RETURN(
       const int wait_status,
       RunProgramAndWait(words, std::string(kBuildSessionVariable) + "=" + session, *environment.progress));
@@ -263,8 +268,17 @@ Command CompileCommand() {
           [arguments](CLI::App& app) {
             AddRecipeArguments(app, arguments.get());
             app.add_option("--until", arguments->until, "Stop after this stage")->type_name("STAGE");
-            app.add_option("-j,--jobs", arguments->num_jobs, "Stages to run side by side [1]")
-                ->check(CLI::Range(1, 10000))
+            app.add_option("--shards", arguments->num_shards,
+                           "Parts in which features and matches are made, each by a process of its own [1]")
+                ->check(CLI::Range(1, 100000))
+                ->type_name("N");
+            app.add_option("--launch", arguments->launcher,
+                           "Words put before every stage's command, for a cluster: 'srun -n1 -c2' "
+                           "(docs/cluster.md)")
+                ->type_name("WORDS");
+            app.add_option("-j,--jobs", arguments->num_jobs,
+                           "Stages or shards to run side by side [as many as --shards]")
+                ->check(CLI::Range(1, 100000))
                 ->type_name("N");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Compile(*arguments, environment); }};

@@ -17,9 +17,14 @@
 # Every rule that runs says first what changed.  `make -n` shows all that could run: what follows a stage runs only if
 # that stage's result differs.
 
+CAIRN_RULES := $(dir $(lastword $(MAKEFILE_LIST)))
 CAIRN ?= $(shell command -v cairn)
-# Put before every command, for example a cluster's `srun`.
+# Put before every command, for example a cluster's `srun` (docs/cluster.md).
 LAUNCH ?=
+# In how many parts stages 1 and 2 are done, each by a run of the program of its own: side by side with -j.
+SHARDS ?= 1
+# How often the pairs that matches predict are done in parts; what comes later, stage 2 does in one.
+SHARD_ROUNDS ?= 4
 THREADS ?= 0
 # Most memory for a stage, MiB; empty: most of the machine's.
 MEMORY ?=
@@ -27,7 +32,7 @@ PROGRESS ?= auto
 LOG_LEVEL ?= info
 
 # What changed, of a rule's prerequisites: the first, and how many more.
-CAIRN_CHANGED = $(patsubst $(@D)/%,%,$(patsubst $(CAPTURE)/%,%,$(filter-out cairn-missing,$?)))
+CAIRN_CHANGED = $(patsubst $(@D)/%,%,$(patsubst $(CAPTURE)/%,%,$(filter-out cairn-missing $(SHARD_STAMPS),$?)))
 CAIRN_REASON = $(if $(wildcard $@),$(if $(filter cairn-missing,$?),is missing,$(patsubst options/program,the \
     program,$(firstword $(CAIRN_CHANGED))) changed$(if $(word 2,$(CAIRN_CHANGED)),$(,) $(words $(wordlist \
     2,$(words $(CAIRN_CHANGED)),$(CAIRN_CHANGED))) more)),not made yet)
@@ -114,17 +119,36 @@ $(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
 # Changes with the program's bytes, whatever its date.
 PROGRAM_HASH := $(BUILD)/options/program
 
+CAIRN_LAUNCH = $(if $(strip $(LAUNCH)),$(CAIRN_RULES)launch $@ $(LAUNCH))
 # The stage holds the build folder, leaves X.report.json and then the stamp, with the date at which it began; where it
 # fails, error.json.
 CAIRN_FLAGS = --stamp $@ --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) \
     --log-level $(LOG_LEVEL)
+
+# Shards.  Each takes over what the output's last version and the shards of earlier rounds know, does its share of the
+# rest, and leaves X-ROUND-IofN.db; done, it stays done when others are killed.  Then the stage itself takes all of them
+# over, does what is missing and removes them.  They are SECONDARY: without them nothing is out of date.
+CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
+# $(call CAIRN_SHARD_STAMPS,X,ROUNDS)
+CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp))
+# $(call CAIRN_SHARD_RULE,X,ROUND,I,COMMAND,EARLIER ROUNDS)
+define CAIRN_SHARD_RULE
+.SECONDARY: $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(5))
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: PROGRESS := $(if $(filter json,$(PROGRESS)),json,none)
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(lastword $(5))),$(BUILD)/$(1).begun)
+	$$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$(SHARDS) $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
+	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
+endef
+CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
+CAIRN_REMOVE_SHARDS = $(if $(SHARD_STAMPS),rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*)
 
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
 $(BUILD)/capture.stamp: $(BUILD)/options/simulate.toml $(BUILD)/options/seed $(PROGRAM_HASH)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
+	$(CAIRN_LAUNCH) $(CAIRN) simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
 else
 CAPTURE_STAMP :=
 endif
@@ -133,52 +157,75 @@ endif
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
 $(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(wildcard $(CAPTURE)/frame.json))
 
-$(BUILD)/features.db.stamp: $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) \
-    $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
+CAIRN_EXTRACT = extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml
+FEATURES_INPUTS := $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) $(CAPTURE_STAMP) \
+    $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
+FEATURES_SHARDS := $(call CAIRN_SHARD_STAMPS,features,1)
+$(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call CAIRN_SHARD_RULE,features,1,$(shard),CAIRN_EXTRACT,)))
+.SECONDARY: $(BUILD)/features.begun
+$(BUILD)/features.begun: $(FEATURES_INPUTS)
+	rm -f $(@:.begun=)-*of*
+	touch $@
+
+$(BUILD)/features.db.stamp: SHARD_STAMPS := $(FEATURES_SHARDS)
+$(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml \
-	    --depfile $(@D)/images.d -o $(@:.stamp=) $(CAIRN_FLAGS)
+	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_EXTRACT) --depfile $(@D)/images.d $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) \
+	    $(CAIRN_FLAGS)
+	$(CAIRN_REMOVE_SHARDS)
 
 # Matching wants the visual words first where it looks for images that look alike.
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
     $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
-$(BUILD)/matches.db.stamp: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
-$(BUILD)/matches.db.stamp: $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
+$(BUILD)/%: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
+CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) \
+    --options $(@D)/options/match_features.toml
+MATCHES_INPUTS := $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)
+MATCHES_ROUNDS := $(shell seq $(SHARD_ROUNDS))
+MATCHES_SHARDS := $(call CAIRN_SHARD_STAMPS,matches,$(MATCHES_ROUNDS))
+$(foreach round,$(MATCHES_ROUNDS),$(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call \
+    CAIRN_SHARD_RULE,matches,$(round),$(shard),CAIRN_MATCH,$(shell seq 1 $$(($(round) - 1)))))))
+.SECONDARY: $(BUILD)/matches.begun
+$(BUILD)/matches.begun: $(MATCHES_INPUTS)
+	rm -f $(@:.begun=)-*of*
+	touch $@
+
+$(BUILD)/matches.db.stamp: SHARD_STAMPS := $(MATCHES_SHARDS)
+$(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) match-features $(@D)/features.db --capture $(CAPTURE) \
-	    $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) --options $(@D)/options/match_features.toml -o $(@:.stamp=) \
-	    $(CAIRN_FLAGS)
+	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) $(CAIRN_FLAGS)
+	$(CAIRN_REMOVE_SHARDS)
 
 # Captures without poses only.  The folder's date is that of its last change.
 $(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_IMAGES) $(KNOWN_PLACES)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
+	$(CAIRN_LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
 	    --options $(@D)/options/reconstruct.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 $(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(POSES_READY)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
+	$(CAIRN_LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 $(BUILD)/world.db.stamp: $(BUILD)/classes.db $(BUILD)/options/filter_visibility.toml $(PROGRAM_HASH)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
+	$(CAIRN_LAUNCH) $(CAIRN) filter-visibility $(@D)/classes.db \
 	    --options $(@D)/options/filter_visibility.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/options/decompose_regions.toml \
     $(BUILD)/options/seed $(PROGRAM_HASH)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db --classes $(@D)/classes.db \
+	$(CAIRN_LAUNCH) $(CAIRN) decompose-regions $(@D)/world.db --classes $(@D)/classes.db \
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 # Held-out images of a reconstructed capture have features too, but no words.
 $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
+	$(CAIRN_LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
@@ -189,7 +236,7 @@ $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
     $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN) $(POSES_READY)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
+	$(CAIRN_LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
@@ -197,5 +244,5 @@ $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/re
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(BUILD)/options/seed $(CAIRN) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_WHY)
-	$(LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
+	$(CAIRN_LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
