@@ -85,7 +85,7 @@ Status ReplaceFileAtomically(const std::string& path,
     status = MakeError(ErrorCode::kIo, "{}: cannot be replaced: {}", path, std::strerror(errno));
   }
   if (!status.ok()) {
-    fs::remove(temporary, error);
+    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) fs::remove(temporary + suffix, error);
     return status;
   }
   return SyncPath(folder.string(), O_RDONLY | O_DIRECTORY);

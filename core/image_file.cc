@@ -87,6 +87,7 @@ Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path)
     cv::Mat grey = cv::imdecode(buffer, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
     if (!grey.empty()) return grey;
   } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault
     return MakeError(ErrorCode::kCorrupt, "{}: cannot be decoded: {}", path, exception.err);
   }
   return MakeError(ErrorCode::kCorrupt,

@@ -3,6 +3,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -53,6 +55,24 @@ int64_t ControlGroupLimit() {
 int64_t DefaultMemoryMib() {
   const int64_t machine = int64_t{sysconf(_SC_PHYS_PAGES)} * sysconf(_SC_PAGESIZE);
   return std::max<int64_t>(1, std::min(machine, ControlGroupLimit()) / 5 * 4 >> 20);
+}
+
+Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mib) {
+  const int64_t needed_mib = (num_bytes + kProgramBytes + (int64_t{1} << 20) - 1) >> 20;
+  if (needed_mib <= memory_mib) return Ok();
+  return MakeError(
+      ErrorCode::kFailed,
+      "{} takes about {} MiB of memory, but --memory allows {}; give it more, or use a larger machine", work,
+      needed_mib, memory_mib);
+}
+
+Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,
+                          int64_t memory_mib) {
+  std::error_code error;
+  const auto num_bytes = static_cast<double>(std::filesystem::file_size(path, error));
+  if (error) return Ok();  // whoever reads the file tells why it cannot be read
+  return CheckMemory(fmt::format("{} of {}", work, path), std::llround(bytes_per_file_byte * num_bytes),
+                     memory_mib);
 }
 
 }  // namespace cairn

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -40,7 +41,11 @@ void ParallelFor(int64_t num_items, int num_threads, const std::function<void(in
     }
   };
   std::vector<std::thread> workers;
-  for (int64_t w = 1; w < num_workers; ++w) workers.emplace_back(work);
+  workers.reserve(num_workers - 1);
+  try {
+    for (int64_t w = 1; w < num_workers; ++w) workers.emplace_back(work);
+  } catch (const std::system_error&) {  // no memory or no room for more threads: fewer do as well
+  }
   work();
   for (std::thread& worker : workers) worker.join();
   if (first_exception) std::rethrow_exception(first_exception);

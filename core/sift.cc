@@ -104,6 +104,7 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
     cv::SIFT::create(0, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
         ->detectAndCompute(grey, mask, keypoints, descriptors);
   } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault
     return MakeError(ErrorCode::kFailed, "SIFT failed on an image of {} x {} px: {}", grey.cols, grey.rows,
                      exception.err);
   }

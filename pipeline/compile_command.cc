@@ -12,6 +12,8 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <thread>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -21,6 +23,7 @@
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/recipe.h"
+#include "pipeline/stop_signal.h"
 
 namespace cairn {
 namespace {
@@ -35,6 +38,7 @@ struct Arguments {
   int num_shards = 1;
   int num_jobs = 0;  // 0: as many as shards
   std::string launcher;
+  bool no_space_check = false;
 };
 
 // Stage -> the file that it writes.
@@ -148,12 +152,15 @@ Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::
                      std::strerror(reason));
   }
   int wait_status = 0;
-  while (waitpid(pid, &wait_status, 0) < 0) {
-    if (errno != EINTR)
+  bool is_told = false;
+  while (true) {
+    const pid_t ended = waitpid(pid, &wait_status, WNOHANG);
+    if (ended == pid) return wait_status;
+    if (ended < 0 && errno != EINTR)
       return MakeError(ErrorCode::kFailed, "waiting for {}: {}", words[0], std::strerror(errno));
-    if (progress.Cancelled()) kill(pid, SIGTERM);
+    if (progress.Cancelled() && !std::exchange(is_told, true)) kill(pid, SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  return wait_status;
 }
 
 // The stage has printed its message already.
@@ -188,6 +195,7 @@ Status TellOfRun(const BuildRun& run, const BuildPaths& paths, std::ostream& out
 }
 
 Status Compile(const Arguments& arguments, const CommandEnvironment& environment) {
+  LiftStopDeadline();
   const auto begin = std::chrono::steady_clock::now();
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
@@ -213,6 +221,7 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
       "CAIRN=" + paths.program,
       "THREADS=" + std::to_string(environment.num_threads),
       "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
+      std::string("SPACE_CHECK=") + (arguments.no_space_check ? "no" : ""),
       "PROGRESS=" + (collides ? "lines" : environment.progress_style),
       "LOG_LEVEL=" + environment.log_level,
       "SHARDS=" + std::to_string(arguments.num_shards),
@@ -231,6 +240,7 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
                   .ran = RanSince(dates_before, paths.build_dir)};
   if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths);
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  RemoveStaleTemporaries(paths.build_dir);  // of stages that were stopped
   const Status told = TellOfRun(run, paths, *environment.out);
   if (run.error) return *run.error;
   CAIRN_RETURN_IF_ERROR(told);
@@ -280,6 +290,8 @@ Command CompileCommand() {
                            "Stages or shards to run side by side [as many as --shards]")
                 ->check(CLI::Range(1, 100000))
                 ->type_name("N");
+            app.add_flag("--no-space-check", arguments->no_space_check,
+                         "Begin even if the disk seems too full for the stages' files");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Compile(*arguments, environment); }};
 }

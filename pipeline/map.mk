@@ -28,6 +28,8 @@ SHARD_ROUNDS ?= 4
 THREADS ?= 0
 # Most memory for a stage, MiB; empty: most of the machine's.
 MEMORY ?=
+# "no": stages 1 and 2 begin even if the disk seems too full for their results.
+SPACE_CHECK ?=
 PROGRESS ?= auto
 LOG_LEVEL ?= info
 
@@ -124,6 +126,7 @@ CAIRN_LAUNCH = $(if $(strip $(LAUNCH)),$(CAIRN_RULES)launch $@ $(LAUNCH))
 # fails, error.json.
 CAIRN_FLAGS = --stamp $@ --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) \
     --log-level $(LOG_LEVEL)
+CAIRN_NO_SPACE_CHECK = $(if $(filter no,$(SPACE_CHECK)),--no-space-check)
 
 # Shards.  Each takes over what the output's last version and the shards of earlier rounds know, does its share of the
 # rest, and leaves X-ROUND-IofN.db; done, it stays done when others are killed.  Then the stage itself takes all of them
@@ -157,7 +160,7 @@ endif
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
 $(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(wildcard $(CAPTURE)/frame.json))
 
-CAIRN_EXTRACT = extract-features $(CAPTURE) --options $(@D)/options/extract_features.toml
+CAIRN_EXTRACT = extract-features $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) --options $(@D)/options/extract_features.toml
 FEATURES_INPUTS := $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) $(CAPTURE_STAMP) \
     $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
 FEATURES_SHARDS := $(call CAIRN_SHARD_STAMPS,features,1)
@@ -178,7 +181,7 @@ $(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
     $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
 $(BUILD)/%: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
-CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) \
+CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) \
     --options $(@D)/options/match_features.toml
 MATCHES_INPUTS := $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)

@@ -1,16 +1,15 @@
 #include "pipeline/program.h"
 
 #include <unistd.h>
-#include <csignal>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <new>
 #include <optional>
 #include <sstream>
+#include <system_error>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -22,40 +21,13 @@
 #include "core/parallel.h"
 #include "pipeline/build_step.h"
 #include "pipeline/progress.h"
+#include "pipeline/stop_signal.h"
 
 namespace cairn {
 namespace {
 
 constexpr int kUsageExitCode = 2;
-
-std::atomic<bool> stop_requested = false;
-std::atomic<int64_t> stop_requested_ms = 0;  // of the monotonic clock
-static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int64_t>::is_always_lock_free,
-              "the signal handler must not lock");
-
-// The first signal asks for a stop, the second one ends the process.  What comes within a second is the same
-// request: timeout(1) signals a process and then its group.
-void RequestStop(int signal) {
-  constexpr int64_t kSameRequestMs = 1000;
-  timespec now = {};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  const int64_t now_ms = int64_t{1000} * now.tv_sec + now.tv_nsec / 1000000;
-  if (!stop_requested) {
-    stop_requested_ms = now_ms;
-    stop_requested = true;
-  } else if (now_ms - stop_requested_ms > kSameRequestMs) {
-    std::signal(signal, SIG_DFL);
-    std::raise(signal);
-  }
-}
-
-void CatchStopSignals() {
-  stop_requested = false;
-  struct sigaction action = {};
-  action.sa_handler = RequestStop;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
+const Error kStopped = {ErrorCode::kCancelled, "stopped on request"};
 
 struct CommonArguments {
   int num_threads = 0;
@@ -110,7 +82,7 @@ std::unique_ptr<Progress> MakeTerminalProgress(ProgressStyle style) {
                     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
                         .count();
                   },
-              .cancelled = [] { return stop_requested.load(); }});
+              .cancelled = [] { return StopRequested(); }});
 }
 
 // Messages go to stderr, as does the bar: a message first clears the bar's line.
@@ -132,7 +104,10 @@ Error OutOfMemory(const CommandEnvironment& environment) {
 Status RunCaught(const Command& command, const CommandEnvironment& environment) {
   try {
     Status status = command.run(environment);
-    if (!status.ok() && stop_requested) return MakeError(ErrorCode::kCancelled, "stopped on request");
+    if (!status.ok() && StopRequested()) return kStopped;
+    // SQLite calls it an error of the file that it was about to read or write.
+    if (!status.ok() && status.error().message.ends_with("SQLite says: out of memory"))
+      return OutOfMemory(environment);
     return status;
   } catch (const std::bad_alloc&) {
     return OutOfMemory(environment);
@@ -140,6 +115,11 @@ Status RunCaught(const Command& command, const CommandEnvironment& environment) 
     if (exception.code == cv::Error::StsNoMem) return OutOfMemory(environment);
     return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
                      exception.what());
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      return OutOfMemory(environment);  // a thread
+    return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
+                     error.what());
   } catch (const std::exception& exception) {
     return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
                      exception.what());
@@ -165,7 +145,7 @@ std::string StageName(std::string command) {
 
 // Runs the command; what it printed and reported goes to the files that were asked for.
 Status RunCommand(const Command& command, const CommonArguments& arguments, CommandEnvironment environment,
-                  std::ostream& out) {
+                  std::ostream& out, std::ostream& err) {
   const auto begin = std::chrono::steady_clock::now();
   std::optional<BuildStep> step;
   if (!arguments.stamp.empty()) {
@@ -174,6 +154,8 @@ Status RunCommand(const Command& command, const CommonArguments& arguments, Comm
   }
   const std::string report_file =
       arguments.report_file.empty() && step ? step->ReportPath() : arguments.report_file;
+  // What it would still have written is left as a kill leaves it.
+  const StopDeadline deadline([&] { std::_Exit(Report(command.name, arguments, kStopped, err)); });
   StageReport report;
   std::ostringstream printed;
   environment.report = &report;
@@ -247,7 +229,7 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
       .progress = progress.get()};
   const auto command =
       std::find_if(commands.begin(), commands.end(), [&](const Command& c) { return c.name == name; });
-  Status status = RunCommand(*command, arguments, environment, out);
+  Status status = RunCommand(*command, arguments, environment, out, err);
   out.flush();
   if (status.ok() && !out)
     status = MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?");

@@ -8,10 +8,14 @@
 
 #include "core/capture.h"
 #include "core/colmap_database.h"
+#include "core/memory.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
 namespace cairn {
 namespace {
+
+// Bytes of memory for one of the input file.
+constexpr double kMemoryPerFileByte = 1.5;
 
 struct Arguments {
   std::string features_path;
@@ -45,6 +49,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     survey.emplace();
     for (const CaptureImage& image : capture.images) survey->insert(image.name);
   }
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("learning the words", arguments.features_path, kMemoryPerFileByte,
+                                           environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
                          ReadDescriptors(arguments.features_path, survey));
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,

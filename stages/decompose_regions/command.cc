@@ -3,12 +3,17 @@
 #include <spdlog/spdlog.h>
 
 #include "core/file.h"
+#include "core/memory.h"
 #include "stages/decompose_regions/decompose_regions.h"
 #include "stages/decompose_regions/picture.h"
 #include "stages/decompose_regions/reduced_world.h"
 
 namespace cairn {
 namespace {
+
+// Bytes of memory for one of the world, and of the classes that landmarks are chosen by.
+constexpr double kMemoryPerWorldByte = 8;
+constexpr double kMemoryPerClassesByte = 1.5;
 
 struct Arguments {
   std::string world;
@@ -32,6 +37,10 @@ void WarnIfDisconnected(const World& world) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("decomposing the world", arguments.world, kMemoryPerWorldByte,
+                                           environment.memory_mib));
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("choosing landmarks by the classes", arguments.classes,
+                                           kMemoryPerClassesByte, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
   WarnIfDisconnected(world);
   Result<Decomposition> result =

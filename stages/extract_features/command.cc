@@ -5,10 +5,12 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/disk_space.h"
 #include "core/file.h"
 #include "core/reuse_arguments.h"
 #include "stages/extract_features/dependency_file.h"
 #include "stages/extract_features/extract_features.h"
+#include "stages/extract_features/resources.h"
 
 namespace cairn {
 namespace {
@@ -19,6 +21,7 @@ struct Arguments {
   std::string capture;
   std::string output;
   std::string depfile;
+  bool no_space_check = false;
   ExtractFeaturesOptions options;
   OptionArguments option_arguments;
   ReuseArguments reuse;
@@ -40,9 +43,17 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   for (const std::string& warning : capture.warnings) spdlog::warn("{}", warning);
+  if (!arguments.no_space_check) {
+    CAIRN_RETURN_IF_ERROR(CheckDiskSpace(fmt::format("the features of {} images", capture.images.size()),
+                                         fs::absolute(arguments.output).parent_path(),
+                                         EstimateFeaturesBytes(capture, arguments.options)));
+  }
+  CAIRN_ASSIGN_OR_RETURN(
+      const int num_threads,
+      ThreadsThatFit(capture, arguments.options, environment.num_threads, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const ExtractFeaturesSummary summary,
-                         ExtractFeatures(capture, arguments.options, arguments.output,
-                                         environment.num_threads, *environment.progress, reuse));
+                         ExtractFeatures(capture, arguments.options, arguments.output, num_threads,
+                                         *environment.progress, reuse));
   for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
   for (const Reject& reject : summary.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
   if (!arguments.depfile.empty()) {
@@ -80,6 +91,8 @@ Command ExtractFeaturesCommand() {
                                "read and its folder")
                     ->type_name("FILE.d");
                 arguments->reuse.Add(app, "images");
+                app.add_flag("--no-space-check", arguments->no_space_check,
+                             "Begin even if the disk seems too full for the result");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

@@ -1,9 +1,13 @@
 #include "stages/filter_visibility/command.h"
 
+#include "core/memory.h"
 #include "stages/filter_visibility/filter_visibility.h"
 
 namespace cairn {
 namespace {
+
+// Bytes of memory for one of the input file.
+constexpr double kMemoryPerFileByte = 1.5;
 
 struct Arguments {
   std::string classes;
@@ -14,6 +18,8 @@ struct Arguments {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("filtering the classes", arguments.classes, kMemoryPerFileByte,
+                                           environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
   CAIRN_ASSIGN_OR_RETURN(const FilterVisibilityResult result, FilterVisibility(classes, arguments.options));
   const World& world = result.world;

@@ -1,9 +1,13 @@
 #include "stages/group_classes/command.h"
 
+#include "core/memory.h"
 #include "stages/group_classes/group_classes.h"
 
 namespace cairn {
 namespace {
+
+// Bytes of memory for one of the input file.
+constexpr double kMemoryPerFileByte = 3;
 
 struct Arguments {
   std::string matches;
@@ -16,6 +20,8 @@ struct Arguments {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
+  CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches, kMemoryPerFileByte,
+                                           environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
   // A reconstruction refines the database's cameras, under their numbers, along with the poses.
   if (capture.frame && capture.frame->is_reconstructed) {

@@ -1,17 +1,25 @@
 #include "stages/match_features/command.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 
 #include <spdlog/spdlog.h>
 
+#include "core/disk_space.h"
 #include "core/reuse_arguments.h"
 #include "stages/match_features/match_features.h"
 
 namespace cairn {
 namespace {
 
+namespace fs = std::filesystem;
+
+// Size of matches.db by that of features.db, which it has a copy of.
+constexpr double kMatchesPerFeaturesBytes = 1.25;
+
 struct Arguments {
+  bool no_space_check = false;
   MatchFeaturesInputs inputs;
   std::string capture;
   std::string output;
@@ -53,6 +61,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const auto share_mib = static_cast<int>(std::min<int64_t>(environment.memory_mib * 3 / 4, 1 << 24));
   budget_mib = std::max(1, environment.memory_given ? share_mib : std::min(share_mib, budget_mib));
   if (capture) inputs.capture = &*capture;
+  std::error_code error;  // a file that is not there is the stage's to tell
+  const auto features_bytes = static_cast<double>(fs::file_size(inputs.features_path, error));
+  if (!arguments.no_space_check && !error) {
+    CAIRN_RETURN_IF_ERROR(CheckDiskSpace("a copy of the features with matches",
+                                         fs::absolute(arguments.output).parent_path(),
+                                         static_cast<int64_t>(kMatchesPerFeaturesBytes * features_bytes)));
+  }
   CAIRN_ASSIGN_OR_RETURN(const MatchFeaturesSummary summary,
                          MatchFeatures(inputs, options, arguments.output, environment.seed,
                                        environment.num_threads, *environment.progress, reuse));
@@ -95,6 +110,8 @@ Command MatchFeaturesCommand() {
                     ->required()
                     ->type_name("matches.db");
                 arguments->reuse.Add(app, "pairs");
+                app.add_flag("--no-space-check", arguments->no_space_check,
+                             "Begin even if the disk seems too full for the result");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

@@ -54,7 +54,8 @@ std::optional<Eigen::Matrix3d> Run(const PointPairs& pairs, size_t min_num_point
     cv::cv2eigen(model, matrix);
     if (!matrix.allFinite() || matrix.norm() < 1e-12) return std::nullopt;
     return matrix / matrix.norm();
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();
     return std::nullopt;  // OpenCV's estimators throw on some degenerate sets
   }
 }

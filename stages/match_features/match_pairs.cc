@@ -123,7 +123,7 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
     }
     std::future<Result<FeaturesOfImages>> next;
     if (stretch + 1 < ends.size()) {
-      next = std::async(std::launch::async, [&, stretch] {
+      next = std::async(std::launch::async | std::launch::deferred, [&, stretch] {
         return ReadStretch(database, images, pairs, ends[stretch], ends[stretch + 1], features, progress);
       });
     }

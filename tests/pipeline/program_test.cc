@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -16,6 +17,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "core/database.h"
 #include "core/file.h"
 #include "core/temporary.h"
 #include "pipeline/build_step.h"
@@ -96,6 +98,17 @@ TEST(Program, ExceptionsEndWithAMessage) {
   const Outcome out_of_memory = RunStage({"stage", "--memory", "77"},
                                          [](const CommandEnvironment&) -> Status { throw std::bad_alloc(); });
   EXPECT_EQ(out_of_memory.exit_code, 1);
+  const Outcome sqlite = RunStage({"stage"}, [](const CommandEnvironment&) -> Status {
+    return WithDatabaseErrors("a.db", []() -> Status {
+      SQLite::Database database(":memory:", SQLite::OPEN_READWRITE);
+      sqlite3_hard_heap_limit64(1);
+      const auto lift = std::shared_ptr<void>(nullptr, [](void*) { sqlite3_hard_heap_limit64(0); });
+      database.exec("CREATE TABLE t (x)");
+      return Ok();
+    });
+  });
+  EXPECT_EQ(sqlite.exit_code, 1);
+  EXPECT_THAT(sqlite.err, HasSubstr("--memory"));
   EXPECT_THAT(out_of_memory.err, HasSubstr("out of memory, with --memory 77"));
   const Outcome outcome =
       RunStage({"stage"}, [](const CommandEnvironment&) -> Status { throw std::runtime_error("oops"); });
@@ -205,6 +218,18 @@ TEST(Program, InterruptEndsTheCommandWithTheCodeOfCancelled) {
   });
   EXPECT_EQ(outcome.exit_code, 10);
   EXPECT_THAT(outcome.err, HasSubstr("stopped on request"));
+}
+
+TEST(Program, CommandThatNeverLooksForARequestIsEndedWithinASecond) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EXIT(RunStage({"stage"},
+                       [](const CommandEnvironment&) -> Status {
+                         std::raise(SIGTERM);
+                         while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
+                       }),
+              testing::ExitedWithCode(10), "");
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(700));
 }
 
 }  // namespace

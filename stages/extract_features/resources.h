@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/capture.h"
+#include "core/error.h"
+#include "stages/extract_features/extract_features.h"
+
+namespace cairn {
+
+// How many of `num_threads` threads (0: all cores) can each work on a capture's largest image within
+// `memory_mib`. Errors: Failed when not even one can: says what one takes.
+Result<int> ThreadsThatFit(const Capture& capture, const ExtractFeaturesOptions& options, int num_threads,
+                           int64_t memory_mib);
+
+// Bytes of features.db, estimated: images mostly have fewer keypoints than they may.
+int64_t EstimateFeaturesBytes(const Capture& capture, const ExtractFeaturesOptions& options);
+
+}  // namespace cairn
