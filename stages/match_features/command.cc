@@ -7,6 +7,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/disk_space.h"
+#include "core/memory.h"
 #include "core/reuse_arguments.h"
 #include "stages/match_features/match_features.h"
 
@@ -57,6 +58,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   MatchFeaturesInputs inputs = arguments.inputs;
   MatchFeaturesOptions options = arguments.options;
+  CAIRN_RETURN_IF_ERROR(CheckMemory("matching two images", 0, environment.memory_mib));
   int& budget_mib = options.matching.memory_budget_mib;
   const auto share_mib = static_cast<int>(std::min<int64_t>(environment.memory_mib * 3 / 4, 1 << 24));
   budget_mib = std::max(1, environment.memory_given ? share_mib : std::min(share_mib, budget_mib));
