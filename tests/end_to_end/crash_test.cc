@@ -364,7 +364,7 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_THAT(refused.err, ContainsRegex("takes about [0-9]+ MiB of memory, but --memory allows 60"));
     // Less than it was told: whatever gives out first, an error that names --memory and no crash.
-    for (const int limit_mib : {16, 20, 24, 32}) {
+    for (const int limit_mib : {32, 48, 64}) {
       const ProgramRun cut_short =
           RunShell(fmt::format("ulimit -d $(({} * 1024)); {} --memory 4000", limit_mib, command));
       if (cut_short.exit_code != 0) {
