@@ -34,8 +34,27 @@ std::string BuildId(const dl_phdr_info& object) {
   return "";
 }
 
+int CountObject(dl_phdr_info*, size_t, void* count) {
+  ++*static_cast<int*>(count);
+  return 0;
+}
+
+// Objects that the program is linked with; whatever is loaded later (OpenCV looks for OpenCL) follows them.
+const int num_linked_objects = [] {
+  int count = 0;
+  dl_iterate_phdr(CountObject, &count);
+  return count;
+}();
+
+struct Libraries {
+  int num_objects = 0;
+  std::vector<std::string> ids;
+};
+
 // Called for the executable first (its name is empty), then for each library.
-int AddLibrary(dl_phdr_info* object, size_t, void* libraries) {
+int AddLibrary(dl_phdr_info* object, size_t, void* context) {
+  auto& libraries = *static_cast<Libraries*>(context);
+  if (++libraries.num_objects > num_linked_objects) return 1;
   const std::string_view name = object->dlpi_name;
   if (!name.starts_with('/')) return 0;  // the executable, and the kernel's own
   std::string id = BuildId(*object);
@@ -43,18 +62,18 @@ int AddLibrary(dl_phdr_info* object, size_t, void* libraries) {
     const auto hash = HashFile(object->dlpi_name);
     id = hash.ok() ? *hash : std::string(name);
   }
-  static_cast<std::vector<std::string>*>(libraries)->push_back(std::move(id));
+  libraries.ids.push_back(std::move(id));
   return 0;
 }
 
 std::string MakeIdentity() {
   const auto executable = HashFile("/proc/self/exe");
   if (!executable.ok()) return "";
-  std::vector<std::string> libraries;
+  Libraries libraries;
   dl_iterate_phdr(AddLibrary, &libraries);
-  std::sort(libraries.begin(), libraries.end());
+  std::sort(libraries.ids.begin(), libraries.ids.end());
   std::string identity = *executable;
-  for (const std::string& library : libraries) identity += library;
+  for (const std::string& library : libraries.ids) identity += library;
   identity += cv::getVersionString();
   identity += cv::getCPUFeaturesLine();
   identity += NameOf(FastestKernel());

@@ -72,6 +72,8 @@ class ReuseSources {
   // Why what was added gives nothing, one message for each.
   const std::vector<std::string>& unusable() const { return unusable_; }
 
+  bool empty() const { return sources_.empty(); }
+
   // The first result of this key for which `read(const ReuseEntry&, Source&)` returns one (a std::optional);
   // exceptions of SQLite count as none.  Any thread.
   template <typename Read>

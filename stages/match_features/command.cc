@@ -38,6 +38,12 @@ void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::
     return;
   }
   const std::string shard = fmt::format("shard {}/{}", reuse.shard->index, reuse.shard->count);
+  if (!summary.image_step.empty()) {
+    out << fmt::format("match_features: {}: {} of {} images, {} taken over; {} left to other shards\n", shard,
+                       summary.image_step, summary.num_image_results, summary.num_taken_over,
+                       summary.num_left_to_others);
+    return;
+  }
   if (summary.num_pairs_tried + summary.num_left_to_others == 0) {
     out << fmt::format("match_features: {}: nothing to do, all pairs ({}) are known\n", shard, summary.pairs);
     return;

@@ -1,6 +1,7 @@
 #include "stages/match_features/match_features.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -9,7 +10,7 @@
 #include "core/file.h"
 #include "stages/match_features/match_round.h"
 #include "stages/match_features/pair_list.h"
-#include "stages/match_features/retrieve_pairs.h"
+#include "stages/match_features/partners_by_looks.h"
 
 namespace cairn {
 namespace {
@@ -36,41 +37,53 @@ Result<std::vector<PosedCamera>> PosedCameras(const MatchImages& images) {
   return posed;
 }
 
-Result<IndexPairs> SelectSequencePairs(SQLite::Database& features, const MatchImages& images,
-                                       const MatchFeaturesInputs& inputs, const MatchFeaturesOptions& options,
-                                       uint64_t seed, int num_threads, Progress& progress) {
+// Each image with its neighbours in the order of names, and with loop candidates.
+Result<std::optional<IndexPairs>> SelectSequencePairs(SQLite::Database* shard_database, MatchRun* run) {
+  const MatchFeaturesOptions& options = run->options;
   std::vector<std::string> names;
-  for (const MatchImage& image : images.images) names.push_back(image.name);
+  for (const MatchImage& image : run->images.images) names.push_back(image.name);
   const std::vector<int> order = NaturalOrder(names);
   IndexPairs pairs = SequencePairs(order, options.sequence_window);
-  if (options.num_loop_candidates == 0) return pairs;
-  CAIRN_ASSIGN_OR_RETURN(
-      const ImageSimilarity similarity,
-      MeasureSimilarity(features, images, inputs.vocabulary_path, seed, num_threads, progress));
-  const IndexPairs loops =
-      LoopPairs(similarity, order, options.sequence_window, options.num_loop_candidates, num_threads);
+  if (options.num_loop_candidates == 0) return std::optional(std::move(pairs));
+  ContentHasher key;
+  key.Text("loops").UInt(options.sequence_window).UInt(options.num_loop_candidates);
+  for (const int idx : order) key.UInt(idx);
+  const LooksRule rule = {.key = key.Finish(),
+                          .partners = [&](const ImageSimilarity& similarity, const std::vector<int>& idxs) {
+                            return LoopPartners(similarity, idxs, order, options.sequence_window,
+                                                options.num_loop_candidates, run->num_threads);
+                          }};
+  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, shard_database, run));
+  if (!partners) return std::optional<IndexPairs>();
+  const IndexPairs loops = PairsFromPartners(*partners);
   pairs.insert(pairs.end(), loops.begin(), loops.end());
   std::sort(pairs.begin(), pairs.end());
-  return pairs;
+  return std::optional(std::move(pairs));
 }
 
-// Pairs by every method but frustum.
-Result<IndexPairs> SelectPairs(SQLite::Database& features, const MatchImages& images,
-                               const MatchFeaturesInputs& inputs, const MatchFeaturesOptions& options,
-                               const std::string& method, uint64_t seed, int num_threads,
-                               Progress& progress) {
+Result<std::optional<IndexPairs>> SelectRetrievedPairs(SQLite::Database* shard_database, MatchRun* run) {
+  const int num_retrieved = run->options.num_retrieved;
+  const LooksRule rule = {.key = ContentHasher().Text("retrieved").UInt(num_retrieved).Finish(),
+                          .partners = [&](const ImageSimilarity& similarity, const std::vector<int>& idxs) {
+                            return RetrievedPartners(similarity, idxs, num_retrieved, run->num_threads);
+                          }};
+  CAIRN_ASSIGN_OR_RETURN(const auto partners, PartnersByLooks(rule, shard_database, run));
+  if (!partners) return std::optional<IndexPairs>();
+  return std::optional(PairsFromPartners(*partners));
+}
+
+// Pairs by every method but frustum.  Nothing: the run is a shard that has done its share of choosing them,
+// and has written it to its database.
+Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, MatchRun* run) {
+  const std::string& method = run->summary.pairs;
   if (method == "list") {
-    CAIRN_ASSIGN_OR_RETURN(PairList list, ReadPairList(inputs.pair_list_path, images));
-    return std::move(list.pairs);
+    CAIRN_ASSIGN_OR_RETURN(PairList list, ReadPairList(run->inputs.pair_list_path, run->images));
+    return std::optional(std::move(list.pairs));
   }
-  const int num_images = static_cast<int>(images.images.size());
-  if (method == "exhaustive") return ExhaustivePairs(num_images);
-  if (method == "sequence")
-    return SelectSequencePairs(features, images, inputs, options, seed, num_threads, progress);
-  CAIRN_ASSIGN_OR_RETURN(
-      const ImageSimilarity similarity,
-      MeasureSimilarity(features, images, inputs.vocabulary_path, seed, num_threads, progress));
-  return RetrievedPairs(similarity, num_images, options.num_retrieved, num_threads);
+  if (method == "exhaustive")
+    return std::optional(ExhaustivePairs(static_cast<int>(run->images.images.size())));
+  return method == "sequence" ? SelectSequencePairs(shard_database, run)
+                              : SelectRetrievedPairs(shard_database, run);
 }
 
 // What the predictor knows of the images, in the world frame.
@@ -143,22 +156,26 @@ Status CheckRanges(const MatchFeaturesOptions& options) {
   return Ok();
 }
 
-Status MatchAll(const IndexPairs& pairs, SQLite::Database& database, MatchRun* run) {
-  if (run->summary.pairs == "frustum") return MatchFrustum(database, run);
-  CAIRN_RETURN_IF_ERROR(MatchRound(pairs, nullptr, database, run));
-  return Ok();
-}
-
 // The database of the features, with the verified pairs.
-Status WriteMatches(const std::string& matches_path, const std::string& features_path,
-                    const IndexPairs& pairs, MatchRun* run) {
+Status WriteMatches(const std::string& matches_path, MatchRun* run) {
+  const std::string& features_path = run->inputs.features_path;
+  IndexPairs pairs;
+  if (run->summary.pairs != "frustum") {
+    auto selected = WithDatabaseErrors(features_path, [&] { return SelectPairs(nullptr, run); });
+    if (!selected.ok()) return selected.error();
+    pairs = std::move(selected).value().value();
+  }
   return ReplaceFileAtomically(matches_path, [&](const std::string& temporary) -> Status {
     return WithDatabaseErrors(temporary, [&]() -> Status {
       CopyColmapDatabase(run->features, temporary);
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
       database.exec(
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");
-      CAIRN_RETURN_IF_ERROR(MatchAll(pairs, database, run));
+      if (run->summary.pairs == "frustum") {
+        CAIRN_RETURN_IF_ERROR(MatchFrustum(database, run));
+      } else {
+        CAIRN_RETURN_IF_ERROR(MatchRound(std::move(pairs), nullptr, database, run));
+      }
       if (run->summary.num_pairs_verified == 0) {
         return MakeError(
             ErrorCode::kNoData,
@@ -172,10 +189,16 @@ Status WriteMatches(const std::string& matches_path, const std::string& features
   });
 }
 
-// Only the shard's pairs, without features.
-Status WriteShard(const std::string& matches_path, const IndexPairs& pairs, MatchRun* run) {
-  return WriteDatabase(matches_path, kColmapSchema,
-                       [&](SQLite::Database& database) { return MatchAll(pairs, database, run); });
+// Only the shard's results, without features.
+Status WriteShard(const std::string& matches_path, MatchRun* run) {
+  return WriteDatabase(matches_path, kColmapSchema, [&](SQLite::Database& database) -> Status {
+    if (run->images.images.size() < 2) return Ok();
+    if (run->summary.pairs == "frustum") return MatchFrustum(database, run);
+    CAIRN_ASSIGN_OR_RETURN(std::optional<IndexPairs> pairs, SelectPairs(&database, run));
+    if (!pairs) return Ok();
+    CAIRN_RETURN_IF_ERROR(MatchRound(std::move(*pairs), nullptr, database, run));
+    return Ok();
+  });
 }
 
 }  // namespace
@@ -191,8 +214,10 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
   if (!images.ok()) return images.error();
   MatchRun run{.features = features,
                .images = *images,
+               .inputs = inputs,
                .options = options,
                .reuse = reuse,
+               .seed = seed,
                .num_threads = num_threads,
                .progress = progress,
                .keys = PairKeys(features, *images, options.matching)};
@@ -209,16 +234,7 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
     for (const std::string& message : sources->unusable()) summary.not_reused.push_back(message);
   cv::setNumThreads(1);  // pairs are the unit of parallel work
   summary.pairs = inputs.pair_list_path.empty() ? ChooseMethod(*images, options) : "list";
-  IndexPairs pairs;
-  if (summary.pairs != "frustum" && summary.num_images >= 2) {
-    auto selected = WithDatabaseErrors(path, [&] {
-      return SelectPairs(features, *images, inputs, options, summary.pairs, seed, num_threads, progress);
-    });
-    if (!selected.ok()) return selected.error();
-    pairs = std::move(selected).value();
-  }
-  CAIRN_RETURN_IF_ERROR(reuse.shard ? WriteShard(matches_path, pairs, &run)
-                                    : WriteMatches(matches_path, path, pairs, &run));
+  CAIRN_RETURN_IF_ERROR(reuse.shard ? WriteShard(matches_path, &run) : WriteMatches(matches_path, &run));
   CAIRN_RETURN_IF_ERROR(WriteReuseFile(matches_path, std::move(run.entries)));
   return std::move(summary);
 }

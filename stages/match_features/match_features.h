@@ -65,7 +65,10 @@ struct MatchFeaturesSummary {
   std::string pairs;           // how pairs were chosen
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
   int num_rounds = 0;          // of pairs; after a shard's last one the pairs of the next are not known yet
-  int64_t num_left_to_others = 0;       // pairs of a shard's last round that other shards match
+  // What a shard worked on instead of pairs, to choose them: "words" or "partners" of images; empty: nothing.
+  std::string image_step;
+  int num_image_results = 0;
+  int64_t num_left_to_others = 0;       // pairs, or images, of a shard's last round that other shards work on
   std::vector<std::string> not_reused;  // why earlier outputs gave nothing
 };
 
@@ -75,8 +78,9 @@ struct MatchFeaturesSummary {
 // same options: same bytes as without.  Same bytes for any number of threads and any memory budget.  O(pairs
 // * features^2).
 //
-// A shard goes through the rounds of pairs with what `reuse.files` know; of the first round that these do not
-// know whole it matches its share of what is missing, a contiguous stretch of the order in which pairs are
+// A shard goes through the rounds of pairs with what `reuse.files` know (before these, where pairs are those
+// that look alike, the words of the images and their partners); of the first round that these do not know
+// whole it matches its share of what is missing, a contiguous stretch of the order in which pairs are
 // matched, and writes a database with these pairs alone; it may have none.
 //
 // Errors: Corrupt (a database), NoData (fewer than two images with features, no pair verified, a vocabulary

@@ -37,24 +37,6 @@ Result<DescriptorMatrix> SampleDescriptors(SQLite::Database& database, const Mat
   return sample;
 }
 
-Result<Vocabulary> TreeFor(SQLite::Database& database, const MatchImages& images,
-                           const std::string& vocabulary_path, uint64_t seed, int num_threads,
-                           Progress& progress) {
-  if (!vocabulary_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(Vocabulary vocabulary, ReadVocabulary(vocabulary_path));
-    if (vocabulary.num_words() > 1) return vocabulary;
-    return MakeError(ErrorCode::kNoData,
-                     "{}: a vocabulary of {} word(s) tells no images apart; build it from images with "
-                     "features, or leave --vocabulary out: one is then grown from the images at hand",
-                     vocabulary_path, vocabulary.num_words());
-  }
-  int64_t num_descriptors = 0;
-  for (const MatchImage& image : images.images) num_descriptors += image.num_features;
-  CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix sample,
-                         SampleDescriptors(database, images, num_descriptors, progress));
-  return GrowVocabulary(sample, num_descriptors, kTreeOptions, seed, num_threads, progress);
-}
-
 }  // namespace
 
 ImageSimilarity::ImageSimilarity(const std::vector<std::vector<WordIdx>>& words, int num_words)
@@ -98,19 +80,38 @@ std::vector<int> ImageSimilarity::Ranked(int idx) const {
   return ranked;
 }
 
-Result<ImageSimilarity> MeasureSimilarity(SQLite::Database& database, const MatchImages& images,
+Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const MatchImages& images,
                                           const std::string& vocabulary_path, uint64_t seed, int num_threads,
                                           Progress& progress) {
-  CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
-                         TreeFor(database, images, vocabulary_path, seed, num_threads, progress));
-  const int num_images = static_cast<int>(images.images.size());
+  if (!vocabulary_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(Vocabulary vocabulary, ReadVocabulary(vocabulary_path));
+    if (vocabulary.num_words() > 1) return vocabulary;
+    return MakeError(ErrorCode::kNoData,
+                     "{}: a vocabulary of {} word(s) tells no images apart; build it from images with "
+                     "features, or leave --vocabulary out: one is then grown from the images at hand",
+                     vocabulary_path, vocabulary.num_words());
+  }
+  int64_t num_descriptors = 0;
+  for (const MatchImage& image : images.images) num_descriptors += image.num_features;
+  CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix sample,
+                         SampleDescriptors(database, images, num_descriptors, progress));
+  return GrowVocabulary(sample, num_descriptors, kTreeOptions, seed, num_threads, progress);
+}
+
+Result<std::vector<std::vector<WordIdx>>> QuantizeImages(SQLite::Database& database,
+                                                         const MatchImages& images,
+                                                         const std::vector<int>& idxs,
+                                                         const Vocabulary& vocabulary, int num_threads,
+                                                         Progress& progress) {
+  const int num_images = static_cast<int>(idxs.size());
   std::vector<std::vector<WordIdx>> words(num_images);
   progress.Begin("compare images", num_images, "images");
   for (int begin = 0; begin < num_images; begin += kBlockSize) {
     std::vector<DescriptorMatrix> block(std::min(kBlockSize, num_images - begin));
     for (size_t i = 0; i < block.size(); ++i) {
       if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while comparing images");
-      CAIRN_ASSIGN_OR_RETURN(block[i], ReadDatabaseDescriptors(database, images.images[begin + i].image_id));
+      CAIRN_ASSIGN_OR_RETURN(block[i],
+                             ReadDatabaseDescriptors(database, images.images[idxs[begin + i]].image_id));
     }
     ParallelFor(static_cast<int64_t>(block.size()), num_threads, [&](int64_t i) {
       words[begin + i] = QuantizeDescriptors(vocabulary, block[i]);
@@ -118,29 +119,30 @@ Result<ImageSimilarity> MeasureSimilarity(SQLite::Database& database, const Matc
     });
   }
   progress.End();
-  return ImageSimilarity(words, vocabulary.num_words());
+  return words;
 }
 
-IndexPairs RetrievedPairs(const ImageSimilarity& similarity, int num_images, int num_retrieved,
-                          int num_threads) {
-  std::vector<std::vector<int>> partners(num_images);
-  ParallelFor(num_images, num_threads, [&](int64_t i) {
-    partners[i] = similarity.MostSimilar(static_cast<int>(i), num_retrieved, [](int) { return true; });
+std::vector<std::vector<int>> RetrievedPartners(const ImageSimilarity& similarity,
+                                                const std::vector<int>& idxs, int num_retrieved,
+                                                int num_threads) {
+  std::vector<std::vector<int>> partners(idxs.size());
+  ParallelFor(static_cast<int64_t>(idxs.size()), num_threads, [&](int64_t i) {
+    partners[i] = similarity.MostSimilar(idxs[i], num_retrieved, [](int) { return true; });
   });
-  return PairsFromPartners(partners);
+  return partners;
 }
 
-IndexPairs LoopPairs(const ImageSimilarity& similarity, const std::vector<int>& order, int window,
-                     int num_loops, int num_threads) {
+std::vector<std::vector<int>> LoopPartners(const ImageSimilarity& similarity, const std::vector<int>& idxs,
+                                           const std::vector<int>& order, int window, int num_loops,
+                                           int num_threads) {
   std::vector<int> place(order.size());  // of each image in the order
   for (int i = 0; i < static_cast<int>(order.size()); ++i) place[order[i]] = i;
-  std::vector<std::vector<int>> partners(order.size());
-  ParallelFor(static_cast<int64_t>(order.size()), num_threads, [&](int64_t i) {
-    partners[i] = similarity.MostSimilar(static_cast<int>(i), num_loops, [&](int other) {
-      return std::abs(place[other] - place[i]) > window;
-    });
+  std::vector<std::vector<int>> partners(idxs.size());
+  ParallelFor(static_cast<int64_t>(idxs.size()), num_threads, [&](int64_t i) {
+    partners[i] = similarity.MostSimilar(
+        idxs[i], num_loops, [&](int other) { return std::abs(place[other] - place[idxs[i]]) > window; });
   });
-  return PairsFromPartners(partners);
+  return partners;
 }
 
 }  // namespace cairn

@@ -47,22 +47,31 @@ class ImageSimilarity {
   std::vector<std::vector<Posting>> inverted_files_;  // per word
 };
 
-// The similarity of the images of a database.  `vocabulary_path` is a vocabulary.db: only its tree is used,
-// so that one made from other images serves too.  Empty: a tree is grown from an even sample of the
-// descriptors at hand, the same for any number of threads.  Features are read one block of images at a time.
-// Errors: NoData (a vocabulary without words), those of ReadVocabulary, Corrupt, Cancelled; throws
+// The vocabulary.db at `vocabulary_path`, of which only the tree is used, so that one made from other images
+// serves too.  Empty: a tree grown from an even sample of the descriptors at hand, the same for any number of
+// threads.  Errors: NoData (a vocabulary without words), those of ReadVocabulary, Corrupt, Cancelled; throws
 // SQLite::Exception.
-Result<ImageSimilarity> MeasureSimilarity(SQLite::Database& database, const MatchImages& images,
+Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const MatchImages& images,
                                           const std::string& vocabulary_path, uint64_t seed, int num_threads,
                                           Progress& progress);
 
-// Each image with the `num_retrieved` images most like it.
-IndexPairs RetrievedPairs(const ImageSimilarity& similarity, int num_images, int num_retrieved,
-                          int num_threads);
+// The words of images, ascending, in the order of `idxs` (indices into images.images).  Features are read one
+// block of images at a time.  Errors: Corrupt, Cancelled; throws SQLite::Exception.
+Result<std::vector<std::vector<WordIdx>>> QuantizeImages(SQLite::Database& database,
+                                                         const MatchImages& images,
+                                                         const std::vector<int>& idxs,
+                                                         const Vocabulary& vocabulary, int num_threads,
+                                                         Progress& progress);
 
-// Loop candidates: each image with the `num_loops` images most like it of those farther than `window` from it
-// in `order` (image indices).
-IndexPairs LoopPairs(const ImageSimilarity& similarity, const std::vector<int>& order, int window,
-                     int num_loops, int num_threads);
+// For each image of `idxs` the `num_retrieved` images most like it.
+std::vector<std::vector<int>> RetrievedPartners(const ImageSimilarity& similarity,
+                                                const std::vector<int>& idxs, int num_retrieved,
+                                                int num_threads);
+
+// Loop candidates: for each image of `idxs` the `num_loops` images most like it of those farther than
+// `window` from it in `order` (image indices).
+std::vector<std::vector<int>> LoopPartners(const ImageSimilarity& similarity, const std::vector<int>& idxs,
+                                           const std::vector<int>& order, int window, int num_loops,
+                                           int num_threads);
 
 }  // namespace cairn

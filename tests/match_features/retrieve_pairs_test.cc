@@ -25,15 +25,24 @@ TEST(RetrievePairs, SharedRareWordsCountMost) {
 
 TEST(RetrievePairs, APairStandsOnceWhoeverAsked) {
   const ImageSimilarity similarity({{0, 0, 1}, {0, 0}, {1}, {2}}, 3);
-  EXPECT_THAT(RetrievedPairs(similarity, 4, 1, 2), ElementsAre(Pair(0, 1), Pair(0, 2)));
-  EXPECT_THAT(RetrievedPairs(similarity, 4, 3, 1), ElementsAre(Pair(0, 1), Pair(0, 2)));
+  EXPECT_THAT(PairsFromPartners(RetrievedPartners(similarity, {0, 1, 2, 3}, 1, 2)),
+              ElementsAre(Pair(0, 1), Pair(0, 2)));
+  EXPECT_THAT(PairsFromPartners(RetrievedPartners(similarity, {0, 1, 2, 3}, 3, 1)),
+              ElementsAre(Pair(0, 1), Pair(0, 2)));
+}
+
+TEST(RetrievePairs, SomeImagesArePairedAsAllAre) {
+  const ImageSimilarity similarity({{0, 0, 1}, {0, 0}, {1}, {2}}, 3);
+  const auto all = RetrievedPartners(similarity, {0, 1, 2, 3}, 2, 2);
+  EXPECT_THAT(RetrievedPartners(similarity, {2, 0}, 2, 2), ElementsAre(all[2], all[0]));
 }
 
 TEST(RetrievePairs, LoopCandidatesAreNoNeighbours) {
   // A round: image 5 is back where 0 was; all neighbours share a word too.
   const ImageSimilarity similarity({{0, 9}, {0, 1}, {1, 2}, {2, 3}, {3, 4}, {4, 9}, {5}}, 10);
-  EXPECT_THAT(LoopPairs(similarity, {0, 1, 2, 3, 4, 5, 6}, 2, 1, 2), ElementsAre(Pair(0, 5)));
-  EXPECT_THAT(LoopPairs(similarity, {0, 1, 2, 3, 4, 5, 6}, 5, 1, 2), IsEmpty());
+  const std::vector<int> all = {0, 1, 2, 3, 4, 5, 6};
+  EXPECT_THAT(PairsFromPartners(LoopPartners(similarity, all, all, 2, 1, 2)), ElementsAre(Pair(0, 5)));
+  EXPECT_THAT(PairsFromPartners(LoopPartners(similarity, all, all, 5, 1, 2)), IsEmpty());
 }
 
 }  // namespace

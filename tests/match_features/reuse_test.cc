@@ -32,6 +32,16 @@ class MatchFeaturesReuse : public MatchFeaturesTest {
                     "UPDATE descriptors SET rows = 79, data = substr(data, 1, 79 * 128) WHERE image_id = {0}",
                     image_id));
   }
+  // Images 5 to 8 show another place, so that words tell images apart.
+  void MoveLastImages() {
+    Random random(11);
+    std::string bytes(80 * kDescriptorDim, '\0');
+    for (char& byte : bytes) byte = static_cast<char>(135 * std::pow(random.Uniform(), 4));
+    SQLite::Database database(folder_ + "/features.db", SQLite::OPEN_READWRITE);
+    SQLite::Statement update(database, "UPDATE descriptors SET data = ? WHERE image_id > 4");
+    update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+    update.exec();
+  }
   void ExpectAsClean(const std::string& name, bool with_poses) {
     const auto clean = MatchTo("clean.db", with_poses, {}, 1);
     ASSERT_TRUE(clean.ok()) << clean.error().message;
@@ -53,18 +63,19 @@ class MatchFeaturesReuse : public MatchFeaturesTest {
     std::vector<std::string> files;
     for (*num_rounds = 0;; ++*num_rounds) {
       std::vector<std::string> outputs;
-      int64_t num_pairs = 0, num_left = 0;
+      int64_t num_done = 0, num_missing = 0;
       for (int i = 1; i <= num_shards; ++i) {
         const std::string name = fmt::format("round{}_{}.db", *num_rounds, i);
         const auto shard = MatchTo(name, with_poses, {.files = files, .shard = Shard{i, num_shards}});
         EXPECT_TRUE(shard.ok()) << shard.error().message;
         if (!shard.ok() || *num_rounds > 20) return {};
-        num_pairs += shard->num_pairs_tried;
-        num_left = shard->num_pairs_tried + shard->num_left_to_others;
+        const int64_t num_own = shard->num_pairs_tried + shard->num_image_results;
+        num_done += num_own;
+        num_missing = num_own + shard->num_left_to_others;
         outputs.push_back(folder_ + "/" + name);
       }
-      EXPECT_EQ(num_pairs, num_left) << "the shares are the whole round";
-      if (num_pairs == 0) return files;
+      EXPECT_EQ(num_done, num_missing) << "the shares are the whole round";
+      if (num_done == 0) return files;
       files.insert(files.end(), outputs.begin(), outputs.end());
     }
   }
@@ -207,6 +218,38 @@ TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesThroughTheRoundsOfFrustum) {
   EXPECT_GT(mended->num_taken_over, 0);
   EXPECT_LT(mended->num_taken_over, mended->num_pairs_tried);
   ExpectAsClean("mended.db", true);
+}
+
+TEST_F(MatchFeaturesReuse, ShardsMergeToTheSameBytesWherePairsLookAlike) {
+  MoveLastImages();
+  options_.num_retrieved = 3;
+  options_.sequence_window = 2;
+  options_.num_loop_candidates = 2;
+  for (const char* method : {"retrieval", "sequence"}) {
+    options_.pairs = method;
+    int num_rounds = 0;
+    std::vector<std::string> files = RunShards(3, false, &num_rounds);
+    EXPECT_EQ(num_rounds, 3) << "words, partners, pairs";
+    const auto merged = MatchTo("merged.db", false, {.files = files});
+    ASSERT_TRUE(merged.ok()) << merged.error().message;
+    EXPECT_EQ(merged->num_taken_over, merged->num_pairs_tried);
+    ExpectAsClean("merged.db", false);
+    // A node died in each round.
+    const auto mended = MatchTo("mended.db", false, {.files = {files[0], files[2], files[3], files[7]}});
+    ASSERT_TRUE(mended.ok()) << mended.error().message;
+    EXPECT_GT(mended->num_taken_over, 0);
+    ExpectAsClean("mended.db", false);
+  }
+}
+
+TEST_F(MatchFeaturesReuse, AnotherSeedOrVocabularyMakesOtherWords) {
+  MoveLastImages();
+  options_.pairs = "retrieval";
+  ASSERT_EQ(MatchTo("a.db", false, {.shard = Shard{1, 1}})->image_step, "words");
+  const ReuseOptions again{.files = {folder_ + "/a.db"}, .shard = Shard{1, 1}};
+  EXPECT_EQ(MatchTo("b.db", false, again)->image_step, "partners");
+  seed_ = 1;
+  EXPECT_EQ(MatchTo("b.db", false, again)->image_step, "words");
 }
 
 TEST_F(MatchFeaturesReuse, ShardsOfARoundThatLostOneDoItsPairs) {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "stages/match_features/match_run.h"
+
+namespace cairn {
+
+// Work on each image before there are pairs, of which a shard does its share: its result is a row of numbers.
+struct ImageStep {
+  std::string name;  // "words"
+  // Hash of all that the result of an image depends on.
+  std::function<Result<ContentHash>(int idx)> key;
+  // Results of some images, in their order.
+  std::function<Result<std::vector<std::vector<int>>>(const std::vector<int>& idxs)> compute;
+};
+
+// The results of all images, by index, taken over from reuse.files or computed.  A shard that lacks some
+// computes its share of them, writes that to the database, and is done: nothing is returned.  Without a
+// database no shard. Errors: those of the step; throws SQLite::Exception.
+Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageStep& step,
+                                                                  SQLite::Database* shard_database,
+                                                                  MatchRun* run);
+
+}  // namespace cairn

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "core/progress.h"
+#include "core/reuse.h"
+#include "stages/match_features/image_features.h"
+#include "stages/match_features/match_features.h"
+#include "stages/match_features/pair_reuse.h"
+
+namespace cairn {
+
+// A run of the stage: what it reads, and how far it has come.
+struct MatchRun {
+  SQLite::Database& features;
+  const MatchImages& images;
+  const MatchFeaturesInputs& inputs;
+  const MatchFeaturesOptions& options;
+  const ReuseOptions& reuse;
+  uint64_t seed;
+  int num_threads;
+  Progress& progress;
+  PairKeys keys;
+  ReuseSources named;     // reuse.files
+  ReuseSources previous;  // the output's earlier state
+  std::vector<ReuseEntry> entries;
+  MatchFeaturesSummary summary;
+};
+
+}  // namespace cairn
