@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "core/parallel.h"
@@ -24,16 +25,17 @@ void PairPredictor::Add(int idx1, int idx2, const std::vector<Match>& inliers) {
     matches_.emplace_back(first_feature_[idx1] + match.idx1, first_feature_[idx2] + match.idx2);
 }
 
-PairPredictor::Links PairPredictor::CollectLinks() const {
+PairPredictor::Links PairPredictor::CollectLinks(size_t first_match) const {
   Links links;
   links.begin.resize(view_of_.size() + 2, 0);
-  for (const auto& [f, h] : matches_) {
+  const std::span matches = std::span(matches_).subspan(first_match);
+  for (const auto& [f, h] : matches) {
     ++links.begin[f + 2];
     ++links.begin[h + 2];
   }
   for (size_t f = 2; f < links.begin.size(); ++f) links.begin[f] += links.begin[f - 1];
-  links.feature.resize(2 * matches_.size());
-  for (const auto& [f, h] : matches_) {
+  links.feature.resize(2 * matches.size());
+  for (const auto& [f, h] : matches) {
     links.feature[links.begin[f + 1]++] = h;
     links.feature[links.begin[h + 1]++] = f;
   }
@@ -50,7 +52,23 @@ bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, const PredictP
          RaysConverge(ray1, ray2, baseline, tolerance_rad);
 }
 
-std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, const std::vector<bool>& tried,
+std::vector<bool> PairPredictor::NewlyLinked(int idx, const Links& links, const Links& new_links) const {
+  std::vector<bool> linked(views_.size(), false);
+  const auto follow = [&](uint32_t f, const Links& first, const Links& second) {
+    for (uint64_t i = first.begin[f]; i < first.begin[f + 1]; ++i) {
+      const uint32_t middle = first.feature[i];
+      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k)
+        linked[view_of_[second.feature[k]]] = true;
+    }
+  };
+  for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
+    follow(f, new_links, links);
+    follow(f, links, new_links);
+  }
+  return linked;
+}
+
+std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, const std::vector<bool>& settled,
                                                 const PredictPairsOptions& options) const {
   const auto min_cosine = static_cast<float>(std::cos(RadFromDeg(options.max_ray_angle_deg)));
   std::vector<int> expected(views_.size(), 0);
@@ -62,7 +80,7 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
       for (uint64_t k = links.begin[middle]; k < links.begin[middle + 1]; ++k) {
         const uint32_t h = links.feature[k];
         const int other = view_of_[h];
-        if (other <= idx || tried[other] || counted[other] == f + 1) continue;
+        if (settled[other] || counted[other] == f + 1) continue;
         if (ray.dot(Ray(h)) < min_cosine || !CanMeet(f, h, options)) continue;
         counted[other] = f + 1;
         ++expected[other];
@@ -73,27 +91,37 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
 }
 
 Result<IndexPairs> PairPredictor::Predict(const IndexPairs& tried, const PredictPairsOptions& options,
-                                          int num_threads, Progress& progress) const {
+                                          int num_threads, Progress& progress) {
   const int num_views = static_cast<int>(views_.size());
-  const Links links = CollectLinks();
+  const Links links = CollectLinks(0);
+  const bool is_first = num_predicted_from_ == 0;
+  const Links new_links = is_first ? Links() : CollectLinks(num_predicted_from_);
   std::vector<IndexPairs> predicted(views_.size());
   progress.Begin("predict pairs", num_views, "images");
   ParallelFor(num_views, num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
     const int idx = static_cast<int>(i);
-    std::vector<bool> is_tried(views_.size(), false);
+    std::vector<bool> settled(views_.size(), false);
+    if (!is_first) {
+      settled = NewlyLinked(idx, links, new_links);
+      settled.flip();
+    }
+    std::fill(settled.begin(), settled.begin() + idx + 1, true);
     for (auto it = std::lower_bound(tried.begin(), tried.end(), std::pair(idx, 0));
          it != tried.end() && it->first == idx; ++it) {
-      is_tried[it->second] = true;
+      settled[it->second] = true;
     }
-    const std::vector<int> expected = ExpectedMatches(idx, links, is_tried, options);
-    for (int other = idx + 1; other < num_views; ++other) {
-      if (expected[other] >= options.min_num_expected_matches) predicted[i].emplace_back(idx, other);
+    if (std::find(settled.begin(), settled.end(), false) != settled.end()) {
+      const std::vector<int> expected = ExpectedMatches(idx, links, settled, options);
+      for (int other = idx + 1; other < num_views; ++other) {
+        if (expected[other] >= options.min_num_expected_matches) predicted[i].emplace_back(idx, other);
+      }
     }
     progress.Advance();
   });
   progress.End();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while predicting pairs");
+  num_predicted_from_ = matches_.size();
   IndexPairs pairs;
   for (const IndexPairs& part : predicted) pairs.insert(pairs.end(), part.begin(), part.end());
   return pairs;

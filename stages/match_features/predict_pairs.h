@@ -43,10 +43,12 @@ class PairPredictor {
   void Add(int idx1, int idx2, const std::vector<Match>& inliers);
 
   // Pairs (idx1 < idx2, ascending) of enough expected matches that are not in `tried` (ascending).  Same for
-  // any order of the calls of Add and any number of threads.  Cost: sum over features of (matches)^2.
-  // Memory: 16 bytes per match and 20 per feature.  Errors: Cancelled.
+  // any order of the calls of Add and any number of threads.  A later call looks only at pairs that matches
+  // added since the last one lead to: others promise what they did.  REQUIRES of later calls: the same
+  // options, and in `tried` the pairs of the earlier calls.  Cost: sum over features of (matches)^2; later,
+  // of images with such pairs.  Memory: 16 bytes per match and 28 per feature.  Errors: Cancelled.
   Result<IndexPairs> Predict(const IndexPairs& tried, const PredictPairsOptions& options, int num_threads,
-                             Progress& progress) const;
+                             Progress& progress);
 
  private:
   // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
@@ -54,9 +56,12 @@ class PairPredictor {
     std::vector<uint64_t> begin;
     std::vector<uint32_t> feature;
   };
-  Links CollectLinks() const;
-  // Expected matches with every later image that is not in `tried`, flags per image.
-  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<bool>& tried,
+  // Of the matches from `first_match` on.
+  Links CollectLinks(size_t first_match) const;
+  // Later images to which a chain leads that has a match of `new_links`, flags per image.
+  std::vector<bool> NewlyLinked(int idx, const Links& links, const Links& new_links) const;
+  // Expected matches with every later image that is not in `settled`, flags per image.
+  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<bool>& settled,
                                    const PredictPairsOptions& options) const;
   bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
   const Eigen::Vector3f& Ray(uint32_t feature) const {
@@ -68,6 +73,7 @@ class PairPredictor {
   std::vector<uint32_t> first_feature_;  // of each view, counted over all; one more than views
   std::vector<int> view_of_;             // of each feature
   std::vector<std::pair<uint32_t, uint32_t>> matches_;
+  size_t num_predicted_from_ = 0;  // of matches_, at the last call of Predict
 };
 
 }  // namespace cairn

@@ -1,9 +1,13 @@
 #include "stages/match_features/predict_pairs.h"
 
+#include <algorithm>
+#include <tuple>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/pose.h"
+#include "core/random.h"
 
 namespace cairn {
 namespace {
@@ -32,7 +36,8 @@ std::vector<Match> Same(uint32_t begin, uint32_t end) {
   return matches;
 }
 
-IndexPairs Predict(const PairPredictor& predictor, int min_num_expected, const IndexPairs& tried,
+// Works on a copy: a call of its own changes what later ones return.
+IndexPairs Predict(PairPredictor predictor, int min_num_expected, const IndexPairs& tried,
                    double max_ray_angle_deg = 90, int num_threads = 2) {
   NoProgress progress;
   return *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16, 1e-3}, num_threads, progress);
@@ -80,6 +85,38 @@ TEST(PredictPairs, AFeatureCountsOnceAndTheOrderOfMatchesDoesNotMatter) {
   EXPECT_THAT(Predict(there, 1, pairs), ElementsAre(Pair(0, 3), Pair(1, 2)));
   EXPECT_THAT(Predict(there, 2, pairs), IsEmpty());
   EXPECT_EQ(Predict(back, 1, pairs, 90, 1), Predict(there, 1, pairs, 90, 4));
+}
+
+TEST(PredictPairs, LaterCallsFindWhatAllMatchesAtOncePredict) {
+  // Twelve views of the wall, the matches of random pairs of them added in five parts.
+  Random random(5);
+  std::vector<PairPredictor::View> views;
+  for (int i = 0; i < 12; ++i) views.push_back(At(0.01 * i));
+  PairPredictor in_parts(views);
+  std::vector<std::tuple<int, int, std::vector<Match>>> added;
+  IndexPairs tried;
+  NoProgress progress;
+  int num_predicted = 0;
+  for (int part = 0; part < 5; ++part) {
+    for (int k = 0; k < 4; ++k) {
+      const int i = static_cast<int>(random.UniformInt(0, 10)),
+                j = static_cast<int>(random.UniformInt(i + 1, 11));
+      const auto begin = static_cast<uint32_t>(random.UniformInt(0, 7));
+      added.emplace_back(i, j, Same(begin, begin + 3));
+      in_parts.Add(i, j, Same(begin, begin + 3));
+      tried.emplace_back(i, j);
+    }
+    std::sort(tried.begin(), tried.end());
+    PairPredictor at_once(views);
+    for (const auto& [i, j, matches] : added) at_once.Add(i, j, matches);
+    const IndexPairs predicted = *in_parts.Predict(tried, {2, 90, 16, 1e-3}, 2, progress);
+    EXPECT_EQ(predicted, Predict(at_once, 2, tried)) << part;
+    num_predicted += static_cast<int>(predicted.size());
+    tried.insert(tried.end(), predicted.begin(), predicted.end());
+    std::sort(tried.begin(), tried.end());
+  }
+  EXPECT_GT(num_predicted, 10);
+  EXPECT_THAT(*in_parts.Predict(tried, {2, 90, 16, 1e-3}, 2, progress), IsEmpty()) << "nothing was added";
 }
 
 }  // namespace
