@@ -11,6 +11,8 @@
 #include "core/exif.h"
 #include "core/file.h"
 #include "core/image_file.h"
+#include "core/points_line.h"
+#include "core/sessions.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -27,26 +29,27 @@ bool HasImageSuffix(const fs::path& path) {
   return kSuffixes.count(suffix) > 0;
 }
 
-// Relative names of all image files below a folder, ascending.
-std::vector<std::string> ListImages(const std::string& folder) {
+// Relative names of all image files below a folder, ascending.  Links to folders are followed where they are
+// a session's.
+std::vector<std::string> ListImages(const std::string& folder, const std::vector<std::string>& sessions) {
   std::vector<std::string> names;
-  std::error_code error;
-  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
-  for (; !error && it != end; it.increment(error)) {
-    std::error_code type_error;  // a broken link does not end the list
-    if (it->is_regular_file(type_error) && HasImageSuffix(it->path())) {
-      names.push_back(it->path().lexically_relative(folder).generic_string());
+  std::vector<std::string> starts = {folder};
+  for (const std::string& session : sessions) {
+    std::error_code link_error;
+    if (fs::is_symlink(folder + "/" + session, link_error)) starts.push_back(folder + "/" + session);
+  }
+  for (const std::string& start : starts) {
+    std::error_code error;
+    fs::recursive_directory_iterator it(start, fs::directory_options::skip_permission_denied, error), end;
+    for (; !error && it != end; it.increment(error)) {
+      std::error_code type_error;  // a broken link does not end the list
+      if (it->is_regular_file(type_error) && HasImageSuffix(it->path())) {
+        names.push_back(it->path().lexically_relative(folder).generic_string());
+      }
     }
   }
   std::sort(names.begin(), names.end());
   return names;
-}
-
-bool IsPointsLine(const std::vector<std::string>& words) {
-  double value = 0;
-  return words.size() % 3 == 0 && std::all_of(words.begin(), words.end(), [&](const std::string& word) {
-           return ParseNumber(word, &value);
-         });
 }
 
 // Fields MODEL WIDTH HEIGHT PARAMS... from words[first] on.
@@ -78,12 +81,12 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
   return camera;
 }
 
-// A folder of images without lists: one camera for each image size and focal length.
-Status ReadFlatFolder(Capture* capture) {
+// A folder of images without lists: one camera for each session, image size and focal length.
+Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
   capture->images_folder =
       fs::is_directory(capture->root + "/images") ? capture->root + "/images" : capture->root;
-  std::map<std::tuple<int, int, double>, CameraId> camera_ids;
-  for (const std::string& name : ListImages(capture->images_folder)) {
+  std::map<std::tuple<int, int, int, double>, CameraId> camera_ids;
+  for (const std::string& name : ListImages(capture->images_folder, sessions)) {
     const std::string path = capture->images_folder + "/" + name;
     const Result<cv::Mat> image = ReadGreyImage(path);
     if (!image.ok()) {
@@ -91,7 +94,8 @@ Status ReadFlatFolder(Capture* capture) {
       continue;
     }
     const double focal_mm = ReadExif(path).focal_length_35mm_mm;
-    const auto [entry, is_new] = camera_ids.emplace(std::tuple(image->cols, image->rows, focal_mm),
+    const int session = SessionOfImage(sessions, name);
+    const auto [entry, is_new] = camera_ids.emplace(std::tuple(session, image->cols, image->rows, focal_mm),
                                                     static_cast<CameraId>(camera_ids.size() + 1));
     if (is_new) {
       Camera camera = GuessCamera(entry->second, image->cols, image->rows);
@@ -236,8 +240,12 @@ Result<Capture> ReadCapture(const std::string& root) {
   }
   Capture capture;
   capture.root = root;
+  std::vector<std::string> sessions;
+  if (const std::string path = root + "/" + kSessionsFile; fs::exists(path, error)) {
+    CAIRN_ASSIGN_OR_RETURN(sessions, ReadSessionsText(path));
+  }
   if (!fs::exists(root + "/images.txt", error)) {
-    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(&capture));
+    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(sessions, &capture));
   } else {
     capture.has_poses = true;
     capture.images_folder = root + "/images";
@@ -249,7 +257,7 @@ Result<Capture> ReadCapture(const std::string& root) {
     if (const std::string frame = root + "/" + kCaptureFrameFile; fs::exists(frame, error)) {
       CAIRN_ASSIGN_OR_RETURN(capture.frame, ReadCaptureFrame(frame));
     }
-    const std::vector<std::string> names = ListImages(capture.images_folder);
+    const std::vector<std::string> names = ListImages(capture.images_folder, sessions);
     std::set<std::string> unlisted(names.begin(), names.end());
     for (const CaptureImage& image : capture.images) unlisted.erase(image.name);
     for (const CaptureImage& image : capture.queries) unlisted.erase(image.name);

@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/file.h"
@@ -26,6 +27,9 @@ std::string Absolute(const std::string& path) {
   while (text.size() > 1 && text.back() == '/') text.pop_back();
   return text;
 }
+
+// Several captures are joined into one, in the build folder.
+bool IsJoined(const Recipe& recipe) { return recipe.captures.size() > 1; }
 
 // Tells programs apart without reading them, as map.mk does: bytes and seconds since 1970.
 std::string SizeAndDate(const std::string& path) {
@@ -60,6 +64,13 @@ Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture
   for (const char* name : {"control_points", "distances"}) {
     const std::string file = ReconstructOptionText(recipe, name);
     if (file.empty()) continue;
+    if (IsJoined(recipe)) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "[reconstruct] {} = \"{}\" names images of one capture, and the recipe has {}: put the images of "
+          "each session into a folder of one capture, and the folders' names into its sessions.txt",
+          name, file, recipe.captures.size());
+    }
     const std::string path = (fs::path(capture) / file).lexically_normal().string();
     CAIRN_RETURN_IF_ERROR(CheckMakePath(fmt::format("[reconstruct] {}", name), path));
     if (!fs::exists(path)) {
@@ -72,19 +83,50 @@ Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture
   return files;
 }
 
+// The folder that the stages read.
+std::string CaptureFolder(const Recipe& recipe, const std::string& build_dir) {
+  if (recipe.simulated || IsJoined(recipe)) return build_dir + "/capture";
+  return Absolute(recipe.captures.front().path);
+}
+
+// What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
+struct SessionWords {
+  std::string folders;
+  std::string queries;
+};
+
+Result<SessionWords> JoinedSessions(const Recipe& recipe) {
+  SessionWords words;
+  if (!IsJoined(recipe)) return words;
+  for (const RecipeCapture& capture : recipe.captures) {
+    const std::string folder = Absolute(capture.path);
+    CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", folder));
+    words.folders += fmt::format("{}{}={}", words.folders.empty() ? "" : " ", capture.name, folder);
+    if (capture.queries_path.empty()) continue;
+    const std::string queries = Absolute(capture.queries_path);
+    CAIRN_RETURN_IF_ERROR(CheckMakePath("the list of queries", queries));
+    words.queries += fmt::format("{}{}={}", words.queries.empty() ? "" : " ", capture.name, queries);
+  }
+  return words;
+}
+
 // The held-out images that check_map localizes; empty = the map is sealed without a self-test.
 std::string QueriesPath(const Recipe& recipe, const std::string& capture, const std::string& build_dir) {
-  if (!recipe.queries_path.empty()) return Absolute(recipe.queries_path);
+  const auto has_queries = [](const RecipeCapture& c) {
+    return !c.queries_path.empty() || fs::exists(c.path + "/queries.txt");
+  };
+  if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
+    return Absolute(recipe.captures.front().queries_path);
   if (IsReconstructed(recipe))
     return ReconstructOptionText(recipe, "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
-  const std::string queries = capture + "/queries.txt";
-  return recipe.simulated || fs::exists(queries) ? queries : "";
+  const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
+  return recipe.simulated || is_any ? capture + "/queries.txt" : "";
 }
 
 }  // namespace
 
 bool IsReconstructed(const Recipe& recipe) {
-  return !recipe.simulated && !fs::exists(recipe.capture_path + "/images.txt");
+  return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
 }
 
 Status CheckMakePath(const std::string& what, const std::string& path) {
@@ -101,13 +143,14 @@ Status CheckMakePath(const std::string& what, const std::string& path) {
 }
 
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
-  const std::string capture = recipe.simulated ? paths.build_dir + "/capture" : Absolute(recipe.capture_path);
+  const std::string capture = CaptureFolder(recipe, paths.build_dir);
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the map", paths.map));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", capture));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the list of queries", queries));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
+  CAIRN_ASSIGN_OR_RETURN(const SessionWords sessions, JoinedSessions(recipe));
 
   const std::string options = paths.build_dir + "/options";
   CAIRN_RETURN_IF_ERROR(CreateFolder(options));
@@ -118,7 +161,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string seed = std::to_string(recipe.seed);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/seed", seed + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/capture", capture + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+      options + "/capture",
+      IsJoined(recipe) ? sessions.folders + "\n" + sessions.queries + "\n" : capture + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));
@@ -129,10 +174,10 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string config = fmt::format(
       "{}{}{}\n"
       "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
-      "NAME := {}\nSEED := {}\nPROGRAM := {}\n",
+      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\n",
       kConfigHead, paths.recipe, kConfigHeadEnd, paths.map, capture, recipe.simulated ? "yes" : "no",
       IsReconstructed(recipe) ? "yes" : "no", known_places, queries, recipe.name, seed,
-      SizeAndDate(paths.program));
+      SizeAndDate(paths.program), sessions.folders, sessions.queries);
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 

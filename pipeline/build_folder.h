@@ -19,16 +19,17 @@ struct BuildPaths {
 // $#%:;&|<>()[]*?'"`\=!
 Status CheckMakePath(const std::string& what, const std::string& path);
 
-// Whether the capture has no poses of its own: then `reconstruct` finds them.
+// Whether the captures have no poses of their own: then `reconstruct` finds them.
 bool IsReconstructed(const Recipe& recipe);
 
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
-//   options/seed, name, capture, queries    one value each
+//   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
 //   options/program       hash of the program: another one redoes every stage, whatever its date
-//   config.mk             MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and
-//                         PROGRAM for map.mk
-// Errors: InvalidArgument (CheckMakePath), NotFound (a file that [reconstruct] names), Io.
+//   config.mk             MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
+//                         QUERIES, NAME, SEED and PROGRAM for map.mk
+// Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names beside several captures), NotFound
+// (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
 
 // The map and the recipe that a folder was last configured for; empty where it is no build folder.

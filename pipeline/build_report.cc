@@ -22,10 +22,10 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kBuildReportVersion = 1;
-constexpr const char* kLine[] = {"simulate",          "extract_features", "match_features",
-                                 "reconstruct",       "group_classes",    "filter_visibility",
-                                 "decompose_regions", "build_vocabulary", "link_appearance",
-                                 "decompose_views",   "emit_map",         "check_map"};
+constexpr const char* kLine[] = {
+    "simulate",        "join_captures",     "extract_features",  "match_features",   "reconstruct",
+    "group_classes",   "filter_visibility", "decompose_regions", "build_vocabulary", "link_appearance",
+    "decompose_views", "emit_map",          "check_map"};
 
 struct StageFile {
   size_t place = 0;  // in the line
@@ -52,7 +52,9 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     if (!name.ends_with(kReportSuffix)) continue;
     CAIRN_ASSIGN_OR_RETURN(Json report, ReadJson(entry.path().string()));
     const std::string stage = report["stage"];
-    if ((stage == "simulate" && !run.simulated) || (stage == "reconstruct" && !run.reconstructed)) continue;
+    if ((stage == "simulate" && !run.simulated) || (stage == "join_captures" && !run.joined) ||
+        (stage == "reconstruct" && !run.reconstructed))
+      continue;
     name.resize(name.size() - std::string_view(kReportSuffix).size());
     const size_t place = std::find(std::begin(kLine), std::end(kLine), stage) - std::begin(kLine);
     files.push_back({place, name, std::move(report)});

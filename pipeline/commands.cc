@@ -5,6 +5,7 @@
 #include "pipeline/export_command.h"
 #include "pipeline/import_command.h"
 #include "pipeline/inspect_command.h"
+#include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
 #include "stages/build_vocabulary/command.h"
 #include "stages/check_map/command.h"
@@ -27,6 +28,7 @@ std::vector<Command> AllCommands() {
       BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
       ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
+      JoinCapturesCommand(),
   };
 }
 

@@ -235,6 +235,7 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
                   .map = arguments.output,
                   .seed = recipe.seed,
                   .simulated = recipe.simulated,
+                  .joined = recipe.captures.size() > 1,
                   .reconstructed = IsReconstructed(recipe),
                   .whole_line = goal == paths.map,
                   .ran = RanSince(dates_before, paths.build_dir)};

@@ -61,8 +61,8 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and PROGRAM; `cairn configure` writes
-# it beside the options.
+# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and PROGRAM;
+# `cairn configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -85,7 +85,12 @@ ifeq ($(RECONSTRUCTED),yes)
 CAIRN_OUTPUTS += $(BUILD)/poses
 endif
 # Poses, cameras and frame, read by the stages that know the capture.
-CAPTURE_LISTS := $(wildcard $(CAPTURE)/cameras.txt $(CAPTURE)/images.txt $(CAPTURE)/frame.json)
+CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt))
+ifneq ($(SESSIONS),)
+# What the joined capture consists of, there or not yet.
+CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)),,cameras.txt images.txt \
+    frame.json $(if $(QUERIES),queries.txt)))
+endif
 # The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
@@ -156,9 +161,25 @@ else
 CAPTURE_STAMP :=
 endif
 
+# Several captures become one.  Lists that stay the same keep their dates.
+ifneq ($(SESSIONS),)
+$(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
+UNCHANGED := $(shell for list in $(CAPTURE_LISTS); do [ $(BUILD)/capture.stamp -nt $$list ] && echo $$list; done)
+$(filter-out $(UNCHANGED),$(CAPTURE_LISTS)): $(BUILD)/capture.stamp ;
+$(UNCHANGED): $(BUILD)/capture.stamp
+	+@: # the same bytes as before
+SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
+SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json,$(SESSION_FOLDERS:%=%/$(list)))) \
+    $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
+$(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
+$(BUILD)/capture.stamp: $(BUILD)/options/capture $(PROGRAM_HASH) $(SESSION_LISTS)
+	$(CAIRN_WHY)
+	$(CAIRN_LAUNCH) $(CAIRN) join-captures $(SESSIONS) -o $(CAPTURE) $(CAIRN_FLAGS)
+endif
+
 # What the stages after matching take poses from.
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
-$(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(wildcard $(CAPTURE)/frame.json))
+$(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(filter %/frame.json,$(CAPTURE_LISTS)))
 
 CAIRN_EXTRACT = extract-features $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) --options $(@D)/options/extract_features.toml
 FEATURES_INPUTS := $(BUILD)/options/extract_features.toml $(BUILD)/options/capture $(PROGRAM_HASH) $(CAPTURE_STAMP) \
@@ -200,15 +221,16 @@ $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
 	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
-# Captures without poses only.  The folder's date is that of its last change.
-$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/options/reconstruct.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
-    $(CAPTURE_IMAGES) $(KNOWN_PLACES)
+# Captures without poses only.  The folder's date is that of its last change.  The hash of each image, and so of its GPS
+# tags, is in features.db.
+$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/features.db $(BUILD)/options/reconstruct.toml \
+    $(BUILD)/options/seed $(PROGRAM_HASH) $(KNOWN_PLACES)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) reconstruct $(@D)/matches.db --capture $(CAPTURE) \
 	    --options $(@D)/options/reconstruct.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
-$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
-    $(POSES_READY)
+$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(BUILD)/options/group_classes.toml $(BUILD)/options/seed \
+    $(PROGRAM_HASH) $(POSES_READY)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) group-classes $(@D)/matches.db --capture $(POSES) \
 	    --options $(@D)/options/group_classes.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
@@ -225,8 +247,8 @@ $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/option
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 # Held-out images of a reconstructed capture have features too, but no words.
-$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
-    $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
+$(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed \
+    $(PROGRAM_HASH) $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
@@ -237,7 +259,7 @@ STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCT
     filter_visibility decompose_regions build_vocabulary emit_map
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
-    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(CAIRN) $(POSES_READY)
+    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) $(POSES_READY)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
 	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
@@ -245,7 +267,7 @@ $(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/re
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
-    $(BUILD)/options/seed $(CAIRN) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
+    $(BUILD)/options/seed $(PROGRAM_HASH) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)

@@ -23,17 +23,18 @@ constexpr Key kTopKeys[] = {
     {"seed", "integer", "Seed of everything random in the compile; at least 0. Default 0."},
 };
 constexpr Key kCaptureKeys[] = {
+    {"name", "text",
+     "Name of the session in the map, where there are several captures: letters, digits, '-', '_' and '.'. "
+     "Default: the name of the folder."},
     {"path", "text",
      "Folder of the capture (images/, cameras.txt, images.txt), relative to the recipe. Required."},
     {"queries", "text",
      "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
-     "capture's "
-     "queries.txt, if there is one."},
+     "capture's queries.txt, if there is one."},
     {"floor_plan", "text", "Floor plan of the place, relative to the recipe. Default: none."},
     {"up", "text or list",
-     "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]. "
-     "Default "
-     "\"auto\"."},
+     "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]; the "
+     "same for all captures that give one. Default \"auto\"."},
 };
 
 Error UnknownKey(const std::string& path, const toml::key& key, const std::string& what,
@@ -90,12 +91,12 @@ class RecipeReader {
       return MakeError(ErrorCode::kInvalidArgument, "{}: no name; add a line such as name = \"kitchen\"",
                        path_);
     }
-    if (recipe_.capture_path.empty() && !recipe_.simulated) {
+    if (recipe_.captures.empty() && !recipe_.simulated) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: no capture; add [[capture]] with path = \"FOLDER\", or [simulate] to render one",
                        path_);
     }
-    if (!recipe_.capture_path.empty() && recipe_.simulated) {
+    if (!recipe_.captures.empty() && recipe_.simulated) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: has both [[capture]] and [simulate]; keep one of them", path_);
     }
@@ -152,35 +153,78 @@ class RecipeReader {
     if (captures == nullptr || captures->empty() || !captures->is_homogeneous<toml::table>()) {
       return WrongType(path_, node, "capture", "a table: [[capture]] with path = \"FOLDER\"");
     }
-    if (captures->size() > 1) {
-      return MakeError(ErrorCode::kUnsupported, "{}: one capture per recipe in this version, found {}",
-                       TomlPlace(path_, (*captures)[1]), captures->size());
-    }
-    return ReadCaptureTable(*captures->front().as_table());
+    for (const toml::node& capture : *captures) CAIRN_RETURN_IF_ERROR(ReadCaptureTable(*capture.as_table()));
+    return Ok();
   }
 
-  Status ReadCaptureTable(const toml::table& capture) {
-    for (const auto& [key, node] : capture) {
+  Status ReadCaptureTable(const toml::table& table) {
+    RecipeCapture capture;
+    std::string up;
+    for (const auto& [key, node] : table) {
       const std::string name(key.str());
       if (name == "path") {
-        CAIRN_ASSIGN_OR_RETURN(recipe_.capture_path, ExistingPath(name, node));
+        CAIRN_ASSIGN_OR_RETURN(capture.path, ExistingPath(name, node));
+      } else if (name == "name") {
+        CAIRN_ASSIGN_OR_RETURN(capture.name, Text(name, node));
+        CAIRN_RETURN_IF_ERROR(CheckName(path_, node, capture.name));
       } else if (name == "queries") {
-        CAIRN_ASSIGN_OR_RETURN(recipe_.queries_path, ExistingPath(name, node));
+        CAIRN_ASSIGN_OR_RETURN(capture.queries_path, ExistingPath(name, node));
       } else if (name == "floor_plan") {
-        CAIRN_ASSIGN_OR_RETURN(recipe_.floor_plan_path, ExistingPath(name, node));
+        CAIRN_ASSIGN_OR_RETURN(capture.floor_plan_path, ExistingPath(name, node));
       } else if (name == "up") {
-        CAIRN_ASSIGN_OR_RETURN(recipe_.up, UpDirection(node));
+        CAIRN_ASSIGN_OR_RETURN(up, UpDirection(node));
       } else {
         std::vector<std::string> valid;
         for (const Key& k : kCaptureKeys) valid.emplace_back(k.name);
         return UnknownKey(path_, key, "key of [[capture]]", valid);
       }
     }
-    if (recipe_.capture_path.empty()) {
+    if (capture.path.empty()) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: [[capture]] has no path; add path = \"FOLDER\"",
-                       TomlPlace(path_, capture));
+                       TomlPlace(path_, table));
     }
+    if (!up.empty() && up != "auto") {
+      if (recipe_.up != "auto" && recipe_.up != up) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "{}: up differs from that of a capture above; all captures share one frame",
+                         TomlPlace(path_, table));
+      }
+      recipe_.up = up;
+    }
+    return AddCapture(table, std::move(capture));
+  }
+
+  // Sessions go by their names.
+  Status AddCapture(const toml::table& table, RecipeCapture capture) {
+    const bool is_named = !capture.name.empty();
+    if (!is_named) capture.name = NameOfFolder(capture.path);
+    for (const RecipeCapture& other : recipe_.captures) {
+      if (other.path == capture.path) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "{}: the folder {} is given twice; remove one [[capture]]", TomlPlace(path_, table),
+                         capture.path);
+      }
+      if (other.name == capture.name) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "{}: two captures are named '{}'{}; give this one another, such as name = \"{}-2\"",
+                         TomlPlace(path_, table), capture.name, is_named ? "" : " (the name of the folder)",
+                         capture.name);
+      }
+    }
+    recipe_.captures.push_back(std::move(capture));
     return Ok();
+  }
+
+  // A session's name made of a folder's: what a name cannot have becomes '_'.
+  static std::string NameOfFolder(const std::string& path) {
+    fs::path folder(path);
+    if (!folder.has_filename()) folder = folder.parent_path();
+    std::string name = folder.filename().string().substr(0, 100);
+    for (char& c : name) {
+      if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';
+    }
+    if (name.empty() || name.front() == '.' || name.front() == '-') name = "capture";
+    return name;
   }
 
   Result<std::string> Text(const std::string& key, const toml::node& node) const {
@@ -263,7 +307,9 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
       "This page is printed by `cairn recipe-reference`, from the options that the stages declare.\n\n"
       "## Top of the file\n";
   AppendKeys(&page, kTopKeys);
-  page += "\n## `[[capture]]`\n\nOne survey. A recipe has either this or `[simulate]`.\n";
+  page +=
+      "\n## `[[capture]]`\n\nOne survey, once or several times: sessions, cameras, days, all "
+      "in one frame ([captures](captures.md)). A recipe has either this or `[simulate]`.\n";
   AppendKeys(&page, kCaptureKeys);
   page += "\n## `[gate]`\n\nBelow these figures no map is written. They are options of `[check_map]`.\n";
   AppendOptions(&page, GateOptions(stages));

@@ -9,27 +9,33 @@
 
 namespace cairn {
 
-// What a map is made from: a TOML file with `name`, `seed`, one capture (or [simulate]), and a table of
-// options per stage.  docs/recipe.md lists every key.
-struct Recipe {
-  std::string name;   // becomes the map's name: letters, digits, '-', '_' and '.'
-  uint64_t seed = 0;  // of everything random in the compile
-  // Folder of the capture; relative paths of the recipe are resolved against the recipe's folder.  Empty
-  // where the capture is simulated.
-  std::string capture_path;
+// One survey of a recipe; paths are resolved against the recipe's folder.
+struct RecipeCapture {
+  // The session's name in the map: that of the capture's folder where the recipe gives none.
+  std::string name;
+  std::string path;
   // Held-out images for the self-test; empty = the capture's queries.txt, if it has one.
   std::string queries_path;
   std::string floor_plan_path;  // empty = none
-  // "auto", or the up direction in the capture's frame as "x,y,z".
+};
+
+// What a map is made from: a TOML file with `name`, `seed`, captures (or [simulate]), and a table of options
+// per stage.  docs/recipe.md lists every key.
+struct Recipe {
+  std::string name;   // becomes the map's name: letters, digits, '-', '_' and '.'
+  uint64_t seed = 0;  // of everything random in the compile
+  // In the order of the recipe, all in one frame, with different names; none where the capture is simulated.
+  std::vector<RecipeCapture> captures;
+  // "auto", or the up direction in the captures' frame as "x,y,z".
   std::string up = "auto";
   bool simulated = false;            // [simulate]: the capture is rendered first
   std::vector<StageOptions> stages;  // in the order of the line, defaults overridden by the recipe's tables
 };
 
 // Reads a recipe.  `stages` are the stages with their defaults (AllStageOptions()).
-// Errors: NotFound, Io, Corrupt (not TOML), Unsupported (several captures); InvalidArgument for an unknown
-// key or table (with the nearest valid one), a wrong type or a value outside its range.  Each names the file
-// and the line.
+// Errors: NotFound, Io, Corrupt (not TOML); InvalidArgument for an unknown key or table (with the nearest
+// valid one), a wrong type or a value outside its range, two captures of one name or folder, or of different
+// up directions.  Each names the file and the line.
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages);
 
 // The reference page of recipes (docs/recipe.md): every key with its default, range and meaning, in Markdown.

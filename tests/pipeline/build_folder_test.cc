@@ -25,7 +25,7 @@ class BuildFolderTest : public testing::Test {
     folder_ = fs::path(testing::TempDir()) / fmt::format("build_folder_test_{}", getpid());
     fs::create_directories(folder_ / "survey");
     recipe_.name = "kitchen";
-    recipe_.capture_path = (folder_ / "survey").string();
+    recipe_.captures = {{.name = "survey", .path = (folder_ / "survey").string()}};
     recipe_.stages = TestStages();
     paths_ = {.build_dir = (folder_ / "kitchen.build").string(),
               .map = (folder_ / "kitchen.cairn").string(),
@@ -65,17 +65,17 @@ TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
 }
 
 TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
-  ASSERT_TRUE(WriteFileAtomically(recipe_.capture_path + "/images.txt", "").ok());
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/images.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
-  EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.capture_path + "\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.captures[0].path + "\n"));
   EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \n"));
-  ASSERT_TRUE(WriteFileAtomically(recipe_.capture_path + "/queries.txt", "").ok());
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/queries.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
-  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + recipe_.capture_path + "/queries.txt\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + recipe_.captures[0].path + "/queries.txt\n"));
 }
 
 TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {
-  recipe_.capture_path.clear();
+  recipe_.captures.clear();
   recipe_.simulated = true;
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_THAT(Text("config.mk"),

@@ -47,7 +47,9 @@ TEST_F(RecipeTest, NameAndCaptureAreEnough) {
     ASSERT_TRUE(recipe.ok()) << recipe.error().message;
     EXPECT_EQ(recipe->name, "kitchen");
     EXPECT_EQ(recipe->seed, 0u);
-    EXPECT_EQ(recipe->capture_path, (folder_ / "survey").string());
+    ASSERT_EQ(recipe->captures.size(), 1u);
+    EXPECT_EQ(recipe->captures[0].path, (folder_ / "survey").string());
+    EXPECT_EQ(recipe->captures[0].name, "survey");
     EXPECT_FALSE(recipe->simulated);
     EXPECT_EQ(OptionsToml(recipe->stages[1].table), OptionsToml(TestStages()[1].table));
   }
@@ -116,10 +118,36 @@ TEST_F(RecipeTest, WhatIsMissingIsSaid) {
   EXPECT_EQ(recipe.error().code, ErrorCode::kNotFound);
 }
 
-TEST_F(RecipeTest, SeveralCapturesAreRefused) {
-  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\n[[capture]]\npath = \"survey\"\n",
-                      ErrorCode::kUnsupported),
-              HasSubstr("recipe.toml:4: one capture per recipe in this version, found 2"));
+TEST_F(RecipeTest, SeveralCapturesAreSessionsWithNames) {
+  fs::create_directories(folder_ / "second survey");
+  const auto recipe = Read(
+      "name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0, 1]\n"
+      "[[capture]]\npath = \"second survey\"\n[[capture]]\npath = \".\"\nname = \"third\"\nup = \"auto\"\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  ASSERT_EQ(recipe->captures.size(), 3u);
+  EXPECT_EQ(recipe->captures[0].name, "survey");
+  EXPECT_EQ(recipe->captures[1].name, "second_survey");
+  EXPECT_EQ(recipe->captures[2].name, "third");
+  EXPECT_EQ(recipe->up, "0,0,1");
+}
+
+TEST_F(RecipeTest, CapturesThatContradictEachOtherAreRefused) {
+  const std::string first = "name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0, 1]\n";
+  fs::create_directories(folder_ / "other/survey");
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"survey\"\nname = \"b\"\n"),
+              HasSubstr("recipe.toml:5: the folder " + (folder_ / "survey").string() + " is given twice"));
+  EXPECT_THAT(
+      Message(first + "[[capture]]\npath = \"other/survey\"\n"),
+      HasSubstr("recipe.toml:5: two captures are named 'survey' (the name of the folder); give this one "
+                "another, such as name = \"survey-2\""));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other/survey\"\nname = \"survey\"\n"),
+              HasSubstr("two captures are named 'survey'; give"));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nup = [0, 1, 0]\n"),
+              HasSubstr("recipe.toml:5: up differs from that of a capture above"));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nname = \"a/b\"\n"),
+              HasSubstr("recipe.toml:7: name = "));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nnme = \"b\"\n"),
+              HasSubstr("recipe.toml:7: unknown key of [[capture]] 'nme'; did you mean 'name'?"));
 }
 
 TEST_F(RecipeTest, NamesThatCannotBeFileNamesAreRefused) {
