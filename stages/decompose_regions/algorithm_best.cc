@@ -24,7 +24,7 @@ void AddRegions(const Decomposition& decomposition, const ReducedWorld& wide, Co
 }  // namespace
 
 Decomposition AlgorithmBest(const World& world, const Decomposition& start, const BestOptions& options,
-                            uint64_t seed) {
+                            uint64_t seed, Progress& progress) {
   const ReducedWorld wide = ReduceWorld(world, start.k, start.tau, seed, AreaSplit::kBeforeShrinking);
   const int max_uncovered = static_cast<int>(start.uncovered.size());
   CoreFinder finder(wide);
@@ -32,10 +32,13 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
   AddRegions(start, wide, &finder, &generation.pool());
   std::vector<int> cover(generation.pool().size());
   std::iota(cover.begin(), cover.end(), 0);
+  progress.Begin("save regions", 1 + options.num_repairs, "steps");
   generation.Run();
+  progress.Advance();
   cover = SearchCover(
       &generation, wide, cover, seed,
-      {.exchanges_per_station = options.exchanges_per_station, .num_repairs = options.num_repairs});
+      {.exchanges_per_station = options.exchanges_per_station, .num_repairs = options.num_repairs}, progress);
+  progress.End();
 
   Decomposition fewest = start;
   fewest.regions.clear();

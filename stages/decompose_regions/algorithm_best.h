@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/decomposition.h"
+#include "core/progress.h"
 #include "core/world.h"
 
 namespace cairn {
@@ -19,11 +20,11 @@ struct BestOptions {
 // Fewer regions: replaces those of `start` by at most as many that leave at most as many coverable stations
 // uncovered, and states a certified lower bound (column_generation.h).  Not in [Sala06], whose §VII asks for
 // it.  Column generation on the linear program of set cover finds regions worth having and the bound; dives
-// and simulated annealing choose among them (cover_search.h). Time grows with the stations times the regions
-// that meet at one, and with the repairs.  Pure. REQUIRES: `start` is a decomposition of the world;
-// CheckWorld(world) is ok.
+// and simulated annealing choose among them (cover_search.h).  Time grows with the stations times the regions
+// that meet at one, and with the repairs.  Pure; told to stop, it returns what it has.
+// REQUIRES: `start` is a decomposition of the world; CheckWorld(world) is ok.
 Decomposition AlgorithmBest(const World& world, const Decomposition& start, const BestOptions& options,
-                            uint64_t seed);
+                            uint64_t seed, Progress& progress);
 
 // The lower bound alone, for a decomposition made by any algorithm.
 int CertifiedLowerBound(const World& world, const Decomposition& decomposition);

@@ -165,7 +165,7 @@ class CoverSearch {
 }  // namespace
 
 std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& wide, std::vector<int> start,
-                             uint64_t seed, const CoverSearchOptions& options) {
+                             uint64_t seed, const CoverSearchOptions& options, Progress& progress) {
   CoverSearch search(generation, wide, options);
   std::vector<int> best = std::move(start);
   search.DropSuperfluous(&best);
@@ -177,7 +177,8 @@ std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& w
     if (wide.coverable[station]) centers.push_back(station);
   }
   for (int repair = 0; repair < options.num_repairs; ++repair) {
-    if (static_cast<int>(best.size()) <= generation->lower_bound()) break;
+    if (static_cast<int>(best.size()) <= generation->lower_bound() || progress.Cancelled()) break;
+    progress.Advance();
     const StationIdx center = centers[random.UniformInt(0, static_cast<int64_t>(centers.size()) - 1)];
     const size_t num_opened = static_cast<size_t>(random.UniformInt(kMinOpened, kMaxOpened));
     std::vector<int> cover = search.Dive(search.Opened(best, center, num_opened), best.size(), false);
@@ -187,7 +188,7 @@ std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& w
     best = std::move(cover);
     num_uncovered = now;
   }
-  search.Anneal(&best, &random);
+  if (!progress.Cancelled()) search.Anneal(&best, &random);
   std::sort(best.begin(), best.end());
   return best;
 }

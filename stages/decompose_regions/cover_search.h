@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/progress.h"
 #include "stages/decompose_regions/column_generation.h"
 
 namespace cairn {
@@ -21,6 +22,6 @@ struct CoverSearchOptions {
 // cover so that few stations are uncovered (cover_annealing.h). `start`: pool indices of regions that cover
 // enough.  Returns pool indices, ascending; never more than `start`.
 std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& wide, std::vector<int> start,
-                             uint64_t seed, const CoverSearchOptions& options);
+                             uint64_t seed, const CoverSearchOptions& options, Progress& progress);
 
 }  // namespace cairn

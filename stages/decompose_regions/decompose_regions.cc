@@ -188,7 +188,8 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
     decomposition = AlgorithmBest(world, decomposition,
                                   {.exchanges_per_station = options.best_exchanges_per_station,
                                    .num_repairs = options.best_num_repairs},
-                                  seed);
+                                  seed, progress);
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
   } else if (options.lower_bound == "certified" && is_small) {
     decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
   } else if (options.lower_bound != "none") {

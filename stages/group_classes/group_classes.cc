@@ -362,6 +362,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
     }
   } else {
     triangulations = TriangulateAll(tracks, posed, state, options.triangulation, num_threads);
+    progress.Advance(options.num_rounds);
   }
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while grouping classes");
   result.final_rms_px = RmsErrorPx(triangulations);
