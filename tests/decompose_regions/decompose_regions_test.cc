@@ -108,15 +108,21 @@ TEST(DecomposeRegions, MaxHoleHoldsOnRandomWorlds) {
   }
 }
 
-// Cancels once as many stations are assigned as `limit`.
+// Cancels once as many stations are assigned as `limit`.  Stations are the first task; `best` has a second
+// one.
 class CancelAfter : public Progress {
  public:
   explicit CancelAfter(int64_t limit) : limit_(limit) {}
-  void Begin(std::string_view, int64_t total, std::string_view) override { total_ = total; }
-  void Advance(int64_t num_items) override { done_ += num_items; }
+  void Begin(std::string_view, int64_t total, std::string_view) override {
+    if (++num_tasks_ == 1) total_ = total;
+    total_later_ += num_tasks_ > 1 ? total : 0;
+  }
+  void Advance(int64_t num_items) override { (num_tasks_ == 1 ? done_ : done_later_) += num_items; }
   void End() override {}
   bool Cancelled() const override { return done_ >= limit_; }
+  int num_tasks_ = 0;
   int64_t done_ = 0, total_ = 0;
+  int64_t done_later_ = 0, total_later_ = 0;
 
  private:
   const int64_t limit_;
@@ -129,6 +135,8 @@ TEST(DecomposeRegions, ReportsEveryCoverableStationOnceAndStopsWhenCancelled) {
     CancelAfter never(1000000);
     ASSERT_TRUE(DecomposeRegions(world, options, 0, never).ok());
     EXPECT_EQ(never.done_, never.total_) << algorithm;
+    EXPECT_EQ(never.num_tasks_, algorithm == std::string("best") ? 2 : 1);
+    EXPECT_LE(never.done_later_, never.total_later_);  // repairs end where the lower bound is reached
     EXPECT_EQ(never.total_, static_cast<int64_t>(CoverableStations(world, 2, 0).size()));
     CancelAfter soon(1);
     const Result<Decomposition> result = DecomposeRegions(world, options, 0, soon);
