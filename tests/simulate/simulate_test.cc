@@ -139,6 +139,8 @@ class SimulateCommandTest : public SimulateCaptureTest {
     app.parse(reversed);
     CommandEnvironment environment = given;
     environment.progress = &progress_;
+    StageReport report;
+    environment.report = &report;
     std::ostringstream out;
     environment.out = &out;
     return command.run(environment);
