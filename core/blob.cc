@@ -49,6 +49,15 @@ float BlobReader::Float32() { return std::bit_cast<float>(static_cast<uint32_t>(
 
 double BlobReader::Float64() { return std::bit_cast<double>(LittleEndian(8)); }
 
+std::string_view BlobReader::Bytes(size_t num_bytes) {
+  if (!ok_ || bytes_.size() - position_ < num_bytes) {
+    ok_ = false;
+    return {};
+  }
+  position_ += num_bytes;
+  return bytes_.substr(position_ - num_bytes, num_bytes);
+}
+
 std::string BlobReader::ZeroTerminated() {
   const size_t end = bytes_.find('\0', position_);
   if (!ok_ || end == std::string_view::npos) {

@@ -20,6 +20,7 @@ class BlobWriter {
   void Float32(float value);
   void Float64(double value);
   void Bytes(const uint8_t* bytes, size_t num_bytes);
+  void Bytes(std::string_view bytes) { bytes_.append(bytes); }
   // The text up to its first zero byte, and a zero byte.
   void ZeroTerminated(const std::string& text) { bytes_.append(text.c_str()).push_back('\0'); }
   std::string Take() { return std::move(bytes_); }
@@ -44,6 +45,10 @@ class BlobReader {
   double Float64();
   // The bytes before the next zero byte, which is read too.
   std::string ZeroTerminated();
+  // The next bytes; empty past the end.
+  std::string_view Bytes(size_t num_bytes);
+  // What was read makes no sense: from now on as after a read past the end.
+  void Fail() { ok_ = false; }
   size_t num_left() const { return bytes_.size() - position_; }
   bool ok() const { return ok_; }
   // Whether everything was read, without a failure.

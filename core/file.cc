@@ -12,12 +12,19 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/map_error.h"
 #include "core/temporary.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Code of a failed write.
+ErrorCode CodeOfErrno(int error) {
+  if (error == ENOSPC || error == EDQUOT) return kDiskFull;
+  return error == EACCES || error == EROFS || error == EPERM ? kReadOnly : ErrorCode::kIo;
+}
 
 Status SyncPath(const std::string& path, int flags) {
   const int fd = open(path.c_str(), flags | O_CLOEXEC);
@@ -26,7 +33,7 @@ Status SyncPath(const std::string& path, int flags) {
   const int rc = fsync(fd);
   const int error = errno;
   close(fd);
-  if (rc != 0) return MakeError(ErrorCode::kIo, "{}: cannot be synced: {}", path, std::strerror(error));
+  if (rc != 0) return MakeError(CodeOfErrno(error), "{}: cannot be synced: {}", path, std::strerror(error));
   return Ok();
 }
 
@@ -73,6 +80,10 @@ Status ReplaceFileAtomically(const std::string& path,
   }
   if (fs::is_directory(target, error))
     return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
+  if (access(folder.c_str(), W_OK) != 0) {
+    return MakeError(CodeOfErrno(errno), "{}: the folder {} may not be written: {}", path, folder.string(),
+                     std::strerror(errno));
+  }
   const std::string temporary = TemporaryPath(path);
   fs::remove(temporary, error);
   Status status = write(temporary);
@@ -82,7 +93,7 @@ Status ReplaceFileAtomically(const std::string& path,
   }
   if (status.ok()) status = SyncPath(temporary, O_RDONLY);
   if (status.ok() && std::rename(temporary.c_str(), path.c_str()) != 0) {
-    status = MakeError(ErrorCode::kIo, "{}: cannot be replaced: {}", path, std::strerror(errno));
+    status = MakeError(CodeOfErrno(errno), "{}: cannot be replaced: {}", path, std::strerror(errno));
   }
   if (!status.ok()) {
     for (const char* suffix : {"", "-journal", "-wal", "-shm"}) fs::remove(temporary + suffix, error);
@@ -97,8 +108,9 @@ Status WriteFileAtomically(const std::string& path, std::string_view contents) {
     file.write(contents.data(), static_cast<std::streamsize>(contents.size()));
     file.close();
     if (!file) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be written: {}; is the disk full or the folder read-only?",
-                       path, std::strerror(errno));
+      return MakeError(CodeOfErrno(errno),
+                       "{}: cannot be written: {}; is the disk full or the folder read-only?", path,
+                       std::strerror(errno));
     }
     return Ok();
   });

@@ -10,6 +10,9 @@ Error Invalid(fmt::format_string<Args...> format, Args&&... args) {
   return MakeError(ErrorCode::kInvalidArgument, "map: {}", fmt::format(format, std::forward<Args>(args)...));
 }
 
+// Stored in 32 bits of 0.1 mm: farther than 200 km is a mistake, not a map.
+constexpr double kMaxExtentM = 2e5;
+
 bool IsPose(const Pose& pose) {
   return pose.translation.allFinite() && std::abs(pose.rotation.norm() - 1) < 1e-6;  // false for NaN
 }
@@ -24,12 +27,6 @@ bool IsAscending(const std::vector<int32_t>& values, size_t limit) {
 }
 
 Status CheckImages(const MapRows& rows) {
-  for (size_t i = 0; i < rows.cameras.size(); ++i) {
-    CAIRN_RETURN_IF_ERROR(CheckCamera(rows.cameras[i]));
-    if (i > 0 && rows.cameras[i].camera_id <= rows.cameras[i - 1].camera_id) {
-      return Invalid("camera {} is out of order", rows.cameras[i].camera_id);
-    }
-  }
   for (size_t i = 0; i < rows.images.size(); ++i) {
     const MapImage& image = rows.images[i];
     if (i > 0 && image.image_id <= rows.images[i - 1].image_id)
@@ -38,9 +35,16 @@ Status CheckImages(const MapRows& rows) {
     for (const Camera& camera : rows.cameras) has_camera |= camera.camera_id == image.camera_id;
     if (!has_camera)
       return Invalid("image {} has camera {}, which the map lacks", image.image_id, image.camera_id);
-    if (!IsPose(image.cam_from_world)) return Invalid("image {}: its pose is none", image.image_id);
+    if (!IsPose(image.cam_from_world) || image.cam_from_world.translation.cwiseAbs().maxCoeff() > kMaxExtentM)
+      return Invalid("image {}: its pose is none", image.image_id);
     if (image.station < -1 || image.station >= static_cast<StationIdx>(rows.stations.size())) {
       return Invalid("image {}: station {} of {}", image.image_id, image.station, rows.stations.size());
+    }
+    if (image.name.size() > kMaxNameBytes)
+      return Invalid("image {}: a name of {} bytes", image.image_id, image.name.size());
+    if (image.landmarks.size() > kMaxImageLandmarks) {
+      return Invalid("image {}: {} landmarks, at most {} are stored", image.image_id, image.landmarks.size(),
+                     kMaxImageLandmarks);
     }
     if (!IsAscending(image.landmarks, rows.landmarks.size())) {
       return Invalid("image {}: its landmarks are not ascending below {}", image.image_id,
@@ -52,7 +56,8 @@ Status CheckImages(const MapRows& rows) {
 
 Status CheckRegions(const MapRows& rows) {
   for (size_t i = 0; i < rows.stations.size(); ++i) {
-    if (!rows.stations[i].position.allFinite() || !std::isfinite(rows.stations[i].heading_deg.value_or(0))) {
+    if (!(rows.stations[i].position.cwiseAbs().maxCoeff() <= kMaxExtentM) ||
+        !std::isfinite(rows.stations[i].heading_deg.value_or(0))) {
       return Invalid("station {}: its place is not finite", i);
     }
   }
@@ -80,8 +85,28 @@ Status CheckRegions(const MapRows& rows) {
 
 }  // namespace
 
+Status CheckMapHead(const MapHead& head) {
+  CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(head.frame));
+  for (size_t i = 0; i < head.cameras.size(); ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckCamera(head.cameras[i]));
+    if (i > 0 && head.cameras[i].camera_id <= head.cameras[i - 1].camera_id) {
+      return Invalid("camera {} is out of order", head.cameras[i].camera_id);
+    }
+  }
+  if (!IsPose(head.floor_from_world) || !IsPose(head.camera_from_given))
+    return Invalid("a frame's rotation is none");
+  if (!(head.stated_pose_sigma_m >= 0 && head.stated_pose_sigma_m < 1e3) ||
+      !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
+    return Invalid("the noise of the stated poses is no valid number");
+  }
+  for (const auto& [name, value] : head.self_test) {
+    if (!std::isfinite(value)) return Invalid("self-test figure '{}' is not finite", name);
+  }
+  return Ok();
+}
+
 Status CheckMapRows(const MapRows& rows) {
-  CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(rows.frame));
+  CAIRN_RETURN_IF_ERROR(CheckMapHead(rows));
   CAIRN_RETURN_IF_ERROR(CheckImages(rows));
   CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
@@ -93,16 +118,9 @@ Status CheckMapRows(const MapRows& rows) {
         (landmark.covariance.diagonal().array() < 0).any()) {
       return Invalid("landmark {}: its position, covariance or scale is no valid number", i);
     }
-    // Stored in 32 bits of the unit: farther than 200 km is a mistake, not a map.
-    if (landmark.position.cwiseAbs().maxCoeff() > 2e5 || landmark.scale_m > 2e5) {
+    if (landmark.position.cwiseAbs().maxCoeff() > kMaxExtentM || landmark.scale_m > kMaxExtentM) {
       return Invalid("landmark {} lies more than 200 km from the origin of its frame", i);
     }
-  }
-  if (!IsPose(rows.floor_from_world) || !IsPose(rows.camera_from_given))
-    return Invalid("a frame's rotation is none");
-  if (!(rows.stated_pose_sigma_m >= 0 && rows.stated_pose_sigma_m < 1e3) ||
-      !(rows.stated_pose_sigma_deg >= 0 && rows.stated_pose_sigma_deg <= 180)) {
-    return Invalid("the noise of the stated poses is no valid number");
   }
   size_t image = 0;
   for (const ImageId image_id : rows.vocabulary.document_ids) {
@@ -110,9 +128,6 @@ Status CheckMapRows(const MapRows& rows) {
     if (image == rows.images.size() || rows.images[image].image_id != image_id) {
       return Invalid("the vocabulary knows image {}, which the map lacks", image_id);
     }
-  }
-  for (const auto& [name, value] : rows.self_test) {
-    if (!std::isfinite(value)) return Invalid("self-test figure '{}' is not finite", name);
   }
   return Ok();
 }

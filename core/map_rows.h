@@ -52,9 +52,12 @@ struct MapRegion {
   std::vector<LandmarkIdx> landmarks;  // ascending
 };
 
-struct MapRows {
+// What a map says of itself as a whole.
+struct MapHead {
   std::string name;
-  std::string writer;   // program and version, "cairn 0.1.0"
+  std::string writer;  // program and version, "cairn 0.1.0"
+  // Of the processor that found the features: another one's may differ in the last bits.
+  std::string instruction_set;
   uint64_t seed = 0;    // of the compilation
   bool sealed = false;  // checked, with its self-test figures
   // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
@@ -82,31 +85,42 @@ struct MapRows {
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
 
-  std::vector<Camera> cameras;   // ascending camera_id
+  std::vector<Camera> cameras;  // ascending camera_id
+};
+
+struct MapRows : MapHead {
   std::vector<MapImage> images;  // ascending image_id
   std::vector<MapStation> stations;
   std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
   std::vector<MapRegion> regions;
   std::vector<MapLandmark> landmarks;
   DescriptorMatrix descriptors;  // row i: landmark i
-  Vocabulary vocabulary;         // documents are among `images`
+  // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
+  Vocabulary vocabulary;
 };
 
-inline constexpr int kMapVersionMajor = 1;
+inline constexpr int kMapVersionMajor = 2;
 inline constexpr int kMapVersionMinor = 0;
-// Unit of stored positions and scales: 0.1 mm, so a coordinate is off by at most 0.05 mm.
-inline constexpr double kMapLengthUnitM = 1e-4;
+// Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
+inline constexpr int kMaxImageLandmarks = 1 << 18;
+inline constexpr int kMaxNameBytes = 4096;
 
 // Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
 // strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.
 Status CheckMapRows(const MapRows& rows);
+// The same for the head alone.
+Status CheckMapHead(const MapHead& head);
 
-// Writes a map file.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io.
+// Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io, DiskFull,
+// ReadOnly.
 Status WriteMapRows(const MapRows& rows, const std::string& path);
 
-// Reads a map file; every length, index and number is checked, and nothing larger than the file states is
-// allocated. Errors: NotFound; Corrupt (not SQLite, truncated, a SQLite file of another kind, damaged rows);
-// Unsupported (a newer major version; names the writer).
+// Reads a whole map file; every hash, length, index and number is checked, and nothing larger than the file
+// states is allocated.  Errors: as MapFile::Open (core/map_file.h).
 Result<MapRows> ReadMapRows(const std::string& path);
+
+// Reads a map of format 1.x, which today's runtime does not: for `cairn migrate`.  Errors: NotFound; Corrupt;
+// Unsupported (another version).
+Result<MapRows> ReadMapRowsVersion1(const std::string& path);
 
 }  // namespace cairn

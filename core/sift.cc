@@ -134,4 +134,17 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   return features;
 }
 
+std::string SiftInstructionSet() {
+#if defined(__x86_64__)
+  const char* const best = cv::checkHardwareSupport(CV_CPU_AVX512_SKX) ? " avx512"
+                           : cv::checkHardwareSupport(CV_CPU_AVX2)     ? " avx2"
+                                                                       : " sse2";
+  return std::string("x86-64") + best;
+#elif defined(__aarch64__)
+  return "aarch64";
+#else
+  return "other";
+#endif
+}
+
 }  // namespace cairn

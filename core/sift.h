@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include <opencv2/core/mat.hpp>
 
 #include "core/error.h"
@@ -31,5 +33,9 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
 // OpenCV's keypoint position in COLMAP's pixels: half a pixel for the pixel's centre, minus the quarter that
 // OpenCV 4.6's SIFT adds when it starts from the doubled image.
 Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg);
+
+// The instruction set of this processor that OpenCV's SIFT uses, for example "x86-64 avx2": the last bits of
+// features differ between them.
+std::string SiftInstructionSet();
 
 }  // namespace cairn

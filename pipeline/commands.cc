@@ -7,6 +7,7 @@
 #include "pipeline/inspect_command.h"
 #include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
+#include "pipeline/seal_commands.h"
 #include "stages/build_vocabulary/command.h"
 #include "stages/check_map/command.h"
 #include "stages/decompose_regions/command.h"
@@ -28,7 +29,8 @@ std::vector<Command> AllCommands() {
       BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
       ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
-      JoinCapturesCommand(),
+      JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
+      MigrateCommand(),
   };
 }
 

@@ -1,6 +1,7 @@
 #include "pipeline/inspect_command.h"
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "core/database.h"
 #include "core/decomposition.h"
 #include "core/file.h"
+#include "core/map_file.h"
 #include "core/map_rows.h"
 #include "pipeline/floor_svg.h"
 
@@ -23,6 +25,15 @@ struct Arguments {
   bool json = false;
   std::string svg_path;
 };
+
+// Bytes of the blocks of each kind.
+nlohmann::ordered_json BytesPerBlockKind(const MapDirectory& directory) {
+  std::map<std::string, int64_t> bytes;
+  for (const BlockEntry& entry : directory.blocks()) {
+    bytes[BlockKindName(static_cast<BlockKind>(entry.kind))] += entry.num_bytes;
+  }
+  return bytes;
+}
 
 // Bytes of the pages of each table (its indices included), largest first; the file's remainder is SQLite's
 // own.
@@ -49,6 +60,7 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
   nlohmann::ordered_json json = {{"name", rows.name},
                                  {"format", fmt::format("{}.{}", kMapVersionMajor, kMapVersionMinor)},
                                  {"writer", rows.writer},
+                                 {"instruction_set", rows.instruction_set},
                                  {"sealed", rows.sealed},
                                  {"seed", rows.seed},
                                  {"unit", rows.frame.unit},
@@ -117,7 +129,7 @@ std::string MapText(const nlohmann::ordered_json& json) {
           if (c != '\n') line += c;
           if (c == '\n') text += "  " + std::exchange(line, "") + "\n";
         }
-      } else if (key == "bytes_per_table") {
+      } else if (key == "bytes_per_table" || key == "bytes_per_block_kind") {
         text += fmt::format("  {:<22} {:>12} {:>5.1f} %\n", name, entry.get<int64_t>(),
                             100.0 * entry.get<double>() / json["bytes"].get<double>());
       } else {
@@ -131,9 +143,11 @@ std::string MapText(const nlohmann::ordered_json& json) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.map_path, {}));
   CAIRN_ASSIGN_OR_RETURN(const auto tables, BytesPerTable(arguments.map_path));
-  const auto json =
-      MapJson(rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
+  auto json = MapJson(rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
+  json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
+  if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
   *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json));
   if (arguments.svg_path.empty()) return Ok();
   return WriteFileAtomically(arguments.svg_path, FloorSvg(rows));

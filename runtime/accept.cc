@@ -153,7 +153,7 @@ OptionTable DescribeOptions(AcceptOptions* o) {
 }
 
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  const Map& map, const AcceptOptions& options) {
+                  double distance_from_survey_m, const AcceptOptions& options) {
   if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
     return {NoFix::kTooFewInliers,
             fmt::format("{} inliers, at least {} are needed", inliers.size(), options.min_num_inliers)};
@@ -170,14 +170,10 @@ Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& in
             fmt::format("standard deviation {:.3f} m and {:.2f} degrees, at most {} and {} are allowed",
                         sigma_m, sigma_deg, options.max_sigma_m, options.max_sigma_deg)};
   }
-  double distance = std::numeric_limits<double>::infinity();
-  for (const MapImage& image : map.rows().images) {
-    distance = std::min(distance, CenterErrorM(image.cam_from_world, pose.cam_from_world));
-  }
-  if (options.max_distance_from_survey_m > 0 && distance > options.max_distance_from_survey_m) {
+  if (options.max_distance_from_survey_m > 0 && distance_from_survey_m > options.max_distance_from_survey_m) {
     return {NoFix::kFarFromSurvey,
-            fmt::format("{:.1f} m from the nearest survey image, at most {} m are allowed", distance,
-                        options.max_distance_from_survey_m)};
+            fmt::format("{:.1f} m from the nearest survey image, at most {} m are allowed",
+                        distance_from_survey_m, options.max_distance_from_survey_m)};
   }
   return {};
 }

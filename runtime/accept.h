@@ -82,6 +82,6 @@ struct Verdict {
 
 // Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey.
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  const Map& map, const AcceptOptions& options);
+                  double distance_from_survey_m, const AcceptOptions& options);
 
 }  // namespace cairn

@@ -3,21 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <numeric>
 #include <utility>
+
+#include "runtime/no_throw.h"
 
 namespace cairn {
 namespace {
 
 // Seed of RANSAC: fixed, so that an image always gives the same answer.
 constexpr uint64_t kRansacSeed = 0;
-
-std::vector<LandmarkIdx> AllLandmarks(const Map& map) {
-  std::vector<LandmarkIdx> landmarks(map.rows().landmarks.size());
-  std::iota(landmarks.begin(), landmarks.end(), 0);
-  return landmarks;
-}
 
 std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
   std::vector<int32_t> images;
@@ -32,28 +27,13 @@ std::vector<Correspondence> Select(const std::vector<Correspondence>& correspond
   return selected;
 }
 
+// Ascending, each once.
 std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
   std::vector<LandmarkIdx> landmarks;
   for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
   return landmarks;
-}
-
-// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
-RegionIdx RegionWithMost(const MapRows& rows, const std::vector<Correspondence>& inliers) {
-  RegionIdx best_region = -1;
-  int most = 0;
-  for (size_t region = 0; region < rows.regions.size(); ++region) {
-    const std::vector<LandmarkIdx>& landmarks = rows.regions[region].landmarks;
-    int count = 0;
-    for (const Correspondence& inlier : inliers) {
-      count += std::binary_search(landmarks.begin(), landmarks.end(), inlier.landmark) ? 1 : 0;
-    }
-    if (count > most) {
-      most = count;
-      best_region = static_cast<RegionIdx>(region);
-    }
-  }
-  return best_region;
 }
 
 Localization Failure(NoFix reason, std::string message) {
@@ -61,6 +41,28 @@ Localization Failure(NoFix reason, std::string message) {
   localization.reason = reason;
   localization.message = std::move(message);
   return localization;
+}
+
+// The one of two answers to believe.  Of two fixes the one with more inliers, unless they are at different
+// places and nearly as good; of two failures the one that came farther is the more telling.
+Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
+  if (!first.has_fix() && !second.has_fix()) {
+    const bool is_better =
+        std::pair(second.num_inliers, second.num_matches) >= std::pair(first.num_inliers, first.num_matches);
+    return is_better ? second : first;
+  }
+  if (!first.has_fix()) return second;
+  if (!second.has_fix()) return first;
+  if (second.num_unguided_inliers > first.num_unguided_inliers) std::swap(first, second);
+  const bool differ =
+      CenterErrorM(first.cam_from_world, second.cam_from_world) > accept.second_pose_distance_m ||
+      RotationErrorDeg(first.cam_from_world, second.cam_from_world) > accept.second_pose_angle_deg;
+  const double needed = accept.max_second_pose_ratio * first.num_unguided_inliers;
+  if (accept.max_second_pose_ratio <= 0 || !differ || second.num_unguided_inliers < needed) return first;
+  first.reason = NoFix::kAmbiguous;
+  first.message = fmt::format("{} and {} matches agree on poses at different places",
+                              first.num_unguided_inliers, second.num_unguided_inliers);
+  return first;
 }
 
 Status CheckQueryCamera(const Camera& camera) {
@@ -109,6 +111,15 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});
+  table.push_back(
+      {.name = "sure_num_unguided_inliers",
+       .value = &options->sure_num_unguided_inliers,
+       .help = "a fix with at least so many unguided inliers is taken without trying more landmarks",
+       .min = 0});
+  table.push_back({.name = "fall_back_max_num_landmarks",
+                   .value = &options->fall_back_max_num_landmarks,
+                   .help = "but not in maps of more landmarks than this",
+                   .min = 0});
   return table;
 }
 
@@ -116,63 +127,68 @@ Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& opt
     : map_(std::move(map)), options_(options) {
   // What the survey's poses were off by does not average out over landmarks.
   options_.refine.systematic_sigma_m =
-      std::hypot(options.refine.systematic_sigma_m, map_->rows().stated_pose_sigma_m);
+      std::hypot(options.refine.systematic_sigma_m, map_->head().stated_pose_sigma_m);
   options_.refine.systematic_sigma_deg =
-      std::hypot(options.refine.systematic_sigma_deg, map_->rows().stated_pose_sigma_deg);
+      std::hypot(options.refine.systematic_sigma_deg, map_->head().stated_pose_sigma_deg);
 }
 
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
                                          const std::optional<PosePrior>& prior) {
-  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-  if (grey.cols != camera.width || grey.rows != camera.height) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
-                     camera.width, camera.height);
-  }
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
-  return LocalizeFeatures(std::move(features), camera, prior);
+  return WithoutExceptions("localize", [&]() -> Result<Localization> {
+    CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+    if (grey.cols != camera.width || grey.rows != camera.height) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
+                       camera.width, camera.height);
+    }
+    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
+    return LocalizeFeatures(std::move(features), camera, prior);
+  });
 }
 
 Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
                                                  const std::optional<PosePrior>& prior) {
-  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-  if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
-    return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
-                     features.keypoints.size(), features.descriptors.rows());
-  }
-  const int num_features = static_cast<int>(features.keypoints.size());
-  if (num_features < options_.accept.min_num_features) {
-    Localization none = Failure(
-        NoFix::kTooFewFeatures,
-        fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
-    none.num_features = num_features;
-    return none;
-  }
-  const Query query = MakeQuery(std::move(features), camera, options_.measurement);
+  return WithoutExceptions("localize", [&]() -> Result<Localization> {
+    CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+    if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
+      return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
+                       features.keypoints.size(), features.descriptors.rows());
+    }
+    const int num_features = static_cast<int>(features.keypoints.size());
+    if (num_features < options_.accept.min_num_features) {
+      Localization none = Failure(
+          NoFix::kTooFewFeatures,
+          fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
+      none.num_features = num_features;
+      return none;
+    }
+    return LocalizeQuery(MakeQuery(std::move(features), camera, options_.measurement), prior);
+  });
+}
 
+Result<Localization> Localizer::LocalizeQuery(const Query& query,
+                                              const std::optional<PosePrior>& prior) const {
   std::vector<ImageId> candidate_ids;
   Localization best = Failure(NoFix::kNoCandidates, "no survey image looks like it");
-  for (const Attempt& attempt : MakeAttempts(query, prior, &candidate_ids)) {
-    Localization localization = Try(query, attempt);
-    // Of the failures, the one that came farthest is the most telling.
-    const bool better = std::pair(localization.num_inliers, localization.num_matches) >=
-                        std::pair(best.num_inliers, best.num_matches);
-    if (localization.has_fix() || better) best = std::move(localization);
-    if (best.has_fix()) break;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
+  for (const Attempt& attempt : attempts) {
+    CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, attempt));
+    best = Better(std::move(best), std::move(localization), options_.accept);
+    if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
-  best.num_features = num_features;
+  best.num_features = static_cast<int>(query.features.keypoints.size());
   best.candidates = std::move(candidate_ids);
   if (best.has_fix()) {
-    const Pose given_from_camera = map_->rows().camera_from_given.Inverse();
+    const Pose given_from_camera = map_->head().camera_from_given.Inverse();
     best.cam_from_world = given_from_camera * best.cam_from_world;
     best.covariance = TransformCovariance(given_from_camera, best.covariance);
   }
   return best;
 }
 
-std::vector<Localizer::Attempt> Localizer::MakeAttempts(const Query& query,
-                                                        const std::optional<PosePrior>& prior,
-                                                        std::vector<ImageId>* candidate_ids) const {
+Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Query& query,
+                                                                const std::optional<PosePrior>& prior,
+                                                                std::vector<ImageId>* candidate_ids) const {
   std::vector<Attempt> attempts;
   const auto add = [&](Scope scope, std::vector<LandmarkIdx> landmarks) {
     if (landmarks.empty()) return;
@@ -182,24 +198,32 @@ std::vector<Localizer::Attempt> Localizer::MakeAttempts(const Query& query,
     attempts.push_back({scope, std::move(landmarks)});
   };
   if (prior) {
-    add(Scope::kPrior, LandmarksOfImages(*map_, ImagesOf(RetrieveByPrior(*map_, *prior, options_.retrieve))));
+    CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, *prior, options_.retrieve));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(near)));
+    add(Scope::kPrior, std::move(landmarks));
   }
-  const std::vector<Candidate> candidates =
-      RetrieveByWords(*map_, query.features.descriptors, options_.retrieve);
-  for (const Candidate& candidate : candidates)
-    candidate_ids->push_back(map_->rows().images[candidate.image].image_id);
-  auto of_regions = LandmarksOfRegions(*map_, RegionsOfCandidates(*map_, candidates, options_.retrieve));
-  auto of_images = LandmarksOfImages(*map_, ImagesOf(candidates));
+  CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, options_.retrieve));
+  for (const Candidate& candidate : candidates) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map_->Image(candidate.image));
+    candidate_ids->push_back(image->image_id);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto regions, RegionsOfCandidates(*map_, candidates, options_.retrieve));
+  CAIRN_ASSIGN_OR_RETURN(auto of_regions, LandmarksOfRegions(*map_, regions));
+  CAIRN_ASSIGN_OR_RETURN(auto of_images, LandmarksOfImages(*map_, ImagesOf(candidates)));
   const bool images_first = options_.first_landmarks == "images" ||
-                            (options_.first_landmarks == "auto" && map_->rows().landmark_choice == "all");
+                            (options_.first_landmarks == "auto" && map_->head().landmark_choice == "all");
   if (images_first) add(Scope::kImages, of_images);
   add(Scope::kRegions, std::move(of_regions));
   add(Scope::kImages, std::move(of_images));
-  if (options_.fall_back_to_all) add(Scope::kAll, AllLandmarks(*map_));
+  if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
+    std::vector<LandmarkIdx> all(map_->num_landmarks());
+    std::iota(all.begin(), all.end(), 0);
+    add(Scope::kAll, std::move(all));
+  }
   return attempts;
 }
 
-Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
+Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) const {
   const AcceptOptions& accept = options_.accept;
   Localization localization;
   localization.scope = attempt.scope;
@@ -209,14 +233,17 @@ Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
     return localization;
   };
 
-  std::vector<Correspondence> matches = MatchLandmarks(query, *map_, attempt.landmarks, options_.match);
+  const bool all = static_cast<int64_t>(attempt.landmarks.size()) == map_->num_landmarks();
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks,
+                         all ? map_->AllLandmarks() : map_->Gather(attempt.landmarks, true));
+  const std::vector<Correspondence> matches = MatchLandmarks(query, *landmarks, options_.match);
   localization.num_matches = static_cast<int>(matches.size());
   if (localization.num_matches < accept.min_num_matches) {
     return fail(NoFix::kTooFewMatches,
                 fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
                             attempt.landmarks.size(), accept.min_num_matches));
   }
-  const std::vector<PoseMeasurement> measurements = MakeMeasurements(query, map_->rows(), matches);
+  const std::vector<PoseMeasurement> measurements = MakeMeasurements(query, *landmarks, matches);
   const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
   if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
   localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
@@ -239,32 +266,51 @@ Localization Localizer::Try(const Query& query, const Attempt& attempt) const {
                                                100 * accept.max_second_pose_ratio));
   }
 
-  matches = Select(matches, estimate->inliers);
+  return Refine(query, *landmarks, Select(matches, estimate->inliers), estimate->cam_from_world,
+                std::move(localization));
+}
+
+Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& matched,
+                                       std::vector<Correspondence> matches, const Pose& cam_from_world,
+                                       Localization localization) const {
+  const auto fail = [&](NoFix reason, std::string message) {
+    localization.reason = reason;
+    localization.message = std::move(message);
+    return localization;
+  };
+  const LandmarkSet* landmarks = &matched;
+  std::shared_ptr<const LandmarkSet> covisible;
   if (options_.match.guided_num_images > 0) {
-    std::vector<Correspondence> guided =
-        MatchGuided(query, *map_, CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match),
-                    estimate->cam_from_world, options_.match);
-    if (guided.size() >= matches.size()) matches = std::move(guided);
+    CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
+                           CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match));
+    CAIRN_ASSIGN_OR_RETURN(covisible, map_->Gather(std::move(seen), false));
+    std::vector<Correspondence> guided = MatchGuided(query, *covisible, cam_from_world, options_.match);
+    if (guided.size() >= matches.size()) {
+      matches = std::move(guided);
+      landmarks = covisible.get();
+    }
   }
-  const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, map_->rows(), matches),
-                                                estimate->cam_from_world, options_.refine);
+  const auto refined =
+      RefinePoseWithCovariance(MakeMeasurements(query, *landmarks, matches), cam_from_world, options_.refine);
   if (!refined)
     return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
   const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
   localization.num_inliers = static_cast<int>(inliers.size());
-  if (localization.num_inliers < accept.min_kept_ratio * localization.num_unguided_inliers) {
+  const double min_kept_ratio = options_.accept.min_kept_ratio;
+  if (localization.num_inliers < min_kept_ratio * localization.num_unguided_inliers) {
     return fail(
         NoFix::kTooFewInliers,
         fmt::format(
             "of {} matches that agree on a pose {} are left after refinement, at least {:.0f} % are needed",
-            localization.num_unguided_inliers, localization.num_inliers, 100 * accept.min_kept_ratio));
+            localization.num_unguided_inliers, localization.num_inliers, 100 * min_kept_ratio));
   }
-  Verdict verdict = JudgePose(*refined, inliers, query, *map_, accept);
+  CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
+  Verdict verdict = JudgePose(*refined, inliers, query, distance, options_.accept);
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
   localization.reason = NoFix::kNone;
   localization.cam_from_world = refined->cam_from_world;
   localization.covariance = refined->covariance;
-  localization.region = RegionWithMost(map_->rows(), inliers);
+  CAIRN_ASSIGN_OR_RETURN(localization.region, RegionWithMost(*map_, LandmarksOf(inliers)));
   return localization;
 }
 

@@ -31,8 +31,12 @@ struct LocalizerOptions {
   // Landmarks to match first: of the candidates' regions, or of the candidate images themselves; "auto":
   // regions, unless the map keeps landmarks that no region has.
   std::string first_landmarks = "auto";
-  // Try all landmarks of the map when those fail.
+  // A fix with at least so many inliers, found without the pose, is taken at once; with fewer, the other sets
+  // of landmarks are tried too, and the fix with most inliers counts: look-alikes give few.  REQUIRES: >= 0
+  int sure_num_unguided_inliers = 20;
+  // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
   bool fall_back_to_all = true;
+  int fall_back_max_num_landmarks = 200000;
 };
 OptionTable DescribeOptions(LocalizerOptions* options);
 
@@ -68,8 +72,9 @@ class Localizer {
   explicit Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options = {});
 
   // From 8-bit grey pixels of the camera's size.  Same image, same result.
-  // Errors: InvalidArgument (not 8-bit grey; a camera that is none or of another size).  An image that cannot
-  // be localized is no error: see Localization::reason.
+  // Errors: InvalidArgument (not 8-bit grey; a camera that is none or of another size); Corrupt, Io (a part
+  // of the map that is needed is damaged or cannot be read).  An image that cannot be localized is no error:
+  // see Localization::reason.  No exception leaves it.
   Result<Localization> Localize(const cv::Mat& grey, const Camera& camera,
                                 const std::optional<PosePrior>& prior = std::nullopt);
 
@@ -81,9 +86,13 @@ class Localizer {
 
  private:
   struct Attempt;
-  std::vector<Attempt> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
-                                    std::vector<ImageId>* candidate_ids) const;
-  Localization Try(const Query& query, const Attempt& attempt) const;
+  Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
+  Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
+                                            std::vector<ImageId>* candidate_ids) const;
+  Result<Localization> Try(const Query& query, const Attempt& attempt) const;
+  Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
+                              std::vector<Correspondence> matches, const Pose& cam_from_world,
+                              Localization localization) const;
   bool IsAmbiguous(const std::vector<PoseMeasurement>& measurements, const PoseEstimate& first) const;
 
   std::shared_ptr<const Map> map_;

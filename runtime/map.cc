@@ -1,45 +1,166 @@
 #include "runtime/map.h"
 
+#include <limits>
+#include <numeric>
 #include <utility>
 
-namespace cairn {
+#include "runtime/no_throw.h"
 
-Result<std::shared_ptr<const Map>> Map::Open(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(path));
-  return std::shared_ptr<const Map>(new Map(std::move(rows)));
+namespace cairn {
+namespace {
+
+// In the cache, beside the numbers of blocks.
+constexpr int64_t kAllLandmarks = -1;
+
+int64_t NumBytes(const LandmarkSet& set) {
+  return static_cast<int64_t>(set.idx.size() * (sizeof(LandmarkIdx) + sizeof(MapLandmark))) +
+         set.descriptors.size() + set.packed.num_bytes();
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Map>> Map::Open(const std::string& path, const MapOptions& options) {
+  return WithoutExceptions(path.c_str(), [&]() -> Result<std::shared_ptr<const Map>> {
+    CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {.public_key = options.public_key}));
+    return std::shared_ptr<const Map>(new Map(std::move(file), options.memory_budget_bytes));
+  });
 }
 
 Result<std::shared_ptr<const Map>> Map::FromRows(MapRows rows) {
-  CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
-  return std::shared_ptr<const Map>(new Map(std::move(rows)));
+  return WithoutExceptions("map", [&]() -> Result<std::shared_ptr<const Map>> {
+    CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
+    return std::shared_ptr<const Map>(new Map(std::move(rows)));
+  });
 }
 
-Map::Map(MapRows rows) : rows_(std::move(rows)) {
-  regions_of_station_.resize(rows_.stations.size());
-  for (size_t region = 0; region < rows_.regions.size(); ++region) {
-    for (const StationIdx station : rows_.regions[region].stations) {
-      regions_of_station_[station].push_back(static_cast<RegionIdx>(region));
+Map::Map(MapFile file, int64_t memory_budget_bytes)
+    : head_(file.head()), directory_(file.directory()), file_(std::move(file)), cache_(memory_budget_bytes) {}
+
+Map::Map(MapRows rows) : head_(rows), cache_(std::numeric_limits<int64_t>::max()) {
+  rows_ = std::make_unique<const MapRows>(std::move(rows));
+  layout_ = std::make_unique<const MapLayout>(*rows_);
+  for (const BlockEntry& entry : layout_->entries()) directory_.Add(entry);
+}
+
+template <typename Block, typename Decode, typename Make>
+Result<std::shared_ptr<const Block>> Map::Load(BlockKind kind, int64_t ordinal, const Decode& decode,
+                                               const Make& make) const {
+  const int64_t block = directory_.Block(kind, ordinal);
+  if (auto found = cache_.Find(block)) return std::static_pointer_cast<const Block>(found);
+  const BlockEntry& entry = directory_.blocks()[block];
+  std::shared_ptr<const Block> loaded;
+  if (file_) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, file_->ReadBlock(block));
+    CAIRN_ASSIGN_OR_RETURN(Block decoded, decode(bytes, entry, file_->NameOf(block)));
+    loaded = std::make_shared<const Block>(std::move(decoded));
+  } else {
+    loaded = std::make_shared<const Block>(make(entry));
+  }
+  const int64_t num_bytes = NumBytes(*loaded);
+  return std::static_pointer_cast<const Block>(cache_.Insert(block, std::move(loaded), num_bytes));
+}
+
+Result<std::shared_ptr<const LandmarkBlock>> Map::Landmarks(int64_t ordinal) const {
+  return Load<LandmarkBlock>(
+      BlockKind::kLandmarks, ordinal,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeLandmarkBlock(bytes, entry, directory_, what);
+      },
+      [&](const auto& entry) { return layout_->MakeLandmarkBlock(entry); });
+}
+
+Result<std::shared_ptr<const ImageBlock>> Map::Images(int64_t ordinal) const {
+  return Load<ImageBlock>(
+      BlockKind::kImages, ordinal,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeImageBlock(bytes, entry, directory_, what);
+      },
+      [&](const auto& entry) { return layout_->MakeImageBlock(entry); });
+}
+
+Result<std::shared_ptr<const StationBlock>> Map::Stations(int64_t ordinal) const {
+  return Load<StationBlock>(
+      BlockKind::kStations, ordinal,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeStationBlock(bytes, entry, directory_, what);
+      },
+      [&](const auto& entry) { return layout_->MakeStationBlock(entry); });
+}
+
+Result<std::shared_ptr<const RegionBlock>> Map::Regions(int64_t ordinal) const {
+  return Load<RegionBlock>(
+      BlockKind::kRegions, ordinal,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeRegionBlock(bytes, entry, directory_, what);
+      },
+      [&](const auto& entry) { return layout_->MakeRegionBlock(entry); });
+}
+
+Result<std::shared_ptr<const WordBlock>> Map::Words(int64_t ordinal) const {
+  return Load<WordBlock>(
+      BlockKind::kWords, ordinal,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeWordBlock(bytes, entry, directory_, what);
+      },
+      [&](const auto& entry) { return layout_->MakeWordBlock(entry); });
+}
+
+Result<std::shared_ptr<const Vocabulary>> Map::VocabularyTree() const {
+  return Load<Vocabulary>(
+      BlockKind::kVocabularyTree, 0,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeVocabularyTree(bytes, entry, directory_, what);
+      },
+      [&](const auto&) { return rows_->vocabulary; });
+}
+
+Result<std::shared_ptr<const std::vector<float>>> Map::DocumentNorms() const {
+  return Load<std::vector<float>>(
+      BlockKind::kDocumentNorms, 0,
+      [&](const auto& bytes, const auto& entry, const auto& what) {
+        return DecodeDocumentNorms(bytes, entry, what);
+      },
+      [&](const auto&) { return layout_->MakeDocumentNorms(); });
+}
+
+Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {
+  CAIRN_ASSIGN_OR_RETURN(const auto block, Images(directory_.OrdinalOf(BlockKind::kImages, image)));
+  return std::shared_ptr<const MapImage>(block, &block->images[image - block->first]);
+}
+
+Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> landmarks,
+                                                       bool packed) const {
+  auto set = std::make_shared<LandmarkSet>();
+  set->idx = std::move(landmarks);
+  set->landmarks.reserve(set->idx.size());
+  set->descriptors.resize(static_cast<Eigen::Index>(set->idx.size()), kDescriptorDim);
+  std::shared_ptr<const LandmarkBlock> block;
+  for (size_t i = 0; i < set->idx.size(); ++i) {
+    const LandmarkIdx landmark = set->idx[i];
+    if (!block || landmark >= block->first + static_cast<int64_t>(block->landmarks.size())) {
+      CAIRN_ASSIGN_OR_RETURN(block, Landmarks(directory_.OrdinalOf(BlockKind::kLandmarks, landmark)));
     }
+    set->landmarks.push_back(block->landmarks[landmark - block->first]);
+    set->descriptors.row(static_cast<Eigen::Index>(i)) = block->descriptors.row(landmark - block->first);
   }
-  images_of_landmark_.resize(rows_.landmarks.size());
-  for (size_t image = 0; image < rows_.images.size(); ++image) {
-    for (const LandmarkIdx landmark : rows_.images[image].landmarks) {
-      images_of_landmark_[landmark].push_back(static_cast<int32_t>(image));
-    }
-  }
-  int32_t image = 0;
-  for (const ImageId image_id :
-       rows_.vocabulary.document_ids) {  // both ascending; every document is an image
-    while (rows_.images[image].image_id < image_id) ++image;
-    image_of_document_.push_back(image);
-  }
+  if (packed) set->packed = PackedDescriptors(set->descriptors);
+  return std::shared_ptr<const LandmarkSet>(std::move(set));
+}
+
+Result<std::shared_ptr<const LandmarkSet>> Map::AllLandmarks() const {
+  if (auto found = cache_.Find(kAllLandmarks)) return std::static_pointer_cast<const LandmarkSet>(found);
+  std::vector<LandmarkIdx> landmarks(num_landmarks());
+  std::iota(landmarks.begin(), landmarks.end(), 0);
+  CAIRN_ASSIGN_OR_RETURN(auto set, Gather(std::move(landmarks), true));
+  const int64_t num_bytes = NumBytes(*set);
+  return std::static_pointer_cast<const LandmarkSet>(cache_.Insert(kAllLandmarks, std::move(set), num_bytes));
 }
 
 Result<Camera> Map::CameraForSize(int width, int height) const {
   const Camera* found = nullptr;
   int num_found = 0;
   std::string sizes;
-  for (const Camera& camera : rows_.cameras) {
+  for (const Camera& camera : head_.cameras) {
     sizes += fmt::format("{}{} x {}", sizes.empty() ? "" : ", ", camera.width, camera.height);
     if (camera.width != width || camera.height != height) continue;
     found = &camera;
@@ -48,7 +169,7 @@ Result<Camera> Map::CameraForSize(int width, int height) const {
   if (num_found == 1) return *found;
   return MakeError(ErrorCode::kNotFound,
                    "{} cameras of map '{}' take images of {} x {} px (its cameras: {}); give the camera",
-                   num_found, rows_.name, width, height, sizes);
+                   num_found, head_.name, width, height, sizes);
 }
 
 }  // namespace cairn

@@ -1,47 +1,85 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
+#include "core/map_file.h"
+#include "core/map_layout.h"
 #include "core/map_rows.h"
+#include "runtime/block_cache.h"
+#include "runtime/landmark_set.h"
 
 namespace cairn {
 
+struct MapOptions {
+  // What is loaded of a map and kept for later queries, at most.  What a query works on at the moment comes
+  // on top of it.
+  int64_t memory_budget_bytes = int64_t{256} << 20;
+  // Maps without a signature of this key are refused.
+  std::optional<PublicKey> public_key;
+};
+
 // An open map: immutable, shareable between threads, one Localizer per thread.  The first header to read;
-// then runtime/localizer.h.
+// then runtime/localizer.h.  Opening reads the head and the directory; blocks are read, checked against their
+// hashes and kept within the budget when a query asks for them.  No exception leaves it.
 class Map {
  public:
-  // Opens a map file read-only; nothing of it is left open.  Errors: as ReadMapRows (core/map_rows.h).
-  static Result<std::shared_ptr<const Map>> Open(const std::string& path);
-  // A map that was never a file.  Errors: InvalidArgument (CheckMapRows).
+  // Opens a map file read-only; it must not change while the map is open.  Errors: as MapFile::Open
+  // (core/map_file.h).
+  static Result<std::shared_ptr<const Map>> Open(const std::string& path, const MapOptions& options = {});
+  // A map that was never a file: its numbers are not rounded.  Errors: InvalidArgument (CheckMapRows).
   static Result<std::shared_ptr<const Map>> FromRows(MapRows rows);
 
-  const MapRows& rows() const { return rows_; }
+  const MapHead& head() const { return head_; }
+  // Blocks and numbers of landmarks, images, ...
+  const MapDirectory& directory() const { return directory_; }
+  int64_t num_landmarks() const { return directory_.Count(BlockKind::kLandmarks); }
+  int64_t num_images() const { return directory_.Count(BlockKind::kImages); }
+  // Without words, every landmark is its own: they are few enough to be searched one by one.
+  bool has_words() const { return directory_.Count(BlockKind::kVocabularyTree) > 0; }
 
   // The camera of the survey with this image size.
   // Errors: NotFound when no camera or more than one has it; lists the sizes there are.
   Result<Camera> CameraForSize(int width, int height) const;
 
-  // Regions that contain a station, ascending.
-  const std::vector<RegionIdx>& RegionsOfStation(StationIdx station) const {
-    return regions_of_station_[station];
-  }
-  // Indices into rows().images of the images that see a landmark, ascending.
-  const std::vector<int32_t>& ImagesOfLandmark(LandmarkIdx landmark) const {
-    return images_of_landmark_[landmark];
-  }
-  // Index into rows().images of a document of the vocabulary.
-  int32_t ImageOfDocument(int32_t document) const { return image_of_document_[document]; }
+  // Blocks by their ordinals, from the cache or the file.  REQUIRES: ordinal < directory().NumBlocks(kind)
+  // Errors: Corrupt (a block without the hash that the directory states), Io.
+  Result<std::shared_ptr<const LandmarkBlock>> Landmarks(int64_t ordinal) const;
+  Result<std::shared_ptr<const ImageBlock>> Images(int64_t ordinal) const;
+  Result<std::shared_ptr<const StationBlock>> Stations(int64_t ordinal) const;
+  Result<std::shared_ptr<const RegionBlock>> Regions(int64_t ordinal) const;
+  Result<std::shared_ptr<const WordBlock>> Words(int64_t ordinal) const;
+  // REQUIRES: has_words()
+  Result<std::shared_ptr<const Vocabulary>> VocabularyTree() const;  // its inverted files: Words
+  Result<std::shared_ptr<const std::vector<float>>> DocumentNorms() const;
+
+  // An image by its index.
+  Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;
+  // These landmarks (ascending), packed for matching if asked.
+  Result<std::shared_ptr<const LandmarkSet>> Gather(std::vector<LandmarkIdx> landmarks, bool packed) const;
+  // All landmarks, packed.  Kept like a block.
+  Result<std::shared_ptr<const LandmarkSet>> AllLandmarks() const;
+
+  // What is kept at the moment.
+  const BlockCache& cache() const { return cache_; }
 
  private:
+  explicit Map(MapFile file, int64_t memory_budget_bytes);
   explicit Map(MapRows rows);
+  template <typename Block, typename Decode, typename Make>
+  Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, const Decode& decode,
+                                            const Make& make) const;
 
-  MapRows rows_;
-  std::vector<std::vector<RegionIdx>> regions_of_station_;
-  std::vector<std::vector<int32_t>> images_of_landmark_;
-  std::vector<int32_t> image_of_document_;
+  MapHead head_;
+  MapDirectory directory_;
+  // One of the two.
+  std::optional<MapFile> file_;
+  std::unique_ptr<const MapRows> rows_;
+  std::unique_ptr<const MapLayout> layout_;
+  mutable BlockCache cache_;
 };
 
 }  // namespace cairn

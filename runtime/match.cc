@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/descriptor_distance.h"
@@ -113,64 +114,65 @@ OptionTable DescribeOptions(MatchOptions* o) {
   };
 }
 
-std::vector<Correspondence> MatchLandmarks(const Query& query, const Map& map,
-                                           const std::vector<LandmarkIdx>& landmarks,
+std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
                                            const MatchOptions& options) {
   const DescriptorMatcherOptions matcher_options{
       .max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad, .mutual = true};
-  std::vector<Match> matches;
-  if (landmarks.size() == map.rows().landmarks.size()) {
-    matches = MatchDescriptors(query.features.descriptors, map.rows().descriptors, matcher_options);
-  } else {
-    DescriptorMatrix descriptors(static_cast<Eigen::Index>(landmarks.size()), kDescriptorDim);
-    for (size_t i = 0; i < landmarks.size(); ++i)
-      descriptors.row(i) = map.rows().descriptors.row(landmarks[i]);
-    matches = MatchDescriptors(query.features.descriptors, descriptors, matcher_options);
-  }
   std::vector<Correspondence> correspondences;
-  for (const Match& match : matches) {
-    if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks[match.idx2]});
+  for (const Match& match : MatchDescriptors(query.packed, landmarks.packed, matcher_options)) {
+    if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks.idx[match.idx2]});
   }
   return correspondences;
 }
 
-std::vector<LandmarkIdx> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                            const MatchOptions& options) {
-  std::map<int32_t, int> num_shared;
+Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                                    const MatchOptions& options) {
+  std::set<int32_t> image_blocks;  // those that a landmark's block names
+  int64_t ordinal = -1;
   for (const LandmarkIdx landmark : seen) {
-    for (const int32_t image : map.ImagesOfLandmark(landmark)) ++num_shared[image];
+    const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
+    if (next == ordinal) continue;
+    ordinal = next;
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+    image_blocks.insert(block->image_blocks.begin(), block->image_blocks.end());
   }
   std::vector<std::pair<int, int32_t>> order;
-  for (const auto& [image, count] : num_shared) order.emplace_back(-count, image);
+  for (const int32_t image_block : image_blocks) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));
+    for (size_t i = 0; i < block->images.size(); ++i) {
+      const int num_shared = NumShared(block->images[i].landmarks, seen);
+      if (num_shared > 0) order.emplace_back(-num_shared, block->first + static_cast<int32_t>(i));
+    }
+  }
   std::sort(order.begin(), order.end());
   std::vector<LandmarkIdx> landmarks = seen;
   for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
-    const std::vector<LandmarkIdx>& of_image = map.rows().images[order[i].second].landmarks;
-    landmarks.insert(landmarks.end(), of_image.begin(), of_image.end());
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
+    landmarks.insert(landmarks.end(), image->landmarks.begin(), image->landmarks.end());
   }
   std::sort(landmarks.begin(), landmarks.end());
   landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
   return landmarks;
 }
 
-std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
-                                        const std::vector<LandmarkIdx>& landmarks, const Pose& cam_from_world,
-                                        const MatchOptions& options) {
+std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
+                                        const Pose& cam_from_world, const MatchOptions& options) {
   const KeypointGrid grid(query, std::max(8.0, options.guided_radius_px));
   const double focal_px = query.camera.MeanFocal();
   const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
   // An angle between RootSIFT vectors of norm 512 as a dot product.
   const double min_dot = kSquaredDescriptorNorm * std::cos(options.guided_max_angle_rad);
   std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
-  for (const LandmarkIdx landmark_idx : landmarks) {
-    const MapLandmark& landmark = map.rows().landmarks[landmark_idx];
+  for (size_t k = 0; k < landmarks.idx.size(); ++k) {
+    const LandmarkIdx landmark_idx = landmarks.idx[k];
+    const MapLandmark& landmark = landmarks.landmarks[k];
     const Eigen::Vector3d point = cam_from_world * landmark.position;
     const auto pixel = ImageFromCamera(query.camera, point);
     if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > query.camera.width ||
         pixel->y() > query.camera.height) {
       continue;
     }
-    const uint8_t* descriptor = map.rows().descriptors.row(landmark_idx).data();
+    const uint8_t* descriptor = landmarks.descriptors.row(static_cast<Eigen::Index>(k)).data();
     std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
     const double radius_px =
         std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px);

@@ -32,20 +32,19 @@ struct MatchOptions {
 };
 OptionTable DescribeOptions(MatchOptions* options);
 
-// Correspondences between the query and these landmarks (ascending; an empty list means none), by mutual
-// nearest descriptors and ratio test, ascending by keypoint.
-std::vector<Correspondence> MatchLandmarks(const Query& query, const Map& map,
-                                           const std::vector<LandmarkIdx>& landmarks,
+// Correspondences between the query and these landmarks, by mutual nearest descriptors and ratio test,
+// ascending by keypoint.  REQUIRES: landmarks.packed
+std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
                                            const MatchOptions& options);
 
-// Landmarks that should be visible given these: those seen in the survey images that share most of them.
-std::vector<LandmarkIdx> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
-                                            const MatchOptions& options);
+// Landmarks that should be visible given these (ascending): those seen in the survey images that share most
+// of them, ascending.  Errors: as Map::Landmarks.
+Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                                    const MatchOptions& options);
 
 // Correspondences of landmarks with keypoints near their projections at `cam_from_world`: per landmark the
 // keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by keypoint.
-std::vector<Correspondence> MatchGuided(const Query& query, const Map& map,
-                                        const std::vector<LandmarkIdx>& landmarks, const Pose& cam_from_world,
-                                        const MatchOptions& options);
+std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
+                                        const Pose& cam_from_world, const MatchOptions& options);
 
 }  // namespace cairn

@@ -46,16 +46,17 @@ Query MakeQuery(Features features, const Camera& camera, const MeasurementOption
     ray = QueryRay{*direction, *pixel_from_ray,
                    std::hypot(options.keypoint_sigma_px, options.keypoint_sigma_per_scale * keypoint.scale)};
   }
+  query.packed = PackedDescriptors(features.descriptors);
   query.features = std::move(features);
   return query;
 }
 
-std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const MapRows& rows,
+std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
                                               const std::vector<Correspondence>& correspondences) {
   std::vector<PoseMeasurement> measurements;
   measurements.reserve(correspondences.size());
   for (const Correspondence& correspondence : correspondences) {
-    const MapLandmark& landmark = rows.landmarks[correspondence.landmark];
+    const MapLandmark& landmark = landmarks.Find(correspondence.landmark);
     measurements.push_back({landmark.position, landmark.covariance, *query.rays[correspondence.keypoint]});
   }
   return measurements;

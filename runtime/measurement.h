@@ -9,6 +9,8 @@
 #include "core/features.h"
 #include "core/map_rows.h"
 #include "core/options.h"
+#include "core/packed_descriptors.h"
+#include "runtime/landmark_set.h"
 
 namespace cairn {
 
@@ -34,6 +36,7 @@ struct Query {
   Features features;
   Camera camera;
   std::vector<std::optional<QueryRay>> rays;  // per keypoint; none where the camera model has no forward ray
+  PackedDescriptors packed;                   // the features' descriptors
 };
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options);
 
@@ -49,8 +52,8 @@ struct PoseMeasurement {
   Eigen::Matrix3d point_covariance = Eigen::Matrix3d::Zero();  // m^2
   QueryRay ray;
 };
-// REQUIRES: the keypoints have rays
-std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const MapRows& rows,
+// REQUIRES: the keypoints have rays, the landmarks are in the set
+std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
                                               const std::vector<Correspondence>& correspondences);
 
 }  // namespace cairn

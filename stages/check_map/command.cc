@@ -30,7 +30,7 @@ struct Arguments {
 };
 
 // The map's camera (its intrinsics may be refined) if it is the same one, else the capture's.
-Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const MapRows& rows) {
+Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const MapHead& rows) {
   const auto given = capture.cameras.find(image.camera_id);
   if (given == capture.cameras.end()) {
     return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which cameras.txt lacks", capture.root,
@@ -45,7 +45,7 @@ Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const
   return given->second;
 }
 
-Result<std::vector<HeldOutImage>> ReadHeldOutImages(const Arguments& arguments, const MapRows& rows) {
+Result<std::vector<HeldOutImage>> ReadHeldOutImages(const Arguments& arguments, const MapHead& rows) {
   const fs::path folder = fs::path(arguments.queries_path).parent_path();
   const std::string root = !arguments.capture_path.empty() ? arguments.capture_path
                            : folder.empty()                ? "."
@@ -110,13 +110,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   cv::setNumThreads(1);  // images in parallel, each on one thread: times mean one core
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
-  if (map->rows().sealed && !arguments.output_path.empty()) {
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(arguments.map_path));
+  if (rows.sealed && !arguments.output_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is sealed already; -o is for a map from emit-map",
                      arguments.map_path);
   }
   CheckMapReport held_out;
   if (!arguments.queries_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, map->rows()));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, rows));
     CAIRN_ASSIGN_OR_RETURN(
         held_out, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
     WarnOfRejects(held_out);
@@ -129,7 +130,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
         foreign, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
     WarnOfRejects(*foreign);
   }
-  const PrintedReport report{.rows = &map->rows(),
+  const PrintedReport report{.rows = &rows,
                              .map_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path)),
                              .held_out = &held_out,
                              .foreign = foreign ? &*foreign : nullptr};
@@ -137,7 +138,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   ReportHeldOut(held_out, environment.report);
   if (!held_out.images.empty()) CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
   if (arguments.output_path.empty()) return Ok();
-  return Seal(map->rows(), held_out, arguments.options, arguments.output_path);
+  return Seal(std::move(rows), held_out, arguments.options, arguments.output_path);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/sift.h"
 #include "stages/emit_map/emit_map.h"
 
 namespace cairn {
@@ -28,6 +29,7 @@ struct Arguments {
 Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
   rows->name = arguments.name;
   rows->writer = "cairn " CAIRN_VERSION;
+  rows->instruction_set = SiftInstructionSet();
   rows->seed = seed;
   for (const auto& [name, path] :
        {std::pair("classes.db", arguments.classes_path), std::pair("world.db", arguments.world_path),

@@ -6,6 +6,8 @@
 #include <tuple>
 
 #include "core/pixel_ray.h"
+#include "stages/emit_map/map_vocabulary.h"
+#include "stages/emit_map/quantize_descriptors.h"
 
 namespace cairn {
 namespace {
@@ -163,38 +165,27 @@ Status AddStations(const World& world, const Decomposition& decomposition, MapRo
   return Ok();
 }
 
-// The vocabulary with only those documents that are images of the map.
-Vocabulary RestrictDocuments(const Vocabulary& vocabulary, const std::vector<MapImage>& images) {
-  Vocabulary restricted = vocabulary;
-  restricted.document_ids.clear();
-  std::vector<int32_t> new_document(vocabulary.document_ids.size(), -1);
-  for (size_t document = 0; document < vocabulary.document_ids.size(); ++document) {
-    const ImageId image_id = vocabulary.document_ids[document];
-    const bool has_image =
-        std::binary_search(images.begin(), images.end(), MapImage{.image_id = image_id},
-                           [](const MapImage& a, const MapImage& b) { return a.image_id < b.image_id; });
-    if (!has_image) continue;
-    new_document[document] = static_cast<int32_t>(restricted.document_ids.size());
-    restricted.document_ids.push_back(image_id);
-  }
-  for (size_t word = 0; word < vocabulary.inverted_files.size(); ++word) {
-    restricted.inverted_files[word].clear();
-    for (const Posting& posting : vocabulary.inverted_files[word]) {
-      if (new_document[posting.document] < 0) continue;
-      restricted.inverted_files[word].push_back({new_document[posting.document], posting.count});
-    }
-  }
-  WeightVocabulary(&restricted);
-  return restricted;
-}
-
 }  // namespace
 
 OptionTable DescribeOptions(EmitMapOptions* options) {
   return {{.name = "landmarks",
            .value = &options->landmarks,
            .help = "classes that become landmarks: those that regions keep, or all",
-           .choices = {"regions", "all"}}};
+           .choices = {"regions", "all"}},
+          {.name = "descriptor_bits",
+           .value = &options->descriptor_bits,
+           .help = "bits in which a value of a landmark's descriptor is stored; 8: as it is",
+           .min = 1,
+           .max = 8},
+          {.name = "min_num_landmarks_for_words",
+           .value = &options->min_num_landmarks_for_words,
+           .help = "least landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
+           .min = 0},
+          {.name = "landmarks_per_word",
+           .value = &options->landmarks_per_word,
+           .help = "most landmarks of a word that could be split",
+           .min = 1},
+          {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1}};
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
@@ -236,7 +227,13 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     row.landmarks.erase(std::unique(row.landmarks.begin(), row.landmarks.end()), row.landmarks.end());
     rows.regions.push_back(std::move(row));
   }
-  rows.vocabulary = RestrictDocuments(vocabulary, rows.images);
+  QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
+  const auto num_landmarks = static_cast<double>(rows.landmarks.size());
+  if (num_landmarks >= options.min_num_landmarks_for_words && !vocabulary.nodes.empty()) {
+    rows.vocabulary =
+        CutVocabulary(vocabulary, rows.descriptors, rows.images,
+                      std::max(options.landmarks_per_word, num_landmarks / options.max_num_words));
+  }
   CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
   return rows;
 }

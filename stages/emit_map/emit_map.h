@@ -21,15 +21,22 @@ namespace cairn {
 struct EmitMapOptions {
   // "regions": the classes that regions keep; "all": every class.
   std::string landmarks = "regions";
+  // Bits in which a value of a landmark's descriptor is stored; 8: as it is.  REQUIRES: in [1, 8]
+  int descriptor_bits = 5;
+  // A map with at least so many landmarks gets a vocabulary; in a smaller one every landmark is its own word.
+  // REQUIRES: >= 0
+  int min_num_landmarks_for_words = 16384;
+  // Most landmarks of a word that could be split, and most words.  REQUIRES: >= 1
+  double landmarks_per_word = 40;
+  int max_num_words = 65536;
 };
 OptionTable DescribeOptions(EmitMapOptions* options);
 
 // Landmarks are ordered by the first region that has them (of no region: last), then by the first image that
-// sees them, then by class: a region's landmarks lie together.  Images of the vocabulary without a pose are
-// left out of its inverted files.  The result has no name, seed, options or hashes: those are the caller's.
-// Pure.  O(observations).
-// Errors: InvalidArgument (inputs that do not belong together: a region's feature, a feature's class or a
-// station's image does not exist), NoData (no class is kept).
+// sees them, then by class: a region's landmarks lie together.  `vocabulary` is a tree over the survey's
+// features; its inverted files are not used.  The result has no name, seed, options or hashes: those are the
+// caller's. Pure.  O(observations). Errors: InvalidArgument (inputs that do not belong together: a region's
+// feature, a feature's class or a station's image does not exist), NoData (no class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options);
 

@@ -23,7 +23,7 @@ HeldOutImage BlankImage(const std::string& name) {
   const std::string path =
       testing::TempDir() + "/" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
   cv::imwrite(path, cv::Mat(480, 640, CV_8UC1, cv::Scalar(128)));
-  return {name, path, RoomMap()->rows().cameras.front(), Pose()};
+  return {name, path, RoomMap()->head().cameras.front(), Pose()};
 }
 
 Result<CheckMapReport> Check(const std::vector<HeldOutImage>& images, const CheckMapOptions& options = {}) {
@@ -56,7 +56,8 @@ TEST(CheckMap, GateNamesTheFigureThatFails) {
 
 TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
   const auto report = Check({BlankImage("quote\".png")});
-  const PrintedReport printed{&RoomMap()->rows(), 1000000, &*report, nullptr};
+  const MapRows rows = MakeSyntheticRoom(1).rows;
+  const PrintedReport printed{&rows, 1000000, &*report, nullptr};
   EXPECT_THAT(ReportText(printed), HasSubstr("held-out images        1"));
   EXPECT_THAT(ReportJson(printed), HasSubstr("quote\\\".png"));
 }

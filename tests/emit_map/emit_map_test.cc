@@ -1,4 +1,5 @@
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/quantize_descriptors.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -57,11 +58,51 @@ TEST(EmitMap, ScaleIsTheKeypointsSizeInSpace) {
   EXPECT_NEAR(Emit(MakeEmitExample())->landmarks[0].scale_m, 0.06, 1e-9);
 }
 
-TEST(EmitMap, VocabularyLosesImagesWithoutPose) {
-  const MapRows rows = *Emit(MakeEmitExample());
+TEST(EmitMap, SmallMapHasNoVocabulary) { EXPECT_TRUE(Emit(MakeEmitExample())->vocabulary.nodes.empty()); }
+
+TEST(EmitMap, VocabularyKeepsTheWordsOfLandmarksOnly) {
+  // All landmarks fall to the first of the two words, so that the other is left out; images 1, 2 and 4 see
+  // landmarks {2}, {0, 1, 2} and {0, 1}.
+  const EmitExample example = MakeEmitExample();
+  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  const MapRows rows =
+      *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(1, 2, 4));
-  EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 2}));
-  EXPECT_THAT(rows.vocabulary.inverted_files[1], ElementsAre(Posting{2, 1}));
+  ASSERT_EQ(rows.vocabulary.num_words(), 1);
+  EXPECT_EQ(rows.vocabulary.depth, 1);
+  EXPECT_EQ(rows.vocabulary.centres(1, 0), 255);
+  EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 1}, Posting{1, 3}, Posting{2, 2}));
+}
+
+TEST(EmitMap, WordsAreNotSplitBelowTheirNumberOfLandmarks) {
+  const EmitExample example = MakeEmitExample();
+  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 3};
+  const MapRows rows =
+      *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
+  EXPECT_EQ(rows.vocabulary.nodes.size(), 1u);  // the root is the only word
+  EXPECT_EQ(rows.vocabulary.depth, 0);
+}
+
+TEST(QuantizeDescriptorValues, FewValuesStayAsTheyAre) {
+  DescriptorMatrix descriptors = DescriptorMatrix::Zero(2, kDescriptorDim);
+  descriptors.row(1).setConstant(77);
+  descriptors(0, 5) = 200;
+  const DescriptorMatrix before = descriptors;
+  QuantizeDescriptorValues(2, &descriptors);
+  EXPECT_EQ(descriptors, before);
+}
+
+TEST(QuantizeDescriptorValues, LevelsAreTheMeansOfTheirValues) {
+  // 10, 12 and 200, 202, equally often: two levels, 11 and 201.
+  DescriptorMatrix descriptors(4, kDescriptorDim);
+  for (int row = 0; row < 4; ++row) {
+    descriptors.row(row).setConstant(static_cast<uint8_t>((row < 2 ? 10 : 200) + 2 * (row % 2)));
+  }
+  QuantizeDescriptorValues(1, &descriptors);
+  EXPECT_EQ(descriptors(0, 0), 11);
+  EXPECT_EQ(descriptors(1, 0), 11);
+  EXPECT_EQ(descriptors(2, 0), 201);
+  EXPECT_EQ(descriptors(3, 0), 201);
 }
 
 TEST(EmitMap, ImageInTheWorldWithoutClassesIsAnError) {

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <filesystem>
 
 #include <gmock/gmock.h>
@@ -5,6 +6,7 @@
 
 #include "core/database.h"
 #include "core/file.h"
+#include "core/map_error.h"
 #include "core/map_rows.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/emit_map/example.h"
@@ -17,7 +19,8 @@ using testing::HasSubstr;
 
 MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
-  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {});
+  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   rows.name = "example";
   rows.writer = "cairn test";
   rows.seed = 18446744073709551615u;
@@ -55,7 +58,15 @@ TEST(MapFile, RoundTripKeepsEverything) {
   EXPECT_EQ(read->images[2].station, 2);
   EXPECT_EQ(read->descriptors, written.descriptors);
   EXPECT_EQ(read->vocabulary.inverted_files, written.vocabulary.inverted_files);
-  EXPECT_NEAR(read->landmarks[0].covariance(1, 1), 2e-4, 1e-10);
+  EXPECT_EQ(read->regions[1].stations, written.regions[1].stations);
+  EXPECT_EQ(read->vocabulary.document_ids, written.vocabulary.document_ids);
+  EXPECT_EQ(read->vocabulary.centres, written.vocabulary.centres);
+  EXPECT_EQ(read->images[1].name, "image2.png");
+  EXPECT_EQ(read->landmarks[2].class_id, 10u);
+  EXPECT_EQ(read->landmarks[2].num_observations, 2);
+  // Standard deviations and sizes within 4.5 %.
+  EXPECT_NEAR(std::sqrt(read->landmarks[0].covariance(1, 1) / 2e-4), 1, 0.045);
+  EXPECT_NEAR(read->landmarks[0].scale_m / written.landmarks[0].scale_m, 1, 0.045);
 }
 
 TEST(MapFile, MapWithoutALowerBoundHasNone) {
@@ -93,81 +104,111 @@ TEST(MapFile, MissingFileIsNotFound) {
   EXPECT_EQ(ReadMapRows(MapPath("nowhere.cairn")).error().code, ErrorCode::kNotFound);
 }
 
-TEST(MapFile, OtherFilesAreRefused) {
-  ASSERT_TRUE(WriteFileAtomically(MapPath("text.cairn"), "this is no map").ok());
-  EXPECT_EQ(ReadMapRows(MapPath("text.cairn")).error().code, ErrorCode::kCorrupt);
-  ASSERT_TRUE(WriteFileAtomically(MapPath("empty.cairn"), "").ok());
-  EXPECT_EQ(ReadMapRows(MapPath("empty.cairn")).error().code, ErrorCode::kCorrupt);
-  ASSERT_TRUE(WriteVocabulary(MakeEmitExample().vocabulary, MapPath("vocabulary.cairn")).ok());
-  const Error error = ReadMapRows(MapPath("vocabulary.cairn")).error();
-  EXPECT_EQ(error.code, ErrorCode::kCorrupt);
-  EXPECT_THAT(error.message, HasSubstr("not a cairn map"));
+TEST(MapFile, EveryKindOfOtherFileHasItsCode) {
+  const std::string path = MapPath("other.cairn");
+  const auto code = [&] { return ReadMapRows(path).error().code; };
+  ASSERT_TRUE(WriteFileAtomically(path, "this is no map").ok());
+  EXPECT_EQ(code(), kNotSqlite);
+  ASSERT_TRUE(WriteFileAtomically(path, "").ok());
+  EXPECT_EQ(code(), kEmptyFile);
+  ASSERT_TRUE(WriteVocabulary(MakeEmitExample().vocabulary, path).ok());
+  EXPECT_EQ(code(), kForeignFile);
+  EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("not a cairn map"));
+  EXPECT_EQ(ReadMapRows(testing::TempDir()).error().code, kNotSqlite);
 }
 
 TEST(MapFile, EveryTruncationIsRefused) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("whole.cairn")).ok());
   const std::string bytes = *ReadFile(MapPath("whole.cairn"));
-  for (size_t size = 0; size < bytes.size(); size += 1024) {
+  for (size_t size = 0; size < bytes.size(); size += 512) {
     ASSERT_TRUE(WriteFileAtomically(MapPath("cut.cairn"), bytes.substr(0, size)).ok());
     const Result<MapRows> read = ReadMapRows(MapPath("cut.cairn"));
     ASSERT_FALSE(read.ok()) << size;
-    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << size << ": " << read.error().message;
+    EXPECT_EQ(read.error().code, size == 0 ? kEmptyFile : kTruncated) << size;
   }
+  ASSERT_TRUE(WriteFileAtomically(MapPath("longer.cairn"), bytes + std::string(1024, '\0')).ok());
+  EXPECT_EQ(ReadMapRows(MapPath("longer.cairn")).error().code, ErrorCode::kCorrupt);
 }
 
 TEST(MapFile, NewerMajorVersionNamesTheWriter) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("newer.cairn")).ok());
-  SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 2003");
+  SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3003");
   const Error error = ReadMapRows(MapPath("newer.cairn")).error();
-  EXPECT_EQ(error.code, ErrorCode::kUnsupported);
-  EXPECT_THAT(error.message, HasSubstr("2.3, written by cairn test"));
+  EXPECT_EQ(error.code, kTooNew);
+  EXPECT_THAT(error.message, HasSubstr("3.3, written by cairn test"));
+  EXPECT_THAT(error.message, HasSubstr("Update the program"));
 }
 
 TEST(MapFile, NewerMinorVersionIsRead) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("minor.cairn")).ok());
   SQLite::Database(MapPath("minor.cairn"), SQLite::OPEN_READWRITE)
-      .exec(
-          "PRAGMA user_version = 1007; CREATE TABLE later (x); ALTER TABLE landmarks ADD COLUMN later "
-          "INTEGER;");
-  EXPECT_TRUE(ReadMapRows(MapPath("minor.cairn")).ok());
+      .exec("PRAGMA user_version = 2007; CREATE TABLE later (x); INSERT INTO later VALUES (1);");
+  const Result<MapRows> read = ReadMapRows(MapPath("minor.cairn"));
+  EXPECT_TRUE(read.ok()) << read.error().message;
 }
 
-TEST(MapFile, DamagedRowsAreRefused) {
-  for (const char* sql : {"DELETE FROM landmarks WHERE landmark_idx = 1",
-                          "UPDATE landmarks SET descriptor = x'00'",
-                          "UPDATE landmarks SET covariance = x'0000'",
-                          "UPDATE landmarks SET x = 9000000000000",
-                          "UPDATE regions SET landmarks = x'7f'",
-                          "UPDATE regions SET num_landmarks = 1000000000000",
-                          "UPDATE regions SET region_idx = 7 WHERE region_idx = 1",
-                          "UPDATE images SET camera_id = 8",
-                          "UPDATE images SET qw = 0.5",
-                          "UPDATE images SET tx = 9e999",
-                          "UPDATE images SET station_idx = 3",
-                          "UPDATE images SET landmarks = x'ffffffffffffffffffff01'",
-                          "UPDATE stations SET neighbours = x'01'",
-                          "UPDATE stations SET x = 9e999",
-                          "UPDATE cameras SET params = x'00'",
-                          "UPDATE cameras SET model = 55",
-                          "UPDATE cameras SET width = -3",
-                          "DELETE FROM frames",
-                          "DELETE FROM meta",
-                          "UPDATE meta SET value = 'x'",
-                          "UPDATE meta SET value = 'x' WHERE key = 'lower_bound'",
-                          "UPDATE meta SET value = 3 WHERE key = 'lower_bound'",
-                          "UPDATE meta SET value = -1 WHERE key = 'uncovered_limit'",
-                          "DELETE FROM meta WHERE key = 'uncovered_limit'",
-                          "DELETE FROM images WHERE image_id = 2",
-                          "DROP TABLE landmarks",
-                          "DROP TABLE vocabulary_words"}) {
+TEST(MapFile, ChangedRowsAreRefused) {
+  for (const char* sql :
+       {"UPDATE meta SET value = 'x' WHERE key = 'name'", "UPDATE self_test SET value = value + 1",
+        "UPDATE cameras SET width = -3", "DELETE FROM frames",
+        "UPDATE blocks SET bytes = x'00' WHERE block_idx = 0", "DELETE FROM blocks WHERE block_idx = 1",
+        "UPDATE directory SET entries = substr(entries, 70)", "DELETE FROM directory",
+        "UPDATE seal SET seal = zeroblob(176)", "DROP TABLE blocks",
+        "ALTER TABLE meta RENAME TO old; CREATE VIEW meta AS SELECT * FROM old",
+        "ALTER TABLE meta ADD COLUMN later AS (zeroblob(100000000))"}) {
     ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("damaged.cairn")).ok());
     SQLite::Database(MapPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
     const Result<MapRows> read = ReadMapRows(MapPath("damaged.cairn"));
     ASSERT_FALSE(read.ok()) << sql;
-    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql << read.error().message;
     EXPECT_THAT(read.error().message, HasSubstr("damaged.cairn")) << sql;
     std::filesystem::remove(MapPath("damaged.cairn"));
   }
+}
+
+TEST(MapFile, FailedWriteLeavesTheOldFile) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("kept.cairn")).ok());
+  const std::string before = *ReadFile(MapPath("kept.cairn"));
+  MapRows broken = ExampleRows();
+  broken.regions[0].landmarks = {0, 99};
+  EXPECT_FALSE(WriteMapRows(broken, MapPath("kept.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("kept.cairn")), before);
+}
+
+// Version 1.0 as the program of that version wrote the example.
+TEST(GoldenMap, Version1IsMigrated) {
+  const std::string path = GOLDEN_DIR "/map_1.0.cairn";
+  EXPECT_EQ(ReadMapRows(path).error().code, kTooOld);
+  EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("cairn migrate"));
+  const Result<MapRows> old = ReadMapRowsVersion1(path);
+  ASSERT_TRUE(old.ok()) << old.error().message;
+  ASSERT_TRUE(WriteMapRows(*old, MapPath("migrated.cairn")).ok());
+  const Result<MapRows> migrated = ReadMapRows(MapPath("migrated.cairn"));
+  ASSERT_TRUE(migrated.ok()) << migrated.error().message;
+  EXPECT_EQ(migrated->name, "example");
+  EXPECT_EQ(migrated->writer, "cairn test");
+  EXPECT_EQ(migrated->lower_bound, 2);
+  EXPECT_EQ(migrated->self_test.at("num_localized"), 3);
+  EXPECT_EQ(migrated->stage_options, old->stage_options);
+  EXPECT_THAT(migrated->images[1].landmarks, ElementsAre(0, 1, 2));
+  EXPECT_EQ(migrated->images[1].name, "image2.png");
+  EXPECT_NEAR(migrated->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(migrated->descriptors, old->descriptors);
+  EXPECT_EQ(migrated->vocabulary.inverted_files, old->vocabulary.inverted_files);
+  EXPECT_EQ(ReadMapRowsVersion1(MapPath("migrated.cairn")).error().code, kTooNew);
+}
+
+// Version 2.0 as the program of that version wrote the example.
+TEST(GoldenMap, Version2IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.0.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->name, "example");
+  EXPECT_THAT(rows->images[1].landmarks, ElementsAre(0, 1, 2));
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_THAT(rows->regions[1].stations, ElementsAre(0, 1));
+  EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(rows->descriptors(1, 0), 30);
+  EXPECT_EQ(rows->vocabulary.num_words(), 1);
 }
 
 }  // namespace

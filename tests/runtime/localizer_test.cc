@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/file.h"
+#include "core/map_error.h"
 #include "tests/runtime/synthetic_room.h"
 
 namespace cairn {
@@ -312,6 +314,17 @@ TEST(Map, CameraIsChosenBySizeOnlyIfOneFits) {
   EXPECT_FALSE((*Map::FromRows(rows))->CameraForSize(640, 480).ok());
 }
 
+TEST(Localizer, WorksWithoutAVocabulary) {
+  MapRows rows = Room().rows;
+  rows.vocabulary = {};
+  Localizer localizer(*Map::FromRows(rows));
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, {}, 3), Room().camera);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_EQ(found.scope, Scope::kRegions);
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+}
+
 TEST(Map, OpensTheFileThatWasWritten) {
   const std::string path = testing::TempDir() + "/room.cairn";
   ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
@@ -321,6 +334,83 @@ TEST(Map, OpensTheFileThatWasWritten) {
   EXPECT_TRUE(
       Localizer(*map).LocalizeFeatures(RenderFeatures(Room(), truth, {}, 3), Room().camera)->has_fix());
   EXPECT_EQ(Map::Open(path + ".none").error().code, ErrorCode::kNotFound);
+}
+
+TEST(Map, FileAnswersAsTheRowsDo) {
+  const std::string path = testing::TempDir() + "/same.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  // As the file has them: rounded.
+  Localizer of_rows(*Map::FromRows(*ReadMapRows(path))), of_file(*Map::Open(path));
+  Random random(9);
+  for (int i = 0; i < 10; ++i) {
+    const Features features = RenderFeatures(Room(), RandomPose(random), {.num_swapped_ratio = 0.4}, i);
+    const Localization a = *of_rows.LocalizeFeatures(features, Room().camera);
+    const Localization b = *of_file.LocalizeFeatures(features, Room().camera);
+    EXPECT_EQ(a.has_fix(), b.has_fix());
+    EXPECT_EQ(a.cam_from_world.translation, b.cam_from_world.translation);
+    EXPECT_EQ(a.candidates, b.candidates);
+    EXPECT_EQ(a.region, b.region);
+  }
+}
+
+TEST(Map, KeepsWithinItsBudgetAndAnswersTheSame) {
+  const std::string path = testing::TempDir() + "/budget.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  const auto roomy = *Map::Open(path), tight = *Map::Open(path, {.memory_budget_bytes = 200'000});
+  Random random(10);
+  for (int i = 0; i < 8; ++i) {
+    const Features features = RenderFeatures(Room(), RandomPose(random), {}, i);
+    const Localization a = *Localizer(roomy).LocalizeFeatures(features, Room().camera);
+    const Localization b = *Localizer(tight).LocalizeFeatures(features, Room().camera);
+    EXPECT_EQ(a.cam_from_world.translation, b.cam_from_world.translation);
+    EXPECT_LE(tight->cache().num_bytes(), 200'000);
+  }
+  EXPECT_GT(roomy->cache().num_bytes(), 200'000);
+  EXPECT_GT(tight->cache().num_loads(), roomy->cache().num_loads());
+}
+
+TEST(Map, DamagedBlockIsAnErrorOfTheQueryThatNeedsIt) {
+  const std::string path = testing::TempDir() + "/hurt.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  std::string bytes = *ReadFile(path);
+  bytes[bytes.size() - 100'000] ^= 1;  // among the landmarks, which come last
+  ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
+  const auto map = Map::Open(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  const auto found =
+      Localizer(*map).LocalizeFeatures(RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3), Room().camera);
+  ASSERT_FALSE(found.ok());
+  EXPECT_EQ(found.error().code, ErrorCode::kCorrupt);
+}
+
+TEST(Map, RequiredKeyIsRequired) {
+  const std::string path = testing::TempDir() + "/keyed.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  const KeyPair keys = MakeKeyPair();
+  EXPECT_EQ(Map::Open(path, {.public_key = keys.public_key}).error().code, kNotSigned);
+  ASSERT_TRUE(SignMap(path, keys.secret_key, path).ok());
+  EXPECT_TRUE(Map::Open(path, {.public_key = keys.public_key}).ok());
+  EXPECT_EQ(Map::Open(path, {.public_key = MakeKeyPair().public_key}).error().code, kWrongKey);
+}
+
+TEST(BlockCache, EvictsWhatWasUsedLongestAgo) {
+  BlockCache cache(100);
+  const auto block = [](int value) { return std::make_shared<const int>(value); };
+  cache.Insert(1, block(1), 40);
+  cache.Insert(2, block(2), 40);
+  EXPECT_NE(cache.Find(1), nullptr);  // now 2 is the oldest
+  cache.Insert(3, block(3), 40);
+  EXPECT_EQ(cache.Find(2), nullptr);
+  EXPECT_NE(cache.Find(1), nullptr);
+  EXPECT_NE(cache.Find(3), nullptr);
+  EXPECT_EQ(cache.num_bytes(), 80);
+}
+
+TEST(BlockCache, WhatIsLargerThanTheBudgetIsNotKept) {
+  BlockCache cache(100);
+  EXPECT_NE(cache.Insert(1, std::make_shared<const int>(1), 200), nullptr);
+  EXPECT_EQ(cache.Find(1), nullptr);
+  EXPECT_EQ(cache.num_bytes(), 0);
 }
 
 }  // namespace

@@ -1,0 +1,181 @@
+// A map of many rooms, as large as asked, and what a robot pays for it:
+//   large_map make MAP NUM_ROOMS             about 230 kB a room; signed, with the key MAP.key
+//   large_map query MAP NUM_QUERIES BUDGET_MIB    opening time, memory, fixes; every query in another room
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/grow_vocabulary.h"
+#include "core/map_seal.h"
+#include "runtime/localizer.h"
+#include "stages/emit_map/map_vocabulary.h"
+#include "stages/emit_map/quantize_descriptors.h"
+#include "tests/runtime/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kLandmarksPerRoom = 1600;
+constexpr int kRoomsPerRow = 64;
+constexpr int kNumHeadings = 8;
+
+// Landmarks of a room of 10 m x 8 m x 3 m, the same for the same number.
+SyntheticRoom MakeRoom(int room_number) {
+  SyntheticRoom room;
+  Random random(MixSeed(1, room_number));
+  const Eigen::Vector3d corner(12.0 * (room_number % kRoomsPerRow), 10.0 * (room_number / kRoomsPerRow), 0);
+  room.descriptors.resize(kLandmarksPerRoom, kDescriptorDim);
+  for (int i = 0; i < kLandmarksPerRoom; ++i) {
+    const double z = random.Uniform(0, 3), along = random.Uniform(-1, 1), depth = random.Uniform(0, 0.3);
+    const Eigen::Vector3d walls[] = {{5 - depth, 4 * along, z},
+                                     {5 * along, 4 - depth, z},
+                                     {-5 + depth, 4 * along, z},
+                                     {5 * along, -4 + depth, z}};
+    room.points.push_back(corner + walls[i % 4]);
+    room.descriptors.row(i) = RandomDescriptor(random);
+  }
+  room.camera.camera_id = 1;
+  room.camera.model = CameraModel::kSimpleRadial;
+  room.camera.width = 640;
+  room.camera.height = 480;
+  room.camera.params = {500, 320, 240, -0.05};
+  return room;
+}
+
+Pose RoomPose(int room_number, double x, double y, double heading_deg) {
+  return PoseAt({12.0 * (room_number % kRoomsPerRow) + x, 10.0 * (room_number / kRoomsPerRow) + y, 1.2},
+                heading_deg);
+}
+
+// Six places with eight headings each; a region per heading.
+void AddRoom(int room_number, MapRows* rows) {
+  const SyntheticRoom room = MakeRoom(room_number);
+  const auto first = static_cast<LandmarkIdx>(rows->landmarks.size());
+  for (const Eigen::Vector3d& point : room.points) {
+    rows->landmarks.push_back({.class_id = static_cast<ClassId>(rows->landmarks.size()),
+                               .position = point,
+                               .covariance = 1e-4 * Eigen::Matrix3d::Identity(),
+                               .num_observations = 12});
+  }
+  rows->descriptors.middleRows(first, kLandmarksPerRoom) = room.descriptors;
+  for (int heading = 0; heading < kNumHeadings; ++heading) {
+    std::vector<LandmarkIdx> seen;
+    MapRegion& region = rows->regions.emplace_back();
+    for (const double x : {-3.0, 0.0, 3.0}) {
+      for (const double y : {-1.5, 1.5}) {
+        const auto station = static_cast<StationIdx>(rows->stations.size());
+        MapImage image{.image_id = static_cast<ImageId>(station + 1),
+                       .name = fmt::format("room{:05}/image{:07}.jpg", room_number, station),
+                       .camera_id = 1,
+                       .cam_from_world = RoomPose(room_number, x, y, 45.0 * heading),
+                       .station = station};
+        for (int i = 0; i < kLandmarksPerRoom; ++i) {
+          const auto pixel = ImageFromCamera(room.camera, image.cam_from_world * room.points[i]);
+          if (pixel && pixel->x() > 0 && pixel->y() > 0 && pixel->x() < 640 && pixel->y() < 480) {
+            image.landmarks.push_back(first + i);
+          }
+        }
+        seen.insert(seen.end(), image.landmarks.begin(), image.landmarks.end());
+        rows->images.push_back(std::move(image));
+        rows->stations.push_back({.position = {x, y}, .heading_deg = 45.0 * heading});
+        region.stations.push_back(station);
+      }
+    }
+    std::sort(seen.begin(), seen.end());
+    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    region.landmarks = std::move(seen);
+  }
+}
+
+Status Make(const std::string& path, int num_rooms) {
+  MapRows rows;
+  rows.name = "large";
+  rows.writer = "large_map";
+  rows.cameras = {MakeRoom(0).camera};
+  rows.descriptors.resize(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
+  for (int room = 0; room < num_rooms; ++room) AddRoom(room, &rows);
+  QuantizeDescriptorValues(4, &rows.descriptors);
+  const Eigen::Index num_training = std::min<Eigen::Index>(rows.descriptors.rows(), 600'000);
+  NoProgress progress;
+  CAIRN_ASSIGN_OR_RETURN(const Vocabulary tree,
+                         GrowVocabulary(rows.descriptors.topRows(num_training), rows.descriptors.rows(),
+                                        {.depth = 5, .min_num_descriptors_to_split = 8}, 0, 0, progress));
+  const double landmarks_per_word = std::max(40.0, static_cast<double>(rows.descriptors.rows()) / 65536);
+  rows.vocabulary = CutVocabulary(tree, rows.descriptors, rows.images, landmarks_per_word);
+  CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, path));
+  const KeyPair keys = MakeKeyPair();
+  std::filesystem::remove(path + ".key");
+  std::filesystem::remove(path + ".key.pub");
+  CAIRN_RETURN_IF_ERROR(WriteKeyPair(keys, path + ".key"));
+  return SignMap(path, keys.secret_key, path);
+}
+
+double ResidentMib() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    double kib = 0;
+    if (word == "VmRSS:" && status >> kib) return kib / 1024;
+  }
+  return 0;
+}
+
+double MillisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+Status Ask(const std::string& path, int num_queries, int64_t budget_mib) {
+  CAIRN_ASSIGN_OR_RETURN(const PublicKey key, ReadPublicKey(path + ".key.pub"));
+  const double before = ResidentMib();
+  const auto start = std::chrono::steady_clock::now();
+  CAIRN_ASSIGN_OR_RETURN(const auto map,
+                         Map::Open(path, {.memory_budget_bytes = budget_mib << 20, .public_key = key}));
+  std::printf(
+      "%.0f MB, %lld landmarks, %lld images; opened in %.1f ms, resident %.1f MiB before, %.1f after\n",
+      static_cast<double>(std::filesystem::file_size(path)) / 1e6,
+      static_cast<long long>(map->num_landmarks()), static_cast<long long>(map->num_images()),
+      MillisecondsSince(start), before, ResidentMib());
+  const int num_rooms = static_cast<int>(map->num_landmarks() / kLandmarksPerRoom);
+  Localizer localizer(map);
+  Random random(7);
+  int num_fixes = 0, num_wrong = 0;
+  double sum_ms = 0;
+  for (int i = 0; i < num_queries; ++i) {
+    const int number = static_cast<int>(random.UniformInt(0, num_rooms - 1));
+    const Pose truth = RoomPose(number, random.Uniform(-3, 3), random.Uniform(-2, 2), random.Uniform(0, 360));
+    const SyntheticRoom room = MakeRoom(number);
+    Features features = RenderFeatures(room, truth, {}, i);
+    const auto begin = std::chrono::steady_clock::now();
+    CAIRN_ASSIGN_OR_RETURN(const Localization found,
+                           localizer.LocalizeFeatures(std::move(features), room.camera));
+    sum_ms += MillisecondsSince(begin);
+    num_fixes += found.has_fix() ? 1 : 0;
+    num_wrong += found.has_fix() && CenterErrorM(found.cam_from_world, truth) > 0.5 ? 1 : 0;
+    if (i == 0) std::printf("first fix %.1f ms after the start of opening\n", MillisecondsSince(start));
+    if ((i + 1) % std::max(1, num_queries / 10) == 0) {
+      std::printf(
+          "%6d queries: %d fixes, %d wrong, %.1f ms each, resident %.1f MiB, %lld loads, %.1f MiB kept\n",
+          i + 1, num_fixes, num_wrong, sum_ms / (i + 1), ResidentMib(),
+          static_cast<long long>(map->cache().num_loads()),
+          static_cast<double>(map->cache().num_bytes()) / (1 << 20));
+      std::fflush(stdout);
+    }
+  }
+  return Ok();
+}
+
+}  // namespace
+}  // namespace cairn
+
+int main(int argc, char** argv) {
+  const std::string verb = argc > 1 ? argv[1] : "";
+  cairn::Status status =
+      cairn::MakeError(cairn::ErrorCode::kInvalidArgument,
+                       "usage: large_map make MAP NUM_ROOMS | large_map query MAP NUM BUDGET_MIB");
+  if (verb == "make" && argc == 4) status = cairn::Make(argv[2], std::atoi(argv[3]));
+  if (verb == "query" && argc == 5) status = cairn::Ask(argv[2], std::atoi(argv[3]), std::atoi(argv[4]));
+  if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
+  return status.ok() ? 0 : 1;
+}

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "core/error.h"
+#include "core/map_rows.h"
+
+namespace cairn {
+
+// The bulk of a map is cut into blocks, each read and checked by itself: schemas/FORMAT.md draws their bytes.
+
+// BLAKE2b, 256 bits.
+using Hash = std::array<uint8_t, 32>;
+
+// The values stand in files: append only.
+enum class BlockKind : uint8_t {
+  kStations = 1,
+  kRegions = 2,
+  kVocabularyTree = 3,
+  kDocumentNorms = 4,
+  kWords = 5,
+  kImages = 6,
+  kLandmarks = 7,
+};
+inline constexpr int kNumBlockKinds = 8;    // 0 is none
+const char* BlockKindName(BlockKind kind);  // "stations"
+
+// What the directory says of a block.
+struct BlockEntry {
+  uint8_t kind = 0;  // a BlockKind, or one of a later minor version
+  uint32_t first = 0;
+  uint32_t count = 0;  // elements first .. first + count - 1
+  uint32_t num_bytes = 0;
+  Hash hash = {};
+  // Of image blocks: contains the cameras' centres, world frame.
+  Eigen::AlignedBox3f centers;
+};
+
+// All blocks of a map, in file order.  Blocks of a kind hold its elements 0, 1, ... one after the other.
+class MapDirectory {
+ public:
+  void Add(const BlockEntry& entry);
+  const std::vector<BlockEntry>& blocks() const { return blocks_; }
+  const BlockEntry& Entry(BlockKind kind, int64_t ordinal) const { return blocks_[Block(kind, ordinal)]; }
+  // Index in blocks() of a kind's block.
+  int64_t Block(BlockKind kind, int64_t ordinal) const { return of_kind_[static_cast<int>(kind)][ordinal]; }
+  int64_t NumBlocks(BlockKind kind) const {
+    return static_cast<int64_t>(of_kind_[static_cast<int>(kind)].size());
+  }
+  // Number of elements of a kind.
+  int64_t Count(BlockKind kind) const { return count_[static_cast<int>(kind)]; }
+  // Ordinal, among those of its kind, of the block with an element.  REQUIRES: element in [0, Count(kind))
+  int64_t OrdinalOf(BlockKind kind, int64_t element) const;
+
+  std::string Encode() const;
+  // `max_num_bytes`: what the blocks can take together.  Errors: Corrupt (lengths, order, counts that the
+  // bytes of a block cannot hold).
+  static Result<MapDirectory> Decode(std::string_view bytes, int64_t max_num_bytes);
+
+ private:
+  std::vector<BlockEntry> blocks_;
+  std::array<std::vector<int64_t>, kNumBlockKinds> of_kind_;
+  std::array<int64_t, kNumBlockKinds> count_ = {};
+};
+
+// Landmarks first, first + 1, ... with which regions have them, and where to look for images that see them.
+struct LandmarkBlock {
+  LandmarkIdx first = 0;
+  std::vector<MapLandmark> landmarks;
+  DescriptorMatrix descriptors;
+  // Regions that have landmarks here, ascending, with those.
+  std::vector<std::pair<RegionIdx, std::vector<LandmarkIdx>>> regions;
+  std::vector<int32_t> image_blocks;  // ordinals of image blocks, ascending
+};
+
+struct ImageBlock {
+  int32_t first = 0;  // index of the first image
+  std::vector<MapImage> images;
+};
+
+struct StationBlock {
+  StationIdx first = 0;
+  std::vector<MapStation> stations;
+  std::vector<std::vector<StationIdx>> neighbours;  // of larger index, ascending
+  std::vector<std::vector<RegionIdx>> regions;      // that contain the station, ascending
+};
+
+struct RegionBlock {
+  RegionIdx first = 0;
+  std::vector<std::vector<int32_t>> landmark_blocks;  // per region, ordinals, ascending
+};
+
+struct WordBlock {
+  WordIdx first = 0;
+  std::vector<std::vector<Posting>> postings;  // per word; documents are images
+};
+
+// Blocks as bytes.  Same block, same bytes.
+std::string EncodeBlock(const LandmarkBlock& block);
+std::string EncodeBlock(const ImageBlock& block);
+std::string EncodeBlock(const StationBlock& block);
+std::string EncodeBlock(const RegionBlock& block);
+std::string EncodeBlock(const WordBlock& block);
+std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
+std::string EncodeDocumentNorms(const std::vector<float>& norms);
+
+// And back.  `entry` is one of the directory's, `what` names the block in messages.  Every length, index and
+// number is checked against the directory.  Errors: Corrupt.
+Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEntry& entry,
+                                          const MapDirectory& directory, const std::string& what);
+Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& entry,
+                                    const MapDirectory& directory, const std::string& what);
+Result<StationBlock> DecodeStationBlock(std::string_view bytes, const BlockEntry& entry,
+                                        const MapDirectory& directory, const std::string& what);
+Result<RegionBlock> DecodeRegionBlock(std::string_view bytes, const BlockEntry& entry,
+                                      const MapDirectory& directory, const std::string& what);
+Result<WordBlock> DecodeWordBlock(std::string_view bytes, const BlockEntry& entry,
+                                  const MapDirectory& directory, const std::string& what);
+// A tree with empty inverted files.
+Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry& entry,
+                                        const MapDirectory& directory, const std::string& what);
+Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const BlockEntry& entry,
+                                               const std::string& what);
+
+// Memory that a block takes once it is decoded, about.
+int64_t NumBytes(const LandmarkBlock& block);
+int64_t NumBytes(const ImageBlock& block);
+int64_t NumBytes(const StationBlock& block);
+int64_t NumBytes(const RegionBlock& block);
+int64_t NumBytes(const WordBlock& block);
+int64_t NumBytes(const Vocabulary& vocabulary);
+int64_t NumBytes(const std::vector<float>& values);
+
+}  // namespace cairn

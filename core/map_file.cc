@@ -1,0 +1,172 @@
+#include "core/map_file.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+
+#include "core/database.h"
+#include "core/map_error.h"
+#include "core/map_head.h"
+#include "core/map_root.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What lies behind a hash is out of a fuzzer's reach: built for one, any hash will do.
+bool SameHash(const Hash& found, const Hash& stated) {
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+  (void)found, (void)stated;
+  return true;
+#else
+  return found == stated;
+#endif
+}
+
+// Size of the file that the header of a SQLite database states (bytes 16, 17: page size; 28 to 31: pages), 0
+// where it states none.
+Result<uint64_t> StatedSize(const std::string& path) {
+  unsigned char head[32] = {};
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be opened", path);
+  if (!file.read(reinterpret_cast<char*>(head), sizeof(head))) return 0;
+  const uint64_t stated = uint64_t{head[16]} << 8 | head[17];
+  const uint64_t num_pages =
+      uint64_t{head[28]} << 24 | uint64_t{head[29]} << 16 | uint64_t{head[30]} << 8 | head[31];
+  return num_pages * (stated == 1 ? 65536 : stated);
+}
+
+Status CheckContainer(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+  if (!fs::is_regular_file(path, error)) {
+    return MakeError(kNotSqlite, "{}: not a regular file, expected a map", path);
+  }
+  const uint64_t num_bytes = fs::file_size(path, error);
+  if (num_bytes == 0) {
+    return MakeError(kEmptyFile, "{}: is empty, expected a map; copy it again", path);
+  }
+  if (!IsSqliteFile(path)) {
+    return MakeError(
+        kNotSqlite,
+        "{}: not a SQLite database, which a map is ({} bytes without the magic 'SQLite format 3')", path,
+        num_bytes);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const uint64_t stated, StatedSize(path));
+  if (num_bytes < stated || num_bytes < 512) {
+    return MakeError(kTruncated, "{}: has {} bytes, but should have {}; copy it again", path, num_bytes,
+                     stated);
+  }
+  if (num_bytes > stated) {
+    return MakeError(ErrorCode::kCorrupt, "{}: has {} bytes, but should have {}; copy it again", path,
+                     num_bytes, stated);
+  }
+  return Ok();
+}
+
+// A damaged or hostile file must not make SQLite run programs, or allocate more than the file has.
+void Harden(SQLite::Database& database, uint64_t num_bytes) {
+  sqlite3* const handle = database.getHandle();
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
+                static_cast<int>(std::clamp<uint64_t>(num_bytes, 100'000, 1'000'000'000)));
+  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0; PRAGMA cache_size = -256;");
+}
+
+// Every table that is read is a plain one: no view, no virtual table, no generated column.
+Status CheckTables(SQLite::Database& database, const std::string& path) {
+  for (const char* const table :
+       {"seal", "meta", "stage_options", "inputs", "frames", "cameras", "self_test", "blocks", "directory"}) {
+    SQLite::Statement query(
+        database,
+        "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
+        "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
+        "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
+    query.bind(1, table);
+    if (!query.executeStep() || query.getColumn(0).getInt() != 1) {
+      return MakeError(ErrorCode::kCorrupt, "{}: has no plain table '{}', which every map has", path, table);
+    }
+  }
+  return Ok();
+}
+
+Result<std::string> ReadDirectory(SQLite::Database& database, const std::string& path) {
+  SQLite::Statement query(database, "SELECT entries FROM directory");
+  if (!query.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table directory is empty", path);
+  return std::string(BlobView(query.getColumn(0)));
+}
+
+}  // namespace
+
+struct MapFile::Connection {
+  Connection(SQLite::Database opened)
+      : database(std::move(opened)), block(database, "SELECT bytes FROM blocks WHERE block_idx = ?") {}
+  SQLite::Database database;
+  SQLite::Statement block;
+  std::mutex mutex;
+};
+
+MapFile::MapFile() = default;
+MapFile::MapFile(MapFile&&) noexcept = default;
+MapFile::~MapFile() = default;
+
+Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& options) {
+  CAIRN_RETURN_IF_ERROR(CheckContainer(path));
+  return WithDatabaseErrors(path, [&]() -> Result<MapFile> {
+    std::error_code error;
+    const uint64_t num_bytes = fs::file_size(path, error);
+    SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    Harden(database, num_bytes);
+    CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path, kMapVersionMajor));
+    CAIRN_RETURN_IF_ERROR(CheckTables(database, path));
+    MapFile file;
+    file.path_ = path;
+    file.minor_version_ = database.execAndGet("PRAGMA user_version").getInt() % 1000;
+    CAIRN_ASSIGN_OR_RETURN(file.seal_, ReadSeal(path));
+    CAIRN_RETURN_IF_ERROR(CheckSignature(file.seal_, path, options.public_key));
+    CAIRN_ASSIGN_OR_RETURN(const std::string entries, ReadDirectory(database, path));
+    if (!SameHash(RootHash(database, entries), file.seal_.root)) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "{}: head and directory do not have the hash that is sealed: the file was damaged or "
+                       "changed; copy it again",
+                       path);
+    }
+    CAIRN_RETURN_IF_ERROR(ReadMapHead(database, path, &file.head_));
+    if (Status status = CheckMapHead(file.head_); !status.ok()) {
+      return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);
+    }
+    Result<MapDirectory> directory = MapDirectory::Decode(entries, static_cast<int64_t>(num_bytes));
+    if (!directory.ok()) return MakeError(ErrorCode::kCorrupt, "{}: {}", path, directory.error().message);
+    file.directory_ = std::move(*directory);
+    file.connection_ = std::make_unique<Connection>(std::move(database));
+    return file;
+  });
+}
+
+std::string MapFile::NameOf(int64_t block) const { return fmt::format("{}: block {}", path_, block); }
+
+Result<std::string> MapFile::ReadBlock(int64_t block) const {
+  const BlockEntry& entry = directory_.blocks()[block];
+  const std::lock_guard lock(connection_->mutex);
+  return WithDatabaseErrors(path_, [&]() -> Result<std::string> {
+    SQLite::Statement& query = connection_->block;
+    query.reset();
+    query.bind(1, block);
+    if (!query.executeStep()) return MakeError(ErrorCode::kCorrupt, "{} is not there", NameOf(block));
+    std::string bytes(BlobView(query.getColumn(0)));
+    query.reset();
+    if (bytes.size() == entry.num_bytes && SameHash(HashOf(bytes), entry.hash)) return bytes;
+    return MakeError(
+        ErrorCode::kCorrupt,
+        "{} ({} bytes) does not have the hash that the directory states: the file was damaged; copy "
+        "it again",
+        NameOf(block), bytes.size());
+  });
+}
+
+}  // namespace cairn

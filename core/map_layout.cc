@@ -1,0 +1,183 @@
+#include "core/map_layout.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace cairn {
+namespace {
+
+constexpr size_t kLandmarksPerBlock = 1024;
+constexpr size_t kImagesPerBlock = 32;
+constexpr size_t kStationsPerBlock = 1024;
+constexpr size_t kRegionsPerBlock = 1024;
+constexpr size_t kWordsPerBlock = 1024;
+constexpr size_t kPostingsPerBlock = 4096;
+
+}  // namespace
+
+MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
+  regions_of_station_.resize(rows.stations.size());
+  for (size_t region = 0; region < rows.regions.size(); ++region) {
+    for (const StationIdx station : rows.regions[region].stations) {
+      regions_of_station_[station].push_back(static_cast<RegionIdx>(region));
+    }
+  }
+  int32_t image = 0;
+  for (const ImageId image_id : rows.vocabulary.document_ids) {  // both ascending; every document is an image
+    while (rows.images[image].image_id < image_id) ++image;
+    image_of_document_.push_back(image);
+  }
+  CutEvenly(BlockKind::kStations, rows.stations.size(), kStationsPerBlock);
+  CutEvenly(BlockKind::kRegions, rows.regions.size(), kRegionsPerBlock);
+  if (!rows.vocabulary.nodes.empty()) {
+    AddEntry(BlockKind::kVocabularyTree, 0, rows.vocabulary.nodes.size());
+    CutEvenly(BlockKind::kDocumentNorms, rows.images.size(), std::numeric_limits<int32_t>::max());
+    CutWords();
+  }
+  const size_t first_image_block = entries_.size();
+  CutEvenly(BlockKind::kImages, rows.images.size(), kImagesPerBlock);
+  for (size_t i = first_image_block; i < entries_.size(); ++i) {
+    BlockEntry& entry = entries_[i];
+    for (uint32_t k = entry.first; k < entry.first + entry.count; ++k) {
+      // As the file has the pose; rounding it to float moves it by less than the margin.
+      const Eigen::Vector3d center = rows.images[k].cam_from_world.Center();
+      const double margin = 2e-4 + 2e-7 * center.norm();
+      entry.centers.extend((center.array() - margin).matrix().cast<float>());
+      entry.centers.extend((center.array() + margin).matrix().cast<float>());
+    }
+  }
+  CutLandmarks();
+  LinkRegions();
+  LinkImages();
+}
+
+void MapLayout::AddEntry(BlockKind kind, size_t first, size_t count) {
+  entries_.push_back({.kind = static_cast<uint8_t>(kind),
+                      .first = static_cast<uint32_t>(first),
+                      .count = static_cast<uint32_t>(count)});
+}
+
+void MapLayout::CutEvenly(BlockKind kind, size_t count, size_t size) {
+  for (size_t first = 0; first < count; first += size) AddEntry(kind, first, std::min(size, count - first));
+}
+
+void MapLayout::CutWords() {
+  const auto& files = rows_.vocabulary.inverted_files;
+  size_t first = 0, num_postings = 0;
+  for (size_t word = 0; word < files.size(); ++word) {
+    num_postings += files[word].size();
+    if (num_postings < kPostingsPerBlock && word + 1 - first < kWordsPerBlock && word + 1 < files.size())
+      continue;
+    AddEntry(BlockKind::kWords, first, word + 1 - first);
+    first = word + 1;
+    num_postings = 0;
+  }
+}
+
+void MapLayout::CutLandmarks() {
+  const size_t num_landmarks = rows_.landmarks.size();
+  std::vector<RegionIdx> home(num_landmarks, std::numeric_limits<RegionIdx>::max());
+  for (size_t region = rows_.regions.size(); region-- > 0;) {
+    for (const LandmarkIdx landmark : rows_.regions[region].landmarks)
+      home[landmark] = static_cast<RegionIdx>(region);
+  }
+  size_t block_first = 0;
+  const auto cut = [&](size_t end) {
+    if (end == block_first) return;
+    AddEntry(BlockKind::kLandmarks, block_first, end - block_first);
+    first_landmarks_.push_back(static_cast<int32_t>(block_first));
+    landmark_block_.resize(end, static_cast<int32_t>(first_landmarks_.size()) - 1);
+    block_first = end;
+  };
+  for (size_t begin = 0, end = 0; begin < num_landmarks; begin = end) {
+    while (end < num_landmarks && home[end] == home[begin]) ++end;
+    if (end - block_first > kLandmarksPerBlock) cut(begin);
+    while (end - block_first > kLandmarksPerBlock) cut(block_first + kLandmarksPerBlock);
+  }
+  cut(num_landmarks);
+}
+
+void MapLayout::LinkRegions() {
+  regions_of_block_.resize(first_landmarks_.size());
+  blocks_of_region_.resize(rows_.regions.size());
+  for (size_t region = 0; region < rows_.regions.size(); ++region) {
+    for (const LandmarkIdx landmark : rows_.regions[region].landmarks) {
+      const int32_t block = landmark_block_[landmark];
+      std::vector<int32_t>& blocks = blocks_of_region_[region];
+      if (blocks.empty() || blocks.back() != block) {
+        blocks.push_back(block);
+        regions_of_block_[block].emplace_back(static_cast<RegionIdx>(region), std::vector<LandmarkIdx>());
+      }
+      regions_of_block_[block].back().second.push_back(landmark);
+    }
+  }
+}
+
+void MapLayout::LinkImages() {
+  image_blocks_of_block_.resize(first_landmarks_.size());
+  for (size_t image = 0; image < rows_.images.size(); ++image) {
+    const auto image_block = static_cast<int32_t>(image / kImagesPerBlock);
+    for (const LandmarkIdx landmark : rows_.images[image].landmarks) {
+      std::vector<int32_t>& image_blocks = image_blocks_of_block_[landmark_block_[landmark]];
+      if (image_blocks.empty() || image_blocks.back() != image_block) image_blocks.push_back(image_block);
+    }
+  }
+}
+
+LandmarkBlock MapLayout::MakeLandmarkBlock(const BlockEntry& entry) const {
+  const int32_t ordinal = landmark_block_[entry.first];
+  LandmarkBlock block;
+  block.first = static_cast<LandmarkIdx>(entry.first);
+  block.landmarks.assign(rows_.landmarks.begin() + entry.first,
+                         rows_.landmarks.begin() + entry.first + entry.count);
+  block.descriptors = rows_.descriptors.middleRows(entry.first, entry.count);
+  block.regions = regions_of_block_[ordinal];
+  block.image_blocks = image_blocks_of_block_[ordinal];
+  return block;
+}
+
+ImageBlock MapLayout::MakeImageBlock(const BlockEntry& entry) const {
+  const auto begin = rows_.images.begin() + entry.first;
+  return {static_cast<int32_t>(entry.first), {begin, begin + entry.count}};
+}
+
+StationBlock MapLayout::MakeStationBlock(const BlockEntry& entry) const {
+  StationBlock block;
+  block.first = static_cast<StationIdx>(entry.first);
+  const auto begin = rows_.stations.begin() + entry.first;
+  block.stations.assign(begin, begin + entry.count);
+  const auto regions = regions_of_station_.begin() + entry.first;
+  block.regions.assign(regions, regions + entry.count);
+  block.neighbours.resize(entry.count);
+  auto edge = std::lower_bound(rows_.station_edges.begin(), rows_.station_edges.end(),
+                               std::pair(block.first, StationIdx{-1}));
+  for (; edge != rows_.station_edges.end() && edge->first < static_cast<int64_t>(entry.first) + entry.count;
+       ++edge) {
+    block.neighbours[edge->first - block.first].push_back(edge->second);
+  }
+  return block;
+}
+
+RegionBlock MapLayout::MakeRegionBlock(const BlockEntry& entry) const {
+  const auto begin = blocks_of_region_.begin() + entry.first;
+  return {static_cast<RegionIdx>(entry.first), {begin, begin + entry.count}};
+}
+
+WordBlock MapLayout::MakeWordBlock(const BlockEntry& entry) const {
+  const auto begin = rows_.vocabulary.inverted_files.begin() + entry.first;
+  WordBlock block{static_cast<WordIdx>(entry.first), {begin, begin + entry.count}};
+  for (std::vector<Posting>& postings : block.postings) {
+    for (Posting& posting : postings) posting.document = image_of_document_[posting.document];
+  }
+  return block;
+}
+
+std::vector<float> MapLayout::MakeDocumentNorms() const {
+  std::vector<float> norms(rows_.images.size(), 0);
+  for (size_t document = 0; document < image_of_document_.size(); ++document) {
+    norms[image_of_document_[document]] = rows_.vocabulary.document_norms[document];
+  }
+  return norms;
+}
+
+}  // namespace cairn

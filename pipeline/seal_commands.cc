@@ -1,0 +1,125 @@
+#include "pipeline/seal_commands.h"
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/map_file.h"
+#include "core/map_rows.h"
+#include "core/map_seal.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string input_path;
+  std::string key_path;
+  std::string output_path;
+};
+
+// Every byte by the file's hash, the signature, then every block and every row.
+Status Verify(const Arguments& arguments, const CommandEnvironment& environment) {
+  MapFileOptions options;
+  if (!arguments.key_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.input_path, options));
+  CAIRN_RETURN_IF_ERROR(CheckFileHash(arguments.input_path));
+  CAIRN_RETURN_IF_ERROR(ReadMapRows(arguments.input_path));
+  *environment.out << fmt::format("{}: whole, {}\n", arguments.input_path,
+                                  file.seal().is_signed()
+                                      ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),
+                                                    options.public_key ? "" : ", which nobody asked for")
+                                      : "not signed");
+  return Ok();
+}
+
+Status Keygen(const Arguments& arguments, const CommandEnvironment& environment) {
+  const KeyPair keys = MakeKeyPair();
+  CAIRN_RETURN_IF_ERROR(WriteKeyPair(keys, arguments.output_path));
+  *environment.out << fmt::format("{}: keep it secret; {}.pub: for robots ({})\n", arguments.output_path,
+                                  arguments.output_path, HexOf(keys.public_key));
+  return Ok();
+}
+
+Status Sign(const Arguments& arguments, const CommandEnvironment&) {
+  CAIRN_ASSIGN_OR_RETURN(const SecretKey key, ReadSecretKey(arguments.key_path));
+  return SignMap(arguments.input_path, key, arguments.output_path);
+}
+
+Status Migrate(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRowsVersion1(arguments.input_path));
+  CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
+  *environment.out << fmt::format("{}: map '{}' as version {}.{}, not signed\n", arguments.output_path,
+                                  rows.name, kMapVersionMajor, kMapVersionMinor);
+  return Ok();
+}
+
+}  // namespace
+
+Command VerifyCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "verify",
+      .summary = "Checks every byte of a map, and its signature",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->input_path, "Map")->required()->type_name("MAP");
+            app.add_option("--public-key", arguments->key_path, "Key whose signature the map must have")
+                ->type_name("KEY.pub");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Verify(*arguments, environment); },
+  };
+}
+
+Command KeygenCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "keygen",
+      .summary = "Makes a pair of keys for signing maps",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("key", arguments->output_path, "Secret key to write; KEY.pub is the public one")
+                ->required()
+                ->type_name("KEY");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Keygen(*arguments, environment); },
+  };
+}
+
+Command SignCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "sign",
+      .summary = "Writes a signed copy of a map",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->input_path, "Map")->required()->type_name("MAP");
+            app.add_option("--key", arguments->key_path, "Secret key from keygen")
+                ->required()
+                ->type_name("KEY");
+            app.add_option("-o,--output", arguments->output_path, "Signed map to write")
+                ->required()
+                ->type_name("SIGNED");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Sign(*arguments, environment); },
+  };
+}
+
+Command MigrateCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "migrate",
+      .summary = "Writes a map of an earlier format in today's",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->input_path, "Map of format 1.x")->required()->type_name("OLD");
+            app.add_option("-o,--output", arguments->output_path, "Map to write")
+                ->required()
+                ->type_name("NEW");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Migrate(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

@@ -1,0 +1,66 @@
+#include "stages/emit_map/map_vocabulary.h"
+
+#include <algorithm>
+#include <map>
+
+namespace cairn {
+namespace {
+
+// Landmarks below every node.
+std::vector<int64_t> CountLandmarks(const Vocabulary& tree, const DescriptorMatrix& descriptors) {
+  std::vector<int64_t> of_word(tree.num_words(), 0);
+  for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
+    ++of_word[QuantizeDescriptor(tree, descriptors.row(i).data())];
+  }
+  std::vector<int64_t> counts(tree.nodes.size(), 0);
+  for (size_t node = tree.nodes.size(); node-- > 0;) {  // children come after their parent
+    if (tree.nodes[node].num_children == 0) counts[node] = of_word[tree.nodes[node].word];
+    for (int i = 0; i < tree.nodes[node].num_children; ++i)
+      counts[node] += counts[tree.nodes[node].first_child + i];
+  }
+  return counts;
+}
+
+}  // namespace
+
+Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmark_descriptors,
+                         const std::vector<MapImage>& images, double landmarks_per_word) {
+  const std::vector<int64_t> counts = CountLandmarks(tree, landmark_descriptors);
+  Vocabulary cut;
+  std::vector<int32_t> kept = {0};  // nodes of `tree`, breadth first
+  std::vector<int> depths = {0};
+  for (size_t i = 0; i < kept.size(); ++i) {
+    VocabularyNode& node = cut.nodes.emplace_back();
+    const VocabularyNode& old = tree.nodes[kept[i]];
+    if (static_cast<double>(counts[kept[i]]) <= landmarks_per_word) continue;
+    for (int child = 0; child < old.num_children; ++child) {
+      if (counts[old.first_child + child] == 0) continue;
+      kept.push_back(old.first_child + child);
+      depths.push_back(depths[i] + 1);
+      ++node.num_children;
+    }
+    cut.branching = std::max(cut.branching, node.num_children);
+  }
+  cut.depth = depths.back();
+  cut.centres.resize(static_cast<Eigen::Index>(kept.size()), kDescriptorDim);
+  for (size_t i = 0; i < kept.size(); ++i)
+    cut.centres.row(static_cast<Eigen::Index>(i)) = tree.centres.row(kept[i]);
+  (void)NumberVocabularyNodes(&cut);  // the counts are right by construction
+
+  std::vector<WordIdx> words(landmark_descriptors.rows());
+  for (Eigen::Index i = 0; i < landmark_descriptors.rows(); ++i) {
+    words[i] = QuantizeDescriptor(cut, landmark_descriptors.row(i).data());
+  }
+  for (size_t image = 0; image < images.size(); ++image) {
+    cut.document_ids.push_back(images[image].image_id);
+    std::map<WordIdx, int32_t> num_seen;
+    for (const LandmarkIdx landmark : images[image].landmarks) ++num_seen[words[landmark]];
+    for (const auto& [word, count] : num_seen) {
+      cut.inverted_files[word].push_back({static_cast<int32_t>(image), count});
+    }
+  }
+  WeightVocabulary(&cut);
+  return cut;
+}
+
+}  // namespace cairn

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vector>
+
+#include "core/map_rows.h"
+#include "core/vocabulary_tree.h"
+
+namespace cairn {
+
+// `tree` cut down to what a map needs [Mariottini11 §IV: the tree]: a node with few landmarks below it
+// becomes a word, branches without any are left out, so that the depth follows the size of the map.  Inverted
+// files are those of the landmarks: which images see how many of a word's.  Differs from the source, whose
+// files hold every feature of an image: what is no landmark cannot lead to a fix. `landmarks_per_word`: a
+// node with at most so many is not split.
+Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmark_descriptors,
+                         const std::vector<MapImage>& images, double landmarks_per_word);
+
+}  // namespace cairn

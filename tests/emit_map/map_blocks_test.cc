@@ -1,0 +1,237 @@
+#include "core/map_blocks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/map_layout.h"
+#include "core/random.h"
+#include "stages/emit_map/emit_map.h"
+#include "tests/emit_map/example.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::Pair;
+
+MapRows ExampleRows() {
+  const EmitExample example = MakeEmitExample();
+  return *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                  {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1});
+}
+
+// Landmarks in regions of these sizes, one after the other, and some in none.
+MapRows RowsWithRegions(const std::vector<int>& sizes, int num_others) {
+  MapRows rows;
+  Camera camera;
+  camera.width = camera.height = 100;
+  camera.params = {100, 50, 50};
+  rows.cameras = {camera};
+  LandmarkIdx next = 0;
+  for (const int size : sizes) {
+    MapRegion& region = rows.regions.emplace_back();
+    for (int i = 0; i < size; ++i) region.landmarks.push_back(next++);
+  }
+  rows.landmarks.resize(next + num_others);
+  rows.descriptors = DescriptorMatrix::Zero(next + num_others, kDescriptorDim);
+  return rows;
+}
+
+std::vector<std::pair<int, int>> LandmarkBlocks(const MapRows& rows) {
+  std::vector<std::pair<int, int>> blocks;
+  const MapLayout layout(rows);
+  for (const BlockEntry& entry : layout.entries()) {
+    if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks))
+      blocks.emplace_back(entry.first, entry.count);
+  }
+  return blocks;
+}
+
+TEST(MapLayout, SmallRegionsShareABlockAndNoneIsSplit) {
+  EXPECT_THAT(LandmarkBlocks(RowsWithRegions({500, 500, 100}, 0)),
+              ElementsAre(Pair(0, 1000), Pair(1000, 100)));
+  EXPECT_THAT(LandmarkBlocks(RowsWithRegions({40, 1000}, 20)), ElementsAre(Pair(0, 40), Pair(40, 1020)));
+}
+
+TEST(MapLayout, LargeRegionsAreRunsOfBlocks) {
+  EXPECT_THAT(LandmarkBlocks(RowsWithRegions({10, 2500}, 0)),
+              ElementsAre(Pair(0, 10), Pair(10, 1024), Pair(1034, 1024), Pair(2058, 452)));
+}
+
+TEST(MapLayout, BlocksKnowTheirRegionsAndImages) {
+  const MapRows rows = ExampleRows();
+  const MapLayout layout(rows);
+  for (const BlockEntry& entry : layout.entries()) {
+    if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks)) {
+      const LandmarkBlock block = layout.MakeLandmarkBlock(entry);
+      EXPECT_THAT(block.regions, ElementsAre(Pair(0, ElementsAre(0, 1)), Pair(1, ElementsAre(0, 2))));
+      EXPECT_THAT(block.image_blocks, ElementsAre(0));
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kImages)) {
+      for (const MapImage& image : rows.images) {
+        EXPECT_TRUE(entry.centers.contains(image.cam_from_world.Center().cast<float>()));
+      }
+    }
+  }
+}
+
+// Every block of the example as bytes, with the directory that goes with them.
+struct EncodedBlocks {
+  MapRows rows = ExampleRows();
+  MapDirectory directory;
+  std::vector<std::string> bytes;
+
+  EncodedBlocks() {
+    const MapLayout layout(rows);
+    for (BlockEntry entry : layout.entries()) {
+      bytes.push_back(Encode(layout, entry));
+      entry.num_bytes = static_cast<uint32_t>(bytes.back().size());
+      directory.Add(entry);
+    }
+  }
+  std::string Encode(const MapLayout& layout, const BlockEntry& entry) const {
+    switch (static_cast<BlockKind>(entry.kind)) {
+      case BlockKind::kStations:
+        return EncodeBlock(layout.MakeStationBlock(entry));
+      case BlockKind::kRegions:
+        return EncodeBlock(layout.MakeRegionBlock(entry));
+      case BlockKind::kVocabularyTree:
+        return EncodeVocabularyTree(rows.vocabulary);
+      case BlockKind::kDocumentNorms:
+        return EncodeDocumentNorms(layout.MakeDocumentNorms());
+      case BlockKind::kWords:
+        return EncodeBlock(layout.MakeWordBlock(entry));
+      case BlockKind::kImages:
+        return EncodeBlock(layout.MakeImageBlock(entry));
+      case BlockKind::kLandmarks:
+        return EncodeBlock(layout.MakeLandmarkBlock(entry));
+    }
+    return "";
+  }
+  Status Decode(size_t block, const std::string& changed) const {
+    const BlockEntry& entry = directory.blocks()[block];
+    switch (static_cast<BlockKind>(entry.kind)) {
+      case BlockKind::kStations:
+        CAIRN_RETURN_IF_ERROR(DecodeStationBlock(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kRegions:
+        CAIRN_RETURN_IF_ERROR(DecodeRegionBlock(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kVocabularyTree:
+        CAIRN_RETURN_IF_ERROR(DecodeVocabularyTree(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kDocumentNorms:
+        CAIRN_RETURN_IF_ERROR(DecodeDocumentNorms(changed, entry, "block"));
+        return Ok();
+      case BlockKind::kWords:
+        CAIRN_RETURN_IF_ERROR(DecodeWordBlock(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kImages:
+        CAIRN_RETURN_IF_ERROR(DecodeImageBlock(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kLandmarks:
+        CAIRN_RETURN_IF_ERROR(DecodeLandmarkBlock(changed, entry, directory, "block"));
+        return Ok();
+    }
+    return Ok();
+  }
+};
+
+TEST(MapBlocks, EveryTruncationIsRefused) {
+  const EncodedBlocks blocks;
+  ASSERT_EQ(blocks.bytes.size(), 7u);
+  for (size_t block = 0; block < blocks.bytes.size(); ++block) {
+    const std::string& bytes = blocks.bytes[block];
+    EXPECT_TRUE(blocks.Decode(block, bytes).ok());
+    for (size_t size = 0; size < bytes.size(); ++size) {
+      const Status status = blocks.Decode(block, bytes.substr(0, size));
+      ASSERT_FALSE(status.ok()) << block << ": " << size;
+      EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
+    }
+    EXPECT_FALSE(blocks.Decode(block, bytes + '\0').ok()) << block;
+  }
+}
+
+TEST(MapBlocks, AnyBytesAreRefusedOrDecoded) {
+  const EncodedBlocks blocks;
+  Random random(1);
+  for (int i = 0; i < 20000; ++i) {
+    const size_t block = random.UniformInt(0, blocks.bytes.size() - 1);
+    std::string bytes = blocks.bytes[block];
+    for (uint64_t change = random.UniformInt(1, 4); change > 0; --change) {
+      bytes[random.UniformInt(0, bytes.size() - 1)] = static_cast<char>(random.UniformInt(0, 255));
+    }
+    const Status status = blocks.Decode(block, bytes);
+    EXPECT_TRUE(status.ok() || status.error().code == ErrorCode::kCorrupt);
+  }
+}
+
+TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
+  EncodedBlocks blocks;
+  const MapLayout layout(blocks.rows);
+  for (size_t i = 0; i < blocks.directory.blocks().size(); ++i) {
+    const BlockEntry& entry = blocks.directory.blocks()[i];
+    if (entry.kind == static_cast<uint8_t>(BlockKind::kImages)) {
+      ImageBlock images = layout.MakeImageBlock(entry);
+      images.images[1].landmarks = {0, 3};
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(images)).ok());
+      images = layout.MakeImageBlock(entry);
+      images.images[1].station = 3;
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(images)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
+      WordBlock words = layout.MakeWordBlock(entry);
+      words.postings[0].back().document = 3;
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(words)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kStations)) {
+      StationBlock stations = layout.MakeStationBlock(entry);
+      stations.neighbours[2] = {1};
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(stations)).ok());
+      stations = layout.MakeStationBlock(entry);
+      stations.regions[0] = {2};
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(stations)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kRegions)) {
+      RegionBlock regions = layout.MakeRegionBlock(entry);
+      regions.landmark_blocks[0] = {1};
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(regions)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks)) {
+      LandmarkBlock landmarks = layout.MakeLandmarkBlock(entry);
+      landmarks.regions[1].first = 2;
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(landmarks)).ok());
+      landmarks = layout.MakeLandmarkBlock(entry);
+      landmarks.image_blocks = {1};
+      EXPECT_FALSE(blocks.Decode(i, EncodeBlock(landmarks)).ok());
+    }
+  }
+}
+
+TEST(MapDirectory, DecodesWhatItEncoded) {
+  const EncodedBlocks blocks;
+  const std::string bytes = blocks.directory.Encode();
+  EXPECT_EQ(bytes.size(), 69 * blocks.bytes.size());
+  const Result<MapDirectory> decoded = MapDirectory::Decode(bytes, 1'000'000);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+  EXPECT_EQ(decoded->Encode(), bytes);
+  EXPECT_EQ(decoded->Count(BlockKind::kLandmarks), 3);
+  EXPECT_EQ(decoded->OrdinalOf(BlockKind::kLandmarks, 2), 0);
+}
+
+TEST(MapDirectory, EntriesThatMakeNoSenseAreRefused) {
+  const EncodedBlocks blocks;
+  EXPECT_FALSE(MapDirectory::Decode(blocks.directory.Encode(), 100).ok());  // more bytes than the file
+  EXPECT_FALSE(MapDirectory::Decode(blocks.directory.Encode().substr(0, 100), 1'000'000).ok());
+  const auto with = [&](const std::function<void(BlockEntry*)>& change) {
+    MapDirectory changed;
+    for (BlockEntry entry : blocks.directory.blocks()) {
+      if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks)) change(&entry);
+      changed.Add(entry);
+    }
+    return MapDirectory::Decode(changed.Encode(), 1'000'000).ok();
+  };
+  EXPECT_TRUE(with([](BlockEntry*) {}));
+  EXPECT_TRUE(with([](BlockEntry* entry) { entry->kind = 200; }));  // of a later minor version
+  EXPECT_FALSE(with([](BlockEntry* entry) { entry->first = 1; }));
+  EXPECT_FALSE(with([](BlockEntry* entry) { entry->count = 1000; }));
+  EXPECT_FALSE(with([](BlockEntry* entry) { entry->count = 0; }));
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,83 @@
+#include <sys/mount.h>
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/map_error.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+int Code(ErrorCode code) { return static_cast<int>(code); }
+
+// A map of format 1.0, and what the program makes of it.
+class SealedMap : public testing::Test {
+ protected:
+  SealedMap() : folder_("sealed_map_test") {
+    const ProgramRun run = RunShell("cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + Path("map.cairn"));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+  }
+  std::string Path(const std::string& name) const { return folder_ / name; }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(SealedMap, IsSignedAndVerified) {
+  EXPECT_EQ(RunShell("cairn verify " + Path("map.cairn")).exit_code, 0);
+  ASSERT_EQ(RunShell("cairn keygen " + Path("key")).exit_code, 0);
+  ASSERT_EQ(RunShell("cairn keygen " + Path("other")).exit_code, 0);
+  const std::string required = " --public-key " + Path("key.pub");
+  EXPECT_EQ(RunShell("cairn verify " + Path("map.cairn") + required).exit_code, Code(kNotSigned));
+  const ProgramRun sign =
+      RunShell("cairn sign " + Path("map.cairn") + " --key " + Path("key") + " -o " + Path("signed.cairn"));
+  ASSERT_EQ(sign.exit_code, 0) << sign.err;
+  const ProgramRun verify = RunShell("cairn verify " + Path("signed.cairn") + required);
+  EXPECT_EQ(verify.exit_code, 0) << verify.err;
+  EXPECT_THAT(verify.out, HasSubstr("whole, signed with key"));
+  EXPECT_EQ(RunShell("cairn verify " + Path("signed.cairn") + " --public-key " + Path("other.pub")).exit_code,
+            Code(kWrongKey));
+}
+
+TEST_F(SealedMap, FlippedBitIsFound) {
+  std::string bytes = *ReadFile(Path("map.cairn"));
+  bytes[bytes.size() / 2] ^= 4;
+  ASSERT_TRUE(WriteFileAtomically(Path("flipped.cairn"), bytes).ok());
+  const ProgramRun run = RunShell("cairn verify " + Path("flipped.cairn"));
+  EXPECT_EQ(run.exit_code, Code(ErrorCode::kCorrupt));
+  EXPECT_THAT(run.err, HasSubstr("flipped.cairn"));
+}
+
+TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
+  const ProgramRun run = RunShell("cairn inspect " GOLDEN_DIR "/map_1.0.cairn");
+  EXPECT_EQ(run.exit_code, Code(kTooOld));
+  EXPECT_THAT(run.err, HasSubstr("cairn migrate"));
+  EXPECT_EQ(RunShell("cairn inspect " + Path("map.cairn")).exit_code, 0);
+}
+
+TEST_F(SealedMap, FullDiskAndReadOnlyFolderLeaveTheOldMap) {
+  const std::string disk = Path("disk");
+  fs::create_directories(disk);
+  if (mount("none", disk.c_str(), "tmpfs", 0, "size=8k") != 0)
+    GTEST_SKIP() << "only root can mount a small tmpfs";
+  ASSERT_TRUE(WriteFileAtomically(disk + "/out.cairn", "the map of yesterday").ok());
+  const std::string migrate = "cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + disk + "/out.cairn";
+  const ProgramRun full = RunShell(migrate);
+  EXPECT_EQ(full.exit_code, Code(kDiskFull)) << full.err;
+  EXPECT_EQ(*ReadFile(disk + "/out.cairn"), "the map of yesterday");
+  EXPECT_EQ(mount("none", disk.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, ""), 0);
+  const ProgramRun read_only = RunShell(migrate);
+  EXPECT_EQ(read_only.exit_code, Code(kReadOnly)) << read_only.err;
+  EXPECT_EQ(*ReadFile(disk + "/out.cairn"), "the map of yesterday");
+  umount2(disk.c_str(), MNT_DETACH);
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,38 @@
+// Writes the fuzzer's first inputs, made from the example of tests/emit_map:  make_fuzz_seeds FOLDER
+// GOLDEN_1.0
+#include <cstdio>
+#include <string>
+
+#include "core/file.h"
+#include "core/map_file.h"
+#include "stages/emit_map/emit_map.h"
+#include "tests/emit_map/example.h"
+
+int main(int argc, char** argv) {
+  using namespace cairn;
+  if (argc != 3) return std::fprintf(stderr, "usage: make_fuzz_seeds FOLDER map_1.0.cairn\n"), 2;
+  const std::string folder = argv[1];
+  const EmitExample example = MakeEmitExample();
+  for (const int min_num_landmarks_for_words : {0, 100}) {
+    const auto rows =
+        EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                {.min_num_landmarks_for_words = min_num_landmarks_for_words, .landmarks_per_word = 1});
+    const std::string map = folder + (min_num_landmarks_for_words == 0 ? "/map_words" : "/map");
+    if (!rows.ok() || !WriteMapRows(*rows, map).ok()) return 1;
+    const auto file = MapFile::Open(map, {});
+    if (!file.ok()) return 1;
+    for (size_t i = 0; min_num_landmarks_for_words == 0 && i < file->directory().blocks().size(); ++i) {
+      const BlockEntry& entry = file->directory().blocks()[i];
+      std::string counts(8, '\0');  // of each kind, less 1
+      for (int kind = 1; kind < kNumBlockKinds; ++kind) {
+        counts[kind] = static_cast<char>(file->directory().Count(static_cast<BlockKind>(kind)) - 1);
+      }
+      const std::string seed = std::string(1, static_cast<char>(entry.kind)) + counts + *file->ReadBlock(i);
+      if (!WriteFileAtomically(fmt::format("{}/block_{}", folder, entry.kind), seed).ok()) return 1;
+    }
+    if (!WriteFileAtomically(folder + "/directory", "\x08" + file->directory().Encode()).ok()) return 1;
+    if (!WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok()) return 1;
+  }
+  const auto old = ReadFile(argv[2]);
+  return old.ok() && WriteFileAtomically(folder + "/map_version1", "\x09" + *old).ok() ? 0 : 1;
+}

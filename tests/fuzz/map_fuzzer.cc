@@ -1,0 +1,134 @@
+// What a robot reads, fed with any bytes: libFuzzer's entry.  The first byte chooses: 0 a whole map file,
+// opened, read and asked for a place; 1 to 7 a block of that kind, the next 8 bytes being the counts that its
+// directory states; 8 a directory; 9 a map of format 1.  Built with the preset `fuzz`, hashes are not
+// compared, so that what lies behind them is reached.
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "core/map_blocks.h"
+#include "core/map_file.h"
+#include "core/random.h"
+#include "runtime/localizer.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kImageSide = 400;
+
+// Features that any map may be asked about.
+const Features& SomeFeatures() {
+  static const Features features = [] {
+    Random random(1);
+    Features some;
+    some.descriptors.resize(100, kDescriptorDim);
+    for (int i = 0; i < 100; ++i) {
+      some.keypoints.push_back({static_cast<float>(random.Uniform(0, kImageSide)),
+                                static_cast<float>(random.Uniform(0, kImageSide)), 2, 0});
+      for (int k = 0; k < kDescriptorDim; ++k) {
+        some.descriptors(i, k) = static_cast<uint8_t>(random.UniformInt(0, 60));
+      }
+    }
+    return some;
+  }();
+  return features;
+}
+
+std::string WriteTemporary(std::string_view bytes) {
+  static const std::string path = std::string(access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp") +
+                                  "/cairn_fuzz_" + std::to_string(getpid());
+  std::FILE* const file = std::fopen(path.c_str(), "wb");
+  if (file == nullptr) std::abort();
+  std::fwrite(bytes.data(), 1, bytes.size(), file);
+  std::fclose(file);
+  return path;
+}
+
+void TryFile(std::string_view bytes) {
+  const std::string path = WriteTemporary(bytes);
+  (void)ReadMapRows(path).ok();
+  const auto map = Map::Open(path, {.memory_budget_bytes = 1 << 20});
+  if (!map.ok()) return;
+  Camera camera;
+  camera.width = camera.height = kImageSide;
+  camera.params = {300, 200, 200};
+  Localizer localizer(*map);
+  (void)localizer.LocalizeFeatures(SomeFeatures(), camera).ok();
+  (void)localizer.LocalizeFeatures(SomeFeatures(), camera, PosePrior{}).ok();
+}
+
+// Counts as the directory of a small map would state them: from the bytes.
+MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_bytes) {
+  MapDirectory directory;
+  for (int k = 1; k < kNumBlockKinds; ++k) {
+    const auto count = static_cast<uint32_t>(static_cast<uint8_t>(counts[k])) + 1;
+    const bool is_own = k == static_cast<int>(kind);
+    if (!is_own && kind != BlockKind::kVocabularyTree && k == static_cast<int>(BlockKind::kVocabularyTree))
+      continue;
+    directory.Add({.kind = static_cast<uint8_t>(k),
+                   .first = 0,
+                   .count = is_own ? std::min<uint32_t>(count, static_cast<uint32_t>(num_bytes) + 1) : count,
+                   .num_bytes = static_cast<uint32_t>(num_bytes)});
+  }
+  return directory;
+}
+
+void TryBlock(BlockKind kind, std::string_view bytes) {
+  if (bytes.size() < 8) return;
+  const MapDirectory directory = DirectoryFor(kind, bytes.substr(0, 8), bytes.size() - 8);
+  const BlockEntry& entry = directory.Entry(kind, 0);
+  bytes.remove_prefix(8);
+  switch (kind) {
+    case BlockKind::kStations:
+      (void)DecodeStationBlock(bytes, entry, directory, "block").ok();
+      break;
+    case BlockKind::kRegions:
+      (void)DecodeRegionBlock(bytes, entry, directory, "block").ok();
+      break;
+    case BlockKind::kVocabularyTree: {
+      const auto tree = DecodeVocabularyTree(bytes, entry, directory, "block");
+      if (tree.ok()) (void)QuantizeDescriptor(*tree, SomeFeatures().descriptors.data());
+      break;
+    }
+    case BlockKind::kDocumentNorms:
+      (void)DecodeDocumentNorms(bytes, entry, "block").ok();
+      break;
+    case BlockKind::kWords:
+      (void)DecodeWordBlock(bytes, entry, directory, "block").ok();
+      break;
+    case BlockKind::kImages: {
+      const auto images = DecodeImageBlock(bytes, entry, directory, "block");
+      if (images.ok()) (void)EncodeBlock(*images);
+      break;
+    }
+    case BlockKind::kLandmarks: {
+      const auto landmarks = DecodeLandmarkBlock(bytes, entry, directory, "block");
+      // What was decoded is encoded to what decodes again.
+      if (landmarks.ok() && !DecodeLandmarkBlock(EncodeBlock(*landmarks), entry, directory, "block").ok()) {
+        std::abort();
+      }
+      break;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace cairn
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
+  if (size == 0) return 0;
+  const std::string_view rest(reinterpret_cast<const char*>(bytes) + 1, size - 1);
+  const int choice = bytes[0] % 10;
+  if (choice == 0) {
+    cairn::TryFile(rest);
+  } else if (choice < cairn::kNumBlockKinds) {
+    cairn::TryBlock(static_cast<cairn::BlockKind>(choice), rest);
+  } else if (choice == 8) {
+    (void)cairn::MapDirectory::Decode(rest, 1 << 20).ok();
+  } else {
+    (void)cairn::ReadMapRowsVersion1(cairn::WriteTemporary(rest)).ok();
+  }
+  return 0;
+}
