@@ -83,6 +83,7 @@ Status ReadTables(SQLite::Database& database, const std::string& path, MapHead* 
   auto meta = ReadTexts(database, "SELECT key, value FROM meta");
   head->name = meta["name"];
   head->writer = meta["writer"];
+  head->sessions = SplitWords(meta["sessions"]);
   head->instruction_set = meta["instruction_set"];
   head->sealed = meta["sealed"] == "1";
   head->landmark_choice = meta["landmarks"];
@@ -152,6 +153,10 @@ Status ReadCameras(SQLite::Database& database, const std::string& path, MapHead*
 
 void WriteTables(SQLite::Database& database, const MapHead& head) {
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", FrameTexts(head.frame));
+  if (!head.sessions.empty()) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+               {{"sessions", fmt::format("{}", fmt::join(head.sessions, " "))}});
+  }
   if (head.lower_bound) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
                {{"lower_bound", std::to_string(*head.lower_bound)},

@@ -1,6 +1,9 @@
 #include "core/map_rows.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "core/sessions.h"
 
 namespace cairn {
 namespace {
@@ -85,8 +88,29 @@ Status CheckRegions(const MapRows& rows) {
 
 }  // namespace
 
+std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
+  std::vector<std::vector<int>> sessions(rows.landmarks.size());
+  if (rows.sessions.empty()) return sessions;
+  for (const MapImage& image : rows.images) {
+    const int session = SessionOfImage(rows.sessions, image.name);
+    if (session < 0) continue;
+    for (const LandmarkIdx landmark : image.landmarks) {
+      std::vector<int>& of_landmark = sessions[landmark];
+      const auto place = std::lower_bound(of_landmark.begin(), of_landmark.end(), session);
+      if (place == of_landmark.end() || *place != session) of_landmark.insert(place, session);
+    }
+  }
+  return sessions;
+}
+
 Status CheckMapHead(const MapHead& head) {
   CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(head.frame));
+  for (size_t i = 0; i < head.sessions.size(); ++i) {
+    if (!IsSessionName(head.sessions[i])) return Invalid("session '{}' has no valid name", head.sessions[i]);
+    const auto place = head.sessions.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::find(head.sessions.begin(), place, head.sessions[i]) != place)
+      return Invalid("session '{}' stands twice", head.sessions[i]);
+  }
   for (size_t i = 0; i < head.cameras.size(); ++i) {
     CAIRN_RETURN_IF_ERROR(CheckCamera(head.cameras[i]));
     if (i > 0 && head.cameras[i].camera_id <= head.cameras[i - 1].camera_id) {

@@ -77,6 +77,8 @@ struct MapHead {
 
   // What the world frame's coordinates mean: their unit, and where on the Earth they are.
   CaptureFrame frame;
+  // The surveys that the map is made from, where it was several: the image SESSION/NAME is of one of them.
+  std::vector<std::string> sessions;
   Pose floor_from_world;
   // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
   // noise.
@@ -110,6 +112,10 @@ inline constexpr int kMaxNameBytes = 4096;
 Status CheckMapRows(const MapRows& rows);
 // The same for the head alone.
 Status CheckMapHead(const MapHead& head);
+
+// The surveys that see each landmark: positions in `sessions`, ascending.  Empty lists where the map is of
+// one survey.  O(observations).
+std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows);
 
 // Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io, DiskFull,
 // ReadOnly.

@@ -15,6 +15,7 @@
 #include "core/file.h"
 #include "core/map_file.h"
 #include "core/map_rows.h"
+#include "core/sessions.h"
 #include "pipeline/floor_svg.h"
 
 namespace cairn {
@@ -49,6 +50,37 @@ Result<std::vector<std::pair<std::string, int64_t>>> BytesPerTable(const std::st
       tables.emplace_back(query.getColumn(0).getString(), query.getColumn(1).getInt64());
     return tables;
   });
+}
+
+// Images and landmarks of each survey, and how many landmarks several of them see.
+nlohmann::ordered_json SessionsJson(const MapRows& rows) {
+  std::vector<int64_t> num_images(rows.sessions.size()), num_landmarks(rows.sessions.size()),
+      num_only(rows.sessions.size());
+  std::vector<std::vector<int64_t>> num_shared(rows.sessions.size(),
+                                               std::vector<int64_t>(rows.sessions.size()));
+  for (const MapImage& image : rows.images) {
+    if (const int session = SessionOfImage(rows.sessions, image.name); session >= 0) ++num_images[session];
+  }
+  for (const std::vector<int>& seen_by : LandmarkSessions(rows)) {
+    if (seen_by.size() == 1) ++num_only[seen_by[0]];
+    for (const int session : seen_by) {
+      ++num_landmarks[session];
+      for (const int other : seen_by) ++num_shared[session][other];
+    }
+  }
+  auto sessions = nlohmann::ordered_json::array();
+  for (size_t i = 0; i < rows.sessions.size(); ++i) {
+    nlohmann::ordered_json session = {{"name", rows.sessions[i]},
+                                      {"num_images", num_images[i]},
+                                      {"num_landmarks", num_landmarks[i]},
+                                      {"num_landmarks_of_it_alone", num_only[i]},
+                                      {"num_landmarks_shared_with", nlohmann::ordered_json::object()}};
+    for (size_t j = 0; j < rows.sessions.size(); ++j) {
+      if (j != i) session["num_landmarks_shared_with"][rows.sessions[j]] = num_shared[i][j];
+    }
+    sessions.push_back(std::move(session));
+  }
+  return sessions;
 }
 
 nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
@@ -90,12 +122,28 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
                       {"altitude_m", rows.frame.anchor->altitude_m}};
   }
   if (rows.lower_bound) json["lower_bound"] = *rows.lower_bound;
+  json["sessions"] = SessionsJson(rows);
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;
   json["stage_options"] = rows.stage_options;
   json["input_hashes"] = rows.input_hashes;
   return json;
+}
+
+std::string SessionsText(const nlohmann::ordered_json& sessions) {
+  if (sessions.empty()) return "";
+  std::string text = fmt::format("\nsessions\n  {:<22} {:>8} {:>10} {:>10}  shared with\n", "", "images",
+                                 "landmarks", "alone");
+  for (const auto& session : sessions) {
+    text += fmt::format("  {:<22} {:>8} {:>10} {:>10} ", session["name"].get<std::string>(),
+                        session["num_images"].get<int64_t>(), session["num_landmarks"].get<int64_t>(),
+                        session["num_landmarks_of_it_alone"].get<int64_t>());
+    for (const auto& [name, count] : session["num_landmarks_shared_with"].items())
+      text += fmt::format(" {} {}", name, count.get<int64_t>());
+    text += "\n";
+  }
+  return text;
 }
 
 std::string RegionsLine(const nlohmann::ordered_json& json) {
@@ -114,7 +162,9 @@ std::string MapText(const nlohmann::ordered_json& json) {
   std::string text;
   for (const auto& [key, value] : json.items()) {
     if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before
-    if (key == "num_regions") {
+    if (key == "sessions") {
+      text += SessionsText(value);
+    } else if (key == "num_regions") {
       text += RegionsLine(json);
     } else if (!value.is_object()) {
       text += fmt::format("{:<24} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());

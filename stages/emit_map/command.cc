@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/sessions.h"
 #include "core/sift.h"
 #include "stages/emit_map/emit_map.h"
 
@@ -19,6 +20,7 @@ struct Arguments {
   std::string regions_path;
   std::string vocabulary_path;
   std::string frame_path;
+  std::string sessions_path;
   std::string name;
   std::vector<std::string> stage_options;  // "STAGE=FILE.toml"
   std::string output_path;
@@ -59,6 +61,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.frame_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.frame, ReadCaptureFrame(arguments.frame_path));
   }
+  if (!arguments.sessions_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(rows.sessions, ReadSessionsText(arguments.sessions_path));
+  }
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
   environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
@@ -89,6 +94,8 @@ Command EmitMapCommand() {
             app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
             app.add_option("--frame", arguments->frame_path,
                            "frame.json of the poses: unit and place on the Earth [metres, anywhere]");
+            app.add_option("--sessions", arguments->sessions_path,
+                           "sessions.txt of the capture: image SESSION/NAME is of that survey [one survey]");
             app.add_option("--name", arguments->name, "name of the map")->required();
             app.add_option("--stage-options", arguments->stage_options,
                            "STAGE=FILE.toml, once per stage: options to note in the map");

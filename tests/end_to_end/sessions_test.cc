@@ -76,6 +76,32 @@ class Sessions : public testing::Test {
 };
 TemporaryFolder* Sessions::folder_ = nullptr;
 
+TEST_F(Sessions, MapOfTwoKnowsWhichSeesWhat) {
+  const ProgramRun run = RunShell("cairn inspect --json " + Path("two.cairn"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto json = nlohmann::json::parse(run.out);
+  const auto& sessions = json["sessions"];
+  ASSERT_EQ(sessions.size(), 2u);
+  EXPECT_EQ(sessions[0]["name"], "day1");
+  EXPECT_EQ(sessions[1]["name"], "day2");
+  const int shared = sessions[0]["num_landmarks_shared_with"]["day2"].get<int>();
+  EXPECT_GT(shared, 100);
+  EXPECT_EQ(sessions[1]["num_landmarks_shared_with"]["day1"], shared);
+  int num_images = 0, num_landmarks = shared;
+  for (const auto& session : sessions) {
+    EXPECT_EQ(session["num_landmarks"].get<int>(), session["num_landmarks_of_it_alone"].get<int>() + shared);
+    num_images += session["num_images"].get<int>();
+    num_landmarks += session["num_landmarks_of_it_alone"].get<int>();
+  }
+  EXPECT_EQ(num_images, json["num_images"]);
+  EXPECT_EQ(num_landmarks, json["num_landmarks"]);
+  EXPECT_EQ(json["num_cameras"], 2);
+  EXPECT_THAT(RunShell("cairn inspect " + Path("two.cairn")).out,
+              ContainsRegex("\n  day1 .* day2 [0-9]+\n  day2 "));
+  // Where the captures lie is not in the map.
+  EXPECT_EQ(RunShell("grep -c " + folder_->string() + " " + Path("two.cairn")).out, "0\n");
+}
+
 TEST_F(Sessions, MapOfTwoLocalizesQueriesOfBoth) {
   EXPECT_THAT(ReadFile(Path("two.build/capture/queries.txt")).value(),
               AllOf(HasSubstr("day1/q"), HasSubstr("day2/q")));
