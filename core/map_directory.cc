@@ -86,6 +86,7 @@ std::string MapDirectory::Encode() const {
 Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_num_bytes) {
   BlobReader reader(bytes);
   MapDirectory directory;
+  directory.blocks_.reserve(bytes.size() / 69);
   int64_t num_bytes = 0;
   while (reader.num_left() > 0 && reader.ok()) {
     BlockEntry entry;
@@ -93,7 +94,8 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
     entry.first = reader.UInt32();
     entry.count = reader.UInt32();
     entry.num_bytes = reader.UInt32();
-    for (uint8_t& byte : entry.hash) byte = reader.UInt8();
+    const std::string_view hash = reader.Bytes(entry.hash.size());
+    std::copy(hash.begin(), hash.end(), entry.hash.begin());  // none where it is cut off
     for (Eigen::Vector3f* corner : {&entry.centers.min(), &entry.centers.max()}) {
       for (int axis = 0; axis < 3; ++axis) (*corner)[axis] = reader.Float32();
     }
