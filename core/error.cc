@@ -1,20 +1,8 @@
 #include "core/error.h"
 
-#include <array>
-
-#include "core/map_error.h"
-
 namespace cairn {
 
-const char* MapErrorName(ErrorCode code) {
-  constexpr std::array kNames = {"empty_file", "truncated",  "not_sqlite", "foreign_file", "too_new",
-                                 "too_old",    "not_signed", "wrong_key",  "read_only",    "disk_full"};
-  const auto index = static_cast<size_t>(static_cast<int>(code) - static_cast<int>(kEmptyFile));
-  return index < kNames.size() ? kNames[index] : nullptr;
-}
-
 const char* ErrorCodeName(ErrorCode code) {
-  if (const char* const name = MapErrorName(code)) return name;
   switch (code) {
     case ErrorCode::kFailed:
       return "failed";
@@ -36,6 +24,26 @@ const char* ErrorCodeName(ErrorCode code) {
       return "busy";
     case ErrorCode::kCancelled:
       return "cancelled";
+    case ErrorCode::kEmptyFile:
+      return "empty_file";
+    case ErrorCode::kTruncated:
+      return "truncated";
+    case ErrorCode::kNotSqlite:
+      return "not_sqlite";
+    case ErrorCode::kForeignFile:
+      return "foreign_file";
+    case ErrorCode::kTooNew:
+      return "too_new";
+    case ErrorCode::kTooOld:
+      return "too_old";
+    case ErrorCode::kNotSigned:
+      return "not_signed";
+    case ErrorCode::kWrongKey:
+      return "wrong_key";
+    case ErrorCode::kReadOnly:
+      return "read_only";
+    case ErrorCode::kDiskFull:
+      return "disk_full";
   }
   return "failed";
 }

@@ -22,6 +22,17 @@ enum class ErrorCode : int {
   kGate = 8,             // a map below its recipe's [gate]
   kBusy = 9,             // another process holds the file or the folder
   kCancelled = 10,       // the user stopped it
+  // Files that a robot opens, or that a map is written to, where kCorrupt or kIo would not say what to do.
+  kEmptyFile = 11,    // no bytes at all
+  kTruncated = 12,    // shorter than it says
+  kNotSqlite = 13,    // no SQLite database, but should be one
+  kForeignFile = 14,  // a SQLite database of another program
+  kTooNew = 15,       // a map of a later format than this program reads
+  kTooOld = 16,       // a map of an earlier format: `cairn migrate`
+  kNotSigned = 17,    // a signature is required
+  kWrongKey = 18,     // signed with another key, or the signature is false
+  kReadOnly = 19,     // the folder or file may not be written
+  kDiskFull = 20,     // no space is left
 };
 
 // Stable lower-case name of a code, as it stands in error.json ("corrupt", "no_data", ...).

@@ -12,7 +12,6 @@
 #include <fstream>
 #include <sstream>
 
-#include "core/map_error.h"
 #include "core/temporary.h"
 
 namespace cairn {
@@ -22,8 +21,8 @@ namespace fs = std::filesystem;
 
 // Code of a failed write.
 ErrorCode CodeOfErrno(int error) {
-  if (error == ENOSPC || error == EDQUOT) return kDiskFull;
-  return error == EACCES || error == EROFS || error == EPERM ? kReadOnly : ErrorCode::kIo;
+  if (error == ENOSPC || error == EDQUOT) return ErrorCode::kDiskFull;
+  return error == EACCES || error == EROFS || error == EPERM ? ErrorCode::kReadOnly : ErrorCode::kIo;
 }
 
 Status SyncPath(const std::string& path, int flags) {

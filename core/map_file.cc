@@ -6,7 +6,6 @@
 #include <mutex>
 
 #include "core/database.h"
-#include "core/map_error.h"
 #include "core/map_head.h"
 #include "core/map_root.h"
 
@@ -42,22 +41,22 @@ Status CheckContainer(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
   if (!fs::is_regular_file(path, error)) {
-    return MakeError(kNotSqlite, "{}: not a regular file, expected a map", path);
+    return MakeError(ErrorCode::kNotSqlite, "{}: not a regular file, expected a map", path);
   }
   const uint64_t num_bytes = fs::file_size(path, error);
   if (num_bytes == 0) {
-    return MakeError(kEmptyFile, "{}: is empty, expected a map; copy it again", path);
+    return MakeError(ErrorCode::kEmptyFile, "{}: is empty, expected a map; copy it again", path);
   }
   if (!IsSqliteFile(path)) {
     return MakeError(
-        kNotSqlite,
+        ErrorCode::kNotSqlite,
         "{}: not a SQLite database, which a map is ({} bytes without the magic 'SQLite format 3')", path,
         num_bytes);
   }
   CAIRN_ASSIGN_OR_RETURN(const uint64_t stated, StatedSize(path));
   if (num_bytes < stated || num_bytes < 512) {
-    return MakeError(kTruncated, "{}: has {} bytes, but should have {}; copy it again", path, num_bytes,
-                     stated);
+    return MakeError(ErrorCode::kTruncated, "{}: has {} bytes, but should have {}; copy it again", path,
+                     num_bytes, stated);
   }
   if (num_bytes > stated) {
     return MakeError(ErrorCode::kCorrupt, "{}: has {} bytes, but should have {}; copy it again", path,

@@ -1,6 +1,5 @@
 // Maps written: the tables of schemas/0002_map.sql.
 #include "core/database.h"
-#include "core/map_error.h"
 #include "core/map_head.h"
 #include "core/map_layout.h"
 #include "core/map_root.h"
@@ -90,7 +89,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
         database.exec("COMMIT");
       } catch (const SQLite::Exception& exception) {
         if (exception.getErrorCode() != SQLITE_FULL) throw;
-        return MakeError(kDiskFull, "{}: cannot be written: {}", path, exception.what());
+        return MakeError(ErrorCode::kDiskFull, "{}: cannot be written: {}", path, exception.what());
       }
       return Ok();
     }));

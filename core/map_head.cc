@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "core/blob.h"
-#include "core/map_error.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -222,7 +221,7 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
   constexpr int kApplicationId = 0x63726d70;  // 'crmp'
   const int application_id = database.execAndGet("PRAGMA application_id").getInt();
   if (application_id != kApplicationId) {
-    return MakeError(kForeignFile,
+    return MakeError(ErrorCode::kForeignFile,
                      "{}: a SQLite file, but not a cairn map (application_id {:#x}, expected {:#x})", path,
                      application_id, kApplicationId);
   }
@@ -234,7 +233,7 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
     const auto meta = ReadTexts(database, "SELECT key, value FROM meta WHERE key = 'writer'");
     if (!meta.empty()) writer = meta.begin()->second;
   }
-  return MakeError(found > major ? kTooNew : kTooOld,
+  return MakeError(found > major ? ErrorCode::kTooNew : ErrorCode::kTooOld,
                    "{}: map version {}.{}, written by {}; {}.x is read here. {}", path, found, version % 1000,
                    writer, major,
                    found > major ? "Update the program, or compile the map with this one."

@@ -12,7 +12,6 @@
 
 #include "core/blob.h"
 #include "core/file.h"
-#include "core/map_error.h"
 #include "core/map_file.h"
 
 namespace cairn {
@@ -208,21 +207,21 @@ Status CheckFileHash(const std::string& path) {
 Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required) {
   if (!seal.is_signed()) {
     if (!required) return Ok();
-    return MakeError(kNotSigned,
+    return MakeError(ErrorCode::kNotSigned,
                      "{}: is not signed, and a signature of key {} is required; sign it with `cairn sign`",
                      path, HexOf(*required));
   }
   if (required && seal.public_key != *required) {
-    return MakeError(kWrongKey, "{}: is signed with key {}, but {} is required", path, HexOf(seal.public_key),
-                     HexOf(*required));
+    return MakeError(ErrorCode::kWrongKey, "{}: is signed with key {}, but {} is required", path,
+                     HexOf(seal.public_key), HexOf(*required));
   }
   const std::string bytes = EncodeSeal(seal);
   if (crypto_sign_verify_detached(seal.signature.data(), reinterpret_cast<const uint8_t*>(bytes.data()),
                                   kSignedBytes, seal.public_key.data()) == 0) {
     return Ok();
   }
-  return MakeError(kWrongKey, "{}: its signature is not that of key {}: it was changed since", path,
-                   HexOf(seal.public_key));
+  return MakeError(ErrorCode::kWrongKey, "{}: its signature is not that of key {}: it was changed since",
+                   path, HexOf(seal.public_key));
 }
 
 KeyPair MakeKeyPair() {
@@ -264,7 +263,7 @@ Status SignMap(const std::string& path, const SecretKey& key, const std::string&
   return ReplaceFileAtomically(signed_path, [&](const std::string& temporary) -> Status {
     std::error_code error;
     if (!fs::copy_file(path, temporary, error)) {
-      return MakeError(error == std::errc::no_space_on_device ? kDiskFull : ErrorCode::kIo,
+      return MakeError(error == std::errc::no_space_on_device ? ErrorCode::kDiskFull : ErrorCode::kIo,
                        "{}: cannot be written: {}", signed_path, error.message());
     }
     fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);

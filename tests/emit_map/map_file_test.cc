@@ -6,7 +6,6 @@
 
 #include "core/database.h"
 #include "core/file.h"
-#include "core/map_error.h"
 #include "core/map_rows.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/emit_map/example.h"
@@ -108,13 +107,13 @@ TEST(MapFile, EveryKindOfOtherFileHasItsCode) {
   const std::string path = MapPath("other.cairn");
   const auto code = [&] { return ReadMapRows(path).error().code; };
   ASSERT_TRUE(WriteFileAtomically(path, "this is no map").ok());
-  EXPECT_EQ(code(), kNotSqlite);
+  EXPECT_EQ(code(), ErrorCode::kNotSqlite);
   ASSERT_TRUE(WriteFileAtomically(path, "").ok());
-  EXPECT_EQ(code(), kEmptyFile);
+  EXPECT_EQ(code(), ErrorCode::kEmptyFile);
   ASSERT_TRUE(WriteVocabulary(MakeEmitExample().vocabulary, path).ok());
-  EXPECT_EQ(code(), kForeignFile);
+  EXPECT_EQ(code(), ErrorCode::kForeignFile);
   EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("not a cairn map"));
-  EXPECT_EQ(ReadMapRows(testing::TempDir()).error().code, kNotSqlite);
+  EXPECT_EQ(ReadMapRows(testing::TempDir()).error().code, ErrorCode::kNotSqlite);
 }
 
 TEST(MapFile, EveryTruncationIsRefused) {
@@ -124,7 +123,7 @@ TEST(MapFile, EveryTruncationIsRefused) {
     ASSERT_TRUE(WriteFileAtomically(MapPath("cut.cairn"), bytes.substr(0, size)).ok());
     const Result<MapRows> read = ReadMapRows(MapPath("cut.cairn"));
     ASSERT_FALSE(read.ok()) << size;
-    EXPECT_EQ(read.error().code, size == 0 ? kEmptyFile : kTruncated) << size;
+    EXPECT_EQ(read.error().code, size == 0 ? ErrorCode::kEmptyFile : ErrorCode::kTruncated) << size;
   }
   ASSERT_TRUE(WriteFileAtomically(MapPath("longer.cairn"), bytes + std::string(1024, '\0')).ok());
   EXPECT_EQ(ReadMapRows(MapPath("longer.cairn")).error().code, ErrorCode::kCorrupt);
@@ -134,7 +133,7 @@ TEST(MapFile, NewerMajorVersionNamesTheWriter) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("newer.cairn")).ok());
   SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3003");
   const Error error = ReadMapRows(MapPath("newer.cairn")).error();
-  EXPECT_EQ(error.code, kTooNew);
+  EXPECT_EQ(error.code, ErrorCode::kTooNew);
   EXPECT_THAT(error.message, HasSubstr("3.3, written by cairn test"));
   EXPECT_THAT(error.message, HasSubstr("Update the program"));
 }
@@ -178,7 +177,7 @@ TEST(MapFile, FailedWriteLeavesTheOldFile) {
 // Version 1.0 as the program of that version wrote the example.
 TEST(GoldenMap, Version1IsMigrated) {
   const std::string path = GOLDEN_DIR "/map_1.0.cairn";
-  EXPECT_EQ(ReadMapRows(path).error().code, kTooOld);
+  EXPECT_EQ(ReadMapRows(path).error().code, ErrorCode::kTooOld);
   EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("cairn migrate"));
   const Result<MapRows> old = ReadMapRowsVersion1(path);
   ASSERT_TRUE(old.ok()) << old.error().message;
@@ -195,7 +194,7 @@ TEST(GoldenMap, Version1IsMigrated) {
   EXPECT_NEAR(migrated->landmarks[0].position.x(), 2.1234, 1e-12);
   EXPECT_EQ(migrated->descriptors, old->descriptors);
   EXPECT_EQ(migrated->vocabulary.inverted_files, old->vocabulary.inverted_files);
-  EXPECT_EQ(ReadMapRowsVersion1(MapPath("migrated.cairn")).error().code, kTooNew);
+  EXPECT_EQ(ReadMapRowsVersion1(MapPath("migrated.cairn")).error().code, ErrorCode::kTooNew);
 }
 
 // Version 2.0 as the program of that version wrote the example.

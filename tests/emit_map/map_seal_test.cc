@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
-#include "core/map_error.h"
 #include "core/map_file.h"
 #include "core/random.h"
 #include "stages/emit_map/emit_map.h"
@@ -75,8 +74,8 @@ TEST(MapSeal, SignatureIsThatOfItsKey) {
   EXPECT_EQ(*ReadFile(path), before);
   EXPECT_TRUE(Verify(signed_path).ok());
   EXPECT_TRUE(Verify(signed_path, keys.public_key).ok());
-  EXPECT_EQ(Verify(signed_path, others.public_key).error().code, kWrongKey);
-  EXPECT_EQ(Verify(path, keys.public_key).error().code, kNotSigned);
+  EXPECT_EQ(Verify(signed_path, others.public_key).error().code, ErrorCode::kWrongKey);
+  EXPECT_EQ(Verify(path, keys.public_key).error().code, ErrorCode::kNotSigned);
   // The same map and key: the same bytes.
   ASSERT_TRUE(SignMap(path, keys.secret_key, InFolder("again.cairn")).ok());
   EXPECT_EQ(*ReadFile(InFolder("again.cairn")), *ReadFile(signed_path));
@@ -92,7 +91,7 @@ TEST(MapSeal, ForgedRootIsNotSigned) {
   std::string bytes = *ReadFile(path);
   bytes[bytes.find("cairn map seal 2") + 20] ^= 1;
   ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
-  EXPECT_EQ(MapFile::Open(path, {}).error().code, kWrongKey);
+  EXPECT_EQ(MapFile::Open(path, {}).error().code, ErrorCode::kWrongKey);
 }
 
 TEST(MapSeal, DamagedMapIsNotSigned) {

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/map_error.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {
@@ -35,7 +34,7 @@ TEST_F(SealedMap, IsSignedAndVerified) {
   ASSERT_EQ(RunShell("cairn keygen " + Path("key")).exit_code, 0);
   ASSERT_EQ(RunShell("cairn keygen " + Path("other")).exit_code, 0);
   const std::string required = " --public-key " + Path("key.pub");
-  EXPECT_EQ(RunShell("cairn verify " + Path("map.cairn") + required).exit_code, Code(kNotSigned));
+  EXPECT_EQ(RunShell("cairn verify " + Path("map.cairn") + required).exit_code, Code(ErrorCode::kNotSigned));
   const ProgramRun sign =
       RunShell("cairn sign " + Path("map.cairn") + " --key " + Path("key") + " -o " + Path("signed.cairn"));
   ASSERT_EQ(sign.exit_code, 0) << sign.err;
@@ -43,7 +42,7 @@ TEST_F(SealedMap, IsSignedAndVerified) {
   EXPECT_EQ(verify.exit_code, 0) << verify.err;
   EXPECT_THAT(verify.out, HasSubstr("whole, signed with key"));
   EXPECT_EQ(RunShell("cairn verify " + Path("signed.cairn") + " --public-key " + Path("other.pub")).exit_code,
-            Code(kWrongKey));
+            Code(ErrorCode::kWrongKey));
 }
 
 TEST_F(SealedMap, FlippedBitIsFound) {
@@ -57,7 +56,7 @@ TEST_F(SealedMap, FlippedBitIsFound) {
 
 TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
   const ProgramRun run = RunShell("cairn inspect " GOLDEN_DIR "/map_1.0.cairn");
-  EXPECT_EQ(run.exit_code, Code(kTooOld));
+  EXPECT_EQ(run.exit_code, Code(ErrorCode::kTooOld));
   EXPECT_THAT(run.err, HasSubstr("cairn migrate"));
   EXPECT_EQ(RunShell("cairn inspect " + Path("map.cairn")).exit_code, 0);
 }
@@ -70,11 +69,11 @@ TEST_F(SealedMap, FullDiskAndReadOnlyFolderLeaveTheOldMap) {
   ASSERT_TRUE(WriteFileAtomically(disk + "/out.cairn", "the map of yesterday").ok());
   const std::string migrate = "cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + disk + "/out.cairn";
   const ProgramRun full = RunShell(migrate);
-  EXPECT_EQ(full.exit_code, Code(kDiskFull)) << full.err;
+  EXPECT_EQ(full.exit_code, Code(ErrorCode::kDiskFull)) << full.err;
   EXPECT_EQ(*ReadFile(disk + "/out.cairn"), "the map of yesterday");
   EXPECT_EQ(mount("none", disk.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, ""), 0);
   const ProgramRun read_only = RunShell(migrate);
-  EXPECT_EQ(read_only.exit_code, Code(kReadOnly)) << read_only.err;
+  EXPECT_EQ(read_only.exit_code, Code(ErrorCode::kReadOnly)) << read_only.err;
   EXPECT_EQ(*ReadFile(disk + "/out.cairn"), "the map of yesterday");
   umount2(disk.c_str(), MNT_DETACH);
 }

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
-#include "core/map_error.h"
 #include "tests/runtime/synthetic_room.h"
 
 namespace cairn {
@@ -387,10 +386,10 @@ TEST(Map, RequiredKeyIsRequired) {
   const std::string path = testing::TempDir() + "/keyed.cairn";
   ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
   const KeyPair keys = MakeKeyPair();
-  EXPECT_EQ(Map::Open(path, {.public_key = keys.public_key}).error().code, kNotSigned);
+  EXPECT_EQ(Map::Open(path, {.public_key = keys.public_key}).error().code, ErrorCode::kNotSigned);
   ASSERT_TRUE(SignMap(path, keys.secret_key, path).ok());
   EXPECT_TRUE(Map::Open(path, {.public_key = keys.public_key}).ok());
-  EXPECT_EQ(Map::Open(path, {.public_key = MakeKeyPair().public_key}).error().code, kWrongKey);
+  EXPECT_EQ(Map::Open(path, {.public_key = MakeKeyPair().public_key}).error().code, ErrorCode::kWrongKey);
 }
 
 TEST(BlockCache, EvictsWhatWasUsedLongestAgo) {
