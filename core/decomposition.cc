@@ -1,6 +1,7 @@
 #include "core/decomposition.h"
 
 #include "core/database.h"
+#include "core/dropped_items.h"
 #include "schemas/regions_sql.h"
 
 namespace cairn {
@@ -79,6 +80,15 @@ bool HasJsonSuffix(const std::string& path) {
   return path.size() >= 5 && path.compare(path.size() - 5, 5, ".json") == 0;
 }
 
+Status WriteWithDropped(const Decomposition& decomposition, const std::string& path,
+                        const std::vector<DroppedItem>& dropped_items) {
+  return WriteDatabase(path, kRegionsSql, [&](SQLite::Database& database) -> Status {
+    WriteTables(database, decomposition);
+    WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
+    return Ok();
+  });
+}
+
 }  // namespace
 
 std::string NumRegionsText(size_t num_regions, std::optional<int> lower_bound) {
@@ -97,19 +107,21 @@ Result<Decomposition> ReadDecompositionDatabase(const std::string& path) {
 }
 
 Status WriteDecompositionDatabase(const Decomposition& decomposition, const std::string& path) {
-  return WriteDatabase(path, kRegionsSql, [&](SQLite::Database& database) -> Status {
-    WriteTables(database, decomposition);
-    return Ok();
-  });
+  return WriteWithDropped(decomposition, path, {});
 }
 
 Result<Decomposition> ReadDecomposition(const std::string& path) {
   return IsSqliteFile(path) ? ReadDecompositionDatabase(path) : ReadDecompositionJson(path);
 }
 
-Status WriteDecomposition(const Decomposition& decomposition, const std::string& path) {
+Status WriteDecomposition(const Decomposition& decomposition, const std::string& path,
+                          const std::vector<DroppedItem>& dropped_items) {
   return HasJsonSuffix(path) ? WriteDecompositionJson(decomposition, path)
-                             : WriteDecompositionDatabase(decomposition, path);
+                             : WriteWithDropped(decomposition, path, dropped_items);
+}
+
+Status WriteDecomposition(const Decomposition& decomposition, const std::string& path) {
+  return WriteDecomposition(decomposition, path, {});
 }
 
 }  // namespace cairn

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/database.h"
+#include "core/dropped_items.h"
 #include "schemas/classes_sql.h"
 
 namespace cairn {
@@ -67,7 +68,8 @@ Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& pat
 
 }  // namespace
 
-Status WriteClasses(const Classes& classes, const std::string& path) {
+Status WriteClasses(const Classes& classes, const std::string& path,
+                    const std::vector<DroppedItem>& dropped_items) {
   return WriteDatabase(path, kClassesSql, [&](SQLite::Database& database) -> Status {
     SQLite::Statement camera_row(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, ?)");
     for (const Camera& camera : classes.cameras) {
@@ -116,8 +118,13 @@ Status WriteClasses(const Classes& classes, const std::string& path) {
       dropped_row.exec();
       dropped_row.reset();
     }
+    WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
     return Ok();
   });
+}
+
+Status WriteClasses(const Classes& classes, const std::string& path) {
+  return WriteClasses(classes, path, {});
 }
 
 Result<Classes> ReadClasses(const std::string& path) {

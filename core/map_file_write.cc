@@ -1,4 +1,4 @@
-// Maps written: the tables of schemas/0002_map.sql.
+// Maps written: the tables of schemas/0002_map.sql and map_findings.sql.
 #include "core/database.h"
 #include "core/map_head.h"
 #include "core/map_layout.h"
@@ -6,6 +6,7 @@
 #include "core/map_rows.h"
 #include "core/map_seal.h"
 #include "schemas/0002_map_sql.h"
+#include "schemas/map_findings_sql.h"
 
 namespace cairn {
 namespace {
@@ -68,6 +69,7 @@ Result<Hash> WriteTables(SQLite::Database& database, const MapRows& rows) {
   InsertBlob(database, "INSERT INTO seal VALUES (?)", EncodeSeal(Seal()));
   WriteMapHead(database, rows);
   CAIRN_ASSIGN_OR_RETURN(const std::string directory, WriteBlocks(database, rows));
+  WriteMapFindings(database, rows.findings);
   return RootHash(database, directory);
 }
 
@@ -85,6 +87,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
             "PRAGMA page_size = {}; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;", page_size));
         database.exec("BEGIN");
         database.exec(k0002MapSql);
+        database.exec(kMapFindingsSql);
         CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows));
         database.exec("COMMIT");
       } catch (const SQLite::Exception& exception) {

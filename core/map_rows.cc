@@ -153,7 +153,7 @@ Status CheckMapRows(const MapRows& rows) {
       return Invalid("the vocabulary knows image {}, which the map lacks", image_id);
     }
   }
-  return Ok();
+  return CheckMapFindings(rows.findings, rows.regions.size(), rows.stations.size());
 }
 
 }  // namespace cairn

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/features.h"
 #include "core/ids.h"
+#include "core/map_findings.h"
 #include "core/pose.h"
 #include "core/vocabulary_tree.h"
 
@@ -99,10 +100,11 @@ struct MapRows : MapHead {
   DescriptorMatrix descriptors;  // row i: landmark i
   // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
   Vocabulary vocabulary;
+  MapFindings findings;
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 0;
+inline constexpr int kMapVersionMinor = 1;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

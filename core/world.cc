@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/database.h"
+#include "core/dropped_items.h"
 #include "schemas/world_sql.h"
 
 namespace cairn {
@@ -222,12 +223,18 @@ Result<World> ReadWorldDatabase(const std::string& path) {
   });
 }
 
-Status WriteWorldDatabase(const World& world, const std::string& path) {
+Status WriteWorldDatabase(const World& world, const std::string& path,
+                          const std::vector<DroppedItem>& dropped_items) {
   CAIRN_RETURN_IF_ERROR(CheckWorld(world));
   return WriteDatabase(path, kWorldSql, [&](SQLite::Database& database) -> Status {
     WriteTables(database, world);
+    WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
     return Ok();
   });
+}
+
+Status WriteWorldDatabase(const World& world, const std::string& path) {
+  return WriteWorldDatabase(world, path, {});
 }
 
 Result<World> ReadWorld(const std::string& path) {

@@ -17,9 +17,14 @@
 #include "core/map_rows.h"
 #include "core/sessions.h"
 #include "pipeline/floor_svg.h"
+#include "pipeline/inspect_drops.h"
+#include "stages/check_map/report.h"
 
 namespace cairn {
 namespace {
+
+constexpr int kMaxRegionLines = 30;
+constexpr int kMaxStationLines = 10;
 
 struct Arguments {
   std::string map_path;
@@ -126,6 +131,8 @@ nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;
+  json["dropped"] = DropsJson(rows);
+  json["self_test_regions"] = SelfTestRegionsJson(rows.findings.self_test_regions);
   json["stage_options"] = rows.stage_options;
   json["input_hashes"] = rows.input_hashes;
   return json;
@@ -158,9 +165,18 @@ std::string RegionsLine(const nlohmann::ordered_json& json) {
 }
 
 // The same values for people: a line each, options as they stand in the recipe.
-std::string MapText(const nlohmann::ordered_json& json) {
+std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
   std::string text;
   for (const auto& [key, value] : json.items()) {
+    if (key == "dropped") {
+      if (!value.empty()) text += "\n" + DropsText(rows, kMaxStationLines);
+      continue;
+    }
+    if (key == "self_test_regions") {
+      if (!value.empty())
+        text += "\n" + SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines);
+      continue;
+    }
     if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before
     if (key == "sessions") {
       text += SessionsText(value);
@@ -198,7 +214,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   auto json = MapJson(rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
-  *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json));
+  *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json, rows));
   if (arguments.svg_path.empty()) return Ok();
   return WriteFileAtomically(arguments.svg_path, FloorSvg(rows));
 }

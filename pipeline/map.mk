@@ -260,11 +260,12 @@ $(BUILD)/%: SESSION_LIST := $(SESSION_LIST)
 STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCTED)),reconstruct) group_classes \
     filter_visibility decompose_regions build_vocabulary emit_map
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
-$(BUILD)/unsealed.cairn.stamp: $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
-    $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) $(POSES_READY) $(SESSION_LIST)
+$(BUILD)/unsealed.cairn.stamp: $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
+    $(BUILD)/vocabulary.db $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) \
+    $(POSES_READY) $(SESSION_LIST)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) emit-map --classes $(@D)/classes.db --world $(@D)/world.db --regions $(@D)/regions.db \
-	    --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
+	$(CAIRN_LAUNCH) $(CAIRN) emit-map --matches $(@D)/matches.db --classes $(@D)/classes.db --world $(@D)/world.db \
+	    --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(addprefix --sessions ,$(SESSION_LIST)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)

@@ -64,13 +64,17 @@ Status CheckName(const std::string& path, const toml::node& node, const std::str
       TomlPlace(path, node), name);
 }
 
+constexpr const char* kGateKeys[] = {"min_localized_ratio", "min_precision_ratio",
+                                     "min_region_localized_ratio", "min_region_precision_ratio",
+                                     "min_region_held_out"};
+
 // The keys of [gate]: those options of check_map that a map must reach to be written.
 OptionTable GateOptions(const std::vector<StageOptions>& stages) {
   OptionTable gate;
   for (const StageOptions& stage : stages) {
     if (stage.stage != "check_map") continue;
     for (const Option& option : stage.table) {
-      if (option.name == "min_localized_ratio" || option.name == "min_precision_ratio")
+      if (std::find(std::begin(kGateKeys), std::end(kGateKeys), option.name) != std::end(kGateKeys))
         gate.push_back(option);
     }
   }

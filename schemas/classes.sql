@@ -40,3 +40,11 @@ CREATE TABLE dropped (
   reason TEXT PRIMARY KEY,
   num_classes INTEGER NOT NULL
 );
+
+-- What was dropped, and why; see drops.md.
+CREATE TABLE dropped_items (
+  reason_id INTEGER NOT NULL,  -- core/drop_reason.h
+  item_id   INTEGER NOT NULL,  -- image_id, pair_id, track_idx or class_id
+  found     INTEGER,           -- what the filter found, where that is a number
+  seen_at   BLOB               -- keypoints: image_id u32, keypoint_idx u32 each
+);

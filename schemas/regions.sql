@@ -19,3 +19,11 @@ CREATE TABLE regions (
   features   BLOB NOT NULL,          -- feature indices of the world
   stations   BLOB NOT NULL           -- the tau-grown region
 );
+
+-- What was dropped, and why; see drops.md.
+CREATE TABLE dropped_items (
+  reason_id INTEGER NOT NULL,  -- core/drop_reason.h
+  item_id   INTEGER NOT NULL,  -- feature_idx or station_idx
+  found     INTEGER,           -- what the filter found, where that is a number
+  seen_at   BLOB               -- NULL
+);

@@ -27,3 +27,11 @@ CREATE TABLE features (
   class_id    INTEGER,              -- feature class behind it; NULL: not known
   stations    BLOB NOT NULL         -- stations that see it, ascending
 );
+
+-- What was dropped, and why; see drops.md.
+CREATE TABLE dropped_items (
+  reason_id INTEGER NOT NULL,  -- core/drop_reason.h
+  item_id   INTEGER NOT NULL,  -- class_id
+  found     INTEGER,           -- what the filter found, where that is a number
+  seen_at   BLOB               -- station_idx: i32 each
+);

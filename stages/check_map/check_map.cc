@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <tuple>
 
 #include <Eigen/LU>
 
@@ -56,21 +57,13 @@ HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage
   return result;
 }
 
-// The least value that at least `part` of them do not exceed.  REQUIRES: not empty
-double Quantile(std::vector<double> values, double part) {
-  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
-  const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
-
 void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOptions& options,
                      std::map<std::string, double>* figures) {
   std::vector<double> errors_m, errors_deg, nees;
   int within_5cm_5deg = 0, within_10cm_2deg = 0, within_10cm_5deg = 0, num_gross_errors = 0;
   double sum_nees = 0;
   for (const HeldOutResult& image : images) {
-    if (!image.rejected.empty() || !image.localization.has_fix()) continue;
+    if (!image.has_fix()) continue;
     errors_m.push_back(image.error_m);
     errors_deg.push_back(image.error_deg);
     nees.push_back(image.nees);
@@ -78,8 +71,7 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
     within_5cm_5deg += image.error_m <= 0.05 && image.error_deg <= 5 ? 1 : 0;
     within_10cm_2deg += image.error_m <= 0.1 && image.error_deg <= 2 ? 1 : 0;
     within_10cm_5deg += image.error_m <= 0.1 && image.error_deg <= 5 ? 1 : 0;
-    num_gross_errors +=
-        image.error_m > options.gross_error_m || image.error_deg > options.gross_error_deg ? 1 : 0;
+    num_gross_errors += IsGrossError(image, options) ? 1 : 0;
   }
   const double num_images = static_cast<double>(images.size());
   const double num_fixes = static_cast<double>(errors_m.size());
@@ -105,7 +97,36 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
   f["nees_high"] = 6 + band;
 }
 
+// Of the regions that have enough images, the first that is below.
+Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& options) {
+  for (const RegionSelfTest& row : report.regions) {
+    if (row.region == kOutsideRegions || row.num_held_out < options.min_region_held_out) continue;
+    for (const auto& [name, found, least] :
+         {std::tuple("localized_ratio", row.LocalizedRatio(), options.min_region_localized_ratio),
+          std::tuple("precision_ratio", row.PrecisionRatio(), options.min_region_precision_ratio)}) {
+      if (found >= least) continue;
+      return MakeError(
+          ErrorCode::kGate,
+          "below the gate: {} of region {} is {:.3f} ({} of its {} held-out images are localized, "
+          "{} of them wrong), at least {:.3f} is asked",
+          name, row.region, found, row.num_localized, row.num_held_out, row.num_gross_errors, least);
+    }
+  }
+  return Ok();
+}
+
 }  // namespace
+
+bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options) {
+  return result.error_m > options.gross_error_m || result.error_deg > options.gross_error_deg;
+}
+
+double Quantile(std::vector<double> values, double part) {
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
+  const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
 
 OptionTable DescribeOptions(CheckMapOptions* o) {
   OptionTable table = {
@@ -127,6 +148,31 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
        .help = "gate: least part of the fixes that are not wrong",
        .min = 0,
        .max = 1},
+      {.name = "min_region_localized_ratio",
+       .value = &o->min_region_localized_ratio,
+       .help = "gate: least part of each region's held-out images localized",
+       .min = 0,
+       .max = 1},
+      {.name = "min_region_precision_ratio",
+       .value = &o->min_region_precision_ratio,
+       .help = "gate: least part of each region's fixes that are not wrong",
+       .min = 0,
+       .max = 1},
+      {.name = "min_region_held_out",
+       .value = &o->min_region_held_out,
+       .help = "gate: regions with fewer held-out images than this are not asked",
+       .min = 1},
+      {.name = "max_station_heading_deg",
+       .value = &o->max_station_heading_deg,
+       .help = "figures of regions: a held-out image stands at the nearest station whose heading is within "
+               "this of its own, degrees",
+       .min = 0,
+       .max = 180},
+      {.name = "max_station_distance_ratio",
+       .value = &o->max_station_distance_ratio,
+       .help = "figures of regions: a held-out image farther from that station than this many times the "
+               "stations' spacing is at none",
+       .min = 0},
   };
   const OptionTable localizer = DescribeOptions(&o->localizer);
   table.insert(table.end(), localizer.begin(), localizer.end());
@@ -162,6 +208,15 @@ Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
 }
 
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
+  const double most_asked =
+      std::max({options.min_localized_ratio, options.min_precision_ratio, options.min_region_localized_ratio,
+                options.min_region_precision_ratio});
+  if (report.images.empty() && most_asked > 0) {
+    return MakeError(ErrorCode::kGate,
+                     "below the gate: a ratio of at least {:.3f} is asked, but there are no held-out images; "
+                     "list some in queries.txt, or ask nothing",
+                     most_asked);
+  }
   const auto check = [&](const std::string& name, double least) -> Status {
     if (least <= 0) return Ok();
     const auto figure = report.figures.find(name);
@@ -171,7 +226,8 @@ Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
                      least);
   };
   CAIRN_RETURN_IF_ERROR(check("localized_ratio", options.min_localized_ratio));
-  return check("precision_ratio", options.min_precision_ratio);
+  CAIRN_RETURN_IF_ERROR(check("precision_ratio", options.min_precision_ratio));
+  return CheckRegionGate(report, options);
 }
 
 }  // namespace cairn

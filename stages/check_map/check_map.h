@@ -7,6 +7,7 @@
 
 #include "core/camera.h"
 #include "core/error.h"
+#include "core/map_findings.h"
 #include "core/options.h"
 #include "core/pose.h"
 #include "core/progress.h"
@@ -26,6 +27,15 @@ struct CheckMapOptions {
   // in [0, 1]
   double min_localized_ratio = 0;
   double min_precision_ratio = 0;
+  // Gate: the same within each region, over the held-out images at its stations; regions with fewer than
+  // min_region_held_out such images are not asked.  REQUIRES: in [0, 1]; >= 1
+  double min_region_localized_ratio = 0;
+  double min_region_precision_ratio = 0;
+  int min_region_held_out = 5;
+  // An image stands at the nearest station of a heading within this of its own, if that is no farther than
+  // this many times the stations' spacing (region_figures.h).  REQUIRES: in [0, 180]; >= 0
+  double max_station_heading_deg = 45;
+  double max_station_distance_ratio = 1.5;
   LocalizerOptions localizer;
 };
 OptionTable DescribeOptions(CheckMapOptions* options);
@@ -49,7 +59,14 @@ struct HeldOutResult {
   double nees = 0;
   double sift_ms = 0;
   double total_ms = 0;  // SIFT included, decoding not
+  bool has_fix() const { return rejected.empty() && localization.has_fix(); }
 };
+
+// Of a fix of an image with a true pose.
+bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options);
+
+// The least value that at least `part` of them do not exceed.  REQUIRES: not empty
+double Quantile(std::vector<double> values, double part);
 
 struct CheckMapReport {
   std::vector<HeldOutResult> images;  // in the given order
@@ -60,6 +77,8 @@ struct CheckMapReport {
   //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees of
   //   freedom)
   std::map<std::string, double> figures;
+  // The same by region, of images with a true pose: for SummarizeRegions (region_figures.h) to fill.
+  std::vector<RegionSelfTest> regions;
   // Means over the images tried.
   double mean_sift_ms = 0;
   double mean_total_ms = 0;
@@ -72,7 +91,8 @@ Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
                                 const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
                                 int num_threads, Progress& progress);
 
-// Whether the figures pass the gate.  Errors: Gate, naming the figure, what was found and what is asked.
+// Whether the figures pass the gate.  Errors: Gate, naming the figure, its region, what was found and what is
+// asked; also where something is asked and there was no image to find out.
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options);
 
 }  // namespace cairn

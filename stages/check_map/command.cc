@@ -11,6 +11,7 @@
 
 #include "core/capture.h"
 #include "stages/check_map/check_map.h"
+#include "stages/check_map/region_figures.h"
 #include "stages/check_map/report.h"
 
 namespace cairn {
@@ -101,7 +102,10 @@ Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& c
             const std::string& path) {
   CheckMapOptions options = checked;
   rows.sealed = true;
-  if (!report.images.empty()) rows.self_test = report.figures;
+  if (!report.images.empty()) {
+    rows.self_test = report.figures;
+    rows.findings.self_test_regions = report.regions;
+  }
   rows.stage_options["check_map"] = OptionsToml(DescribeOptions(&options));
   return WriteMapRows(rows, path);
 }
@@ -120,6 +124,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, rows));
     CAIRN_ASSIGN_OR_RETURN(
         held_out, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
+    held_out.regions = SummarizeRegions(rows, images, held_out.images, arguments.options);
     WarnOfRejects(held_out);
   }
   std::optional<CheckMapReport> foreign;
@@ -136,7 +141,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                              .foreign = foreign ? &*foreign : nullptr};
   *environment.out << (arguments.json ? ReportJson(report) : ReportText(report));
   ReportHeldOut(held_out, environment.report);
-  if (!held_out.images.empty()) CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
+  if (!held_out.images.empty() || !arguments.output_path.empty())
+    CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
   if (arguments.output_path.empty()) return Ok();
   return Seal(std::move(rows), held_out, arguments.options, arguments.output_path);
 }

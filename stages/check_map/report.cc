@@ -1,11 +1,15 @@
 #include "stages/check_map/report.h"
 
+#include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 #include "core/decomposition.h"
 
 namespace cairn {
 namespace {
+
+constexpr int kMaxRegionLines = 10;
 
 // Value of a figure; nothing where no image was localized.
 std::optional<double> Figure(const CheckMapReport& report, const std::string& name) {
@@ -81,6 +85,7 @@ std::string ReportText(const PrintedReport& report) {
     line("NEES", fmt::format("mean {}, median {} (95 % band of the mean {} to {})",
                              Text(figure("mean_nees"), 1, 2), Text(figure("median_nees"), 1, 2),
                              Text(figure("nees_low"), 1, 2), Text(figure("nees_high"), 1, 2)));
+    text += SelfTestRegionsText(held_out.regions, kMaxRegionLines);
     line("ms per image",
          fmt::format("{:.1f} (SIFT alone {:.1f})", held_out.mean_total_ms, held_out.mean_sift_ms));
   }
@@ -106,6 +111,7 @@ std::string ReportJson(const PrintedReport& report) {
     for (const auto& [name, value] : report.held_out->figures) json[name] = value;
     json["mean_total_ms"] = report.held_out->mean_total_ms;
     json["mean_sift_ms"] = report.held_out->mean_sift_ms;
+    json["regions"] = SelfTestRegionsJson(report.held_out->regions);
     json["images"] = ImagesJson(*report.held_out, true);
   }
   if (report.foreign != nullptr) {
@@ -114,6 +120,57 @@ std::string ReportJson(const PrintedReport& report) {
     json["foreign_images"] = ImagesJson(*report.foreign, false);
   }
   return json.dump(2) + "\n";
+}
+
+std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines) {
+  if (regions.empty()) return "";
+  std::vector<RegionSelfTest> order = regions;
+  std::stable_sort(order.begin(), order.end(), [](const RegionSelfTest& a, const RegionSelfTest& b) {
+    const auto key = [](const RegionSelfTest& row) {
+      return std::pair(row.LocalizedRatio() * row.PrecisionRatio(), -row.num_held_out);
+    };
+    return key(a) < key(b);
+  });
+  std::string text = fmt::format("{:<22} {:>6} {:>9} {:>9} {:>19} {:>19}\n", "by region, worst first",
+                                 "images", "localized", "precision", "median error", "90th percentile");
+  const size_t num_lines = std::min<size_t>(order.size(), max_num_lines);
+  for (size_t i = 0; i < num_lines; ++i) {
+    const RegionSelfTest& row = order[i];
+    const auto error = [](double m, double deg) {
+      return fmt::format("{:.2f} cm, {:.3f} deg", 100 * m, deg);
+    };
+    text += fmt::format("  {:<20} {:>6} {:>9} {:>9} {:>19} {:>19}\n",
+                        row.region == kOutsideRegions ? "outside" : fmt::format("region {}", row.region),
+                        row.num_held_out, fmt::format("{:.1f} %", 100 * row.LocalizedRatio()),
+                        row.errors ? fmt::format("{:.1f} %", 100 * row.PrecisionRatio()) : "-",
+                        row.errors ? error(row.errors->median_m, row.errors->median_deg) : "-",
+                        row.errors ? error(row.errors->p90_m, row.errors->p90_deg) : "-");
+  }
+  if (const size_t num_more = order.size() - num_lines; num_more > 0)
+    text += fmt::format("  ... and {} better {}\n", num_more, num_more == 1 ? "one" : "ones");
+  return text;
+}
+
+nlohmann::ordered_json SelfTestRegionsJson(const std::vector<RegionSelfTest>& regions) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RegionSelfTest& row : regions) {
+    nlohmann::ordered_json entry = {{"region", nullptr},
+                                    {"num_held_out", row.num_held_out},
+                                    {"num_localized", row.num_localized},
+                                    {"num_gross_errors", row.num_gross_errors},
+                                    {"localized_ratio", row.LocalizedRatio()},
+                                    {"precision_ratio", nullptr}};
+    if (row.region != kOutsideRegions) entry["region"] = row.region;
+    if (row.errors) {
+      entry["precision_ratio"] = row.PrecisionRatio();
+      entry["median_error_m"] = row.errors->median_m;
+      entry["median_error_deg"] = row.errors->median_deg;
+      entry["p90_error_m"] = row.errors->p90_m;
+      entry["p90_error_deg"] = row.errors->p90_deg;
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
 }
 
 }  // namespace cairn

@@ -2,7 +2,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/map_findings.h"
 #include "core/map_rows.h"
 #include "stages/check_map/check_map.h"
 
@@ -21,5 +25,11 @@ struct PrintedReport {
 std::string ReportText(const PrintedReport& report);
 // One JSON object: the same figures, and every image with its fix or reason.
 std::string ReportJson(const PrintedReport& report);
+
+// For people, a line per region: those with the fewest images localized right first, at most `max_num_lines`.
+// Empty where no region has held-out images.
+std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines);
+// For programs: a list, ascending; "region" is null for images outside.
+nlohmann::ordered_json SelfTestRegionsJson(const std::vector<RegionSelfTest>& regions);
 
 }  // namespace cairn

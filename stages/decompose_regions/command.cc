@@ -5,6 +5,7 @@
 #include "core/file.h"
 #include "core/memory.h"
 #include "stages/decompose_regions/decompose_regions.h"
+#include "stages/decompose_regions/list_dropped.h"
 #include "stages/decompose_regions/picture.h"
 #include "stages/decompose_regions/reduced_world.h"
 
@@ -76,7 +77,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.svg.empty()) {
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawDecomposition(world, decomposition)));
   }
-  return WriteDecomposition(decomposition, arguments.output);
+  return WriteDecomposition(decomposition, arguments.output, ListDropped(world, decomposition));
 }
 
 }  // namespace

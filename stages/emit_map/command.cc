@@ -1,20 +1,25 @@
 #include "stages/emit_map/command.h"
 
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/database.h"
+#include "core/dropped_items.h"
 #include "core/file.h"
 #include "core/sessions.h"
 #include "core/sift.h"
+#include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
 
 namespace cairn {
 namespace {
 
 struct Arguments {
+  std::string matches_path;
   std::string classes_path;
   std::string world_path;
   std::string regions_path;
@@ -27,6 +32,15 @@ struct Arguments {
   EmitMapOptions options;
   OptionArguments option_arguments;
 };
+
+// Images that extract-features rejected: a table of its own in features.db and what is made from it.
+Result<int64_t> CountRejects(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  return WithDatabaseErrors(path, [&]() -> Result<int64_t> {
+    if (!HasTable(database, "cairn_rejects")) return int64_t{0};
+    return database.execAndGet("SELECT count(*) FROM cairn_rejects").getInt64();
+  });
+}
 
 Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
   rows->name = arguments.name;
@@ -51,6 +65,34 @@ Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
   return Ok();
 }
 
+// What all stages before have dropped.  Images that were not read have no image_id: the total says it all.
+Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
+  std::vector<DroppedItem> all;
+  const auto add = [&](const std::string& path, const char* table) -> Status {
+    if (path.empty() || !IsSqliteFile(path)) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(std::vector<DroppedItem> items, ReadDroppedItems(path, table));
+    std::move(items.begin(), items.end(), std::back_inserter(all));
+    return Ok();
+  };
+  CAIRN_RETURN_IF_ERROR(add(arguments.matches_path, kColmapDroppedItemsTable));
+  for (const std::string& path : {arguments.classes_path, arguments.world_path, arguments.regions_path})
+    CAIRN_RETURN_IF_ERROR(add(path, kDroppedItemsTable));
+  if (arguments.matches_path.empty()) return all;
+  CAIRN_ASSIGN_OR_RETURN(const int64_t num_rejects, CountRejects(arguments.matches_path));
+  all.insert(all.end(), num_rejects, {.reason = DropReason::kUnreadable});
+  return all;
+}
+
+Status AddDrops(const Arguments& arguments, const Classes& classes, const World& world, MapRows* rows) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<DroppedItem> dropped, ReadAllDropped(arguments));
+  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(classes, world, dropped));
+  for (const DroppedItem& item : dropped) {
+    if (DescribeDropReason(item.reason).kind == DropKind::kStation)
+      rows->stations[item.item_id].is_covered = false;
+  }
+  return Ok();
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes_path));
@@ -64,6 +106,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.sessions_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.sessions, ReadSessionsText(arguments.sessions_path));
   }
+  CAIRN_RETURN_IF_ERROR(AddDrops(arguments, classes, world, &rows));
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
   environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
@@ -88,6 +131,8 @@ Command EmitMapCommand() {
       .summary = "Puts landmarks, regions and vocabulary together into a map",
       .add_arguments =
           [arguments](CLI::App& app) {
+            app.add_option("--matches", arguments->matches_path,
+                           "matches.db, to count which images and pairs were dropped [not counted]");
             app.add_option("--classes", arguments->classes_path, "classes.db")->required();
             app.add_option("--world", arguments->world_path, "world.db")->required();
             app.add_option("--regions", arguments->regions_path, "regions.db")->required();

@@ -32,7 +32,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   for (const auto& [reason, count] : result.dropped)
     *environment.out << fmt::format("filter_visibility: {} classes dropped: {}\n", count, reason);
   const bool json = arguments.output.ends_with(".json");
-  return json ? WriteWorldJson(world, arguments.output) : WriteWorldDatabase(world, arguments.output);
+  return json ? WriteWorldJson(world, arguments.output)
+              : WriteWorldDatabase(world, arguments.output, result.dropped_items);
 }
 
 }  // namespace

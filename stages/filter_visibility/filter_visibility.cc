@@ -1,6 +1,7 @@
 #include "stages/filter_visibility/filter_visibility.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "stages/filter_visibility/lattice_area.h"
 #include "stages/filter_visibility/stations.h"
@@ -37,27 +38,27 @@ std::vector<StationIdx> LargestComponent(const std::vector<StationIdx>& area,
 // [Sala06 §VI-B] The part of a class's area that stays, empty if none, with the reason.
 std::vector<StationIdx> FilterLatticeArea(const std::vector<StationIdx>& area, const Stations& stations,
                                           const std::vector<std::vector<StationIdx>>& neighbours,
-                                          const FilterVisibilityOptions& options, const char** reason) {
-  *reason = "few_stations";
+                                          const FilterVisibilityOptions& options, DropReason* reason) {
+  *reason = DropReason::kFewStations;
   if (static_cast<int>(area.size()) < options.min_num_stations) return {};
-  *reason = "holes";
+  *reason = DropReason::kHoles;
   const std::vector<int> holes = HoleSizes(area, stations);
   if (static_cast<int>(holes.size()) > options.max_num_holes ||
       std::any_of(holes.begin(), holes.end(), [&](int size) { return size > options.max_hole_stations; })) {
     return {};
   }
-  *reason = "no_block";
+  *reason = DropReason::kNoBlock;
   if (!HasBlock(area, stations, options.min_block_side)) return {};
-  *reason = "trimmed_away";
+  *reason = DropReason::kTrimmedAway;
   return TrimArea(LargestComponent(area, neighbours), stations, options.min_num_neighbours);
 }
 
 std::vector<StationIdx> FilterDrivenArea(const std::vector<StationIdx>& area,
                                          const std::vector<std::vector<StationIdx>>& neighbours,
-                                         const FilterVisibilityOptions& options, const char** reason) {
-  *reason = "few_stations";
+                                         const FilterVisibilityOptions& options, DropReason* reason) {
+  *reason = DropReason::kFewStations;
   if (static_cast<int>(area.size()) < options.min_num_stations_driven) return {};
-  *reason = "scattered";
+  *reason = DropReason::kScattered;
   std::vector<StationIdx> component = LargestComponent(area, neighbours);
   if (static_cast<int>(component.size()) < options.min_num_stations_driven) return {};
   return component;
@@ -150,13 +151,22 @@ Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
   FilterVisibilityResult result{.world = stations.world, .is_lattice = stations.is_lattice};
   for (const FeatureClass& feature_class : classes.classes) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<StationIdx> area, AreaOfClass(feature_class, stations));
-    const char* reason = "";
+    DropReason reason{};
     std::vector<StationIdx> kept = stations.is_lattice
                                        ? FilterLatticeArea(area, stations, neighbours, options, &reason)
                                        : FilterDrivenArea(area, neighbours, options, &reason);
     if (kept.empty()) {
-      ++result.dropped[reason];
+      ++result.dropped[DescribeDropReason(reason).name];
+      result.dropped_items.push_back(
+          {.reason = reason, .item_id = feature_class.class_id, .found = static_cast<int64_t>(area.size())});
       continue;
+    }
+    if (kept.size() < area.size()) {
+      DroppedItem& item = result.dropped_items.emplace_back();
+      item.reason = DropReason::kOutsideArea;
+      item.item_id = feature_class.class_id;
+      std::set_difference(area.begin(), area.end(), kept.begin(), kept.end(),
+                          std::back_inserter(item.seen_at));
     }
     result.world.areas.push_back(std::move(kept));
     result.world.class_ids.push_back(feature_class.class_id);

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/dropped_items.h"
 #include "core/error.h"
 #include "core/feature_class.h"
 #include "core/options.h"
@@ -51,6 +52,8 @@ struct FilterVisibilityResult {
   World world;  // features in ascending class id
   bool is_lattice = false;
   DropCounts dropped;  // classes, by the first filter that they fail
+  // The same classes one by one, and the stations outside of the areas of those that stay.
+  std::vector<DroppedItem> dropped_items;
 };
 
 // Pure: no files, no clock, no globals.  O(observations log observations).

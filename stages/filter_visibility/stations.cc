@@ -7,6 +7,8 @@
 #include <optional>
 #include <tuple>
 
+#include "core/floor_pose.h"
+
 namespace cairn {
 namespace {
 
@@ -16,26 +18,6 @@ constexpr double kTurnedDeg = 30;
 constexpr double kOnGridRatio = 0.2;
 // Positions are written to the micrometre, so that last bits of a refinement do not show.
 double Quantized(double metres) { return std::round(metres * 1e6) / 1e6; }
-
-struct FloorPose {
-  Eigen::Vector2d position;
-  double heading_deg;  // [0, 360)
-};
-
-double AngleBetweenDeg(double a, double b) { return std::abs(std::remainder(a - b, 360.0)); }
-
-FloorPose FloorPoseOf(const SurveyImage& image, const Pose& floor_from_world) {
-  const Eigen::Vector3d center = floor_from_world * image.cam_from_world.Center();
-  Eigen::Vector3d forward = floor_from_world.rotation * image.cam_from_world.ViewingDirection();
-  // A camera that looks straight up or down heads where its image's top points.
-  if (forward.head<2>().norm() < 1e-6) {
-    forward =
-        floor_from_world.rotation * (image.cam_from_world.rotation.conjugate() * -Eigen::Vector3d::UnitY());
-  }
-  double heading_deg = DegFromRad(std::atan2(forward.y(), forward.x()));
-  if (heading_deg < 0) heading_deg += 360;
-  return {center.head<2>(), heading_deg};
-}
 
 Result<Eigen::Vector3d> UpDirection(const std::vector<SurveyImage>& images,
                                     const FilterVisibilityOptions& options) {
@@ -279,7 +261,7 @@ Result<Stations> FindStations(const std::vector<SurveyImage>& images,
   stations.world.floor_from_world = FloorFromUp(up);
   std::vector<FloorPose> poses;
   for (const SurveyImage& image : images)
-    poses.push_back(FloorPoseOf(image, stations.world.floor_from_world));
+    poses.push_back(FloorPoseOf(image.cam_from_world, stations.world.floor_from_world));
 
   std::optional<Lattice> lattice;
   if (options.survey != "driven") lattice = RecogniseLattice(poses, options);

@@ -30,7 +30,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(
       const GroupClassesResult result,
       GroupClasses(matched, capture, arguments.options, environment.num_threads, *environment.progress));
-  CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output));
+  CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
   const Classes& classes = result.classes;
   environment.report->in = {{"images", static_cast<int64_t>(classes.images.size())},
                             {"tracks", result.num_tracks}};

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "core/database.h"
 #include "core/panorama.h"
 #include "core/parallel.h"
 #include "core/pixel_ray.h"
+#include "stages/group_classes/make_classes.h"
 #include "stages/group_classes/union_matches.h"
 
 namespace cairn {
@@ -139,50 +141,19 @@ void Refine(const MatchedFeatures& matched, const std::vector<Track>& tracks,
   state->camera_from_given = problem.camera_from_given;
 }
 
-// Classes from the tracks that triangulate, without the ambiguous ones; counts what is dropped.
-void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
-                 const std::vector<Triangulation>& triangulations, const PosedImages& posed,
-                 const GroupClassesOptions& options, Classes* classes) {
-  std::vector<FeatureClass> candidates;
-  std::vector<ClassAppearance> appearances;
-  for (size_t t = 0; t < tracks.size(); ++t) {
-    const Triangulation& triangulation = triangulations[t];
-    if (triangulation.outcome != TriangulateOutcome::kOk) {
-      const bool is_short = static_cast<int>(tracks[t].size()) < options.triangulation.min_num_observations;
-      classes->dropped[triangulation.outcome == TriangulateOutcome::kSmallAngle ? "small_angle"
-                       : is_short                                               ? "few_observations"
-                                                                                : "reprojection_error"]++;
-      continue;
-    }
-    FeatureClass feature_class;
-    feature_class.position = triangulation.position;
-    feature_class.covariance = triangulation.covariance * std::pow(options.refinement.keypoint_sigma_px, 2);
-    feature_class.reprojection_error_px = triangulation.rms_error_px;
-    std::vector<const uint8_t*> descriptors;
-    for (const int i : triangulation.inliers) {
-      const TrackElement& element = tracks[t][i];
-      const int feature_idx = posed.feature_idx[element.image_idx];
-      const Features& features = matched.features[feature_idx];
-      feature_class.observations.push_back({matched.images[feature_idx].image_id, element.keypoint_idx,
-                                            features.keypoints[element.keypoint_idx]});
-      descriptors.push_back(features.descriptors.row(element.keypoint_idx).data());
-    }
-    ClassAppearance appearance;
-    DescribeClass(descriptors, &appearance);
-    appearance.position = feature_class.position;
-    appearance.num_observations = static_cast<int>(feature_class.observations.size());
-    feature_class.descriptor = appearance.centre;
-    candidates.push_back(std::move(feature_class));
-    appearances.push_back(appearance);
+// Images without a pose, and pairs that have one of them.
+void ListUnposed(const MatchedFeatures& matched, const PosedImages& posed,
+                 std::vector<DroppedItem>* dropped_items) {
+  std::set<ImageId> posed_ids;
+  for (const int i : posed.feature_idx) posed_ids.insert(matched.images[i].image_id);
+  for (const DatabaseImage& image : matched.images) {
+    if (!posed_ids.contains(image.image_id))
+      dropped_items->push_back({.reason = DropReason::kNoPose, .item_id = image.image_id});
   }
-  const std::vector<Ambiguity> ambiguity = FindAmbiguous(appearances, options.ambiguity);
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    if (ambiguity[i] != Ambiguity::kNone) {
-      classes->dropped[ambiguity[i] == Ambiguity::kAmbiguous ? "ambiguous" : "duplicate"]++;
-      continue;
-    }
-    candidates[i].class_id = static_cast<ClassId>(classes->classes.size() + 1);
-    classes->classes.push_back(std::move(candidates[i]));
+  for (const TwoViewGeometry& geometry : matched.geometries) {
+    if (posed_ids.contains(geometry.image_id1) && posed_ids.contains(geometry.image_id2)) continue;
+    dropped_items->push_back({.reason = DropReason::kPairWithoutPose,
+                              .item_id = PairIdFromImageIds(geometry.image_id1, geometry.image_id2)});
   }
 }
 
@@ -382,7 +353,8 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   }
   classes.camera_from_given = state.camera_from_given;
   MeasurePoseNoise(&classes);
-  MakeClasses(matched, tracks, triangulations, posed, options, &classes);
+  ListUnposed(matched, posed, &result.dropped_items);
+  MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes, &result.dropped_items);
   progress.Advance();
   progress.End();
   if (classes.classes.empty()) {

@@ -6,6 +6,7 @@
 
 #include "core/capture.h"
 #include "core/colmap_database.h"
+#include "core/dropped_items.h"
 #include "core/error.h"
 #include "core/feature_class.h"
 #include "core/options.h"
@@ -49,6 +50,8 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path);
 
 struct GroupClassesResult {
   Classes classes;
+  // Images, pairs, tracks and keypoints that did not become part of a class, each with its reason.
+  std::vector<DroppedItem> dropped_items;
   int64_t num_tracks = 0;
   int64_t num_conflicts = 0;  // matches not followed because they join two keypoints of one image
   // Refinement: root mean square reprojection errors before and after, pixels; equal when poses were not

@@ -63,7 +63,7 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
                        num_descriptors[image.image_id]);
     }
     if (num_keypoints[image.image_id] == 0) {
-      result.without_features.insert(image.name);
+      result.without_features.emplace(image.name, image.image_id);
       continue;
     }
     MatchImage match_image{.image_id = image.image_id, .name = image.name, .camera_id = image.camera_id};

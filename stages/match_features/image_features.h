@@ -27,8 +27,8 @@ struct MatchImage {
 
 struct MatchImages {
   std::map<CameraId, Camera> cameras;
-  std::vector<MatchImage> images;          // those with features, ascending image_id
-  std::set<std::string> without_features;  // names of those that the database has besides
+  std::vector<MatchImage> images;                   // those with features, ascending image_id
+  std::map<std::string, ImageId> without_features;  // those that the database has besides, by name
 
   bool AllPosed() const;
 };

@@ -7,6 +7,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/colmap_database.h"
+#include "core/dropped_items.h"
 #include "core/file.h"
 #include "stages/match_features/match_round.h"
 #include "stages/match_features/pair_list.h"
@@ -156,6 +157,16 @@ Status CheckRanges(const MatchFeaturesOptions& options) {
   return Ok();
 }
 
+// A new list of what was dropped, with the images that have no features.
+void ReplaceDroppedItems(const MatchImages& images, SQLite::Database& database) {
+  database.exec(
+      fmt::format("DROP TABLE IF EXISTS {}; {}", kColmapDroppedItemsTable, kColmapDroppedItemsSchema));
+  std::vector<DroppedItem> items;
+  for (const auto& [name, image_id] : images.without_features)
+    items.push_back({.reason = DropReason::kNoFeatures, .item_id = image_id});
+  WriteDroppedItems(database, kColmapDroppedItemsTable, items);
+}
+
 // The database of the features, with the verified pairs.
 Status WriteMatches(const std::string& matches_path, MatchRun* run) {
   const std::string& features_path = run->inputs.features_path;
@@ -171,11 +182,13 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
       database.exec(
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");
+      ReplaceDroppedItems(run->images, database);
       if (run->summary.pairs == "frustum") {
         CAIRN_RETURN_IF_ERROR(MatchFrustum(database, run));
       } else {
         CAIRN_RETURN_IF_ERROR(MatchRound(std::move(pairs), nullptr, database, run));
       }
+      WriteDroppedItems(database, kColmapDroppedItemsTable, run->dropped_pairs);
       if (run->summary.num_pairs_verified == 0) {
         return MakeError(
             ErrorCode::kNoData,

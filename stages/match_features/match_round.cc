@@ -32,6 +32,12 @@ void TellPredictor(const std::pair<int, int>& pair, const PairResult& result, Pa
   if (predictor != nullptr) predictor->Add(pair.first, pair.second, result.geometry.inliers);
 }
 
+// Why a pair was not verified.
+DropReason ReasonOf(const PairResult& result, const VerifyPairOptions& options) {
+  if (result.geometry.config == TwoViewConfig::kWatermark) return DropReason::kWatermark;
+  return result.num_putative < options.min_num_inliers ? DropReason::kFewMatches : DropReason::kFewInliers;
+}
+
 Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, PairPredictor* predictor,
                   SQLite::Database& database, MatchRun* run) {
   CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pair));
@@ -39,7 +45,13 @@ Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, Pai
   MatchFeaturesSummary& summary = run->summary;
   ++summary.num_pairs_tried;
   summary.num_putative += result.num_putative;
-  if (result.geometry.inliers.empty()) return Ok();
+  if (result.geometry.inliers.empty()) {
+    run->dropped_pairs.push_back(
+        {.reason = ReasonOf(result, run->options.matching.verification),
+         .item_id = PairIdFromImageIds(result.geometry.image_id1, result.geometry.image_id2),
+         .found = result.num_putative});
+    return Ok();
+  }
   WriteDatabaseTwoViewGeometry(database, result.geometry);
   ++summary.num_pairs_verified;
   summary.num_inliers += static_cast<int64_t>(result.geometry.inliers.size());

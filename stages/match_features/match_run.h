@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "core/dropped_items.h"
 #include "core/progress.h"
 #include "core/reuse.h"
 #include "stages/match_features/image_features.h"
@@ -24,6 +25,7 @@ struct MatchRun {
   ReuseSources named;     // reuse.files
   ReuseSources previous;  // the output's earlier state
   std::vector<ReuseEntry> entries;
+  std::vector<DroppedItem> dropped_pairs;  // those tried and not verified
   MatchFeaturesSummary summary;
 };
 

@@ -27,7 +27,7 @@ Result<int> FindImage(const std::string& name, const std::map<std::string, int>&
 Result<PairList> ReadPairList(const std::string& path, const MatchImages& images) {
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   std::map<std::string, int> idx_of_name;
-  for (const std::string& name : images.without_features) idx_of_name[name] = -1;
+  for (const auto& [name, image_id] : images.without_features) idx_of_name[name] = -1;
   for (size_t i = 0; i < images.images.size(); ++i) idx_of_name[images.images[i].name] = static_cast<int>(i);
 
   PairList list;

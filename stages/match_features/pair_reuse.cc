@@ -91,6 +91,7 @@ std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImag
       if (!geometry || HashGeometry(*geometry) != entry.contents) return result;
     } else {
       geometry.emplace();
+      geometry->config = static_cast<TwoViewConfig>(entry.row);
     }
     geometry->image_id1 = image1.image_id;
     geometry->image_id2 = image2.image_id;
@@ -101,9 +102,11 @@ std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImag
 
 ReuseEntry EntryOf(const ContentHash& key, const PairResult& result) {
   const TwoViewGeometry& geometry = result.geometry;
+  const bool is_verified = !geometry.inliers.empty();
   return {.key = key,
-          .contents = geometry.inliers.empty() ? ContentHash() : HashGeometry(geometry),
-          .row = PairIdFromImageIds(geometry.image_id1, geometry.image_id2),
+          .contents = is_verified ? HashGeometry(geometry) : ContentHash(),
+          .row = is_verified ? PairIdFromImageIds(geometry.image_id1, geometry.image_id2)
+                             : static_cast<int64_t>(geometry.config),
           .count = result.num_putative};
 }
 

@@ -40,8 +40,8 @@ class PairKeys {
 std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImage& image1,
                                          const MatchImage& image2, ReuseSources* sources);
 
-// Where a later run finds a result: `row` is the pair_id, `count` the number of putative matches; the
-// contents of a pair that was not verified, which has no row, are the zero hash.
+// Where a later run finds a result: `row` is the pair_id, `count` the number of putative matches.  A pair
+// that was not verified has no row: its contents are the zero hash, and `row` is the geometry's config.
 ReuseEntry EntryOf(const ContentHash& key, const PairResult& result);
 
 }  // namespace cairn

@@ -1,10 +1,19 @@
+#include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "core/database.h"
+#include "core/decomposition.h"
+#include "core/dropped_items.h"
+#include "core/feature_class.h"
 #include "core/file.h"
+#include "core/map_rows.h"
+#include "core/world.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {
@@ -188,6 +197,139 @@ TEST_F(Compile, MapLocalizesItsQueries) {
   ASSERT_EQ(localize.exit_code, 0) << localize.err;
   EXPECT_THAT(localize.out, HasSubstr(query));
   EXPECT_TRUE(fs::exists(Path("poses.txt")));
+}
+
+// Number of dropped items of a kind.
+int64_t NumDropped(const std::vector<DroppedItem>& items, DropKind kind) {
+  return std::count_if(items.begin(), items.end(),
+                       [&](const DroppedItem& item) { return DescribeDropReason(item.reason).kind == kind; });
+}
+
+// The number before a word in what a stage printed.
+int64_t NumberBefore(const std::string& path, const std::string& word) {
+  const std::string text = ReadFile(path).value();
+  const size_t end = text.find(" " + word);
+  return std::stoll(text.substr(text.find_last_of(" ", end - 1) + 1));
+}
+
+TEST_F(Compile, WhatEveryStageKeepsAndDropsAddsUp) {
+  const std::string build = Path("tiny.build/");
+  const auto matches = ReadDroppedItems(build + "matches.db", kColmapDroppedItemsTable);
+  ASSERT_TRUE(matches.ok()) << matches.error().message;
+  EXPECT_EQ(NumDropped(*matches, DropKind::kPair) + NumberBefore(build + "matches.db.txt", "verified"),
+            NumberBefore(build + "matches.db.txt", "pairs tried"));
+
+  const Classes classes = *ReadClasses(build + "classes.db");
+  const auto tracks = *ReadDroppedItems(build + "classes.db", kDroppedItemsTable);
+  const auto num_classes = static_cast<int64_t>(classes.classes.size());
+  EXPECT_EQ(NumDropped(tracks, DropKind::kFeature) + num_classes,
+            NumberBefore(build + "classes.db.txt", "tracks"));
+
+  const World world = *ReadWorld(build + "world.db");
+  const auto views = *ReadDroppedItems(build + "world.db", kDroppedItemsTable);
+  EXPECT_EQ(NumDropped(views, DropKind::kFeature) + world.num_features(), num_classes);
+
+  const Decomposition decomposition = *ReadDecomposition(build + "regions.db");
+  std::set<FeatureIdx> kept;
+  for (const Region& region : decomposition.regions)
+    kept.insert(region.features.begin(), region.features.end());
+  const auto features = *ReadDroppedItems(build + "regions.db", kDroppedItemsTable);
+  EXPECT_EQ(NumDropped(features, DropKind::kFeature) + static_cast<int64_t>(kept.size()),
+            world.num_features());
+
+  // The map counts the same things.  tau = 0: stations of regions are covered, the others dropped.
+  const MapRows rows = *ReadMapRows(Path("tiny.cairn"));
+  std::map<std::string, int64_t> counted, listed;
+  for (const DropCount& count : rows.findings.drops) counted[count.name] = count.num_dropped;
+  for (const auto* items : {&*matches, &tracks, &views, &features}) {
+    for (const DroppedItem& item : *items) {
+      const DropReasonEntry& reason = DescribeDropReason(item.reason);
+      listed[reason.name] += reason.kind == DropKind::kKeypoint
+                                 ? static_cast<int64_t>(item.seen_at.size()) / 2
+                             : reason.kind == DropKind::kView ? static_cast<int64_t>(item.seen_at.size())
+                                                              : 1;
+    }
+  }
+  EXPECT_EQ(counted, listed);
+  std::set<StationIdx> covered;
+  for (const MapRegion& region : rows.regions) covered.insert(region.stations.begin(), region.stations.end());
+  for (StationIdx station = 0; station < world.num_stations(); ++station)
+    EXPECT_EQ(rows.stations[station].is_covered, covered.contains(station)) << station;
+}
+
+TEST_F(Compile, ClassesSeenAtAStationAreVisibleThereOrDroppedForOneReason) {
+  const std::string build = Path("tiny.build/");
+  const Classes classes = *ReadClasses(build + "classes.db");
+  const World world = *ReadWorld(build + "world.db");
+  std::map<ImageId, StationIdx> station_of;
+  for (size_t station = 0; station < world.station_images.size(); ++station) {
+    for (const ImageId image : world.station_images[station])
+      station_of[image] = static_cast<StationIdx>(station);
+  }
+  std::vector<int64_t> seen(world.num_stations(), 0), accounted(world.num_stations(), 0);
+  for (const FeatureClass& feature_class : classes.classes) {
+    std::set<StationIdx> stations;
+    for (const Observation& observation : feature_class.observations)
+      stations.insert(station_of.at(observation.image_id));
+    for (const StationIdx station : stations) ++seen[station];
+  }
+  for (const std::vector<StationIdx>& area : world.areas) {
+    for (const StationIdx station : area) ++accounted[station];
+  }
+  for (const DropCount& count : ReadMapRows(Path("tiny.cairn"))->findings.drops) {
+    for (size_t station = 0; count.stage == "filter_visibility" && station < count.at_stations.size();
+         ++station)
+      accounted[station] += count.at_stations[station];
+  }
+  EXPECT_EQ(seen, accounted);
+}
+
+TEST_F(Compile, InspectPrintsWhatWasDroppedAndHowRegionsFared) {
+  const ProgramRun text = RunShell("cairn inspect " + Path("tiny.cairn"));
+  EXPECT_THAT(text.out, HasSubstr("few_observations"));
+  EXPECT_THAT(text.out, HasSubstr("stations that see the fewest landmarks"));
+  EXPECT_THAT(text.out, HasSubstr("by region, worst first"));
+  const auto json = nlohmann::json::parse(RunShell("cairn inspect --json " + Path("tiny.cairn")).out);
+  int num_held_out = 0;
+  for (const auto& region : json["self_test_regions"]) num_held_out += region["num_held_out"].get<int>();
+  EXPECT_GE(num_held_out, 6);  // every query counts in a region or outside
+  for (const auto& reason : json["dropped"]) {
+    const size_t num_counts = reason["at_stations"].size();
+    EXPECT_TRUE(num_counts == 0 || num_counts == json["num_stations"].get<size_t>());
+  }
+}
+
+TEST_F(Compile, RejectedImagesAreCountedInTheMap) {
+  const std::string build = Path("tiny.build/");
+  fs::copy_file(build + "matches.db", Path("rejects.db"));
+  SQLite::Database(Path("rejects.db"), SQLite::OPEN_READWRITE)
+      .exec("INSERT INTO cairn_rejects VALUES ('broken.png', 'truncated'), ('none.png', 'no such file')");
+  const ProgramRun emit =
+      RunShell("cairn emit-map --matches " + Path("rejects.db") + " --classes " + build +
+               "classes.db --world " + build + "world.db --regions " + build + "regions.db --vocabulary " +
+               build + "vocabulary.db --name rejects -o " + Path("rejects.cairn"));
+  ASSERT_EQ(emit.exit_code, 0) << emit.err;
+  const MapRows rows = *ReadMapRows(Path("rejects.cairn"));
+  ASSERT_FALSE(rows.findings.drops.empty());
+  EXPECT_EQ(rows.findings.drops[0].name, "unreadable");
+  EXPECT_EQ(rows.findings.drops[0].num_dropped, 2);
+  EXPECT_THAT(rows.findings.drops[0].at_stations, IsEmpty());
+}
+
+TEST_F(Compile, GateOfRegionsKeepsAMapFromBeingWritten) {
+  // Nothing is localized to better than a nanometre: every fix is a gross error.
+  const std::string check = "cairn check-map " + Path("tiny.build/unsealed.cairn") + " --queries " +
+                            Path("tiny.build/capture/queries.txt") + " --gross-error-m 1e-6 -o " +
+                            Path("gated.cairn") + " --min-region-held-out 1 --min-region-precision-ratio ";
+  const ProgramRun gated = RunShell(check + "0.01");
+  EXPECT_EQ(gated.exit_code, 8);
+  EXPECT_THAT(gated.err, HasSubstr("precision_ratio of region"));
+  EXPECT_FALSE(fs::exists(Path("gated.cairn")));
+  EXPECT_EQ(RunShell(check + "0").exit_code, 0);
+  const ProgramRun unasked = RunShell("cairn check-map " + Path("tiny.build/unsealed.cairn") +
+                                      " --min-localized-ratio 0.5 -o " + Path("unasked.cairn"));
+  EXPECT_EQ(unasked.exit_code, 8);
+  EXPECT_THAT(unasked.err, HasSubstr("no held-out images"));
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include "stages/filter_visibility/filter_visibility.h"
 
+#include <map>
 #include <numbers>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -286,6 +288,107 @@ TEST(FilterVisibility, ClassSeenInAnUnknownImageIsAnError) {
   Classes classes = LatticeSurvey(kFullLattice);
   classes.classes.emplace_back().observations.push_back({.image_id = 9999});
   EXPECT_THAT(FilterVisibility(classes, {}).error().message, HasSubstr("observed in image 9999"));
+}
+
+TEST(FilterVisibilityDrops, ClassesAndStationsThatDoNotCountAreNamedWithTheirReason) {
+  Classes classes = LatticeSurvey(kFullLattice);
+  // Kept; the tail of three stations does not count.
+  AddClass({"#####...", "########", "#####...", "#####...", "........", "........"}, &classes);
+  AddClass({"###.....", "###.....", "###.....", "........", "........", "........"}, &classes);
+  AddClass({"########", "#......#", "########", "........", "........", "........"}, &classes);
+  AddClass({"##......", "##......", "##......", "########", "########", "........"}, &classes);
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  const auto end_of_tail = static_cast<uint32_t>(Area({"........", ".......#"})[0]);
+  EXPECT_THAT(result->dropped_items,
+              ElementsAre(DroppedItem{.reason = DropReason::kOutsideArea,
+                                      .item_id = 10,
+                                      .seen_at = {end_of_tail - 2, end_of_tail - 1, end_of_tail}},
+                          DroppedItem{.reason = DropReason::kFewStations, .item_id = 20, .found = 9},
+                          DroppedItem{.reason = DropReason::kHoles, .item_id = 30, .found = 18},
+                          DroppedItem{.reason = DropReason::kNoBlock, .item_id = 40, .found = 22}));
+}
+
+TEST(FilterVisibilityDrops, AreaWithoutAFullNeighbourhoodIsTrimmedAway) {
+  // The largest component has no block; the one that has is smaller.
+  Classes classes = LatticeSurvey(kFullLattice);
+  AddClass({"###.#...", "###.#...", "###.#...", "....#...", "....####", "....####"}, &classes);
+  AddClass({"########", "########", "########", "........", "........", "........"}, &classes);
+  FilterVisibilityOptions options;
+  options.min_num_neighbours = 7;
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, options);
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->dropped_items,
+              ElementsAre(DroppedItem{.reason = DropReason::kTrimmedAway, .item_id = 10, .found = 21}));
+}
+
+TEST(FilterVisibilityDrops, ScatteredClassesAreNamed) {
+  Classes classes;
+  for (ImageId i = 1; i <= 8; ++i) {
+    classes.images.push_back({.image_id = i, .cam_from_world = CameraAt(0.25 + 0.5 * i, 0.25, 0)});
+  }
+  for (const std::vector<ImageId>& seen_in : {std::vector<ImageId>{1, 2, 3, 8}, {1, 3, 5}}) {
+    FeatureClass& feature_class = classes.classes.emplace_back();
+    feature_class.class_id = static_cast<ClassId>(classes.classes.size());
+    for (const ImageId image_id : seen_in) feature_class.observations.push_back({.image_id = image_id});
+  }
+  const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->dropped_items,
+              ElementsAre(DroppedItem{.reason = DropReason::kOutsideArea, .item_id = 1, .seen_at = {7}},
+                          DroppedItem{.reason = DropReason::kScattered, .item_id = 2, .found = 3}));
+}
+
+TEST(FilterVisibilityDrops, WhatStaysAndWhatIsDroppedAddUpToWhatWasSeenAtEveryStation) {
+  Random random(17);
+  for (int trial = 0; trial < 20; ++trial) {
+    Classes classes = LatticeSurvey(kFullLattice);
+    for (int i = 0; i < 40; ++i) {
+      std::vector<std::string> drawing(kFullLattice.size(), std::string(kFullLattice[0].size(), '.'));
+      const double x = random.Uniform(0, 8), y = random.Uniform(0, 6), radius = random.Uniform(1, 6);
+      for (size_t row = 0; row < drawing.size(); ++row) {
+        for (size_t column = 0; column < drawing[row].size(); ++column) {
+          const bool is_near = std::hypot(column - x, row - y) < radius;
+          if (is_near && random.Uniform() < 0.95) drawing[row][column] = '#';
+        }
+      }
+      AddClass(drawing, &classes);
+    }
+    FilterVisibilityOptions options;
+    options.survey = trial % 2 == 0 ? "lattice" : "driven";
+    options.min_num_stations = 9;
+    const Result<FilterVisibilityResult> result = FilterVisibility(classes, options);
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    std::map<ImageId, StationIdx> station_of;
+    for (size_t station = 0; station < result->world.station_images.size(); ++station) {
+      for (const ImageId image : result->world.station_images[station])
+        station_of[image] = static_cast<StationIdx>(station);
+    }
+    std::map<ClassId, std::set<StationIdx>> seen;  // per class, what is not accounted for yet
+    for (const FeatureClass& feature_class : classes.classes) {
+      for (const Observation& observation : feature_class.observations)
+        seen[feature_class.class_id].insert(station_of.at(observation.image_id));
+    }
+    const size_t num_classes = classes.classes.size();
+    size_t num_accounted = result->world.areas.size();
+    for (size_t i = 0; i < result->world.areas.size(); ++i) {
+      for (const StationIdx station : result->world.areas[i])
+        EXPECT_EQ(seen[result->world.class_ids[i]].erase(station), 1u);
+    }
+    for (const DroppedItem& item : result->dropped_items) {
+      std::set<StationIdx>& left = seen[static_cast<ClassId>(item.item_id)];
+      if (item.reason == DropReason::kOutsideArea) {
+        for (const uint32_t station : item.seen_at)
+          EXPECT_EQ(left.erase(static_cast<StationIdx>(station)), 1u);
+        continue;
+      }
+      EXPECT_EQ(static_cast<int64_t>(left.size()), item.found);
+      left.clear();
+      ++num_accounted;
+    }
+    EXPECT_EQ(num_accounted, num_classes);
+    for (const auto& [class_id, left] : seen) EXPECT_THAT(left, IsEmpty()) << class_id;
+  }
 }
 
 }  // namespace

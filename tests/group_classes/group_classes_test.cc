@@ -1,8 +1,12 @@
 #include "stages/group_classes/group_classes.h"
 
+#include <set>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/database.h"
+#include "core/dropped_items.h"
 #include "core/random.h"
 
 namespace cairn {
@@ -17,6 +21,7 @@ struct Survey {
   Capture capture;
   std::vector<Eigen::Vector3d> points;
   std::vector<Pose> true_poses;
+  std::vector<std::map<int, uint32_t>> keypoint_of_point;  // per image
 };
 
 struct SurveyNoise {
@@ -48,7 +53,8 @@ Survey MakeSurvey(const SurveyNoise& noise) {
     for (int k = 0; k < kDescriptorDim; ++k) d[k] = std::pow(random.Uniform(), 6);
     looks.push_back((d * 512 / d.norm()).array().round().cwiseMin(255.0).cast<uint8_t>());
   }
-  std::vector<std::map<int, uint32_t>> keypoint_of_point(kImages);
+  std::vector<std::map<int, uint32_t>>& keypoint_of_point = survey.keypoint_of_point;
+  keypoint_of_point.resize(kImages);
   for (int i = 0; i < kImages; ++i) {
     Pose given;
     const double turn = i * 0.4;
@@ -200,6 +206,172 @@ TEST(GroupClasses, PosesThatDoNotFitAreAnErrorThatSaysWhatTookTheMost) {
   const auto result = GroupClasses(survey.matched, survey.capture, {}, 1, progress);
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.error().message, HasSubstr("by reprojection_error"));
+}
+
+using ImageKeypoint = std::pair<ImageId, uint32_t>;
+
+// Dropped items by the name of their reason.
+std::map<std::string, std::vector<DroppedItem>> ByReason(const std::vector<DroppedItem>& items) {
+  std::map<std::string, std::vector<DroppedItem>> by_reason;
+  for (const DroppedItem& item : items) by_reason[DescribeDropReason(item.reason).name].push_back(item);
+  return by_reason;
+}
+
+std::vector<ImageKeypoint> KeypointsOf(const DroppedItem& item) {
+  std::vector<ImageKeypoint> keypoints;
+  for (size_t i = 0; i + 1 < item.seen_at.size(); i += 2)
+    keypoints.emplace_back(item.seen_at[i], item.seen_at[i + 1]);
+  return keypoints;
+}
+
+// The keypoints of a scene point, in all images.
+std::vector<ImageKeypoint> KeypointsOfPoint(const Survey& survey, int point) {
+  std::vector<ImageKeypoint> keypoints;
+  for (size_t image = 0; image < survey.keypoint_of_point.size(); ++image) {
+    const auto keypoint = survey.keypoint_of_point[image].find(point);
+    if (keypoint != survey.keypoint_of_point[image].end())
+      keypoints.emplace_back(static_cast<ImageId>(image + 1), keypoint->second);
+  }
+  return keypoints;
+}
+
+TEST(GroupClassesDrops, EveryTrackAndEveryMatchedKeypointIsKeptOrDroppedOnce) {
+  for (const SurveyNoise& noise :
+       {SurveyNoise{}, SurveyNoise{.pixel = 3}, SurveyNoise{.pose_m = 0.02, .pose_deg = 0.5}}) {
+    const Survey survey = MakeSurvey(noise);
+    const GroupClassesResult result = Group(survey);
+    ASSERT_EQ(result.num_conflicts, 0);
+    int64_t num_dropped_tracks = 0;
+    std::set<int64_t> tracks;
+    std::vector<ImageKeypoint> accounted;
+    for (const DroppedItem& item : result.dropped_items) {
+      const std::vector<ImageKeypoint> keypoints = KeypointsOf(item);
+      accounted.insert(accounted.end(), keypoints.begin(), keypoints.end());
+      if (DescribeDropReason(item.reason).kind != DropKind::kFeature) continue;
+      ++num_dropped_tracks;
+      tracks.insert(item.item_id);
+    }
+    for (const FeatureClass& feature_class : result.classes.classes) {
+      for (const Observation& observation : feature_class.observations)
+        accounted.emplace_back(observation.image_id, observation.keypoint_idx);
+    }
+    EXPECT_EQ(static_cast<int64_t>(tracks.size()), num_dropped_tracks);
+    EXPECT_EQ(num_dropped_tracks + static_cast<int64_t>(result.classes.classes.size()), result.num_tracks);
+    int64_t num_counted = 0;
+    for (const auto& [reason, count] : result.classes.dropped) num_counted += count;
+    EXPECT_EQ(num_counted, num_dropped_tracks);
+
+    std::set<ImageKeypoint> matched;
+    for (const TwoViewGeometry& geometry : survey.matched.geometries) {
+      for (const Match& match : geometry.inliers) {
+        matched.emplace(geometry.image_id1, match.idx1);
+        matched.emplace(geometry.image_id2, match.idx2);
+      }
+    }
+    std::sort(accounted.begin(), accounted.end());
+    EXPECT_EQ(accounted, std::vector<ImageKeypoint>(matched.begin(), matched.end()));
+  }
+}
+
+TEST(GroupClassesDrops, ShortTracksAndNarrowOnesAreNamed) {
+  const Survey survey = MakeSurvey({});
+  GroupClassesOptions options;
+  options.triangulation.min_num_observations = 12;
+  auto dropped = ByReason(Group(survey, options).dropped_items);
+  ASSERT_FALSE(dropped["few_observations"].empty());
+  for (const DroppedItem& item : dropped["few_observations"]) EXPECT_LT(KeypointsOf(item).size(), 12u);
+
+  options = {};
+  options.triangulation.min_triangulation_angle_deg = 40;
+  dropped = ByReason(Group(survey, options).dropped_items);
+  EXPECT_GT(dropped["small_angle"].size(), 20u);
+}
+
+TEST(GroupClassesDrops, TracksWhoseRaysDisagreeAreNamed) {
+  GroupClassesOptions options;
+  options.refine_poses = "never";
+  options.triangulation.max_reprojection_error_px = 0.3;  // as large as the noise
+  options.triangulation.min_num_observations = 8;
+  auto dropped = ByReason(Group(MakeSurvey({}), options).dropped_items);
+  ASSERT_FALSE(dropped["reprojection_error"].empty());
+  for (const DroppedItem& item : dropped["reprojection_error"]) EXPECT_GE(KeypointsOf(item).size(), 8u);
+}
+
+TEST(GroupClassesDrops, DisplacedKeypointOfAClassThatStaysIsAnOutlier) {
+  Survey survey = MakeSurvey({});
+  const int point = survey.keypoint_of_point[12].begin()->first;
+  const uint32_t keypoint = survey.keypoint_of_point[12].begin()->second;
+  survey.matched.features[12].keypoints[keypoint].x += 60;
+  const GroupClassesResult result = Group(survey);
+  auto dropped = ByReason(result.dropped_items);
+  ASSERT_EQ(dropped["outlier"].size(), 1u);
+  EXPECT_THAT(KeypointsOf(dropped["outlier"][0]), testing::ElementsAre(ImageKeypoint(13, keypoint)));
+  const FeatureClass& stays = result.classes.classes.at(dropped["outlier"][0].item_id - 1);
+  EXPECT_EQ(stays.observations.size() + 1, KeypointsOfPoint(survey, point).size());
+}
+
+TEST(GroupClassesDrops, LookAlikesAreAmbiguousOrDuplicatesByTheirDistance) {
+  Survey survey = MakeSurvey({});
+  // Two points that at least ten images see and that are classes get one look.
+  std::vector<std::vector<ImageKeypoint>> points;
+  for (const FeatureClass& feature_class : Group(survey).classes.classes) {
+    if (feature_class.observations.size() < 10 || points.size() == 2) continue;
+    std::vector<ImageKeypoint>& keypoints = points.emplace_back();
+    for (const Observation& observation : feature_class.observations)
+      keypoints.emplace_back(observation.image_id, observation.keypoint_idx);
+  }
+  ASSERT_EQ(points.size(), 2u);
+  const auto [image_id, keypoint] = points[0].front();
+  const auto look = survey.matched.features[image_id - 1].descriptors.row(keypoint).eval();
+  for (const auto& [id, k] : points[1]) survey.matched.features[id - 1].descriptors.row(k) = look;
+
+  const auto num_of_both = [&](const std::vector<DroppedItem>& items) {
+    return std::count_if(items.begin(), items.end(), [&](const DroppedItem& item) {
+      return KeypointsOf(item) == points[0] || KeypointsOf(item) == points[1];
+    });
+  };
+  auto dropped = ByReason(Group(survey).dropped_items);
+  EXPECT_EQ(num_of_both(dropped["ambiguous"]), 2);
+  EXPECT_EQ(num_of_both(dropped["duplicate"]), 0);
+
+  GroupClassesOptions options;
+  options.ambiguity.max_duplicate_distance_m = 100;
+  dropped = ByReason(Group(survey, options).dropped_items);
+  EXPECT_EQ(num_of_both(dropped["ambiguous"]), 0);
+  EXPECT_EQ(num_of_both(dropped["duplicate"]), 1);
+}
+
+TEST(GroupClassesDrops, ImagesWithoutAPoseAndTheirPairsAreNamed) {
+  Survey survey = MakeSurvey({});
+  survey.capture.images[7].cam_from_world.reset();
+  const auto is_pair = [](const TwoViewGeometry& g) { return g.image_id1 == 8 || g.image_id2 == 8; };
+  const auto num_pairs =
+      std::count_if(survey.matched.geometries.begin(), survey.matched.geometries.end(), is_pair);
+  auto dropped = ByReason(Group(survey).dropped_items);
+  ASSERT_EQ(dropped["no_pose"].size(), 1u);
+  EXPECT_EQ(dropped["no_pose"][0].item_id, 8);
+  EXPECT_EQ(static_cast<int64_t>(dropped["pair_without_pose"].size()), num_pairs);
+}
+
+TEST(GroupClassesDrops, AreReadBackFromTheFileAsTheyWere) {
+  const GroupClassesResult result = Group(MakeSurvey({.pixel = 2}));
+  const std::string path = testing::TempDir() + "/classes_dropped.db";
+  ASSERT_TRUE(WriteClasses(result.classes, path, result.dropped_items).ok());
+  const auto read = ReadDroppedItems(path, kDroppedItemsTable);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(*read, result.dropped_items);
+  for (const char* sql :
+       {"UPDATE dropped_items SET reason_id = 9999", "UPDATE dropped_items SET reason_id = -1",
+        "UPDATE dropped_items SET item_id = -5", "UPDATE dropped_items SET seen_at = x'00000000'",
+        "UPDATE dropped_items SET seen_at = x'000000'"}) {
+    ASSERT_TRUE(WriteClasses(result.classes, path, result.dropped_items).ok());
+    SQLite::Database(path, SQLite::OPEN_READWRITE).exec(sql);
+    const auto damaged = ReadDroppedItems(path, kDroppedItemsTable);
+    ASSERT_FALSE(damaged.ok()) << sql;
+    EXPECT_EQ(damaged.error().code, ErrorCode::kCorrupt) << sql;
+  }
+  SQLite::Database(path, SQLite::OPEN_READWRITE).exec("DROP TABLE dropped_items");
+  EXPECT_TRUE(ReadDroppedItems(path, kDroppedItemsTable)->empty());  // a file of an earlier program
 }
 
 }  // namespace

@@ -1,10 +1,13 @@
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/colmap_database.h"
+#include "core/dropped_items.h"
 #include "core/file.h"
 #include "core/random.h"
 #include "core/vocabulary_tree.h"
@@ -139,6 +142,74 @@ TEST_F(MatchFeaturesTest, ImagesWithoutFeaturesAreSkippedAndCounted) {
   EXPECT_EQ(summary->num_images, 2);
   EXPECT_EQ(summary->num_without_features, 1);
   EXPECT_EQ(summary->num_pairs_verified, 1);
+}
+
+TEST_F(MatchFeaturesTest, PairsThatAreTriedAreVerifiedOrDroppedWithTheirReason) {
+  // Image 2 has no features; image 4 turns away: descriptors match, the poses forbid it; of image 5 only ten
+  // features are left.
+  WriteFeatures(6, [](SQLite::Database& database) {
+    database.exec("DELETE FROM keypoints WHERE image_id = 2; DELETE FROM descriptors WHERE image_id = 2");
+    database.exec(
+        "UPDATE keypoints SET rows = 10, data = substr(data, 1, length(data) / 8) WHERE image_id = 5");
+    database.exec("UPDATE descriptors SET rows = 10, data = substr(data, 1, 1280) WHERE image_id = 5");
+  });
+  capture_.images[3].cam_from_world->rotation = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY());
+  options_.pairs = "exhaustive";
+  const auto summary = Match(true);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_pairs_tried, 10);  // of images 1, 3, 4, 5, 6
+  const auto items = ReadDroppedItems(folder_ + "/matches.db", kColmapDroppedItemsTable);
+  ASSERT_TRUE(items.ok()) << items.error().message;
+  std::map<DropReason, std::set<std::pair<ImageId, ImageId>>> pairs;
+  int num_images = 0;
+  for (const DroppedItem& item : *items) {
+    if (item.reason == DropReason::kNoFeatures) {
+      ++num_images;
+      EXPECT_EQ(item.item_id, 2);
+      continue;
+    }
+    EXPECT_TRUE(pairs[item.reason].insert(ImageIdsFromPairId(item.item_id)).second);
+    EXPECT_EQ(item.found, item.reason == DropReason::kFewMatches ? 10 : 80);
+  }
+  EXPECT_EQ(num_images, 1);
+  EXPECT_THAT(pairs[DropReason::kFewMatches], testing::ElementsAre(std::pair(1u, 5u), std::pair(3u, 5u),
+                                                                   std::pair(4u, 5u), std::pair(5u, 6u)));
+  EXPECT_THAT(pairs[DropReason::kFewInliers],
+              testing::ElementsAre(std::pair(1u, 4u), std::pair(3u, 4u), std::pair(4u, 6u)));
+  EXPECT_EQ(summary->num_pairs_verified, 3);
+  // Matching its own result again starts a new list.
+  inputs_.features_path = folder_ + "/matches.db";
+  NoProgress progress;
+  ASSERT_TRUE(MatchFeatures(inputs_, options_, folder_ + "/again.db", 0, 1, progress).ok());
+  EXPECT_EQ(*ReadDroppedItems(folder_ + "/again.db", kColmapDroppedItemsTable), *items);
+}
+
+TEST_F(MatchFeaturesTest, PairsThatShareOnlyAWatermarkAreDroppedAsSuch) {
+  // Images 3 and 4 show a caption along the upper border, and nothing of what 1 and 2 show.
+  WriteFeatures(4, [](SQLite::Database& database) {
+    Random random(5);
+    Features caption;
+    caption.descriptors = *ReadDatabaseDescriptors(database, 3);
+    for (int i = 0; i < 80; ++i) {
+      caption.descriptors.row(i).reverseInPlace();
+      caption.keypoints.push_back(
+          {static_cast<float>(random.Uniform(5, 630)), static_cast<float>(random.Uniform(2, 50)), 2, 0});
+    }
+    database.exec("DELETE FROM keypoints WHERE image_id > 2; DELETE FROM descriptors WHERE image_id > 2");
+    WriteDatabaseFeatures(database, 3, caption);
+    WriteDatabaseFeatures(database, 4, caption);
+  });
+  options_.pairs = "exhaustive";
+  const auto summary = Match(false);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_pairs_verified, 1);
+  const auto items = ReadDroppedItems(folder_ + "/matches.db", kColmapDroppedItemsTable);
+  ASSERT_TRUE(items.ok()) << items.error().message;
+  ASSERT_EQ(items->size(), 5u);
+  for (const DroppedItem& item : *items) {
+    const bool is_captions = item.item_id == PairIdFromImageIds(3, 4);
+    EXPECT_EQ(item.reason, is_captions ? DropReason::kWatermark : DropReason::kFewMatches) << item.item_id;
+  }
 }
 
 TEST_F(MatchFeaturesTest, PairListChoosesThePairs) {

@@ -1,0 +1,26 @@
+-- What the compilation found out about a map, for people and programs that judge it; a robot does not need it to localize.
+-- Part of a map beside the tables of the map itself.  See FORMAT.md.
+
+-- Held-out images by the region at whose stations they were taken.  An image counts in every region that has its station.
+CREATE TABLE self_test_regions (
+  region_idx       INTEGER PRIMARY KEY,  -- -1: outside, at no station of any region
+  num_held_out     INTEGER NOT NULL,
+  num_localized    INTEGER NOT NULL,
+  num_gross_errors INTEGER NOT NULL,     -- of those localized
+  -- Of those localized; NULL where there is none.
+  median_error_m   REAL,
+  median_error_deg REAL,
+  p90_error_m      REAL,
+  p90_error_deg    REAL
+);
+
+-- What the stages dropped, by reason; only reasons that occurred.
+CREATE TABLE drop_reasons (
+  reason_id   INTEGER PRIMARY KEY,
+  stage       TEXT NOT NULL,         -- "group_classes"
+  kind        TEXT NOT NULL,         -- what is counted: image, pair, feature, keypoint, view or station
+  name        TEXT NOT NULL,         -- "few_observations"
+  text        TEXT NOT NULL,         -- why, for people
+  num_dropped INTEGER NOT NULL,
+  at_stations BLOB NOT NULL          -- how many at each station, in order: a varint each; empty: none at any
+);

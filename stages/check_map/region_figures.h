@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/map_findings.h"
+#include "core/map_rows.h"
+#include "stages/check_map/check_map.h"
+
+namespace cairn {
+
+// Median over the stations of the distance from a station's place to the next other place, metres; 0 where
+// all stations stand at one place.  O(n^2).
+double StationSpacingM(const std::vector<MapStation>& stations);
+
+// The station at which a camera stands: of those whose heading is within max_station_heading_deg of the
+// camera's (or that see all around) the nearest, then the one of nearest heading, then the first.  None where
+// it is farther away than max_station_distance_ratio times the spacing (of a single place: any distance).
+// `cam_from_world` is in the frame of the poses that the capture states.  O(n).
+std::optional<StationIdx> StationOf(const Pose& cam_from_world, double spacing_m, const MapRows& rows,
+                                    const CheckMapOptions& options);
+
+// How the images with a true pose fared, by the regions that have their station; results[i] is that of
+// images[i].  Ascending region; images at no station of any region count in kOutsideRegions.
+std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutImage>& images,
+                                             const std::vector<HeldOutResult>& results,
+                                             const CheckMapOptions& options);
+
+}  // namespace cairn

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "core/decomposition.h"
+#include "core/dropped_items.h"
+#include "core/world.h"
+
+namespace cairn {
+
+// The features of a world that no region of a decomposition keeps, and the stations whose tau-neighbourhood
+// lies in none, each with the reason:
+//   not_common           no region has it in view from all of its stations
+//   not_chosen           some region has
+//   few_features         fewer than k features are visible from the station
+//   few_common_features  at least k are, but fewer from the station and all others within tau hops
+//   left_over            the station is coverable: decomposition.uncovered
+// First features, then stations, ascending.  Derived from the decomposition alone, whatever made it.
+// O(incidences * regions of a station + edges * tau).
+// REQUIRES: CheckWorld(world) is ok, and `decomposition` is valid for it (CheckRegions).
+std::vector<DroppedItem> ListDropped(const World& world, const Decomposition& decomposition);
+
+}  // namespace cairn
