@@ -1,9 +1,12 @@
 #include "stages/check_map/region_figures.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <tuple>
+#include <utility>
 
 #include "core/floor_pose.h"
 
@@ -33,13 +36,21 @@ RegionSelfTest Summarize(RegionIdx region, const std::vector<const HeldOutResult
 }  // namespace
 
 double StationSpacingM(const std::vector<MapStation>& stations) {
+  std::vector<Eigen::Vector2d> places;
+  for (const MapStation& station : stations) places.push_back(station.position);
+  std::sort(places.begin(), places.end(),
+            [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
   std::vector<double> distances;
-  for (const MapStation& station : stations) {
+  for (auto place = places.begin(); place != places.end(); ++place) {
     double nearest = std::numeric_limits<double>::infinity();
-    for (const MapStation& other : stations) {
-      const double distance = (other.position - station.position).norm();
+    // Whether the other, and all beyond it, are too far away along x.
+    const auto is_beyond = [&](const Eigen::Vector2d& other) {
+      const double distance = (other - *place).norm();
       if (distance > 0) nearest = std::min(nearest, distance);
-    }
+      return std::abs(other.x() - place->x()) > nearest;
+    };
+    (void)std::find_if(place, places.end(), is_beyond);
+    (void)std::find_if(std::make_reverse_iterator(place), places.rend(), is_beyond);
     if (std::isfinite(nearest)) distances.push_back(nearest);
   }
   return distances.empty() ? 0 : Quantile(distances, 0.5);

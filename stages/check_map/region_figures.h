@@ -10,7 +10,7 @@
 namespace cairn {
 
 // Median over the stations of the distance from a station's place to the next other place, metres; 0 where
-// all stations stand at one place.  O(n^2).
+// all stations stand at one place.  O(n^1.5) for a lattice.
 double StationSpacingM(const std::vector<MapStation>& stations);
 
 // The station at which a camera stands: of those whose heading is within max_station_heading_deg of the

@@ -48,6 +48,29 @@ TEST(RegionFigures, ImageStandsAtTheNearestStationUnlessItIsTooFar) {
   EXPECT_EQ(Station(rows, At(4.51)), std::nullopt);
 }
 
+TEST(RegionFigures, SpacingIsTheMedianDistanceToTheNextOtherPlace) {
+  Random random(3);
+  for (int num_stations : {1, 2, 7, 60}) {
+    std::vector<MapStation> stations;
+    for (int i = 0; i < num_stations; ++i) {
+      const Eigen::Vector2d place(random.Uniform(0, 5), random.Uniform(0, 5));
+      // Some places have several headings.
+      for (int heading = 0; heading <= i % 3; ++heading)
+        stations.push_back({.position = place, .heading_deg = 90.0 * heading});
+    }
+    std::vector<double> nearest;
+    for (const MapStation& station : stations) {
+      double least = 1e9;
+      for (const MapStation& other : stations) {
+        const double distance = (other.position - station.position).norm();
+        if (distance > 0) least = std::min(least, distance);
+      }
+      if (least < 1e9) nearest.push_back(least);
+    }
+    EXPECT_EQ(StationSpacingM(stations), nearest.empty() ? 0 : Quantile(nearest, 0.5)) << num_stations;
+  }
+}
+
 TEST(RegionFigures, StationOfAnotherHeadingIsPassedOver) {
   //  station   0: (0, 0) 0 deg    1: (0, 0) 90 deg    2: (1, 0) 270 deg
   MapRows rows;
