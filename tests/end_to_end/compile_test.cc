@@ -205,25 +205,24 @@ int64_t NumDropped(const std::vector<DroppedItem>& items, DropKind kind) {
                        [&](const DroppedItem& item) { return DescribeDropReason(item.reason).kind == kind; });
 }
 
-// The number before a word in what a stage printed.
-int64_t NumberBefore(const std::string& path, const std::string& word) {
-  const std::string text = ReadFile(path).value();
-  const size_t end = text.find(" " + word);
-  return std::stoll(text.substr(text.find_last_of(" ", end - 1) + 1));
+// What a stage reports that it took in ("in") or made ("out").
+int64_t NumReported(const std::string& output, const std::string& side, const std::string& what) {
+  return nlohmann::json::parse(ReadFile(output + ".report.json").value())[side].at(what).get<int64_t>();
 }
 
 TEST_F(Compile, WhatEveryStageKeepsAndDropsAddsUp) {
   const std::string build = Path("tiny.build/");
   const auto matches = ReadDroppedItems(build + "matches.db", kColmapDroppedItemsTable);
   ASSERT_TRUE(matches.ok()) << matches.error().message;
-  EXPECT_EQ(NumDropped(*matches, DropKind::kPair) + NumberBefore(build + "matches.db.txt", "verified"),
-            NumberBefore(build + "matches.db.txt", "pairs tried"));
+  EXPECT_EQ(
+      NumDropped(*matches, DropKind::kPair) + NumReported(build + "matches.db", "out", "verified pairs"),
+      NumReported(build + "matches.db", "in", "pairs"));
 
   const Classes classes = *ReadClasses(build + "classes.db");
   const auto tracks = *ReadDroppedItems(build + "classes.db", kDroppedItemsTable);
   const auto num_classes = static_cast<int64_t>(classes.classes.size());
   EXPECT_EQ(NumDropped(tracks, DropKind::kFeature) + num_classes,
-            NumberBefore(build + "classes.db.txt", "tracks"));
+            NumReported(build + "classes.db", "in", "tracks"));
 
   const World world = *ReadWorld(build + "world.db");
   const auto views = *ReadDroppedItems(build + "world.db", kDroppedItemsTable);
@@ -276,7 +275,8 @@ TEST_F(Compile, ClassesSeenAtAStationAreVisibleThereOrDroppedForOneReason) {
   for (const std::vector<StationIdx>& area : world.areas) {
     for (const StationIdx station : area) ++accounted[station];
   }
-  for (const DropCount& count : ReadMapRows(Path("tiny.cairn"))->findings.drops) {
+  const MapRows rows = *ReadMapRows(Path("tiny.cairn"));
+  for (const DropCount& count : rows.findings.drops) {
     for (size_t station = 0; count.stage == "filter_visibility" && station < count.at_stations.size();
          ++station)
       accounted[station] += count.at_stations[station];
