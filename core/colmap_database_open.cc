@@ -96,9 +96,7 @@ SQLite::Database OpenCopy(const std::string& path) {
 // neither the file nor what lies beside it.
 SQLite::Database OpenUnchanged(const std::string& path) {
   if (IsInWalMode(path)) {
-    if (!IsFilled(path + "-wal")) {
-      return SQLite::Database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
-    }
+    if (!IsFilled(path + "-wal")) return OpenImmutable(path);
     // Without shared memory nobody has it open: its writer died, or somebody copied the two files.
     std::error_code error;
     if (!fs::exists(path + "-shm", error)) return OpenCopy(path);

@@ -21,7 +21,7 @@ ContentHash HashFeatures(const std::vector<Keypoint>& keypoints, const Descripto
 
 ContentHasher& ContentHasher::Text(std::string_view text) {
   bytes_.UInt64(text.size());
-  bytes_.Bytes(reinterpret_cast<const uint8_t*>(text.data()), text.size());
+  bytes_.Bytes(text);
   return *this;
 }
 

@@ -8,16 +8,28 @@ namespace {
 
 constexpr char kMagic[] = "SQLite format 3";  // 16 bytes with the terminating zero
 
-// Bytes 16 and 17 of the header, big-endian, 1 for 65536; 0 where the file has none.
-uint64_t PageSize(const std::string& path) {
-  unsigned char head[18] = {};
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(head), sizeof(head))) return 0;
-  const uint64_t page_size = uint64_t{head[16]} << 8 | head[17];
-  return page_size == 1 ? 65536 : page_size;
+uint64_t BigEndian(std::string_view bytes) {
+  uint64_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<uint8_t>(byte);
+  return value;
 }
 
 }  // namespace
+
+SqliteHeader ParseSqliteHeader(std::string_view head) {
+  SqliteHeader header;
+  if (head.size() >= 18) header.page_size = BigEndian(head.substr(16, 2));
+  if (header.page_size == 1) header.page_size = 65536;
+  if (head.size() >= 32) header.num_pages = BigEndian(head.substr(28, 4));
+  return header;
+}
+
+SqliteHeader ReadSqliteHeader(const std::string& path) {
+  char head[32] = {};
+  std::ifstream file(path, std::ios::binary);
+  file.read(head, sizeof(head));
+  return ParseSqliteHeader({head, static_cast<size_t>(file.gcount())});
+}
 
 std::string DatabaseUri(const std::string& path) {
   std::string uri = "file:";
@@ -29,6 +41,10 @@ std::string DatabaseUri(const std::string& path) {
     }
   }
   return uri;
+}
+
+SQLite::Database OpenImmutable(const std::string& path) {
+  return SQLite::Database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
 }
 
 bool IsSqliteFile(const std::string& path) {
@@ -47,7 +63,8 @@ Status CheckSqliteFile(const std::string& path) {
         "or another kind of file?",
         path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
   }
-  const uint64_t page_size = PageSize(path), num_bytes = std::filesystem::file_size(path, error);
+  const uint64_t page_size = ReadSqliteHeader(path).page_size;
+  const uint64_t num_bytes = std::filesystem::file_size(path, error);
   if (page_size == 0 || num_bytes % page_size == 0) return Ok();
   return MakeError(
       ErrorCode::kCorrupt,
@@ -58,7 +75,7 @@ Status CheckSqliteFile(const std::string& path) {
 Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckSqliteFile(path));
   return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
-    SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    SQLite::Database database = OpenImmutable(path);
     database.execAndGet(
         "SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
     return database;

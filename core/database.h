@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -30,13 +32,26 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
   }
 }
 
+// What the header of a SQLite database states; 0 what it does not reach to.
+struct SqliteHeader {
+  uint64_t page_size = 0;  // bytes 16, 17
+  uint64_t num_pages = 0;  // bytes 28 to 31
+};
+// `head`: the file's first bytes.
+SqliteHeader ParseSqliteHeader(std::string_view head);
+SqliteHeader ReadSqliteHeader(const std::string& path);
+
 // The file as SQLite's URI, to which "?mode=ro" or the like can be appended.
 std::string DatabaseUri(const std::string& path);
+
+// Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody writes meanwhile.
+// Throws SQLite::Exception: call it inside WithDatabaseErrors.
+SQLite::Database OpenImmutable(const std::string& path);
 
 // Errors: NotFound, Corrupt (empty, a folder, without SQLite's magic bytes, or not whole pages).
 Status CheckSqliteFile(const std::string& path);
 
-// Opens an existing database read-only and immutable (no locks, no -wal or -shm beside it).
+// Opens an existing database immutable, and checks it.
 // Errors: NotFound, Corrupt (empty, truncated, or not SQLite).
 Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path);
 

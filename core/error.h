@@ -49,6 +49,12 @@ Error MakeError(ErrorCode code, fmt::format_string<Args...> format, Args&&... ar
   return Error{code, fmt::format(format, std::forward<Args>(args)...)};
 }
 
+// `what` (a file, or a part of it) is not what was written there.
+template <typename... Args>
+Error Corrupt(const std::string& what, fmt::format_string<Args...> format, Args&&... args) {
+  return Error{ErrorCode::kCorrupt, what + ": " + fmt::format(format, std::forward<Args>(args)...)};
+}
+
 // A value or the error that prevented it.  Never empty; reading the wrong side aborts.
 template <typename T>
 class [[nodiscard]] Result {

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -12,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/content_hash.h"
 #include "core/temporary.h"
 
 namespace cairn {
@@ -116,8 +116,8 @@ Status WriteFileAtomically(const std::string& path, std::string_view contents) {
 }
 
 std::string HashBytes(std::string_view bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  const ContentHash hash = HashContents(bytes);
+  return fmt::format("{:016x}{:016x}", hash.high, hash.low);
 }
 
 Result<std::string> HashFile(const std::string& path) {

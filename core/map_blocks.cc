@@ -16,11 +16,6 @@ constexpr double kMaxCoordinate = 2e9;  // 200 km in units of 0.1 mm
 constexpr double kHeadingUnitDeg = 1e-3;
 constexpr int64_t kMaxHeading = 1'000'000'000;  // a million degrees
 
-template <typename... Args>
-Error Corrupt(const std::string& what, fmt::format_string<Args...> format, Args&&... args) {
-  return MakeError(ErrorCode::kCorrupt, "{}: {}", what, fmt::format(format, std::forward<Args>(args)...));
-}
-
 template <typename T>
 int64_t ListBytes(const std::vector<std::vector<T>>& lists) {
   int64_t num_bytes = 0;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <mutex>
 
 #include "core/database.h"
@@ -24,19 +23,6 @@ bool SameHash(const Hash& found, const Hash& stated) {
 #endif
 }
 
-// Size of the file that the header of a SQLite database states (bytes 16, 17: page size; 28 to 31: pages), 0
-// where it states none.
-Result<uint64_t> StatedSize(const std::string& path) {
-  unsigned char head[32] = {};
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be opened", path);
-  if (!file.read(reinterpret_cast<char*>(head), sizeof(head))) return 0;
-  const uint64_t stated = uint64_t{head[16]} << 8 | head[17];
-  const uint64_t num_pages =
-      uint64_t{head[28]} << 24 | uint64_t{head[29]} << 16 | uint64_t{head[30]} << 8 | head[31];
-  return num_pages * (stated == 1 ? 65536 : stated);
-}
-
 Status CheckContainer(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
@@ -53,7 +39,8 @@ Status CheckContainer(const std::string& path) {
         "{}: not a SQLite database, which a map is ({} bytes without the magic 'SQLite format 3')", path,
         num_bytes);
   }
-  CAIRN_ASSIGN_OR_RETURN(const uint64_t stated, StatedSize(path));
+  const SqliteHeader header = ReadSqliteHeader(path);
+  const uint64_t stated = header.page_size * header.num_pages;
   if (num_bytes < stated || num_bytes < 512) {
     return MakeError(ErrorCode::kTruncated, "{}: has {} bytes, but should have {}; copy it again", path,
                      num_bytes, stated);
@@ -119,7 +106,7 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
   return WithDatabaseErrors(path, [&]() -> Result<MapFile> {
     std::error_code error;
     const uint64_t num_bytes = fs::file_size(path, error);
-    SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    SQLite::Database database = OpenImmutable(path);
     Harden(database, num_bytes);
     CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path, kMapVersionMajor));
     CAIRN_RETURN_IF_ERROR(CheckTables(database, path));
@@ -137,10 +124,10 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
     }
     CAIRN_RETURN_IF_ERROR(ReadMapHead(database, path, &file.head_));
     if (Status status = CheckMapHead(file.head_); !status.ok()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);
+      return Corrupt(path, "{}", status.error().message);
     }
     Result<MapDirectory> directory = MapDirectory::Decode(entries, static_cast<int64_t>(num_bytes));
-    if (!directory.ok()) return MakeError(ErrorCode::kCorrupt, "{}: {}", path, directory.error().message);
+    if (!directory.ok()) return Corrupt(path, "{}", directory.error().message);
     file.directory_ = std::move(*directory);
     file.connection_ = std::make_unique<Connection>(std::move(database));
     return file;

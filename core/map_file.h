@@ -51,4 +51,7 @@ class MapFile {
   std::unique_ptr<Connection> connection_;
 };
 
+// All of an open map, as ReadMapRows(path).
+Result<MapRows> ReadMapRows(const MapFile& file);
+
 }  // namespace cairn

@@ -98,12 +98,16 @@ class RowsReader {
 
 Result<MapRows> ReadMapRows(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
+  return ReadMapRows(file);
+}
+
+Result<MapRows> ReadMapRows(const MapFile& file) {
   MapRows rows;
   const Status status = RowsReader(file, &rows).Read();
   if (status.ok()) return rows;
   // CheckMapRows does not know the file.
-  const bool names_file = status.error().message.find(path) != std::string::npos;
-  return MakeError(ErrorCode::kCorrupt, "{}{}", names_file ? "" : path + ": ", status.error().message);
+  const bool names_file = status.error().message.find(file.path()) != std::string::npos;
+  return MakeError(ErrorCode::kCorrupt, "{}{}", names_file ? "" : file.path() + ": ", status.error().message);
 }
 
 }  // namespace cairn

@@ -14,26 +14,6 @@ namespace {
 // Small pages waste less at the ends of blobs, large ones are read faster.
 constexpr size_t kLandmarksForLargePages = 20'000;
 
-std::string EncodeEntry(const MapLayout& layout, const MapRows& rows, const BlockEntry& entry) {
-  switch (static_cast<BlockKind>(entry.kind)) {
-    case BlockKind::kStations:
-      return EncodeBlock(layout.MakeStationBlock(entry));
-    case BlockKind::kRegions:
-      return EncodeBlock(layout.MakeRegionBlock(entry));
-    case BlockKind::kVocabularyTree:
-      return EncodeVocabularyTree(rows.vocabulary);
-    case BlockKind::kDocumentNorms:
-      return EncodeDocumentNorms(layout.MakeDocumentNorms());
-    case BlockKind::kWords:
-      return EncodeBlock(layout.MakeWordBlock(entry));
-    case BlockKind::kImages:
-      return EncodeBlock(layout.MakeImageBlock(entry));
-    case BlockKind::kLandmarks:
-      return EncodeBlock(layout.MakeLandmarkBlock(entry));
-  }
-  return "";
-}
-
 void InsertBlob(SQLite::Database& database, const char* sql, const std::string& bytes) {
   SQLite::Statement insert(database, sql);
   insert.bindNoCopy(1, bytes.data(), static_cast<int>(bytes.size()));
@@ -46,7 +26,7 @@ Result<std::string> WriteBlocks(SQLite::Database& database, const MapRows& rows)
   MapDirectory directory;
   SQLite::Statement insert(database, "INSERT INTO blocks VALUES (?, ?)");
   for (BlockEntry entry : layout.entries()) {
-    const std::string bytes = EncodeEntry(layout, rows, entry);
+    const std::string bytes = layout.Encode(entry);
     if (bytes.size() > 500'000'000) {
       return MakeError(ErrorCode::kInvalidArgument, "map: a block of {} bytes, at most 500 MB are stored",
                        bytes.size());

@@ -48,11 +48,6 @@ std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
   return texts;
 }
 
-template <typename... Args>
-Error Corrupt(const std::string& path, fmt::format_string<Args...> format, Args&&... args) {
-  return MakeError(ErrorCode::kCorrupt, "{}: {}", path, fmt::format(format, std::forward<Args>(args)...));
-}
-
 std::map<std::string, std::string> ReadTexts(SQLite::Database& database, const char* sql) {
   std::map<std::string, std::string> texts;
   SQLite::Statement query(database, sql);

@@ -180,4 +180,24 @@ std::vector<float> MapLayout::MakeDocumentNorms() const {
   return norms;
 }
 
+std::string MapLayout::Encode(const BlockEntry& entry) const {
+  switch (static_cast<BlockKind>(entry.kind)) {
+    case BlockKind::kStations:
+      return EncodeBlock(MakeStationBlock(entry));
+    case BlockKind::kRegions:
+      return EncodeBlock(MakeRegionBlock(entry));
+    case BlockKind::kVocabularyTree:
+      return EncodeVocabularyTree(rows_.vocabulary);
+    case BlockKind::kDocumentNorms:
+      return EncodeDocumentNorms(MakeDocumentNorms());
+    case BlockKind::kWords:
+      return EncodeBlock(MakeWordBlock(entry));
+    case BlockKind::kImages:
+      return EncodeBlock(MakeImageBlock(entry));
+    case BlockKind::kLandmarks:
+      return EncodeBlock(MakeLandmarkBlock(entry));
+  }
+  return "";
+}
+
 }  // namespace cairn

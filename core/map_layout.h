@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,7 +19,9 @@ class MapLayout {
   // Of every block in file order: kind, first, count and centers; neither bytes nor hash.
   const std::vector<BlockEntry>& entries() const { return entries_; }
 
-  // The block of an entry.  REQUIRES: its kind
+  // The block of an entry as it is stored.
+  std::string Encode(const BlockEntry& entry) const;
+  // The same before that.  REQUIRES: its kind
   LandmarkBlock MakeLandmarkBlock(const BlockEntry& entry) const;
   ImageBlock MakeImageBlock(const BlockEntry& entry) const;
   StationBlock MakeStationBlock(const BlockEntry& entry) const;

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "core/blob.h"
+#include "core/database.h"
 #include "core/file.h"
 #include "core/map_file.h"
 
@@ -42,13 +43,9 @@ class SealedFile {
     file.path_ = path;
     file.file_.reset(std::fopen(path.c_str(), mode));
     if (!file.file_) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
-    // The header's bytes 16 and 17: the page size, 1 for 65536.
     std::string head(131072, '\0');
     head.resize(std::fread(head.data(), 1, head.size(), file.file_.get()));
-    const size_t stated = head.size() < 100 ? 0
-                                            : static_cast<size_t>(static_cast<uint8_t>(head[16])) << 8 |
-                                                  static_cast<uint8_t>(head[17]);
-    const size_t page_size = stated == 1 ? 65536 : stated;
+    const size_t page_size = ParseSqliteHeader(head).page_size;
     const std::string_view page =
         std::string_view(head).substr(std::min(page_size, head.size())).substr(0, page_size);
     const size_t found = page.find(kMagic);

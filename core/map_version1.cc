@@ -10,11 +10,6 @@
 namespace cairn {
 namespace {
 
-template <typename... Args>
-Error Corrupt(const std::string& path, fmt::format_string<Args...> format, Args&&... args) {
-  return MakeError(ErrorCode::kCorrupt, "{}: {}", path, fmt::format(format, std::forward<Args>(args)...));
-}
-
 Status ReadImages(SQLite::Database& database, const std::string& path, MapRows* rows) {
   SQLite::Statement query(
       database,

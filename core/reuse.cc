@@ -32,10 +32,6 @@ ContentHash ReadHash(BlobReader* reader) {
   return {high, reader->UInt64()};
 }
 
-void WriteText(std::string_view text, BlobWriter* blob) {
-  blob->Bytes(reinterpret_cast<const uint8_t*>(text.data()), text.size());
-}
-
 }  // namespace
 
 std::string ReusePath(const std::string& output_path) { return output_path + ".reuse"; }
@@ -50,8 +46,8 @@ Status WriteReuseFile(const std::string& output_path, std::vector<ReuseEntry> en
   std::sort(entries.begin(), entries.end(),
             [](const ReuseEntry& a, const ReuseEntry& b) { return a.key < b.key; });
   BlobWriter blob;
-  WriteText(kMagic, &blob);
-  WriteText(ProgramIdentity(), &blob);
+  blob.Bytes(kMagic);
+  blob.Bytes(ProgramIdentity());
   blob.UInt64(entries.size());
   for (const ReuseEntry& entry : entries) {
     WriteHash(entry.key, &blob);
@@ -97,8 +93,7 @@ Result<std::vector<ReuseEntry>> ReadReuseFile(const std::string& output_path) {
 
 SQLite::Database& ReuseSources::Source::Database() {
   if (!database_) {
-    database_ = std::make_unique<SQLite::Database>(DatabaseUri(path_) + "?immutable=1",
-                                                   SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    database_ = std::make_unique<SQLite::Database>(OpenImmutable(path_));
   }
   return *database_;
 }

@@ -25,7 +25,7 @@ Status Verify(const Arguments& arguments, const CommandEnvironment& environment)
   }
   CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.input_path, options));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(arguments.input_path));
-  CAIRN_RETURN_IF_ERROR(ReadMapRows(arguments.input_path));
+  CAIRN_RETURN_IF_ERROR(ReadMapRows(file));
   *environment.out << fmt::format("{}: whole, {}\n", arguments.input_path,
                                   file.seal().is_signed()
                                       ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),

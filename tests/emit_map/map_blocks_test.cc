@@ -83,29 +83,10 @@ struct EncodedBlocks {
   EncodedBlocks() {
     const MapLayout layout(rows);
     for (BlockEntry entry : layout.entries()) {
-      bytes.push_back(Encode(layout, entry));
+      bytes.push_back(layout.Encode(entry));
       entry.num_bytes = static_cast<uint32_t>(bytes.back().size());
       directory.Add(entry);
     }
-  }
-  std::string Encode(const MapLayout& layout, const BlockEntry& entry) const {
-    switch (static_cast<BlockKind>(entry.kind)) {
-      case BlockKind::kStations:
-        return EncodeBlock(layout.MakeStationBlock(entry));
-      case BlockKind::kRegions:
-        return EncodeBlock(layout.MakeRegionBlock(entry));
-      case BlockKind::kVocabularyTree:
-        return EncodeVocabularyTree(rows.vocabulary);
-      case BlockKind::kDocumentNorms:
-        return EncodeDocumentNorms(layout.MakeDocumentNorms());
-      case BlockKind::kWords:
-        return EncodeBlock(layout.MakeWordBlock(entry));
-      case BlockKind::kImages:
-        return EncodeBlock(layout.MakeImageBlock(entry));
-      case BlockKind::kLandmarks:
-        return EncodeBlock(layout.MakeLandmarkBlock(entry));
-    }
-    return "";
   }
   Status Decode(size_t block, const std::string& changed) const {
     const BlockEntry& entry = directory.blocks()[block];
