@@ -23,11 +23,12 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
     return body();
   } catch (const SQLite::Exception& exception) {
     const int code = exception.getErrorCode();
-    const ErrorCode error = code == SQLITE_BUSY || code == SQLITE_LOCKED ? ErrorCode::kBusy
-                            : code == SQLITE_FULL || code == SQLITE_IOERR || code == SQLITE_READONLY ||
-                                    code == SQLITE_CANTOPEN || code == SQLITE_PERM
-                                ? ErrorCode::kIo
-                                : ErrorCode::kCorrupt;
+    const ErrorCode error =
+        code == SQLITE_BUSY || code == SQLITE_LOCKED ? ErrorCode::kBusy
+        : code == SQLITE_FULL                        ? ErrorCode::kDiskFull
+        : code == SQLITE_IOERR || code == SQLITE_READONLY || code == SQLITE_CANTOPEN || code == SQLITE_PERM
+            ? ErrorCode::kIo
+            : ErrorCode::kCorrupt;
     return MakeError(error, "{}: SQLite says: {}", path, exception.what());
   }
 }

@@ -62,18 +62,13 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
     Hash root = {};
     CAIRN_RETURN_IF_ERROR(WithDatabaseErrors(path, [&]() -> Status {
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-      try {
-        database.exec(fmt::format(
-            "PRAGMA page_size = {}; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;", page_size));
-        database.exec("BEGIN");
-        database.exec(k0002MapSql);
-        database.exec(kMapFindingsSql);
-        CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows));
-        database.exec("COMMIT");
-      } catch (const SQLite::Exception& exception) {
-        if (exception.getErrorCode() != SQLITE_FULL) throw;
-        return MakeError(ErrorCode::kDiskFull, "{}: cannot be written: {}", path, exception.what());
-      }
+      database.exec(fmt::format("PRAGMA page_size = {}; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;",
+                                page_size));
+      database.exec("BEGIN");
+      database.exec(k0002MapSql);
+      database.exec(kMapFindingsSql);
+      CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows));
+      database.exec("COMMIT");
       return Ok();
     }));
     return SealFile(temporary, root);
