@@ -64,19 +64,11 @@ void Harden(SQLite::Database& database, uint64_t num_bytes) {
   database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0; PRAGMA cache_size = -256;");
 }
 
-// Every table that is read is a plain one: no view, no virtual table, no generated column.
+// Those that every map has.
 Status CheckTables(SQLite::Database& database, const std::string& path) {
   for (const char* const table :
        {"seal", "meta", "stage_options", "inputs", "frames", "cameras", "self_test", "blocks", "directory"}) {
-    SQLite::Statement query(
-        database,
-        "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
-        "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
-        "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
-    query.bind(1, table);
-    if (!query.executeStep() || query.getColumn(0).getInt() != 1) {
-      return MakeError(ErrorCode::kCorrupt, "{}: has no plain table '{}', which every map has", path, table);
-    }
+    CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, table));
   }
   return Ok();
 }
@@ -131,6 +123,15 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
     file.directory_ = std::move(*directory);
     file.connection_ = std::make_unique<Connection>(std::move(database));
     return file;
+  });
+}
+
+Result<MapFindings> MapFile::ReadFindings() const {
+  const std::lock_guard lock(connection_->mutex);
+  return WithDatabaseErrors(path_, [&]() -> Result<MapFindings> {
+    MapFindings findings;
+    CAIRN_RETURN_IF_ERROR(ReadMapFindings(connection_->database, path_, &findings));
+    return findings;
   });
 }
 

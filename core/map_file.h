@@ -36,6 +36,9 @@ class MapFile {
 
   // The bytes of directory().blocks()[block].  Errors: Corrupt (not those whose hash the directory has), Io.
   Result<std::string> ReadBlock(int64_t block) const;
+  // What the compilation found out: not under the root's hash, so for who judges the map, not for robots.
+  // To be checked with CheckMapFindings.  Errors: Corrupt, Io.
+  Result<MapFindings> ReadFindings() const;
   // "PATH: block 7", for messages.
   std::string NameOf(int64_t block) const;
 

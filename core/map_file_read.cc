@@ -22,7 +22,7 @@ class RowsReader {
       if (!rows_.vocabulary.nodes.empty()) rows_.vocabulary.document_ids.push_back(image.image_id);
     }
     WeightVocabulary(&rows_.vocabulary);
-    CAIRN_ASSIGN_OR_RETURN(rows_.findings, ReadMapFindings(file_.path()));
+    CAIRN_ASSIGN_OR_RETURN(rows_.findings, file_.ReadFindings());
     return CheckMapRows(rows_);
   }
 

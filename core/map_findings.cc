@@ -5,6 +5,7 @@
 
 #include "core/blob.h"
 #include "core/database.h"
+#include "core/map_head.h"
 
 namespace cairn {
 namespace {
@@ -167,15 +168,14 @@ void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
   WriteDropCounts(database, findings);
 }
 
-Result<MapFindings> ReadMapFindings(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
-  return WithDatabaseErrors(path, [&]() -> Result<MapFindings> {
-    MapFindings findings;
-    if (HasTable(database, "self_test_regions"))
-      CAIRN_RETURN_IF_ERROR(ReadSelfTestRegions(database, path, &findings));
-    if (HasTable(database, "drop_reasons")) CAIRN_RETURN_IF_ERROR(ReadDropCounts(database, path, &findings));
-    return findings;
-  });
+Status ReadMapFindings(SQLite::Database& database, const std::string& path, MapFindings* findings) {
+  if (HasTable(database, "self_test_regions")) {
+    CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "self_test_regions"));
+    CAIRN_RETURN_IF_ERROR(ReadSelfTestRegions(database, path, findings));
+  }
+  if (!HasTable(database, "drop_reasons")) return Ok();
+  CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "drop_reasons"));
+  return ReadDropCounts(database, path, findings);
 }
 
 }  // namespace cairn

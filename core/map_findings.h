@@ -66,9 +66,10 @@ struct MapFindings {
 // be.
 Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations);
 
-// The tables inside a map file; one that lacks them has no findings.  The writer throws SQLite::Exception.
-// Errors of the reader: Corrupt, Io; what it reads is to be checked with CheckMapFindings.
+// The tables inside a map file.  Both throw SQLite::Exception: call them inside WithDatabaseErrors.
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings);
-Result<MapFindings> ReadMapFindings(const std::string& path);
+// A file without the tables has no findings.  What is read is to be checked with CheckMapFindings.
+// Errors: Corrupt.
+Status ReadMapFindings(SQLite::Database& database, const std::string& path, MapFindings* findings);
 
 }  // namespace cairn

@@ -203,6 +203,17 @@ void WriteCameras(SQLite::Database& database, const MapHead& head) {
 
 }  // namespace
 
+Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table) {
+  SQLite::Statement query(
+      database,
+      "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
+      "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
+      "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
+  query.bind(1, table);
+  if (query.executeStep() && query.getColumn(0).getInt() == 1) return Ok();
+  return Corrupt(path, "has no plain table '{}'", table);
+}
+
 std::string_view BlobView(const SQLite::Column& column) {
   return {static_cast<const char*>(column.getBlob()), static_cast<size_t>(column.getBytes())};
 }

@@ -18,6 +18,10 @@ void WriteMapHead(SQLite::Database& database, const MapHead& head);
 // Whether the file is a map of this major version.  Errors: ForeignFile; TooNew, naming the writer; TooOld.
 Status CheckMapVersion(SQLite::Database& database, const std::string& path, int major);
 
+// Whether `table` is a plain one: no view, no virtual table, no generated column, which could run a program
+// of whoever made the file.  Errors: Corrupt.
+Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
+
 // A column's bytes, valid until the statement's next step.
 std::string_view BlobView(const SQLite::Column& column);
 // Columns first .. first + 6: qw, qx, qy, qz, tx, ty, tz.

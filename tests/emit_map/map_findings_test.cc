@@ -52,23 +52,25 @@ TEST(MapFindings, RowsThatCannotBeAreNotWritten) {
 }
 
 TEST(MapFindings, DamagedRowsAreRefused) {
-  for (const char* sql : {"UPDATE self_test_regions SET region_idx = 2 WHERE region_idx = 1",
-                          "UPDATE self_test_regions SET region_idx = -2 WHERE region_idx = 1",
-                          "UPDATE self_test_regions SET region_idx = 4294967297 WHERE region_idx = 1",
-                          "UPDATE self_test_regions SET num_held_out = 0",
-                          "UPDATE self_test_regions SET num_held_out = 4294967300",
-                          "UPDATE self_test_regions SET num_localized = 'x'",
-                          "UPDATE self_test_regions SET num_gross_errors = 4",
-                          "UPDATE self_test_regions SET median_error_m = NULL",
-                          "UPDATE self_test_regions SET p90_error_deg = 9e999",
-                          "UPDATE drop_reasons SET reason_id = -1 WHERE reason_id = 1",
-                          "UPDATE drop_reasons SET num_dropped = 0",
-                          "UPDATE drop_reasons SET num_dropped = 199 WHERE reason_id = 44",
-                          "UPDATE drop_reasons SET at_stations = x'0000'",
-                          "UPDATE drop_reasons SET at_stations = x'0000ff' WHERE reason_id = 44",
-                          "UPDATE drop_reasons SET at_stations = x'0000ffffffff7f' WHERE reason_id = 44",
-                          "ALTER TABLE drop_reasons DROP COLUMN text",
-                          "ALTER TABLE self_test_regions DROP COLUMN p90_error_m"}) {
+  for (const char* sql :
+       {"UPDATE self_test_regions SET region_idx = 2 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET region_idx = -2 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET region_idx = 4294967297 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET num_held_out = 0",
+        "UPDATE self_test_regions SET num_held_out = 4294967300",
+        "UPDATE self_test_regions SET num_localized = 'x'",
+        "UPDATE self_test_regions SET num_gross_errors = 4",
+        "UPDATE self_test_regions SET median_error_m = NULL",
+        "UPDATE self_test_regions SET p90_error_deg = 9e999",
+        "UPDATE drop_reasons SET reason_id = -1 WHERE reason_id = 1",
+        "UPDATE drop_reasons SET num_dropped = 0",
+        "UPDATE drop_reasons SET num_dropped = 199 WHERE reason_id = 44",
+        "UPDATE drop_reasons SET at_stations = x'0000'",
+        "UPDATE drop_reasons SET at_stations = x'0000ff' WHERE reason_id = 44",
+        "UPDATE drop_reasons SET at_stations = x'0000ffffffff7f' WHERE reason_id = 44",
+        "ALTER TABLE drop_reasons DROP COLUMN text", "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
+        "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
+        "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
     ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("damaged.cairn")).ok());
     SQLite::Database(MapPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
     const Result<MapRows> read = ReadMapRows(MapPath("damaged.cairn"));
