@@ -15,12 +15,19 @@ constexpr int kGridColumns = 6;
 constexpr int kGridRows = 5;
 constexpr int kNumDepths = 5;
 
-using FrustumSamples = std::vector<Eigen::Vector3d>;  // world frame
+// What of an image tells which others see the same.
+struct Frustum {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // world frame
+  std::vector<Eigen::Vector3d> samples;              // world frame
+  // No camera farther than this from the center sees a sample well enough, metres.
+  double reach_m = 0;
+};
 
 // Points on rays through a grid of pixels, at depths in geometric progression from near to far.
-FrustumSamples SampleFrustum(const PosedCamera& image, const FrustumOverlapOptions& options) {
-  FrustumSamples samples;
+Frustum SampleFrustum(const PosedCamera& image, const FrustumOverlapOptions& options) {
   const Pose world_from_cam = image.cam_from_world.Inverse();
+  Frustum frustum = {.center = world_from_cam.translation};
+  double largest_distance_m = 0;
   for (int row = 0; row < kGridRows; ++row) {
     for (int column = 0; column < kGridColumns; ++column) {
       const Eigen::Vector2d pixel((column + 0.5) / kGridColumns * image.camera.width,
@@ -30,32 +37,41 @@ FrustumSamples SampleFrustum(const PosedCamera& image, const FrustumOverlapOptio
       for (int d = 0; d < kNumDepths; ++d) {
         const double depth =
             options.near_m * std::pow(options.far_m / options.near_m, d / (kNumDepths - 1.0));
-        samples.push_back(world_from_cam * Eigen::Vector3d(ray->x() * depth, ray->y() * depth, depth));
+        frustum.samples.push_back(world_from_cam *
+                                  Eigen::Vector3d(ray->x() * depth, ray->y() * depth, depth));
+        largest_distance_m = std::max(largest_distance_m, (frustum.samples.back() - frustum.center).norm());
       }
     }
   }
-  return samples;
+  // The third side of a triangle of which the others and the angle between them are as large as may be.
+  const double ratio = options.max_scale_ratio;
+  const double cosine = std::cos(RadFromDeg(options.max_view_angle_deg));
+  frustum.reach_m = largest_distance_m * std::sqrt(1 + ratio * ratio - 2 * ratio * cosine) * (1 + 1e-9);
+  return frustum;
 }
 
-double Overlap(const FrustumSamples& samples, const PosedCamera& image1, const PosedCamera& image2,
+// x², negative where x is: compares cosines without a square root.
+double SignedSquare(double x) { return x * std::abs(x); }
+
+double Overlap(const Frustum& frustum, const PosedCamera& image2, const Eigen::Vector3d& center2,
                const FrustumOverlapOptions& options) {
-  if (samples.empty()) return 0;
-  const Eigen::Vector3d center1 = image1.cam_from_world.Center(), center2 = image2.cam_from_world.Center();
-  const double min_cosine = std::cos(RadFromDeg(options.max_view_angle_deg));
+  if (frustum.samples.empty() || (center2 - frustum.center).squaredNorm() > frustum.reach_m * frustum.reach_m)
+    return 0;
+  const double min_cosine_sign_squared = SignedSquare(std::cos(RadFromDeg(options.max_view_angle_deg)));
+  const double max_squared_ratio = options.max_scale_ratio * options.max_scale_ratio;
   int num_seen = 0;
-  for (const Eigen::Vector3d& sample : samples) {
+  for (const Eigen::Vector3d& sample : frustum.samples) {
+    const Eigen::Vector3d ray1 = sample - frustum.center, ray2 = sample - center2;
+    const double squared1 = ray1.squaredNorm(), squared2 = ray2.squaredNorm();
+    if (SignedSquare(ray1.dot(ray2)) < min_cosine_sign_squared * squared1 * squared2) continue;
+    if (std::max(squared1, squared2) > max_squared_ratio * std::min(squared1, squared2)) continue;
     const auto pixel = ImageFromCamera(image2.camera, image2.cam_from_world * sample);
-    if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > image2.camera.width ||
-        pixel->y() > image2.camera.height) {
-      continue;
+    if (pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= image2.camera.width &&
+        pixel->y() <= image2.camera.height) {
+      ++num_seen;
     }
-    const Eigen::Vector3d ray1 = sample - center1, ray2 = sample - center2;
-    const double distance1 = ray1.norm(), distance2 = ray2.norm();
-    if (ray1.dot(ray2) < min_cosine * distance1 * distance2) continue;
-    if (std::max(distance1, distance2) > options.max_scale_ratio * std::min(distance1, distance2)) continue;
-    ++num_seen;
   }
-  return static_cast<double>(num_seen) / static_cast<double>(samples.size());
+  return static_cast<double>(num_seen) / static_cast<double>(frustum.samples.size());
 }
 
 // Negative, zero, positive: a before, equal to, after b, runs of digits compared by value.
@@ -88,7 +104,7 @@ int CompareNaturally(std::string_view a, std::string_view b) {
 
 double FrustumOverlap(const PosedCamera& image1, const PosedCamera& image2,
                       const FrustumOverlapOptions& options) {
-  return Overlap(SampleFrustum(image1, options), image1, image2, options);
+  return Overlap(SampleFrustum(image1, options), image2, image2.cam_from_world.Center(), options);
 }
 
 IndexPairs ExhaustivePairs(int num_images) {
@@ -126,15 +142,15 @@ Result<OverlapRanking> RankOverlaps(const std::vector<PosedCamera>& images,
                                     const FrustumOverlapOptions& options, int num_threads,
                                     Progress& progress) {
   const int num_images = static_cast<int>(images.size());
-  std::vector<FrustumSamples> samples(num_images);
-  ParallelFor(num_images, num_threads, [&](int64_t i) { samples[i] = SampleFrustum(images[i], options); });
+  std::vector<Frustum> frusta(num_images);
+  ParallelFor(num_images, num_threads, [&](int64_t i) { frusta[i] = SampleFrustum(images[i], options); });
   OverlapRanking ranking(num_images);
   progress.Begin("rank overlaps", num_images, "images");
   ParallelFor(num_images, num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
     for (int other = static_cast<int>(i) + 1; other < num_images; ++other) {
-      const double forward = Overlap(samples[i], images[i], images[other], options);
-      const double backward = Overlap(samples[other], images[other], images[i], options);
+      const double forward = Overlap(frusta[i], images[other], frusta[other].center, options);
+      const double backward = Overlap(frusta[other], images[i], frusta[i].center, options);
       if (std::max(forward, backward) >= options.min_overlap_ratio)
         ranking[i].push_back({other, static_cast<float>(0.5 * (forward + backward))});
     }

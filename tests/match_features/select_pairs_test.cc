@@ -1,7 +1,11 @@
 #include "stages/match_features/select_pairs.h"
 
+#include <cmath>
+#include <random>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 namespace cairn {
 namespace {
@@ -72,6 +76,53 @@ TEST(SelectPairs, ScoutsStandAtEvenDistancesInTheOtherRanks) {
 TEST(SelectPairs, OverlapOfAnImageWithItselfIsFull) {
   EXPECT_DOUBLE_EQ(FrustumOverlap(At(0, 0), At(0, 0), {}), 1.0);
   EXPECT_DOUBLE_EQ(FrustumOverlap(At(0, 0), At(0, 180), {}), 0.0);
+}
+
+// Word by word what FrustumOverlapOptions says, on a pinhole camera.
+double OverlapByDefinition(const PosedCamera& image1, const PosedCamera& image2,
+                           const FrustumOverlapOptions& options) {
+  const std::vector<double>& params = image2.camera.params;
+  const Eigen::Vector3d center1 = image1.cam_from_world.Center(), center2 = image2.cam_from_world.Center();
+  int num_seen = 0;
+  for (int i = 0; i < 150; ++i) {  // 6 columns, 5 rows, 5 depths
+    const double x = (i % 6 + 0.5) / 6 * 640, y = (i / 6 % 5 + 0.5) / 5 * 480;
+    const double depth = options.near_m * std::pow(options.far_m / options.near_m, i / 30 / 4.0);
+    const Eigen::Vector3d sample =
+        image1.cam_from_world.Inverse() *
+        Eigen::Vector3d((x - params[1]) / params[0] * depth, (y - params[2]) / params[0] * depth, depth);
+    const Eigen::Vector3d in_image2 = image2.cam_from_world * sample;
+    const Eigen::Vector2d pixel = params[0] * in_image2.hnormalized() + Eigen::Vector2d(params[1], params[2]);
+    const Eigen::Vector3d ray1 = sample - center1, ray2 = sample - center2;
+    const double angle_deg = DegFromRad(std::acos(std::min(1.0, ray1.normalized().dot(ray2.normalized()))));
+    const double ratio = ray1.norm() / ray2.norm();
+    num_seen += in_image2.z() > 0 && pixel.x() >= 0 && pixel.x() <= 640 && pixel.y() >= 0 &&
+                pixel.y() <= 480 && angle_deg <= options.max_view_angle_deg &&
+                ratio <= options.max_scale_ratio && 1 / ratio <= options.max_scale_ratio;
+  }
+  return num_seen / 150.0;
+}
+
+TEST(SelectPairs, OverlapIsThePartOfTheSamplesThatTheOtherCameraSeesWellEnough) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const double max_view_angle_deg : {20.0, 60.0, 90.0, 150.0}) {
+    for (const double max_scale_ratio : {1.3, 3.5}) {
+      const FrustumOverlapOptions options = {.max_view_angle_deg = max_view_angle_deg,
+                                             .max_scale_ratio = max_scale_ratio};
+      int num_overlapping = 0;
+      for (int i = 0; i < 300; ++i) {
+        PosedCamera image = At(0, 0);
+        image.cam_from_world.rotation = Eigen::AngleAxisd(
+            2 * uniform(random), Eigen::Vector3d(uniform(random), 1, uniform(random)).normalized());
+        image.cam_from_world.translation = std::pow(10, 1.5 * uniform(random)) *
+                                           Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+        const double overlap = FrustumOverlap(At(0, 0), image, options);
+        EXPECT_DOUBLE_EQ(overlap, OverlapByDefinition(At(0, 0), image, options));
+        num_overlapping += overlap > 0;
+      }
+      EXPECT_GT(num_overlapping, 10);
+    }
+  }
 }
 
 TEST(SelectPairs, OpposedViewsOfOneWallAreNotMatched) {
