@@ -11,7 +11,7 @@
 #include "core/exif.h"
 #include "core/file.h"
 #include "core/image_file.h"
-#include "core/points_line.h"
+#include "core/image_list.h"
 #include "core/sessions.h"
 #include "core/text.h"
 
@@ -183,29 +183,16 @@ Status WriteCamerasText(const std::string& path, const std::map<CameraId, Camera
 }
 
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   std::vector<CaptureImage> images;
-  int line_number = 0;
-  bool follows_image = false;
-  for (const std::string_view line : SplitLines(contents)) {
-    ++line_number;
-    const std::vector<std::string> words = SplitWords(line);
-    // The line after an image's holds POINTS2D[] (triples of numbers) or nothing; files without it are read
-    // too.
-    const bool is_points_line = follows_image && IsPointsLine(words);
-    follows_image = false;
-    if (words.empty() || words[0][0] == '#' || is_points_line) continue;
-    Result<ModelImage> image = ParseImageLine(line);
-    if (!image.ok()) {
-      return MakeError(image.error().code, "{}:{}: {}", path, line_number, image.error().message);
-    }
-    if (const Status status = NormalizePose(&image->cam_from_world); !status.ok()) {
-      rejects->push_back({image->name, fmt::format("{}:{}: {}", path, line_number, status.error().message)});
+  CAIRN_RETURN_IF_ERROR(VisitImageList(path, [&](ListedImage listed) {
+    ModelImage& image = listed.image;
+    if (const Status status = NormalizePose(&image.cam_from_world); !status.ok()) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: {}", path, listed.line_number, status.error().message)});
     } else {
-      images.push_back({std::move(image->name), image->camera_id, image->cam_from_world});
+      images.push_back({std::move(image.name), image.camera_id, image.cam_from_world});
     }
-    follows_image = true;
-  }
+  }));
   const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
   std::stable_sort(images.begin(), images.end(), by_name);
   const auto twice = std::adjacent_find(images.begin(), images.end(),

@@ -8,11 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "core/colmap_model.h"
 #include "core/file.h"
-#include "core/points_line.h"
+#include "core/image_list.h"
 #include "core/sessions.h"
-#include "core/text.h"
 
 namespace cairn {
 namespace {
@@ -97,25 +95,12 @@ Result<CameraIds> AddCameras(const CaptureSession& session, std::map<CameraId, C
 // stand there. A camera that the session lacks becomes `no_camera`, which the joined capture lacks too.
 Status AppendImageList(const std::string& path, const CaptureSession& session, const CameraIds& cameras,
                        CameraId no_camera, int* num_images, std::string* text) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
-  int line_number = 0;
-  bool follows_image = false;
-  for (const std::string_view line : SplitLines(contents)) {
-    ++line_number;
-    const std::vector<std::string> words = SplitWords(line);
-    const bool is_points_line = follows_image && IsPointsLine(words);
-    follows_image = false;
-    if (words.empty() || words[0][0] == '#' || is_points_line) continue;
-    const Result<ModelImage> image = ParseImageLine(line);
-    if (!image.ok())
-      return MakeError(image.error().code, "{}:{}: {}", path, line_number, image.error().message);
-    const auto camera = cameras.find(image->camera_id);
+  return VisitImageList(path, [&](const ListedImage& listed) {
+    const auto camera = cameras.find(listed.image.camera_id);
     *text +=
-        fmt::format("{} {} {} {}/{}\n\n", ++*num_images, fmt::join(words.begin() + 1, words.begin() + 8, " "),
-                    camera == cameras.end() ? no_camera : camera->second, session.name, image->name);
-    follows_image = true;
-  }
-  return Ok();
+        fmt::format("{} {} {} {}/{}\n\n", ++*num_images, listed.pose_text,
+                    camera == cameras.end() ? no_camera : camera->second, session.name, listed.image.name);
+  });
 }
 
 std::string AnchorText(const GeodeticPosition& anchor) {

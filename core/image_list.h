@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "core/colmap_model.h"
+#include "core/error.h"
+
+namespace cairn {
+
+// An image as a list in COLMAP's images.txt form has it.
+struct ListedImage {
+  int line_number = 0;    // from 1 on
+  std::string pose_text;  // "QW QX QY QZ TX TY TZ", as they stand there
+  ModelImage image;       // as ParseImageLine gives it, without keypoints
+};
+
+// Calls `visit` for each image of such a list, in its order.  The line after an image's, with its keypoints
+// or empty, may be missing.  Errors: those of ReadFile and ParseImageLine, the latter with file and line.
+Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit);
+
+}  // namespace cairn
