@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <new>
@@ -101,6 +102,15 @@ Error OutOfMemory(const CommandEnvironment& environment) {
       environment.memory_mib, NumThreads(environment.num_threads));
 }
 
+// Whether it says that there is no memory, be it for a thread.
+bool IsOutOfMemory(const std::exception& exception) {
+  if (dynamic_cast<const std::bad_alloc*>(&exception) != nullptr) return true;
+  if (const auto* of_opencv = dynamic_cast<const cv::Exception*>(&exception))
+    return of_opencv->code == cv::Error::StsNoMem;
+  const auto* of_system = dynamic_cast<const std::system_error*>(&exception);
+  return of_system != nullptr && of_system->code() == std::errc::resource_unavailable_try_again;
+}
+
 Status RunCaught(const Command& command, const CommandEnvironment& environment) {
   try {
     Status status = command.run(environment);
@@ -109,18 +119,8 @@ Status RunCaught(const Command& command, const CommandEnvironment& environment) 
     if (!status.ok() && status.error().message.ends_with("SQLite says: out of memory"))
       return OutOfMemory(environment);
     return status;
-  } catch (const std::bad_alloc&) {
-    return OutOfMemory(environment);
-  } catch (const cv::Exception& exception) {
-    if (exception.code == cv::Error::StsNoMem) return OutOfMemory(environment);
-    return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
-                     exception.what());
-  } catch (const std::system_error& error) {
-    if (error.code() == std::errc::resource_unavailable_try_again)
-      return OutOfMemory(environment);  // a thread
-    return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
-                     error.what());
   } catch (const std::exception& exception) {
+    if (IsOutOfMemory(exception)) return OutOfMemory(environment);
     return MakeError(ErrorCode::kFailed, "unexpected failure: {}; please report it with the command line",
                      exception.what());
   }
