@@ -140,4 +140,14 @@ ReuseSources::Source& ReuseSources::OpenSoon(Source& source) {
   return source;
 }
 
+Result<std::vector<std::string>> AddReuseSources(const ReuseOptions& options, const std::string& output_path,
+                                                 ReuseSources* named, ReuseSources* previous) {
+  for (const std::string& file : options.files) CAIRN_RETURN_IF_ERROR(named->Add(file));
+  if (options.previous) previous->AddIfReadable(output_path);
+  std::vector<std::string> unusable = named->unusable();
+  if (previous != named)
+    unusable.insert(unusable.end(), previous->unusable().begin(), previous->unusable().end());
+  return unusable;
+}
+
 }  // namespace cairn

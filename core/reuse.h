@@ -106,4 +106,10 @@ class ReuseSources {
   std::vector<std::string> unusable_;
 };
 
+// Adds options.files to `named` and, with options.previous, what the output's last run left to `previous`;
+// the two may be the same.  Returns why what was added gives nothing, one message for each.  Errors: those of
+// ReuseSources::Add.
+Result<std::vector<std::string>> AddReuseSources(const ReuseOptions& options, const std::string& output_path,
+                                                 ReuseSources* named, ReuseSources* previous);
+
 }  // namespace cairn

@@ -153,10 +153,8 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
           .masks = masks,
           .images = reuse.shard ? ImagesOfShard(capture.images, *reuse.shard) : capture.images};
   ReuseSources& named = reuse.shard ? run.earlier.to_leave : run.earlier.to_take_over;
-  for (const std::string& file : reuse.files) CAIRN_RETURN_IF_ERROR(named.Add(file));
-  if (reuse.previous) run.earlier.to_take_over.AddIfReadable(features_path);
-  for (const ReuseSources* sources : {&run.earlier.to_leave, &run.earlier.to_take_over})
-    for (const std::string& message : sources->unusable()) run.summary.not_reused.push_back(message);
+  CAIRN_ASSIGN_OR_RETURN(run.summary.not_reused,
+                         AddReuseSources(reuse, features_path, &named, &run.earlier.to_take_over));
   run.summary.rejects = capture.rejects;
   run.summary.inputs = ListInputs(run);
   cv::setNumThreads(1);  // images are the unit of parallel work

@@ -241,10 +241,7 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
     return MakeError(ErrorCode::kNoData, "{}: {} image(s) with features, at least 2 are needed to match",
                      path, summary.num_images);
   }
-  for (const std::string& file : reuse.files) CAIRN_RETURN_IF_ERROR(run.named.Add(file));
-  if (reuse.previous) run.previous.AddIfReadable(matches_path);
-  for (const ReuseSources* sources : {&run.named, &run.previous})
-    for (const std::string& message : sources->unusable()) summary.not_reused.push_back(message);
+  CAIRN_ASSIGN_OR_RETURN(summary.not_reused, AddReuseSources(reuse, matches_path, &run.named, &run.previous));
   cv::setNumThreads(1);  // pairs are the unit of parallel work
   summary.pairs = inputs.pair_list_path.empty() ? ChooseMethod(*images, options) : "list";
   CAIRN_RETURN_IF_ERROR(reuse.shard ? WriteShard(matches_path, &run) : WriteMatches(matches_path, &run));
