@@ -1,5 +1,6 @@
 #include "runtime/map.h"
 
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -42,8 +43,8 @@ Map::Map(MapRows rows) : head_(rows), cache_(std::numeric_limits<int64_t>::max()
   for (const BlockEntry& entry : layout_->entries()) directory_.Add(entry);
 }
 
-template <typename Block, typename Decode, typename Make>
-Result<std::shared_ptr<const Block>> Map::Load(BlockKind kind, int64_t ordinal, const Decode& decode,
+template <typename Block, typename Make>
+Result<std::shared_ptr<const Block>> Map::Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
                                                const Make& make) const {
   const int64_t block = directory_.Block(kind, ordinal);
   if (auto found = cache_.Find(block)) return std::static_pointer_cast<const Block>(found);
@@ -51,76 +52,47 @@ Result<std::shared_ptr<const Block>> Map::Load(BlockKind kind, int64_t ordinal, 
   std::shared_ptr<const Block> loaded;
   if (file_) {
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, file_->ReadBlock(block));
-    CAIRN_ASSIGN_OR_RETURN(Block decoded, decode(bytes, entry, file_->NameOf(block)));
+    CAIRN_ASSIGN_OR_RETURN(Block decoded, decode(bytes, entry, directory_, file_->NameOf(block)));
     loaded = std::make_shared<const Block>(std::move(decoded));
   } else {
-    loaded = std::make_shared<const Block>(make(entry));
+    loaded = std::make_shared<const Block>(std::invoke(make, *layout_, entry));
   }
   const int64_t num_bytes = NumBytes(*loaded);
   return std::static_pointer_cast<const Block>(cache_.Insert(block, std::move(loaded), num_bytes));
 }
 
 Result<std::shared_ptr<const LandmarkBlock>> Map::Landmarks(int64_t ordinal) const {
-  return Load<LandmarkBlock>(
-      BlockKind::kLandmarks, ordinal,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeLandmarkBlock(bytes, entry, directory_, what);
-      },
-      [&](const auto& entry) { return layout_->MakeLandmarkBlock(entry); });
+  return Load(BlockKind::kLandmarks, ordinal, DecodeLandmarkBlock, &MapLayout::MakeLandmarkBlock);
 }
 
 Result<std::shared_ptr<const ImageBlock>> Map::Images(int64_t ordinal) const {
-  return Load<ImageBlock>(
-      BlockKind::kImages, ordinal,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeImageBlock(bytes, entry, directory_, what);
-      },
-      [&](const auto& entry) { return layout_->MakeImageBlock(entry); });
+  return Load(BlockKind::kImages, ordinal, DecodeImageBlock, &MapLayout::MakeImageBlock);
 }
 
 Result<std::shared_ptr<const StationBlock>> Map::Stations(int64_t ordinal) const {
-  return Load<StationBlock>(
-      BlockKind::kStations, ordinal,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeStationBlock(bytes, entry, directory_, what);
-      },
-      [&](const auto& entry) { return layout_->MakeStationBlock(entry); });
+  return Load(BlockKind::kStations, ordinal, DecodeStationBlock, &MapLayout::MakeStationBlock);
 }
 
 Result<std::shared_ptr<const RegionBlock>> Map::Regions(int64_t ordinal) const {
-  return Load<RegionBlock>(
-      BlockKind::kRegions, ordinal,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeRegionBlock(bytes, entry, directory_, what);
-      },
-      [&](const auto& entry) { return layout_->MakeRegionBlock(entry); });
+  return Load(BlockKind::kRegions, ordinal, DecodeRegionBlock, &MapLayout::MakeRegionBlock);
 }
 
 Result<std::shared_ptr<const WordBlock>> Map::Words(int64_t ordinal) const {
-  return Load<WordBlock>(
-      BlockKind::kWords, ordinal,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeWordBlock(bytes, entry, directory_, what);
-      },
-      [&](const auto& entry) { return layout_->MakeWordBlock(entry); });
+  return Load(BlockKind::kWords, ordinal, DecodeWordBlock, &MapLayout::MakeWordBlock);
 }
 
 Result<std::shared_ptr<const Vocabulary>> Map::VocabularyTree() const {
-  return Load<Vocabulary>(
-      BlockKind::kVocabularyTree, 0,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
-        return DecodeVocabularyTree(bytes, entry, directory_, what);
-      },
-      [&](const auto&) { return rows_->vocabulary; });
+  return Load(BlockKind::kVocabularyTree, 0, DecodeVocabularyTree,
+              [&](const auto&, const auto&) { return rows_->vocabulary; });
 }
 
 Result<std::shared_ptr<const std::vector<float>>> Map::DocumentNorms() const {
   return Load<std::vector<float>>(
       BlockKind::kDocumentNorms, 0,
-      [&](const auto& bytes, const auto& entry, const auto& what) {
+      [](std::string_view bytes, const BlockEntry& entry, const MapDirectory&, const std::string& what) {
         return DecodeDocumentNorms(bytes, entry, what);
       },
-      [&](const auto&) { return layout_->MakeDocumentNorms(); });
+      [](const MapLayout& layout, const auto&) { return layout.MakeDocumentNorms(); });
 }
 
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -69,8 +70,12 @@ class Map {
  private:
   explicit Map(MapFile file, int64_t memory_budget_bytes);
   explicit Map(MapRows rows);
-  template <typename Block, typename Decode, typename Make>
-  Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, const Decode& decode,
+  template <typename Block>
+  using Decoder = Result<Block>(std::string_view bytes, const BlockEntry& entry,
+                                const MapDirectory& directory, const std::string& what);
+  // From the cache; else decoded from the file, or made of the rows.
+  template <typename Block, typename Make>
+  Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
                                             const Make& make) const;
 
   MapHead head_;
