@@ -26,6 +26,9 @@ int64_t FewestBytes(BlockKind kind) {
   return 1;
 }
 
+// As MapDirectory::Encode writes an entry: kind; first, count, number of bytes; hash; two corners.
+constexpr size_t kEntryBytes = sizeof(uint8_t) + 3 * sizeof(uint32_t) + sizeof(Hash) + 6 * sizeof(float);
+
 bool IsKnown(uint8_t kind) { return kind >= 1 && kind < kNumBlockKinds; }
 
 }  // namespace
@@ -86,7 +89,7 @@ std::string MapDirectory::Encode() const {
 Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_num_bytes) {
   BlobReader reader(bytes);
   MapDirectory directory;
-  directory.blocks_.reserve(bytes.size() / 69);
+  directory.blocks_.reserve(bytes.size() / kEntryBytes);
   int64_t num_bytes = 0;
   while (reader.num_left() > 0 && reader.ok()) {
     BlockEntry entry;
