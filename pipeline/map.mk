@@ -135,7 +135,8 @@ CAIRN_NO_SPACE_CHECK = $(if $(filter no,$(SPACE_CHECK)),--no-space-check)
 
 # Shards.  Each takes over what the output's last version and the shards of earlier rounds know, does its share of the
 # rest, and leaves X-ROUND-IofN.db; done, it stays done when others are killed.  Then the stage itself takes all of them
-# over, does what is missing and removes them.  They are SECONDARY: without them nothing is out of date.
+# over, does what is missing and removes them, and those of an earlier SHARDS.  They are SECONDARY: without them nothing
+# is out of date.
 CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
 # $(call CAIRN_SHARD_STAMPS,X,ROUNDS)
 CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp))
@@ -149,7 +150,7 @@ $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(
 	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
 endef
 CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
-CAIRN_REMOVE_SHARDS = $(if $(SHARD_STAMPS),rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*)
+CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
 
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp

@@ -214,6 +214,16 @@ TEST_F(MakeGraph, BuildFolderOfAnotherProgramIsMadeAgainNotRead) {
   EXPECT_EQ(Hash("older.cairn"), Hash("tiny.cairn"));
 }
 
+TEST_F(MakeGraph, RunInOnePartRemovesWhatAKilledOneInPartsLeft) {
+  const std::vector<std::string> outputs = {Path("tiny.build/features"), Path("tiny.build/matches")};
+  for (const std::string& output : outputs) {
+    std::ofstream(output + "-1-1of6.db") << "a shard";
+    fs::remove(output + ".db.stamp");
+  }
+  EXPECT_EQ(Compile("tiny").exit_code, 0);
+  for (const std::string& output : outputs) EXPECT_FALSE(fs::exists(output + "-1-1of6.db")) << output;
+}
+
 // Compiles with a launcher that runs `change` beside the first stage: before, or after it has read the
 // images.
 class ChangingCapture : public MakeGraph {
