@@ -149,6 +149,11 @@ $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(
 	$$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$(SHARDS) $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
 	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
 endef
+# What the first round waits for: shards of other inputs are gone.
+.SECONDARY: $(BUILD)/features.begun $(BUILD)/matches.begun
+$(BUILD)/features.begun $(BUILD)/matches.begun:
+	rm -f $(@:.begun=)-*of*
+	touch $@
 CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
 CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
 
@@ -187,10 +192,7 @@ FEATURES_INPUTS := $(BUILD)/options/extract_features.toml $(BUILD)/options/captu
     $(CAPTURE_LISTS) $(CAPTURE_IMAGES)
 FEATURES_SHARDS := $(call CAIRN_SHARD_STAMPS,features,1)
 $(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call CAIRN_SHARD_RULE,features,1,$(shard),CAIRN_EXTRACT,)))
-.SECONDARY: $(BUILD)/features.begun
 $(BUILD)/features.begun: $(FEATURES_INPUTS)
-	rm -f $(@:.begun=)-*of*
-	touch $@
 
 $(BUILD)/features.db.stamp: SHARD_STAMPS := $(FEATURES_SHARDS)
 $(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
@@ -207,14 +209,11 @@ CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(CAIRN_NO_S
     --options $(@D)/options/match_features.toml
 MATCHES_INPUTS := $(BUILD)/features.db $(BUILD)/options/match_features.toml $(BUILD)/options/seed $(PROGRAM_HASH) \
     $(CAPTURE_STAMP) $(CAPTURE_LISTS) $(PAIRS_VOCABULARY)
-MATCHES_ROUNDS := $(shell seq $(SHARD_ROUNDS))
+MATCHES_ROUNDS := $(if $(CAIRN_SHARD_NUMBERS),$(shell seq $(SHARD_ROUNDS)))
 MATCHES_SHARDS := $(call CAIRN_SHARD_STAMPS,matches,$(MATCHES_ROUNDS))
 $(foreach round,$(MATCHES_ROUNDS),$(foreach shard,$(CAIRN_SHARD_NUMBERS),$(eval $(call \
-    CAIRN_SHARD_RULE,matches,$(round),$(shard),CAIRN_MATCH,$(shell seq 1 $$(($(round) - 1)))))))
-.SECONDARY: $(BUILD)/matches.begun
+    CAIRN_SHARD_RULE,matches,$(round),$(shard),CAIRN_MATCH,$(wordlist 2,$(round),0 $(MATCHES_ROUNDS))))))
 $(BUILD)/matches.begun: $(MATCHES_INPUTS)
-	rm -f $(@:.begun=)-*of*
-	touch $@
 
 $(BUILD)/matches.db.stamp: SHARD_STAMPS := $(MATCHES_SHARDS)
 $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
