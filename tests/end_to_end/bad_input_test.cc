@@ -20,9 +20,7 @@ class BadInput : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder("bad_input_test");
-    WriteTinyRecipe(*folder_ / "tiny.toml");
-    const ProgramRun run = RunShell("cairn simulate " + Path("tiny.toml") + " -o " + Path("survey"));
-    ASSERT_EQ(run.exit_code, 0) << run.err;
+    ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(Path("survey")));
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -30,9 +28,7 @@ class BadInput : public testing::Test {
   }
   void SetUp() override {
     CopyCapture(Path("survey"), Path("capture"), 12);
-    ASSERT_TRUE(WriteFileAtomically(Path("bad.toml"),
-                                    "name = \"bad\"\n[[capture]]\npath = \"capture\"\n" + TinyStageOptions())
-                    .ok());
+    WriteCaptureRecipe(Path("bad.toml"), {"capture"});
   }
   void TearDown() override {
     for (const char* name : {"capture", "bad.build", "bad.cairn"}) fs::remove_all(Path(name));

@@ -25,10 +25,7 @@ class Cluster : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>("cluster_test");
-    WriteTinyRecipe(*folder_ / "tiny.toml");
-    const ProgramRun rendered = RunShell(fmt::format("cairn compile {} -o {} --until simulate",
-                                                     *folder_ / "tiny.toml", *folder_ / "tiny.cairn"));
-    ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
+    ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(*folder_ / "survey"));
     WriteRecipe("capture.toml", "k = 4");
     const ProgramRun local =
         RunShell(fmt::format("cairn compile {} -o {}", *folder_ / "capture.toml", *folder_ / "local.cairn"));
@@ -42,8 +39,7 @@ class Cluster : public testing::Test {
   }
 
   static void WriteRecipe(const std::string& name, const std::string& k) {
-    std::ofstream(*folder_ / name) << "name = \"tiny\"\n[[capture]]\npath = \"tiny.build/capture\"\n"
-                                   << TinyStageOptions();
+    WriteCaptureRecipe(*folder_ / name, {"survey"});
     ReplaceInFile(*folder_ / name, "k = 4", k);
   }
 

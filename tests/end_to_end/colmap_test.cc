@@ -20,9 +20,7 @@ class Colmap : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder("colmap_test");
-    WriteTinyRecipe(*folder_ / "tiny.toml");
-    const ProgramRun run = RunShell("cairn simulate " + Path("tiny.toml") + " -o " + Path("survey"));
-    ASSERT_EQ(run.exit_code, 0) << run.err;
+    ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(Path("survey")));
     CopyCapture(Path("survey"), Path("capture"), 40);
   }
   static void TearDownTestSuite() {

@@ -27,11 +27,8 @@ class MakeGraph : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder("make_graph_test");
-    WriteTinyRecipe(Path("simulated.toml"));
-    const ProgramRun simulated = RunShell("cairn compile " + Path("simulated.toml") + " -o " +
-                                          Path("simulated.cairn --until simulate"));
-    ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
-    CopyCapture(Path("simulated.build/capture"), Path("survey"), kNumImages);
+    ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(Path("simulated")));
+    CopyCapture(Path("simulated"), Path("survey"), kNumImages);
     WriteRecipe("tiny.toml", "survey");
     const ProgramRun run = Compile("tiny");
     ASSERT_EQ(run.exit_code, 0) << run.err;
@@ -45,8 +42,7 @@ class MakeGraph : public testing::Test {
   static std::string Path(const std::string& name) { return *folder_ / name; }
 
   static void WriteRecipe(const std::string& name, const std::string& capture) {
-    std::ofstream(Path(name)) << "name = \"tiny\"\n[[capture]]\npath = \"" << capture << "\"\n"
-                              << TinyStageOptions();
+    WriteCaptureRecipe(Path(name), {capture});
   }
 
   static ProgramRun Compile(const std::string& stem, const std::string& arguments = "") {

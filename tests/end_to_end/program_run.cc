@@ -70,6 +70,20 @@ num_queries = 6
                       << more;
 }
 
+void WriteCaptureRecipe(const std::string& path, const std::vector<std::string>& captures) {
+  std::ofstream recipe(path);
+  recipe << "name = \"tiny\"\n";
+  for (const std::string& capture : captures) recipe << "[[capture]]\npath = \"" << capture << "\"\n";
+  recipe << TinyStageOptions();
+}
+
+void RenderTinySurvey(const std::string& capture, const std::string& simulate_arguments) {
+  WriteTinyRecipe(capture + ".toml");
+  const ProgramRun run =
+      RunShell("cairn simulate " + capture + ".toml -o " + capture + " " + simulate_arguments);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+}
+
 void CopyCapture(const std::string& capture, const std::string& copy, int num_images) {
   fs::create_directories(copy + "/images");
   fs::copy_file(capture + "/cameras.txt", copy + "/cameras.txt", fs::copy_options::overwrite_existing);

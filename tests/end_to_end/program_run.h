@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace cairn {
 
@@ -34,6 +35,13 @@ void WriteTinyRecipe(const std::string& path, const std::string& more = "");
 
 // The part of WriteTinyRecipe that follows [simulate]: options that suit so small a survey.
 std::string TinyStageOptions();
+
+// Writes a recipe with TinyStageOptions for captures that exist; their paths may be relative to the recipe's.
+void WriteCaptureRecipe(const std::string& path, const std::vector<std::string>& captures);
+
+// Renders the survey of WriteTinyRecipe into the folder `capture`; the recipe stays beside it, CAPTURE.toml.
+// A failure is a fatal one of the test.
+void RenderTinySurvey(const std::string& capture, const std::string& simulate_arguments = "");
 
 // A copy of the survey of `capture` with its first `num_images` images only, and no queries.
 void CopyCapture(const std::string& capture, const std::string& copy, int num_images);

@@ -40,14 +40,8 @@ class Sessions : public testing::Test {
 
   // Keeps the survey images whose place is even or odd, and the queries of the same kind.
   static void WriteSurvey(const std::string& name, int image_width_px, int parity) {
-    const std::string recipe = Path(name + ".sim.toml");
-    WriteTinyRecipe(recipe);
-    ReplaceInFile(recipe, "image_width_px = 320", "image_width_px = " + std::to_string(image_width_px));
-    const std::string out = Path(name + ".sim");
-    const ProgramRun run =
-        RunShell("cairn compile " + recipe + " -o " + out + ".cairn --progress none --until simulate");
-    ASSERT_EQ(run.exit_code, 0) << run.err;
-    fs::rename(out + ".build/capture", Path(name));
+    ASSERT_NO_FATAL_FAILURE(
+        RenderTinySurvey(Path(name), "--image-width-px " + std::to_string(image_width_px)));
     for (const char* list : {"images.txt", "queries.txt"}) {
       const std::string path = Path(name) + "/" + list;
       std::vector<Reject> rejects;
@@ -60,10 +54,7 @@ class Sessions : public testing::Test {
   }
 
   static void WriteRecipe(const std::string& name, const std::vector<std::string>& captures) {
-    std::ofstream recipe(Path(name));
-    recipe << "name = \"tiny\"\n";
-    for (const std::string& capture : captures) recipe << "[[capture]]\npath = \"" << capture << "\"\n";
-    recipe << TinyStageOptions();
+    WriteCaptureRecipe(Path(name), captures);
   }
 
   static ProgramRun Compile(const std::string& recipe, const std::string& map, const std::string& more = "") {

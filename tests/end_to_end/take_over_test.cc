@@ -20,11 +20,8 @@ class TakeOver : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder("take_over_test");
-    WriteTinyRecipe(Path("simulated.toml"));
-    const ProgramRun simulated = RunShell("cairn compile " + Path("simulated.toml") + " -o " +
-                                          Path("simulated.cairn --until simulate"));
-    ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
-    CopyCapture(Path("simulated.build/capture"), Path("survey"), 24);
+    ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(Path("simulated")));
+    CopyCapture(Path("simulated"), Path("survey"), 24);
   }
   static void TearDownTestSuite() {
     delete folder_;
