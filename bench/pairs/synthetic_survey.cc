@@ -1,15 +1,10 @@
 // Writes a survey of many images for measuring memory, features.db and capture: a camera that moves sideways
 // along a wall of random points, each with its own random descriptor, so that neighbours match and distant
-// images do not.  The image files are empty: only stages after extraction can read the survey.
+// images do not.
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <string>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
+#include "bench/survey_writer.h"
 #include "core/random.h"
 
 namespace cairn {
@@ -37,43 +32,20 @@ Features MakeFeatures(int64_t first_point, int num_features, const Camera& camer
 }
 
 Status WriteSyntheticSurvey(const std::string& folder, int num_images, int num_features) {
-  Camera camera;
-  camera.model = CameraModel::kPinhole;
-  camera.width = 640;
-  camera.height = 480;
-  camera.params = {500, 500, 320, 240};
-  std::filesystem::create_directories(folder + "/images");
-  std::vector<CaptureImage> images;
-  CAIRN_RETURN_IF_ERROR(
-      WriteDatabase(folder + "/features.db", kColmapSchema, [&](SQLite::Database& database) {
-        WriteDatabaseCamera(database, camera);
-        for (int i = 0; i < num_images; ++i) {
-          const auto image_id = static_cast<ImageId>(i + 1);
-          const std::string name = fmt::format("{:06}.png", i);
-          Pose cam_from_world;
-          cam_from_world.translation.x() = -kStep_m * i;
-          images.push_back({name, camera.camera_id, cam_from_world});
-          std::ofstream(folder + "/images/" + name).flush();
-          WriteDatabaseImage(database, {image_id, name, camera.camera_id});
-          WriteDatabaseFeatures(
-              database, image_id,
-              MakeFeatures(int64_t{i} * num_features / kNumStepsPerView, num_features, camera));
-        }
-        return Ok();
-      }));
-  CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", {{camera.camera_id, camera}}));
-  return WriteImagesText(folder + "/images.txt", images);
+  const Camera camera = InventedCamera(500);
+  return WriteInventedSurvey(folder, camera, num_images, [&](int i) {
+    InventedImage image;
+    image.name = fmt::format("{:06}.png", i);
+    image.cam_from_world.translation.x() = -kStep_m * i;
+    image.features = MakeFeatures(int64_t{i} * num_features / kNumStepsPerView, num_features, camera);
+    return image;
+  });
 }
 
 }  // namespace
 }  // namespace cairn
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    std::fprintf(stderr, "usage: synthetic_survey FOLDER NUM_IMAGES NUM_FEATURES\n");
-    return 2;
-  }
-  const cairn::Status status = cairn::WriteSyntheticSurvey(argv[1], std::atoi(argv[2]), std::atoi(argv[3]));
-  if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
-  return status.ok() ? 0 : 1;
+  return cairn::WriteSurveyOfArguments(argc, argv, "synthetic_survey FOLDER NUM_IMAGES NUM_FEATURES",
+                                       cairn::WriteSyntheticSurvey);
 }

@@ -4,20 +4,16 @@
 // Rooms of 7 m x 7 m stand in a row.  A room's survey is a lattice of 12 x 12 stations, 0.5 m apart, with a
 // camera of 90 degrees in each of four headings, so that a room has 576 images.  Its walls bear points, each
 // with its size and its own random descriptor; an image has those that lie within its frustum, at an angle
-// and a distance at which SIFT would find them, with noise on place and descriptor.  The image files are
-// empty: only stages after extraction can read the survey.
+// and a distance at which SIFT would find them, with noise on place and descriptor.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
+#include "bench/survey_writer.h"
 #include "core/random.h"
 
 namespace cairn {
@@ -115,49 +111,26 @@ Features SeeRoom(const std::vector<WallPoint>& points, const Pose& cam_from_worl
 }
 
 Status WriteSyntheticBuilding(const std::string& folder, int num_images, int num_features) {
-  Camera camera;
-  camera.model = CameraModel::kPinhole;
-  camera.width = 640;
-  camera.height = 480;
-  camera.params = {320, 320, 320, 240};
-  std::filesystem::create_directories(folder + "/images");
-  std::vector<CaptureImage> images;
+  const Camera camera = InventedCamera(320);
   int64_t num_keypoints = 0;
-  CAIRN_RETURN_IF_ERROR(
-      WriteDatabase(folder + "/features.db", kColmapSchema, [&](SQLite::Database& database) {
-        WriteDatabaseCamera(database, camera);
-        std::vector<WallPoint> points;
-        for (int i = 0; i < num_images; ++i) {
-          const int room = i / kImagesPerRoom, in_room = i % kImagesPerRoom;
-          if (in_room == 0) points = MakeRoom(room, num_features * kPointsPerFeature);
-          const auto image_id = static_cast<ImageId>(i + 1);
-          const std::string name = fmt::format("{:07}.png", i);
-          const Pose pose = StationPose(room, in_room / kNumHeadings, in_room % kNumHeadings);
-          images.push_back({name, camera.camera_id, pose});
-          std::ofstream(folder + "/images/" + name).flush();
-          WriteDatabaseImage(database, {image_id, name, camera.camera_id});
-          const Features features =
-              SeeRoom(points, pose, camera, num_features, MixSeed(1, static_cast<uint64_t>(i)));
-          num_keypoints += static_cast<int64_t>(features.keypoints.size());
-          WriteDatabaseFeatures(database, image_id, features);
-        }
-        return Ok();
-      }));
-  CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", {{camera.camera_id, camera}}));
+  std::vector<WallPoint> points;
+  CAIRN_RETURN_IF_ERROR(WriteInventedSurvey(folder, camera, num_images, [&](int i) {
+    const int room = i / kImagesPerRoom, in_room = i % kImagesPerRoom;
+    if (in_room == 0) points = MakeRoom(room, num_features * kPointsPerFeature);
+    const Pose pose = StationPose(room, in_room / kNumHeadings, in_room % kNumHeadings);
+    Features features = SeeRoom(points, pose, camera, num_features, MixSeed(1, static_cast<uint64_t>(i)));
+    num_keypoints += static_cast<int64_t>(features.keypoints.size());
+    return InventedImage{fmt::format("{:07}.png", i), pose, std::move(features)};
+  }));
   std::printf("%d images, %.0f features an image\n", num_images,
               static_cast<double>(num_keypoints) / num_images);
-  return WriteImagesText(folder + "/images.txt", images);
+  return Ok();
 }
 
 }  // namespace
 }  // namespace cairn
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    std::fprintf(stderr, "usage: synthetic_building FOLDER NUM_IMAGES MAX_NUM_FEATURES\n");
-    return 2;
-  }
-  const cairn::Status status = cairn::WriteSyntheticBuilding(argv[1], std::atoi(argv[2]), std::atoi(argv[3]));
-  if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
-  return status.ok() ? 0 : 1;
+  return cairn::WriteSurveyOfArguments(argc, argv, "synthetic_building FOLDER NUM_IMAGES MAX_NUM_FEATURES",
+                                       cairn::WriteSyntheticBuilding);
 }
