@@ -23,32 +23,20 @@ constexpr int kLandmarksPerRoom = 1600;
 constexpr int kRoomsPerRow = 64;
 constexpr int kNumHeadings = 8;
 
-// Landmarks of a room of 10 m x 8 m x 3 m, the same for the same number.
+// World frame, metres.
+Eigen::Vector3d RoomOrigin(int room_number) {
+  return {12.0 * (room_number % kRoomsPerRow), 10.0 * (room_number / kRoomsPerRow), 0};
+}
+
+// The same room for the same number.
 SyntheticRoom MakeRoom(int room_number) {
-  SyntheticRoom room;
-  Random random(MixSeed(1, room_number));
-  const Eigen::Vector3d corner(12.0 * (room_number % kRoomsPerRow), 10.0 * (room_number / kRoomsPerRow), 0);
-  room.descriptors.resize(kLandmarksPerRoom, kDescriptorDim);
-  for (int i = 0; i < kLandmarksPerRoom; ++i) {
-    const double z = random.Uniform(0, 3), along = random.Uniform(-1, 1), depth = random.Uniform(0, 0.3);
-    const Eigen::Vector3d walls[] = {{5 - depth, 4 * along, z},
-                                     {5 * along, 4 - depth, z},
-                                     {-5 + depth, 4 * along, z},
-                                     {5 * along, -4 + depth, z}};
-    room.points.push_back(corner + walls[i % 4]);
-    room.descriptors.row(i) = RandomDescriptor(random);
-  }
-  room.camera.camera_id = 1;
-  room.camera.model = CameraModel::kSimpleRadial;
-  room.camera.width = 640;
-  room.camera.height = 480;
-  room.camera.params = {500, 320, 240, -0.05};
+  SyntheticRoom room = MakeUnmappedRoom(MixSeed(1, room_number), kLandmarksPerRoom);
+  for (Eigen::Vector3d& point : room.points) point += RoomOrigin(room_number);
   return room;
 }
 
 Pose RoomPose(int room_number, double x, double y, double heading_deg) {
-  return PoseAt({12.0 * (room_number % kRoomsPerRow) + x, 10.0 * (room_number / kRoomsPerRow) + y, 1.2},
-                heading_deg);
+  return PoseAt(RoomOrigin(room_number) + Eigen::Vector3d(x, y, 1.2), heading_deg);
 }
 
 // Six places with eight headings each; a region per heading.

@@ -89,26 +89,18 @@ inline Features RenderFeatures(const SyntheticRoom& room, const Pose& cam_from_w
   return features;
 }
 
-inline SyntheticRoom MakeSyntheticRoom(uint64_t seed, int num_landmarks = 1600) {
+// The room without a survey: landmarks and camera.
+inline SyntheticRoom MakeUnmappedRoom(uint64_t seed, int num_landmarks) {
   SyntheticRoom room;
   Random random(seed);
   room.descriptors.resize(num_landmarks, kDescriptorDim);
   for (int i = 0; i < num_landmarks; ++i) {
     const double z = random.Uniform(0, 3), along = random.Uniform(-1, 1), depth = random.Uniform(0, 0.3);
-    switch (i % 4) {
-      case 0:
-        room.points.emplace_back(5 - depth, 4 * along, z);
-        break;
-      case 1:
-        room.points.emplace_back(5 * along, 4 - depth, z);
-        break;
-      case 2:
-        room.points.emplace_back(-5 + depth, 4 * along, z);
-        break;
-      default:
-        room.points.emplace_back(5 * along, -4 + depth, z);
-        break;
-    }
+    const Eigen::Vector3d walls[] = {{5 - depth, 4 * along, z},
+                                     {5 * along, 4 - depth, z},
+                                     {-5 + depth, 4 * along, z},
+                                     {5 * along, -4 + depth, z}};
+    room.points.push_back(walls[i % 4]);
     room.descriptors.row(i) = RandomDescriptor(random);
   }
   room.camera.camera_id = 1;
@@ -116,7 +108,11 @@ inline SyntheticRoom MakeSyntheticRoom(uint64_t seed, int num_landmarks = 1600) 
   room.camera.width = 640;
   room.camera.height = 480;
   room.camera.params = {500, 320, 240, -0.05};
+  return room;
+}
 
+inline SyntheticRoom MakeSyntheticRoom(uint64_t seed, int num_landmarks = 1600) {
+  SyntheticRoom room = MakeUnmappedRoom(seed, num_landmarks);
   MapRows& rows = room.rows;
   rows.name = "room";
   rows.writer = "cairn test";
