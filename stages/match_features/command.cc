@@ -89,8 +89,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                              {"matches", summary.num_inliers}};
   environment.report->taken_over = {{"pairs", summary.num_taken_over}};
   AddDropped("images", {{"no features", summary.num_without_features}}, environment.report);
-  AddDropped("pairs", {{"not verified", summary.num_pairs_tried - summary.num_pairs_verified}},
-             environment.report);
+  AddDropped("pairs", summary.dropped_pairs, environment.report);
   Print(summary, reuse, *environment.out);
   return Ok();
 }

@@ -5,6 +5,7 @@
 
 #include "core/capture.h"
 #include "core/error.h"
+#include "core/feature_class.h"
 #include "core/options.h"
 #include "core/progress.h"
 #include "core/reuse.h"
@@ -62,6 +63,7 @@ struct MatchFeaturesSummary {
   int64_t num_pairs_verified = 0;
   int64_t num_putative = 0;  // matches before verification
   int64_t num_inliers = 0;
+  DropCounts dropped_pairs;    // of those tried: why they were not verified (core/drop_reason.h)
   std::string pairs;           // how pairs were chosen
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
   int num_rounds = 0;          // of pairs; after a shard's last one the pairs of the next are not known yet

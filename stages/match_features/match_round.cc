@@ -46,8 +46,10 @@ Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, Pai
   ++summary.num_pairs_tried;
   summary.num_putative += result.num_putative;
   if (result.geometry.inliers.empty()) {
+    const DropReason reason = ReasonOf(result, run->options.matching.verification);
+    ++summary.dropped_pairs[DescribeDropReason(reason).name];
     run->dropped_pairs.push_back(
-        {.reason = ReasonOf(result, run->options.matching.verification),
+        {.reason = reason,
          .item_id = PairIdFromImageIds(result.geometry.image_id1, result.geometry.image_id2),
          .found = result.num_putative});
     return Ok();
