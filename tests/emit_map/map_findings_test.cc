@@ -13,12 +13,14 @@
 namespace cairn {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 // Two regions, three stations.
 MapRows RowsWithFindings() {
   const EmitExample example = MakeEmitExample();
-  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {});
+  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                      {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
   rows.findings.drops = {{1, "extract_features", "image", "unreadable", "cannot be read", 3, {}},
@@ -78,6 +80,17 @@ TEST(MapFindings, DamagedRowsAreRefused) {
     EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
     std::filesystem::remove(MapPath("damaged.cairn"));
   }
+}
+
+// Version 2.1 as the program of that version wrote the rows above.
+TEST(GoldenMap, Version2_1IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.1.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->findings, RowsWithFindings().findings);
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(rows->descriptors(1, 0), 30);
+  EXPECT_EQ(rows->vocabulary.num_words(), 1);
 }
 
 TEST(MapFindings, MapWithoutTheTablesHasNone) {
