@@ -77,8 +77,9 @@ Result<CameraIds> AddCameras(const CaptureSession& session, std::map<CameraId, C
   CameraIds ids;
   for (const auto& [camera_id, camera] : cameras) {
     const auto key = [](const Camera& c) { return std::tie(c.model, c.width, c.height, c.params); };
-    const auto equal = std::find_if(joined->begin(), joined->end(),
-                                    [&](const auto& entry) { return key(entry.second) == key(camera); });
+    const auto equal =
+        std::find_if(joined->begin(), joined->end(),
+                     [&, wanted = key(camera)](const auto& entry) { return key(entry.second) == wanted; });
     if (equal != joined->end()) {
       ids[camera_id] = equal->first;
       continue;
