@@ -13,17 +13,12 @@
 
 #include "core/content_hash.h"
 #include "core/temporary.h"
+#include "core/write_error.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Code of a failed write.
-ErrorCode CodeOfErrno(int error) {
-  if (error == ENOSPC || error == EDQUOT) return ErrorCode::kDiskFull;
-  return error == EACCES || error == EROFS || error == EPERM ? ErrorCode::kReadOnly : ErrorCode::kIo;
-}
 
 Status SyncPath(const std::string& path, int flags) {
   const int fd = open(path.c_str(), flags | O_CLOEXEC);
@@ -32,7 +27,7 @@ Status SyncPath(const std::string& path, int flags) {
   const int rc = fsync(fd);
   const int error = errno;
   close(fd);
-  if (rc != 0) return MakeError(CodeOfErrno(error), "{}: cannot be synced: {}", path, std::strerror(error));
+  if (rc != 0) return WriteError(path, "cannot be synced", error);
   return Ok();
 }
 
@@ -80,8 +75,7 @@ Status ReplaceFileAtomically(const std::string& path,
   if (fs::is_directory(target, error))
     return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
   if (access(folder.c_str(), W_OK) != 0) {
-    return MakeError(CodeOfErrno(errno), "{}: the folder {} may not be written: {}", path, folder.string(),
-                     std::strerror(errno));
+    return WriteError(path, fmt::format("the folder {} may not be written", folder.string()), errno);
   }
   const std::string temporary = TemporaryPath(path);
   fs::remove(temporary, error);
@@ -92,7 +86,7 @@ Status ReplaceFileAtomically(const std::string& path,
   }
   if (status.ok()) status = SyncPath(temporary, O_RDONLY);
   if (status.ok() && std::rename(temporary.c_str(), path.c_str()) != 0) {
-    status = MakeError(CodeOfErrno(errno), "{}: cannot be replaced: {}", path, std::strerror(errno));
+    status = WriteError(path, "cannot be replaced", errno);
   }
   if (!status.ok()) {
     for (const char* suffix : {"", "-journal", "-wal", "-shm"}) fs::remove(temporary + suffix, error);
@@ -106,11 +100,7 @@ Status WriteFileAtomically(const std::string& path, std::string_view contents) {
     std::ofstream file(temporary, std::ios::binary);
     file.write(contents.data(), static_cast<std::streamsize>(contents.size()));
     file.close();
-    if (!file) {
-      return MakeError(CodeOfErrno(errno),
-                       "{}: cannot be written: {}; is the disk full or the folder read-only?", path,
-                       std::strerror(errno));
-    }
+    if (!file) return WriteError(path, "cannot be written", errno);
     return Ok();
   });
 }

@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 
 #include "core/temporary.h"
+#include "core/write_error.h"
 
 namespace cairn {
 namespace {
@@ -23,18 +23,17 @@ Status ReplaceFolder(const std::string& temporary, const std::string& path) {
   const int fd = open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const int synced = fd < 0 ? -1 : syncfs(fd);
   if (fd >= 0) close(fd);
-  if (synced != 0)
-    return MakeError(ErrorCode::kIo, "{}: cannot be synced: {}", temporary, std::strerror(errno));
+  if (synced != 0) return WriteError(temporary, "cannot be synced", errno);
   std::error_code error;
   if (!fs::exists(path, error)) {
     if (std::rename(temporary.c_str(), path.c_str()) == 0) return Ok();
-    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", path, std::strerror(errno));
+    return WriteError(path, "cannot be created", errno);
   }
   if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) != 0) {
     // File systems that cannot exchange: the old folder steps aside first.
     const std::string aside = temporary + "-old";
     if (std::rename(path.c_str(), aside.c_str()) != 0 || std::rename(temporary.c_str(), path.c_str()) != 0) {
-      return MakeError(ErrorCode::kIo, "{}: cannot be replaced: {}", path, std::strerror(errno));
+      return WriteError(path, "cannot be replaced", errno);
     }
     fs::remove_all(aside, error);
   }
@@ -92,7 +91,7 @@ Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
   std::error_code error;
   fs::remove_all(temporary, error);
   if (!fs::create_directories(temporary, error)) {
-    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", temporary, error.message());
+    return WriteError(temporary, "cannot be created", error.value());
   }
   Status status = write(temporary);
   if (status.ok()) status = ReplaceFolder(temporary, target);

@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "core/image_list.h"
 #include "core/sessions.h"
+#include "core/write_error.h"
 
 namespace cairn {
 namespace {
@@ -157,14 +158,14 @@ Status WriteOrRemove(const std::string& path, const std::string& text) {
   std::error_code error;
   fs::remove(path, error);
   if (!error) return Ok();
-  return MakeError(ErrorCode::kIo, "{}: cannot be removed: {}", path, error.message());
+  return WriteError(path, "cannot be removed", error.value());
 }
 
 // images/SESSION -> the session's images, and no other links.
 Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) return MakeError(ErrorCode::kIo, "{}: the folder cannot be made: {}", folder, error.message());
+  if (error) return WriteError(folder, "the folder cannot be made", error.value());
   std::set<std::string> names;
   for (const CaptureSession& session : sessions) {
     names.insert(session.name);
@@ -178,8 +179,8 @@ Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string
     fs::create_directory_symlink(target, temporary, error);
     if (!error) fs::rename(temporary, link, error);
     if (error) {
-      return MakeError(ErrorCode::kIo, "{}: the link to {} cannot be made: {}", link.string(),
-                       target.string(), error.message());
+      return WriteError(link.string(), fmt::format("the link to {} cannot be made", target.string()),
+                        error.value());
     }
   }
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {

@@ -14,6 +14,7 @@
 #include "core/database.h"
 #include "core/file.h"
 #include "core/map_file.h"
+#include "core/write_error.h"
 
 namespace cairn {
 namespace {
@@ -65,7 +66,7 @@ class SealedFile {
     if (std::fseek(file_.get(), static_cast<long>(offset_), SEEK_SET) != 0 ||
         std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size() ||
         std::fflush(file_.get()) != 0) {
-      return MakeError(ErrorCode::kIo, "{}: its seal cannot be written: {}", path_, std::strerror(errno));
+      return WriteError(path_, "its seal cannot be written", errno);
     }
     return Ok();
   }
@@ -260,8 +261,7 @@ Status SignMap(const std::string& path, const SecretKey& key, const std::string&
   return ReplaceFileAtomically(signed_path, [&](const std::string& temporary) -> Status {
     std::error_code error;
     if (!fs::copy_file(path, temporary, error)) {
-      return MakeError(error == std::errc::no_space_on_device ? ErrorCode::kDiskFull : ErrorCode::kIo,
-                       "{}: cannot be written: {}", signed_path, error.message());
+      return WriteError(signed_path, "cannot be written", error.value());
     }
     fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);
     CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(temporary, "r+b"));

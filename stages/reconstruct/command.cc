@@ -7,6 +7,7 @@
 
 #include "core/file.h"
 #include "core/folder.h"
+#include "core/write_error.h"
 #include "stages/reconstruct/reconstruct.h"
 
 namespace cairn {
@@ -54,8 +55,8 @@ Status WritePosesFolder(const ReconstructResult& result, const Capture& capture,
   const fs::path images = fs::canonical(capture.images_folder, error);
   if (!error) fs::create_directory_symlink(images, folder + "/images", error);
   if (!error) return Ok();
-  return MakeError(ErrorCode::kIo, "{}/images: the link to {} cannot be made: {}", folder,
-                   capture.images_folder, error.message());
+  return WriteError(folder + "/images", fmt::format("the link to {} cannot be made", capture.images_folder),
+                    error.value());
 }
 
 // The files of a folder with what is in them, or what links point to.
@@ -119,8 +120,7 @@ Result<ReconstructResult> ReconstructInto(const Arguments& arguments, const Capt
                                           Progress& progress) {
   const std::string work = folder + "/work";
   std::error_code error;
-  if (!fs::create_directory(work, error))
-    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", work, error.message());
+  if (!fs::create_directory(work, error)) return WriteError(work, "cannot be created", error.value());
   CAIRN_ASSIGN_OR_RETURN(ReconstructResult result,
                          Reconstruct(input, capture, arguments.options, work, progress));
   fs::remove_all(work, error);

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "core/write_error.h"
 #include "stages/reconstruct/run_program.h"
 
 namespace cairn {
@@ -180,7 +181,7 @@ Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::
   CAIRN_RETURN_IF_ERROR(WriteMapperDatabase(input, options, database));
   std::error_code error;
   if (!fs::create_directories(models_folder, error))
-    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", models_folder, error.message());
+    return WriteError(models_folder, "cannot be created", error.value());
   CAIRN_ASSIGN_OR_RETURN(
       const ProgramOutcome outcome,
       RunColmap(input, MapperWords(database, images_folder, options, models_folder), options, progress));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "core/write_error.h"
 #include "stages/reconstruct/align.h"
 #include "stages/reconstruct/known_places.h"
 
@@ -152,7 +153,7 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
     const std::string folder = work_folder + "/" + name;
     std::error_code error;
     if (!std::filesystem::create_directory(folder, error))
-      return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
+      return WriteError(folder, "cannot be created", error.value());
     return RunMapper(input, capture.images_folder, mapper, folder, progress);
   };
   Result<std::vector<ColmapModel>> models = run(options.mapper, "first");

@@ -13,6 +13,7 @@
 #include "core/folder.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/write_error.h"
 #include "stages/simulate/building.h"
 #include "stages/simulate/floor_plan.h"
 #include "stages/simulate/survey.h"
@@ -30,10 +31,7 @@ Status WriteJpeg(const std::string& path, const cv::Mat& grey, int quality) {
   std::ofstream file(path, std::ios::binary);
   file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   file.close();
-  if (!file) {
-    return MakeError(ErrorCode::kIo, "{}: cannot be written: {}; is the disk full or the folder read-only?",
-                     path, std::strerror(errno));
-  }
+  if (!file) return WriteError(path, "cannot be written", errno);
   return Ok();
 }
 
@@ -83,7 +81,7 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
       ReplaceFolderAtomically(path, "a capture", {"images.txt"}, [&](const std::string& folder) -> Status {
         std::error_code error;
         if (!fs::create_directory(folder + "/images", error)) {
-          return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
+          return WriteError(folder, "cannot be created", error.value());
         }
         CAIRN_RETURN_IF_ERROR(
             WriteImages(building, survey, options, seed, folder + "/images", num_threads, progress));

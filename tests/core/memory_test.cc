@@ -44,7 +44,7 @@ TEST(DiskSpace, ShortageIsRefusedBeforeTheWorkWithTheWayAround) {
   EXPECT_TRUE(CheckDiskSpace("little", testing::TempDir(), 4096).ok());
   const Status status = CheckDiskSpace("the features of 9 images", testing::TempDir(), int64_t{1} << 60);
   ASSERT_FALSE(status.ok());
-  EXPECT_EQ(status.error().code, ErrorCode::kIo);
+  EXPECT_EQ(status.error().code, ErrorCode::kDiskFull);
   EXPECT_THAT(status.error().message, HasSubstr("the features of 9 images takes about 1152921504607 MB"));
   EXPECT_THAT(status.error().message, HasSubstr("--no-space-check"));
 }

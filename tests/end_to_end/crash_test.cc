@@ -260,7 +260,7 @@ TEST(FullDisk, EveryStageSaysSoLeavesNothingBehindAndFinishesOnceThereIsRoom) {
   workplace.Forget(Line()[1]);
   ASSERT_TRUE(disk.LeaveRoom(1 << 20));
   const ProgramRun refused = workplace.Compile();
-  EXPECT_EQ(refused.exit_code, 7);
+  EXPECT_EQ(refused.exit_code, static_cast<int>(ErrorCode::kDiskFull));
   EXPECT_THAT(
       refused.err,
       ContainsRegex("the features of 88 images takes about [0-9]+ MB, but the disk has [0-9]+ MB left"));
