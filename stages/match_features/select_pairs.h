@@ -50,7 +50,8 @@ struct OverlapPartner {
 };
 using OverlapRanking = std::vector<std::vector<OverlapPartner>>;  // of each image
 // The images that each image overlaps by min_overlap_ratio in either direction, largest mean overlap first,
-// ties to the smaller index.  O(images^2) on `num_threads` threads.  Errors: Cancelled.
+// ties to the smaller index.  O(images^2), but only those within reach of each other take more than a look at
+// their distance.  Errors: Cancelled.
 Result<OverlapRanking> RankOverlaps(const std::vector<PosedCamera>& images,
                                     const FrustumOverlapOptions& options, int num_threads,
                                     Progress& progress);
