@@ -88,14 +88,14 @@ nlohmann::ordered_json SessionsJson(const MapRows& rows) {
   return sessions;
 }
 
-nlohmann::ordered_json MapJson(const MapRows& rows, int64_t num_bytes,
+nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t num_bytes,
                                const std::vector<std::pair<std::string, int64_t>>& tables) {
   size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
   for (const auto& postings : rows.vocabulary.inverted_files) num_postings += postings.size();
   for (const MapStation& station : rows.stations) num_uncovered += station.is_covered ? 0 : 1;
   for (const MapRegion& region : rows.regions) num_region_landmarks += region.landmarks.size();
   nlohmann::ordered_json json = {{"name", rows.name},
-                                 {"format", fmt::format("{}.{}", kMapVersionMajor, kMapVersionMinor)},
+                                 {"format", fmt::format("{}.{}", kMapVersionMajor, file.minor_version())},
                                  {"writer", rows.writer},
                                  {"instruction_set", rows.instruction_set},
                                  {"sealed", rows.sealed},
@@ -208,10 +208,11 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.map_path, {}));
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(file));
   CAIRN_ASSIGN_OR_RETURN(const auto tables, BytesPerTable(arguments.map_path));
-  auto json = MapJson(rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
+  auto json =
+      MapJson(file, rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
   *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json, rows));

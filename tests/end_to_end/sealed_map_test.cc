@@ -61,6 +61,13 @@ TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
   EXPECT_EQ(RunShell("cairn inspect " + Path("map.cairn")).exit_code, 0);
 }
 
+TEST_F(SealedMap, InspectStatesTheFormatOfTheFile) {
+  for (const std::string version : {"2.0", "2.1"}) {
+    const ProgramRun run = RunShell("cairn inspect --json " GOLDEN_DIR "/map_" + version + ".cairn");
+    EXPECT_THAT(run.out, HasSubstr("\"format\": \"" + version + "\"")) << run.err;
+  }
+}
+
 TEST_F(SealedMap, FullDiskAndReadOnlyFolderLeaveTheOldMap) {
   const std::string disk = Path("disk");
   fs::create_directories(disk);
