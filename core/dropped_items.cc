@@ -17,14 +17,14 @@ Result<DroppedItem> ItemOfRow(SQLite::Statement& row, const std::string& what) {
   const int64_t reason_id = row.getColumn(0).getInt64();
   const DropReasonEntry* const reason =
       reason_id >= 0 && reason_id < 1 << 16 ? FindDropReason(static_cast<int>(reason_id)) : nullptr;
-  if (reason == nullptr) return MakeError(ErrorCode::kCorrupt, "{}: unknown reason {}", what, reason_id);
+  if (reason == nullptr) return Corrupt(what, "unknown reason {}", reason_id);
   item.reason = reason->reason;
   item.item_id = row.getColumn(1).getInt64();
-  if (item.item_id < 0) return MakeError(ErrorCode::kCorrupt, "{}: item {}", what, item.item_id);
+  if (item.item_id < 0) return Corrupt(what, "item {}", item.item_id);
   if (!row.getColumn(2).isNull()) item.found = row.getColumn(2).getInt64();
   CAIRN_ASSIGN_OR_RETURN(item.seen_at, BlobToVector<uint32_t>(row.getColumn(3), what));
   if (HoldsKeypoints(*reason) && item.seen_at.size() % 2 != 0)
-    return MakeError(ErrorCode::kCorrupt, "{}: a keypoint without its index", what);
+    return Corrupt(what, "a keypoint without its index");
   return item;
 }
 

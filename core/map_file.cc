@@ -75,7 +75,7 @@ Status CheckTables(SQLite::Database& database, const std::string& path) {
 
 Result<std::string> ReadDirectory(SQLite::Database& database, const std::string& path) {
   SQLite::Statement query(database, "SELECT entries FROM directory");
-  if (!query.executeStep()) return MakeError(ErrorCode::kCorrupt, "{}: table directory is empty", path);
+  if (!query.executeStep()) return Corrupt(path, "table directory is empty");
   return std::string(BlobView(query.getColumn(0)));
 }
 

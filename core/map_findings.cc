@@ -103,7 +103,7 @@ Status ReadSelfTestRegions(SQLite::Database& database, const std::string& path, 
     RegionSelfTest row;
     const int64_t region = query.getColumn(0).getInt64();
     if (region < kOutsideRegions || region > std::numeric_limits<RegionIdx>::max())
-      return MakeError(ErrorCode::kCorrupt, "{}: table self_test_regions: region {}", path, region);
+      return Corrupt(path, "table self_test_regions: region {}", region);
     row.region = static_cast<RegionIdx>(region);
     row.num_held_out = CountOf(query.getColumn(1));
     row.num_localized = CountOf(query.getColumn(2));
@@ -137,8 +137,7 @@ Status ReadDropCounts(SQLite::Database& database, const std::string& path, MapFi
                                                                              : -1);
     }
     if (!counts.ok()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: table drop_reasons: the counts of reason {} are cut off",
-                       path, row.reason_id);
+      return Corrupt(path, "table drop_reasons: the counts of reason {} are cut off", row.reason_id);
     }
     findings->drops.push_back(std::move(row));
   }

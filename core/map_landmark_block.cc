@@ -176,7 +176,7 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   block.landmarks.resize(entry.count);
   BlobReader reader(bytes);
   const auto corrupt = [&](const char* part) {
-    return MakeError(ErrorCode::kCorrupt, "{}: {} of {} landmarks make no sense", what, part, entry.count);
+    return Corrupt(what, "{} of {} landmarks make no sense", part, entry.count);
   };
   if (!ReadRegions(&reader, directory.Count(BlockKind::kRegions), &block)) return corrupt("the regions");
   int64_t max_num_values = kMaxListElements;
