@@ -15,6 +15,7 @@
 #include "stages/extract_features/command.h"
 #include "stages/filter_visibility/command.h"
 #include "stages/group_classes/command.h"
+#include "stages/link_appearance/command.h"
 #include "stages/match_features/command.h"
 #include "stages/reconstruct/command.h"
 #include "stages/simulate/command.h"
@@ -30,7 +31,7 @@ std::vector<Command> AllCommands() {
       ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
       JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
-      MigrateCommand(),
+      MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),
   };
 }
 

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/options.h"
+#include "core/progress.h"
+#include "stages/link_appearance/link_appearance.h"
+
+namespace cairn {
+
+// How many left-out images the kept ones of the rest locate [Booij06 §V]: an image is localized when it is
+// linked to a kept one.
+struct CheckAppearanceOptions {
+  // The curve's sizes, as parts of the nodes.  REQUIRES: in [0, 1]
+  std::vector<double> kept_ratios = {0.02, 0.04, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.5};
+  // Weighted sets: links of fewer inliers count in proportion.  REQUIRES: >= 1
+  int weighted_num_inliers = 100;
+  // Sets of m-fold domination are checked up to this m.  REQUIRES: >= 1
+  int max_num_dominators = 3;
+};
+OptionTable DescribeOptions(CheckAppearanceOptions* options);
+
+// A left-out image: its links to nodes of the graph.
+struct LeftOutImage {
+  std::vector<NodeIdx> linked;  // ascending
+  NodeIdx node = -1;            // that of the graph which it is itself, -1: none
+};
+
+// A set, or sets of one size or kind, and what they locate.
+struct AppearanceFigure {
+  double num_kept = 0;       // mean over the left-out images
+  double num_localized = 0;  // of the left-out images
+  double num_by_random = 0;  // expected of random sets of the same size
+};
+struct AppearanceCheck {
+  int num_nodes = 0;  // that sets are chosen from, the left-out one not counted
+  int num_left_out = 0;
+  int num_linked = 0;  // of these, with any link: more no set can locate
+  std::vector<std::string>
+      set_names;  // of sets that meet their demands: "greedy", "improved", "weighted", ...
+  std::vector<AppearanceFigure> sets;
+  std::vector<int> sizes;                             // the curve's
+  std::vector<std::string> curve_names;               // "greedy", "weighted", "2-fold"
+  std::vector<std::vector<AppearanceFigure>> curves;  // per name and size
+};
+
+// Leave-one-out: each node in turn is taken out of the graph, and the sets are chosen from the rest, per
+// component where that falls apart; ties go to the smallest node.
+std::vector<LeftOutImage> EachNodeLeftOut(const AppearanceGraph& graph);
+
+// Sets by `link_options` (its num_tries for the improved ones), by links that count by inliers, and of m-fold
+// domination; and of the curve's sizes, greedily.  Random sets of the same size are expected to locate an
+// image of d neighbours among n with 1 - C(n - d, k) / C(n, k), no sampling.
+// Same figures for any number of threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options),
+// NoData (nothing is left out), Cancelled.
+Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
+                                        const std::vector<LeftOutImage>& left_out,
+                                        const LinkAppearanceOptions& link_options,
+                                        const CheckAppearanceOptions& options, uint64_t seed, int num_threads,
+                                        Progress& progress);
+
+// Takes images out of a survey by name: what is left, and what their links were.  Errors: NotFound (a name
+// that the survey does not have).
+struct HeldOutSplit {
+  ImageLinks survey;
+  std::vector<std::vector<int>> linked;  // per held-out image: indices of survey images, ascending
+};
+Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::string>& names);
+
+}  // namespace cairn

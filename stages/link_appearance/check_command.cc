@@ -1,0 +1,129 @@
+#include <optional>
+
+#include "core/capture.h"
+#include "core/file.h"
+#include "core/text.h"
+#include "stages/link_appearance/check_appearance.h"
+#include "stages/link_appearance/command.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string matches;
+  std::string capture;
+  std::string held_out;
+  LinkAppearanceOptions options;
+  CheckAppearanceOptions check_options;
+  OptionArguments option_arguments;
+};
+
+// Names of one a line, or of COLMAP's images.txt, where they end every line of ten words.
+Result<std::vector<std::string>> ReadNames(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  std::vector<std::string> names;
+  bool is_list = true;
+  for (const std::string_view line : SplitLines(text)) {
+    const std::string_view name = Trim(line);
+    if (name.empty() || name[0] == '#') continue;
+    is_list = is_list && SplitWords(name).size() < 10;
+    names.emplace_back(name);
+  }
+  if (is_list) return names;
+  std::vector<Reject> rejects;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> images, ReadImagesText(path, &rejects));
+  names.clear();
+  for (const CaptureImage& image : images) names.push_back(image.name);
+  for (const Reject& reject : rejects) names.push_back(reject.name);
+  return names;
+}
+
+std::string Table(const AppearanceCheck& check) {
+  const auto percent = [&](double num) { return 100 * num / check.num_left_out; };
+  std::string text = fmt::format("{} left-out images, {} of them linked to any of {} nodes\n",
+                                 check.num_left_out, check.num_linked, check.num_nodes);
+  text += fmt::format("{:<20}{:>8}{:>9}{:>12}{:>12}{:>12}\n", "sets that dominate", "kept", "kept %",
+                      "localized", "localized %", "random %");
+  for (size_t i = 0; i < check.sets.size(); ++i) {
+    const AppearanceFigure& figure = check.sets[i];
+    text += fmt::format("{:<20}{:>8.1f}{:>9.1f}{:>12.0f}{:>12.1f}{:>12.1f}\n", check.set_names[i],
+                        figure.num_kept, 100 * figure.num_kept / std::max(1, check.num_nodes),
+                        figure.num_localized, percent(figure.num_localized), percent(figure.num_by_random));
+  }
+  text += fmt::format("{:<11}{:>9}", "kept", "kept %");
+  for (const std::string& name : check.curve_names) text += fmt::format("{:>12}", name + " %");
+  text += fmt::format("{:>12}\n", "random %");
+  for (size_t s = 0; s < check.sizes.size(); ++s) {
+    text +=
+        fmt::format("{:<11}{:>9.1f}", check.sizes[s], 100.0 * check.sizes[s] / std::max(1, check.num_nodes));
+    for (const auto& curve : check.curves) text += fmt::format("{:>12.1f}", percent(curve[s].num_localized));
+    text += fmt::format("{:>12.1f}\n", percent(check.curves[0][s].num_by_random));
+  }
+  return text;
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  std::optional<Capture> capture;
+  if (!arguments.capture.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
+  }
+  const LinkAppearanceOptions& options = arguments.options;
+  CAIRN_ASSIGN_OR_RETURN(const ImageLinks images, ReadImageLinks(arguments.matches, options.min_num_inliers));
+  HeldOutSplit split{.survey = images};
+  if (!arguments.held_out.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<std::string> names, ReadNames(arguments.held_out));
+    CAIRN_ASSIGN_OR_RETURN(split, HoldOut(images, names));
+  }
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::vector<NodeIdx> node_of_image,
+      FuseImages(split.survey.images, options.fuse, options.same_place_m, capture ? &*capture : nullptr));
+  const AppearanceGraph graph = FusedGraph(split.survey.links, node_of_image);
+  std::vector<LeftOutImage> left_out;
+  if (arguments.held_out.empty()) {
+    left_out = EachNodeLeftOut(graph);
+  } else {
+    for (const std::vector<int>& linked : split.linked) {
+      LeftOutImage& image = left_out.emplace_back();
+      for (const int index : linked) image.linked.push_back(node_of_image[index]);
+      std::sort(image.linked.begin(), image.linked.end());
+      image.linked.erase(std::unique(image.linked.begin(), image.linked.end()), image.linked.end());
+    }
+  }
+  CAIRN_ASSIGN_OR_RETURN(const AppearanceCheck check,
+                         CheckAppearance(graph, left_out, options, arguments.check_options, environment.seed,
+                                         environment.num_threads, *environment.progress));
+  *environment.out << Table(check);
+  return Ok();
+}
+
+}  // namespace
+
+Command CheckAppearanceCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {.name = "check-appearance",
+          .summary = "Leave images out and count those that the kept ones of the rest still locate",
+          .add_arguments =
+              [arguments](CLI::App& app) {
+                app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
+                    ->required()
+                    ->type_name("matches.db");
+                app.add_option("--capture", arguments->capture,
+                               "Capture folder with the survey's poses, for fuse = place");
+                app.add_option(
+                       "--held-out", arguments->held_out,
+                       "Images of the database that are no survey, names or queries.txt: these are left out "
+                       "together, instead of each image in turn")
+                    ->type_name("FILE");
+                OptionTable table = DescribeOptions(&arguments->options);
+                for (Option& option : DescribeOptions(&arguments->check_options)) {
+                  // One name stands for one option on the command line.
+                  if (option.name == "max_num_dominators") option.help += " (num_dominators is not read)";
+                  table.push_back(option);
+                }
+                arguments->option_arguments.Add(app, std::move(table));
+              },
+          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+}
+
+}  // namespace cairn

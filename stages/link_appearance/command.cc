@@ -1,0 +1,93 @@
+#include "stages/link_appearance/command.h"
+
+#include <optional>
+
+#include "core/capture.h"
+#include "core/file.h"
+#include "stages/link_appearance/appearance_database.h"
+#include "stages/link_appearance/link_appearance.h"
+#include "stages/link_appearance/picture.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string matches;
+  std::string capture;
+  std::string output;
+  std::string svg;
+  LinkAppearanceOptions options;
+  OptionArguments option_arguments;
+};
+
+// "25 of 234 nodes kept (10.7 %), at least 20 are needed"
+std::string KeptText(const LinkAppearanceResult& result) {
+  const Appearance& appearance = result.appearance;
+  const size_t num_kept = appearance.Kept().size();
+  std::string text =
+      fmt::format("{} of {} nodes kept ({:.1f} %)", num_kept, appearance.nodes.size(),
+                  100.0 * static_cast<double>(num_kept) / static_cast<double>(appearance.nodes.size()));
+  if (result.num_greedy > 0) text += fmt::format(", {} before local search", result.num_greedy);
+  if (const int bound = appearance.LowerBound(); bound > 0) {
+    text += fmt::format(", at least {} are needed", bound);
+  }
+  return text;
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  std::optional<Capture> capture;
+  if (!arguments.capture.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const ImageLinks images,
+                         ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
+  CAIRN_ASSIGN_OR_RETURN(
+      const LinkAppearanceResult result,
+      LinkAppearance(images, capture ? &*capture : nullptr, arguments.options, environment.seed));
+  const Appearance& appearance = result.appearance;
+  CAIRN_RETURN_IF_ERROR(WriteAppearance(appearance, arguments.output));
+  if (!arguments.svg.empty()) {
+    const std::vector<std::optional<FloorPose>> places =
+        capture ? NodePlaces(appearance, images.images, *capture) : std::vector<std::optional<FloorPose>>();
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawAppearance(appearance, places)));
+  }
+  environment.report->in = {{"images", static_cast<int64_t>(images.images.size())},
+                            {"pairs", static_cast<int64_t>(images.links.size())}};
+  environment.report->out = {{"nodes", appearance.graph.num_nodes()},
+                             {"links", appearance.graph.num_links()},
+                             {"kept images", static_cast<int64_t>(appearance.KeptImages().size())}};
+  *environment.out << fmt::format("link_appearance: {} images, {} nodes, {} links, {} components\n",
+                                  images.images.size(), appearance.graph.num_nodes(),
+                                  appearance.graph.num_links(), appearance.NumComponents());
+  *environment.out << fmt::format("link_appearance: {}\n", KeptText(result));
+  for (const std::string& note : result.notes) *environment.out << fmt::format("link_appearance: {}\n", note);
+  return Ok();
+}
+
+}  // namespace
+
+Command LinkAppearanceCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "link-appearance",
+      .summary = "Link images that see the same and keep the fewest that still locate the robot (stage 7)",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
+                ->required()
+                ->type_name("matches.db");
+            app.add_option("--capture", arguments->capture,
+                           "Capture folder with the survey's poses: for fuse = place and for the picture");
+            app.add_option("-o,--output", arguments->output, "File to write")
+                ->required()
+                ->type_name("appearance.db");
+            app.add_option("--svg", arguments->svg,
+                           "also draw the graph as SVG: over the floor, or without poses as a matrix")
+                ->type_name("FILE.svg");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+}
+
+}  // namespace cairn

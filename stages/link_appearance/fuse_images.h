@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/capture.h"
+#include "core/colmap_database.h"
+#include "core/error.h"
+#include "stages/link_appearance/appearance_graph.h"
+
+namespace cairn {
+
+// The images of a survey and which of them see the same: a link per verified pair.
+struct ImageLinks {
+  std::vector<DatabaseImage> images;  // ascending image_id
+  std::vector<AppearanceLink> links;  // of indices into `images`
+};
+
+// Reads the verified pairs of a COLMAP database that have at least `min_num_inliers` inliers: pairs from
+// which the local space can be reconstructed [Booij06 §III], or which show it from one place.  No features
+// are read. Errors: as OpenColmapDatabase; Corrupt (a pair of unknown images, of one image, or with a number
+// of inliers that is none).
+Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_inliers);
+
+// Which images are one node: per image the index of its node; nodes are numbered by their first images.
+// "none": each image is one.  "name": those whose names are equal up to the last '_', as those of a rig or of
+// several headings at one station often are.  "place": those whose cameras stand within `same_place_m` of a
+// node's first image, by the capture's poses.
+// Errors: InvalidArgument ("place" and an image without pose: `capture` is null, or has none for it).
+Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images, const std::string& fuse,
+                                        double same_place_m, const Capture* capture);
+
+// The graph of the nodes: a link counts the inliers of all pairs of its nodes' images.
+AppearanceGraph FusedGraph(const std::vector<AppearanceLink>& links,
+                           const std::vector<NodeIdx>& node_of_image);
+
+}  // namespace cairn

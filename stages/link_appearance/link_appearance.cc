@@ -1,0 +1,255 @@
+#include "stages/link_appearance/link_appearance.h"
+
+#include <algorithm>
+
+#include "stages/link_appearance/domination.h"
+#include "stages/link_appearance/greedy_dominating_set.h"
+#include "stages/link_appearance/online_dominating_set.h"
+#include "stages/link_appearance/restore_cycles.h"
+
+namespace cairn {
+namespace {
+
+DominationOptions DominationOf(const LinkAppearanceOptions& options) {
+  return {.num_dominators = options.num_dominators,
+          .strong_num_inliers = options.strong_num_inliers,
+          .min_component_nodes = options.min_component_nodes};
+}
+
+std::vector<NodeIdx> ArriveOneByOne(const AppearanceGraph& graph, int max_num_dropped) {
+  OnlineDominatingSet online(max_num_dropped);
+  for (NodeIdx node = 0; node < graph.num_nodes(); ++node) {
+    std::vector<AppearanceGraph::Neighbour> earlier;
+    for (const AppearanceGraph::Neighbour& n : graph.Neighbours(node)) {
+      if (n.node < node) earlier.push_back(n);
+    }
+    online.Add(earlier);
+  }
+  return online.kept();
+}
+
+// A set of exactly num_kept nodes, as far as there are so many: a dominating one, and more, where that many
+// suffice; otherwise the connected one that misses least.
+std::vector<NodeIdx> ChooseExactly(const Domination& domination, const LinkAppearanceOptions& options,
+                                   const std::vector<NodeIdx>& dominating, uint64_t seed) {
+  const ImproveOptions improve{.num_tries = options.num_tries};
+  const int target = options.num_kept;
+  if (static_cast<int>(dominating.size()) <= target) {
+    return GreedyDominatingSet(domination, target, dominating);
+  }
+  return ImproveDominatingSet(domination, GreedyDominatingSet(domination, target), improve, seed, target);
+}
+
+Status CheckTogether(const LinkAppearanceOptions& options) {
+  if (options.max_detour_links == 1) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option max_detour_links = 1: expected 0 (no cycles are restored) or at least 2, as two "
+                     "kept neighbours of one image are linked by at least one link");
+  }
+  if (options.algorithm == "online" &&
+      (options.num_dominators > 1 || options.strong_num_inliers > 1 || options.num_kept > 0)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option algorithm = 'online': num_dominators and strong_num_inliers must be 1 and "
+                     "num_kept 0; choose 'greedy' for others");
+  }
+  return Ok();
+}
+
+// The bound of one component; shrinks the kept nodes where the search for it finds fewer.
+int BoundComponent(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
+                   std::vector<NodeIdx>* kept) {
+  const Domination domination(graph, DominationOf(options));
+  const ConnectedBound bound = BoundConnectedSet(domination, *kept, options.bound);
+  if (!bound.smaller.empty()) *kept = bound.smaller;
+  return bound.lower_bound;
+}
+
+// Bounds all components; where no size is given, better sets replace the kept ones.
+void BoundAll(const Domination& domination, const LinkAppearanceOptions& options, Appearance* appearance) {
+  const AppearanceComponents& components = domination.components();
+  for (const std::vector<NodeIdx>& nodes : components.nodes) {
+    if (!domination.IsIn(nodes[0])) {
+      appearance->lower_bounds.push_back(0);
+      continue;
+    }
+    const AppearanceGraph graph = InducedSubgraph(domination.graph(), nodes);
+    const Domination part(graph, DominationOf(options));
+    std::vector<NodeIdx> kept;
+    for (size_t i = 0; i < nodes.size(); ++i) {
+      if (appearance->nodes[nodes[i]].role == NodeRole::kDominating) kept.push_back(static_cast<NodeIdx>(i));
+    }
+    // With a size given the set may not dominate, or hold more than it takes: a set that does is bounded.
+    const bool is_chosen = options.num_kept == 0;
+    if (!is_chosen) kept = GreedyDominatingSet(part);
+    const size_t size_before = kept.size();
+    appearance->lower_bounds.push_back(BoundComponent(graph, options, &kept));
+    if (!is_chosen || kept.size() == size_before) continue;
+    for (const NodeIdx node : nodes) appearance->nodes[node].role = NodeRole::kDropped;
+    for (const NodeIdx node : kept) appearance->nodes[nodes[node]].role = NodeRole::kDominating;
+  }
+}
+
+void Restore(const AppearanceGraph& graph, int c, std::vector<NodeRole>* roles) {
+  std::vector<NodeIdx> kept;
+  for (NodeIdx node = 0; node < graph.num_nodes(); ++node) {
+    if ((*roles)[node] != NodeRole::kDropped) kept.push_back(node);
+  }
+  for (const NodeIdx node : RestoreCycles(graph, kept, c)) (*roles)[node] = NodeRole::kRestored;
+}
+
+void AddNotes(const Domination& domination, const LinkAppearanceOptions& options,
+              LinkAppearanceResult* result) {
+  const int num_nodes = domination.graph().num_nodes();
+  const auto& components = domination.components().nodes;
+  const auto alone = std::count_if(components.begin(), components.end(),
+                                   [](const std::vector<NodeIdx>& nodes) { return nodes.size() == 1; });
+  std::vector<std::string>& notes = result->notes;
+  if (domination.graph().num_links() == 0 && num_nodes > 1) {
+    notes.push_back(fmt::format("no two of the {} nodes are linked by {} inliers: each stands alone",
+                                num_nodes, options.min_num_inliers));
+  } else if (components.size() > 1) {
+    notes.push_back(
+        fmt::format("the graph has {} components, {} of them of one node; no path leads from one "
+                    "to another",
+                    components.size(), alone));
+  }
+  if (options.num_kept > num_nodes) {
+    notes.push_back(fmt::format("num_kept = {}: there are {} nodes", options.num_kept, num_nodes));
+  }
+  if (!result->undominated.empty()) {
+    const int needed = result->appearance.LowerBound();
+    notes.push_back(fmt::format(
+        "num_kept = {} leaves {} of {} nodes without enough kept neighbours{}", options.num_kept,
+        result->undominated.size(), num_nodes,
+        needed > options.num_kept ? fmt::format("; at least {} would be needed", needed) : std::string()));
+  }
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(LinkAppearanceOptions* options) {
+  ConnectedBoundOptions& bound = options->bound;
+  return {
+      {"min_num_inliers", &options->min_num_inliers, "fewest verified inliers of a link", 1},
+      {.name = "fuse",
+       .value = &options->fuse,
+       .help =
+           "images that are one node: none, name: equal up to the last '_', place: taken within same_place_m",
+       .choices = {"none", "name", "place"}},
+      {"same_place_m", &options->same_place_m, "images within this distance were taken at one place, m",
+       1e-6},
+      {.name = "algorithm",
+       .value = &options->algorithm,
+       .help = "how nodes are chosen: greedy [Booij06], or online: one by one in the order of their numbers",
+       .choices = {"greedy", "online"}},
+      {"max_num_dropped", &options->max_num_dropped, "online: most kept nodes that an arrival drops", 0},
+      {"num_dominators", &options->num_dominators,
+       "how many kept neighbours every other node has, where it has that many neighbours [Booij06: 1]", 1},
+      {"strong_num_inliers", &options->strong_num_inliers,
+       "links of fewer inliers count in proportion; 1: all links count alike [Booij06: 1]", 1},
+      {"min_component_nodes", &options->min_component_nodes,
+       "of components with fewer nodes than this none is kept", 1},
+      {"num_kept", &options->num_kept, "nodes to keep, exactly; 0: as many as are needed", 0},
+      {"num_tries", &options->num_tries, "tries of the local search for a better set; 0: none", 0},
+      {"max_detour_links", &options->max_detour_links,
+       "cycles are restored until kept neighbours of neighbours are fewer links apart than this; 0: not "
+       "[Booij06: c]",
+       0},
+      {.name = "lower_bound",
+       .value = &bound.lower_bound,
+       .help = "bound on the size: counting, program: an integer program, auto: program for components of "
+               "few links",
+       .choices = {"auto", "counting", "program", "none"}},
+      {"max_num_program_links", &bound.max_num_program_links,
+       "auto: most links of a component with a program", 0},
+      {"max_num_cut_rounds", &bound.max_num_cut_rounds, "program: most rounds of cuts before branching", 0},
+      {"max_num_branches", &bound.max_num_branches, "program: most nodes of the branching tree; 0: none", 0},
+  };
+}
+
+std::vector<NodeIdx> Appearance::Kept() const {
+  std::vector<NodeIdx> kept;
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    if (nodes[i].role != NodeRole::kDropped) kept.push_back(static_cast<NodeIdx>(i));
+  }
+  return kept;
+}
+
+std::vector<ImageId> Appearance::KeptImages() const {
+  std::vector<ImageId> images;
+  for (const AppearanceNode& node : nodes) {
+    if (node.role != NodeRole::kDropped) images.insert(images.end(), node.images.begin(), node.images.end());
+  }
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+int Appearance::LowerBound() const {
+  std::vector<char> is_in(lower_bounds.size(), 0);
+  for (const AppearanceNode& node : nodes) is_in[node.component] |= node.role != NodeRole::kDropped;
+  int sum = 0;
+  for (size_t i = 0; i < lower_bounds.size(); ++i) {
+    if (is_in[i] && lower_bounds[i] == 0) return 0;
+    sum += lower_bounds[i];
+  }
+  return sum;
+}
+
+std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
+                                 uint64_t seed, int* num_greedy) {
+  const Domination domination(graph, DominationOf(options));
+  std::vector<NodeIdx> kept = options.algorithm == "online" ? ArriveOneByOne(graph, options.max_num_dropped)
+                                                            : GreedyDominatingSet(domination);
+  std::erase_if(kept, [&](NodeIdx node) { return !domination.IsIn(node); });
+  if (num_greedy) *num_greedy = static_cast<int>(kept.size());
+  if (options.num_tries > 0 && options.algorithm == "greedy") {
+    kept = ImproveDominatingSet(domination, kept, {.num_tries = options.num_tries}, seed);
+  }
+  if (options.num_kept > 0) kept = ChooseExactly(domination, options, kept, seed);
+  std::vector<NodeRole> roles(graph.num_nodes(), NodeRole::kDropped);
+  for (const NodeIdx node : kept) roles[node] = NodeRole::kDominating;
+  if (options.max_detour_links > 0 && options.num_kept == 0) Restore(graph, options.max_detour_links, &roles);
+  return roles;
+}
+
+Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
+                                            const LinkAppearanceOptions& options, uint64_t seed) {
+  LinkAppearanceOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_RETURN_IF_ERROR(CheckTogether(options));
+  if (images.images.empty()) {
+    return MakeError(ErrorCode::kNoData, "no image: expected a database of matched images");
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<NodeIdx> node_of_image,
+                         FuseImages(images.images, options.fuse, options.same_place_m, capture));
+  LinkAppearanceResult result;
+  Appearance& appearance = result.appearance;
+  appearance.graph = FusedGraph(images.links, node_of_image);
+  appearance.num_dominators = options.num_dominators;
+  appearance.strong_num_inliers = options.strong_num_inliers;
+  appearance.max_detour_links = options.num_kept == 0 ? options.max_detour_links : 0;
+  const Domination domination(appearance.graph, DominationOf(options));
+  appearance.nodes.resize(appearance.graph.num_nodes());
+  for (size_t i = 0; i < node_of_image.size(); ++i) {
+    appearance.nodes[node_of_image[i]].images.push_back(images.images[i].image_id);
+  }
+  // The bound is that of dominating sets, before cycles are restored.
+  LinkAppearanceOptions without_cycles = options;
+  without_cycles.max_detour_links = 0;
+  std::vector<NodeRole> roles = ChooseKept(appearance.graph, without_cycles, seed, &result.num_greedy);
+  for (size_t i = 0; i < roles.size(); ++i) {
+    appearance.nodes[i].component = domination.components().component_of[i];
+    appearance.nodes[i].role = roles[i];
+  }
+  BoundAll(domination, options, &appearance);
+  if (appearance.max_detour_links > 0) {
+    for (size_t i = 0; i < roles.size(); ++i) roles[i] = appearance.nodes[i].role;
+    Restore(appearance.graph, appearance.max_detour_links, &roles);
+    for (size_t i = 0; i < roles.size(); ++i) appearance.nodes[i].role = roles[i];
+  }
+  result.undominated = domination.Undominated(NodeMarks(appearance.graph.num_nodes(), appearance.Kept()));
+  AddNotes(domination, options, &result);
+  return result;
+}
+
+}  // namespace cairn

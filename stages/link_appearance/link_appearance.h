@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/ids.h"
+#include "core/options.h"
+#include "stages/link_appearance/appearance_graph.h"
+#include "stages/link_appearance/connected_bound.h"
+#include "stages/link_appearance/fuse_images.h"
+#include "stages/link_appearance/improve_dominating_set.h"
+
+namespace cairn {
+
+// Finds the fewest images that still locate the robot: links images between which a relative pose can be
+// recovered, and keeps a set of them in which every image is kept or linked to a kept one, and which hangs
+// together, so that a path over kept images leads everywhere (a connected dominating set, CDS).
+// Before: match_features.  After: emit_map.  Implements [Booij06]:
+//   links                      fuse_images.h        §III
+//   the greedy algorithm       greedy_dominating_set.h  §IV-B
+//   restoring cycles           restore_cycles.h     §IV-C
+//   leave-one-out              check_appearance.h   §V
+// and what it asks for: m-fold domination and weighted links (domination.h), a target size, images one by one
+// (online_dominating_set.h), local search (improve_dominating_set.h), and a bound (connected_bound.h).
+struct LinkAppearanceOptions {
+  // Fewest verified inliers of a link.  REQUIRES: >= 1
+  int min_num_inliers = 15;
+  // Which images are one node of the graph (fuse_images.h): "none", "name", "place".
+  std::string fuse = "none";
+  // Images within this distance were taken at one place.  REQUIRES: > 0
+  double same_place_m = 0.1;
+  // How nodes are chosen: "greedy" [Booij06], or "online": one by one in the order of their numbers.
+  std::string algorithm = "greedy";
+  // online: most kept nodes that an arrival drops.  REQUIRES: >= 0
+  int max_num_dropped = 4;
+  // domination.h
+  int num_dominators = 1;
+  int strong_num_inliers = 1;
+  int min_component_nodes = 1;
+  // Nodes to keep: that many exactly, the best set of them; 0: as many as domination takes.  REQUIRES: >= 0
+  int num_kept = 0;
+  // Tries of the local search that makes the set smaller, or of a given size better; 0: none.  REQUIRES: >= 0
+  int num_tries = 5000;
+  // c of restore_cycles.h, for sets without given size; 0: no cycles are restored.  REQUIRES: >= 0, not 1
+  int max_detour_links = 0;
+  ConnectedBoundOptions bound;
+};
+OptionTable DescribeOptions(LinkAppearanceOptions* options);
+
+// Why a node is kept, or not.
+enum class NodeRole : int {
+  kDropped = 0,
+  kDominating = 1,
+  kRestored = 2,  // for a cycle
+};
+
+struct AppearanceNode {
+  std::vector<ImageId> images;  // ascending
+  int component = 0;
+  NodeRole role = NodeRole::kDropped;
+  friend bool operator==(const AppearanceNode&, const AppearanceNode&) = default;
+};
+
+// Content of appearance.db.
+struct Appearance {
+  std::vector<AppearanceNode> nodes;
+  AppearanceGraph graph;
+  // Per component: every connected set that meets its nodes' demands has at least so many; 0: not computed.
+  std::vector<int> lower_bounds;
+  int num_dominators = 1;
+  int strong_num_inliers = 1;
+  int max_detour_links = 0;
+
+  std::vector<NodeIdx> Kept() const;        // ascending
+  std::vector<ImageId> KeptImages() const;  // ascending
+  int NumComponents() const { return static_cast<int>(lower_bounds.size()); }
+  int LowerBound() const;  // of all components; 0: of some not computed
+};
+
+struct LinkAppearanceResult {
+  Appearance appearance;
+  int num_greedy = 0;                // before local search
+  std::vector<NodeIdx> undominated;  // of a given size that does not suffice
+  std::vector<std::string> notes;    // what is out of the ordinary about the graph or the set, for people
+};
+
+// The kept nodes of a graph, by the options, without bound: what is done for a survey as well as for a
+// left-out image (check_appearance.h).  Roles per node.  `num_greedy` may be null.
+std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
+                                 uint64_t seed, int* num_greedy);
+
+// Pure: no files, no clock; same result for the same seed.  `capture` is for fuse = "place" and may be null.
+// Errors: InvalidArgument (an option), NoData (no image).
+Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
+                                            const LinkAppearanceOptions& options, uint64_t seed);
+
+}  // namespace cairn

@@ -1,0 +1,289 @@
+#include "stages/link_appearance/picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "core/pose.h"
+
+namespace cairn {
+namespace {
+
+// Okabe and Ito's blue and vermilion, which people who see colours differently tell apart.
+constexpr char kKeptColour[] = "#0072b2", kRestoredColour[] = "#d55e00";
+constexpr double kLongSidePx = 1000, kMarginPx = 40, kTitlePx = 56, kLegendPx = 60;
+// Matrices of more nodes have less than a pixel for each.
+constexpr double kMaxCellPx = 12;
+
+class Picture {
+ public:
+  explicit Picture(const Appearance& appearance) : appearance_(appearance) {}
+
+  std::string OverFloor(const std::vector<std::optional<FloorPose>>& places) {
+    SetView(places);
+    Begin(width_px_, height_px_);
+    DrawLinks(false);
+    DrawLinks(true);
+    DrawNodes();
+    DrawFloorLegend();
+    return End();
+  }
+
+  std::string AsMatrix() {
+    const int num_nodes = appearance_.graph.num_nodes();
+    cell_px_ = std::min(kMaxCellPx, kLongSidePx / std::max(1, num_nodes));
+    width_px_ = std::max(520.0, num_nodes * cell_px_ + 2 * kMarginPx);
+    height_px_ = num_nodes * cell_px_ + kTitlePx + kMarginPx + kLegendPx;
+    Begin(width_px_, height_px_);
+    DrawMatrix();
+    DrawMatrixLegend();
+    return End();
+  }
+
+ private:
+  template <typename... Args>
+  void Write(fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(text_), format, std::forward<Args>(args)...);
+  }
+  bool IsKept(NodeIdx node) const { return appearance_.nodes[node].role != NodeRole::kDropped; }
+  const char* Colour(NodeIdx node) const {
+    return appearance_.nodes[node].role == NodeRole::kRestored ? kRestoredColour : kKeptColour;
+  }
+
+  void Begin(double width, double height) {
+    Write(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
+        "height=\"{1:.0f}\" font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"100%\" "
+        "height=\"100%\" fill=\"#ffffff\"/>\n",
+        width, height);
+    const size_t num_kept = appearance_.Kept().size();
+    const int bound = appearance_.LowerBound();
+    Write(
+        "<text x=\"{:.0f}\" y=\"32\" font-size=\"18\"><tspan font-weight=\"bold\">{} of {} nodes "
+        "kept</tspan>{}",
+        kMarginPx, num_kept, appearance_.nodes.size(),
+        bound > 0 ? fmt::format(", at least {} needed", bound) : std::string());
+    Write("; {} links, {} component{}</text>\n", appearance_.graph.num_links(), appearance_.NumComponents(),
+          appearance_.NumComponents() == 1 ? "" : "s");
+  }
+  std::string End() {
+    Write("</svg>\n");
+    return fmt::to_string(text_);
+  }
+
+  // Chooses the scale and places all nodes that have one; nodes at one place move apart.
+  void SetView(const std::vector<std::optional<FloorPose>>& places) {
+    Eigen::Vector2d low(1e300, 1e300), high(-1e300, -1e300);
+    std::map<std::pair<int64_t, int64_t>, int> num_at;  // decimetres
+    const auto place_key = [](const Eigen::Vector2d& place) {
+      return std::pair<int64_t, int64_t>(std::llround(place.x() * 10), std::llround(place.y() * 10));
+    };
+    for (const std::optional<FloorPose>& place : places) {
+      if (!place) continue;
+      low = low.cwiseMin(place->position);
+      high = high.cwiseMax(place->position);
+      ++num_at[place_key(place->position)];
+    }
+    const Eigen::Vector2d size = (high - low).cwiseMax(0.1);
+    const double px_per_m = (kLongSidePx - 2 * kMarginPx) / size.maxCoeff();
+    // Half of the distance to the nearest other place bounds marks.
+    double nearest_m = size.maxCoeff();
+    std::vector<Eigen::Vector2d> distinct;
+    std::map<std::pair<int64_t, int64_t>, int> seen;
+    for (const std::optional<FloorPose>& place : places) {
+      if (place && seen.emplace(place_key(place->position), 1).second) distinct.push_back(place->position);
+    }
+    for (size_t i = 0; i < distinct.size(); ++i) {
+      for (size_t k = i + 1; k < distinct.size() && k < i + 2000; ++k) {
+        nearest_m = std::min(nearest_m, std::max(0.05, (distinct[i] - distinct[k]).norm()));
+      }
+    }
+    radius_px_ = std::clamp(0.15 * nearest_m * px_per_m, 2.5, 9.0);
+    const double spread_px = std::clamp(0.3 * nearest_m * px_per_m, 3.0, 16.0);
+    for (const std::optional<FloorPose>& place : places) {
+      if (!place) {
+        pixels_.push_back(std::nullopt);
+        continue;
+      }
+      Eigen::Vector2d pixel(kMarginPx + (place->position.x() - low.x()) * px_per_m,
+                            kTitlePx + kMarginPx / 2 + (high.y() - place->position.y()) * px_per_m);
+      if (num_at[place_key(place->position)] > 1) {
+        const double heading = RadFromDeg(place->heading_deg);
+        pixel += spread_px * Eigen::Vector2d(std::cos(heading), -std::sin(heading));
+      }
+      pixels_.push_back(pixel);
+    }
+    px_per_m_ = px_per_m;
+    width_px_ = std::max(640.0, size.x() * px_per_m + 2 * kMarginPx);
+    height_px_ = kTitlePx + size.y() * px_per_m + kMarginPx + kLegendPx;
+  }
+
+  void DrawLinks(bool among_kept) {
+    Write("<g id=\"{}\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{}\">\n",
+          among_kept ? "kept_links" : "links", among_kept ? kKeptColour : "#999999", among_kept ? 2.2 : 0.5,
+          among_kept ? "0.9" : "0.35");
+    for (const AppearanceLink& link : appearance_.graph.Links()) {
+      if ((IsKept(link.node1) && IsKept(link.node2)) != among_kept) continue;
+      if (!pixels_[link.node1] || !pixels_[link.node2]) continue;
+      const Eigen::Vector2d &a = *pixels_[link.node1], &b = *pixels_[link.node2];
+      Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
+    }
+    Write("</g>\n");
+  }
+
+  void DrawMark(double x, double y, NodeRole role) {
+    if (role == NodeRole::kRestored) {
+      Write("<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"{3}\"/>\n",
+            x - radius_px_, y - radius_px_, 2 * radius_px_, kRestoredColour);
+    } else {
+      const bool kept = role == NodeRole::kDominating;
+      Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" {}/>\n", x, y,
+            kept ? 1.3 * radius_px_ : 0.7 * radius_px_,
+            kept ? fmt::format("fill=\"{}\"", kKeptColour)
+                 : std::string("fill=\"#ffffff\" stroke=\"#555555\" stroke-width=\"1\""));
+    }
+  }
+
+  void DrawNodes() {
+    Write("<g id=\"nodes\">\n");
+    for (const bool kept : {false, true}) {
+      for (size_t i = 0; i < appearance_.nodes.size(); ++i) {
+        if (!pixels_[i] || IsKept(static_cast<NodeIdx>(i)) != kept) continue;
+        DrawMark(pixels_[i]->x(), pixels_[i]->y(), appearance_.nodes[i].role);
+      }
+    }
+    Write("</g>\n");
+  }
+
+  void DrawFloorLegend() {
+    const double y = height_px_ - 24;
+    double length_m = 0.1;
+    for (const double next : {0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0}) {
+      if (next * px_per_m_ <= 140) length_m = next;
+    }
+    Write(
+        "<path d=\"M{0:.1f} {1:.1f}v8h{2:.1f}v-8\" fill=\"none\" stroke=\"#000000\"/>\n<text x=\"{3:.1f}\" "
+        "y=\"{4:.1f}\">{5:g} m</text>\n",
+        kMarginPx, y - 6, length_m * px_per_m_, kMarginPx + length_m * px_per_m_ + 8, y + 5, length_m);
+    radius_px_ = 5;
+    double x = 270;
+    for (const auto& [role, label] :
+         {std::pair(NodeRole::kDominating, "kept"), std::pair(NodeRole::kDropped, "dropped"),
+          std::pair(NodeRole::kRestored, "kept for a cycle")}) {
+      DrawMark(x, y, role);
+      Write("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 12, y + 5, label);
+      x += 95;
+    }
+  }
+
+  double MatrixX(NodeIdx node) const { return kMarginPx + node * cell_px_; }
+  double MatrixY(NodeIdx node) const { return kTitlePx + kMarginPx / 2 + node * cell_px_; }
+
+  void DrawMatrix() {
+    const int num_nodes = appearance_.graph.num_nodes();
+    std::vector<int32_t> sorted;
+    for (const AppearanceLink& link : appearance_.graph.Links()) sorted.push_back(link.num_inliers);
+    std::sort(sorted.begin(), sorted.end());
+    Write(
+        "<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"none\" "
+        "stroke=\"#888888\"/>\n<g id=\"matrix\" shape-rendering=\"crispEdges\">\n",
+        MatrixX(0), MatrixY(0), num_nodes * cell_px_);
+    for (const AppearanceLink& link : appearance_.graph.Links()) {
+      const bool both = IsKept(link.node1) && IsKept(link.node2);
+      // Rank among all links: the darkest tenth is black.
+      const auto rank = std::lower_bound(sorted.begin(), sorted.end(), link.num_inliers) - sorted.begin();
+      const int gray = 190 - static_cast<int>(190 * rank / static_cast<int64_t>(sorted.size()));
+      const std::string colour =
+          both ? std::string(kRestoredColour) : fmt::format("#{0:02x}{0:02x}{0:02x}", gray);
+      for (const auto& [row, column] :
+           {std::pair(link.node1, link.node2), std::pair(link.node2, link.node1)}) {
+        Write("<rect x=\"{0:.2f}\" y=\"{1:.2f}\" width=\"{2:.2f}\" height=\"{2:.2f}\" fill=\"{3}\"/>\n",
+              MatrixX(column), MatrixY(row), std::max(cell_px_, 1.0), colour);
+      }
+    }
+    Write("</g>\n<g id=\"kept\">\n");
+    for (const NodeIdx node : appearance_.Kept()) {
+      const double thick = std::max(cell_px_, 2.0);
+      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"10\" fill=\"{}\"/>\n", MatrixX(node),
+            MatrixY(0) - 14, thick, Colour(node));
+      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"10\" height=\"{:.2f}\" fill=\"{}\"/>\n", MatrixX(0) - 14,
+            MatrixY(node), thick, Colour(node));
+    }
+    Write("</g>\n");
+  }
+
+  void DrawMatrixLegend() {
+    const double y = height_px_ - 22;
+    Write(
+        "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"#000000\"/><text x=\"{2:.0f}\" "
+        "y=\"{3:.0f}\">linked (lighter: fewer inliers)</text>\n",
+        kMarginPx, y - 10, kMarginPx + 18, y);
+    Write(
+        "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"{4}\"/><text x=\"{2:.0f}\" "
+        "y=\"{3:.0f}\">both kept</text>\n",
+        kMarginPx + 240, y - 10, kMarginPx + 258, y, kRestoredColour);
+    Write(
+        "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"{4}\"/><text x=\"{2:.0f}\" "
+        "y=\"{3:.0f}\">kept</text>\n",
+        kMarginPx + 350, y - 10, kMarginPx + 368, y, kKeptColour);
+  }
+
+  const Appearance& appearance_;
+  double width_px_ = 0, height_px_ = 0, radius_px_ = 4, px_per_m_ = 1, cell_px_ = 1;
+  std::vector<std::optional<Eigen::Vector2d>> pixels_;
+  fmt::memory_buffer text_;
+};
+
+}  // namespace
+
+std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
+                                                 const std::vector<DatabaseImage>& images,
+                                                 const Capture& capture) {
+  std::map<std::string, Pose> poses;
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const CaptureImage& image : capture.images) {
+    if (!image.cam_from_world) continue;
+    poses.emplace(image.name, *image.cam_from_world);
+    up -= image.cam_from_world->rotation.conjugate() * Eigen::Vector3d::UnitY();
+  }
+  Pose floor_from_world;
+  if (up.norm() > 1e-9) floor_from_world.rotation.setFromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  std::map<ImageId, FloorPose> places;
+  for (const DatabaseImage& image : images) {
+    const auto pose = poses.find(image.name);
+    if (pose != poses.end()) places.emplace(image.image_id, FloorPoseOf(pose->second, floor_from_world));
+  }
+  std::vector<std::optional<FloorPose>> node_places;
+  for (const AppearanceNode& node : appearance.nodes) {
+    FloorPose mean{Eigen::Vector2d::Zero(), 0};
+    int num_places = 0;
+    for (const ImageId image : node.images) {
+      const auto place = places.find(image);
+      if (place == places.end()) continue;
+      mean.position += place->second.position;
+      mean.heading_deg = place->second.heading_deg;
+      ++num_places;
+    }
+    if (num_places == 0) {
+      node_places.push_back(std::nullopt);
+    } else {
+      mean.position /= num_places;
+      node_places.push_back(mean);
+    }
+  }
+  return node_places;
+}
+
+std::string DrawAppearance(const Appearance& appearance,
+                           const std::vector<std::optional<FloorPose>>& places) {
+  const bool has_places =
+      std::any_of(places.begin(), places.end(), [](const auto& place) { return place.has_value(); });
+  Picture picture(appearance);
+  return has_places ? picture.OverFloor(places) : picture.AsMatrix();
+}
+
+}  // namespace cairn

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/capture.h"
+#include "core/floor_pose.h"
+#include "stages/link_appearance/link_appearance.h"
+
+namespace cairn {
+
+// Where the nodes' images were taken on the floor, by the capture's poses: the mean place, and the heading
+// where a node is one image.  Up is the mean of the cameras' up.  None for nodes without poses.
+std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
+                                                 const std::vector<DatabaseImage>& images,
+                                                 const Capture& capture);
+
+// A picture of the graph as SVG.  With places (one per node, metres): a top view, links thin, those among
+// kept nodes bold, kept nodes full, others hollow, nodes that restore cycles square; nodes of several
+// headings at one place are moved apart along these.  Without: the connectivity matrix [Booij06 Fig. 8], row
+// and column i of node i, a dot where two nodes are linked, darker for more inliers, kept nodes marked along
+// the sides and their links coloured.  Same input, same bytes.
+std::string DrawAppearance(const Appearance& appearance, const std::vector<std::optional<FloorPose>>& places);
+
+}  // namespace cairn

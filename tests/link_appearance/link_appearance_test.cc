@@ -1,0 +1,290 @@
+#include "stages/link_appearance/link_appearance.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "stages/link_appearance/appearance_database.h"
+#include "stages/link_appearance/check_appearance.h"
+#include "stages/link_appearance/picture.h"
+#include "tests/link_appearance/graphs.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+ImageLinks ImagesOf(const AppearanceGraph& graph) {
+  ImageLinks images{.links = graph.Links()};
+  for (int i = 0; i < graph.num_nodes(); ++i) {
+    images.images.push_back({static_cast<ImageId>(i + 1), fmt::format("image{}.jpg", i), 1});
+  }
+  return images;
+}
+
+std::string TemporaryPath(const std::string& name) {
+  const char* folder = std::getenv("TEST_TMPDIR");
+  return std::string(folder ? folder : ".") + "/" + name;
+}
+
+// A COLMAP database of images and verified pairs without features.
+void WriteMatches(const std::string& path, const ImageLinks& images, TwoViewConfig config) {
+  std::remove(path.c_str());
+  SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  database.exec(kColmapSchema);
+  WriteDatabaseCamera(database, *ParseCamera("PINHOLE,640,480,500,500,320,240"));
+  for (const DatabaseImage& image : images.images) WriteDatabaseImage(database, image);
+  for (const AppearanceLink& link : images.links) {
+    TwoViewGeometry geometry;
+    geometry.image_id1 = images.images[link.node1].image_id;
+    geometry.image_id2 = images.images[link.node2].image_id;
+    geometry.config = config;
+    for (int i = 0; i < link.num_inliers; ++i) {
+      geometry.inliers.push_back({static_cast<KeypointIdx>(i), static_cast<KeypointIdx>(i)});
+    }
+    WriteDatabaseTwoViewGeometry(database, geometry);
+  }
+}
+
+TEST(LinkAppearance, KeepsTheMiddleOfAStarAndSaysThatOneIsNeeded) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(GraphOf(5, {{2, 0}, {2, 1}, {2, 3}, {2, 4}})), nullptr, {}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->appearance.KeptImages(), ElementsAre(3));
+  EXPECT_EQ(result->appearance.LowerBound(), 1);
+  EXPECT_THAT(result->notes, IsEmpty());
+}
+
+TEST(LinkAppearance, OneImageIsKept) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(AppearanceGraph(1, {})), nullptr, {}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->appearance.KeptImages(), ElementsAre(1));
+}
+
+TEST(LinkAppearance, NoImageIsAnError) {
+  const Result<LinkAppearanceResult> result = LinkAppearance({}, nullptr, {}, 0);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::kNoData);
+}
+
+TEST(LinkAppearance, WithoutAnyLinkEveryImageIsKeptAndItIsSaid) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(AppearanceGraph(4, {})), nullptr, {}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->appearance.KeptImages().size(), 4u);
+  EXPECT_THAT(result->notes, ElementsAre(HasSubstr("no two of the 4 nodes are linked")));
+}
+
+TEST(LinkAppearance, ComponentsAreCountedAndSmallOnesMayBeLeftOut) {
+  //  0 - 1 - 2    3 - 4    5
+  const ImageLinks images = ImagesOf(GraphOf(6, {{0, 1}, {1, 2}, {3, 4}}));
+  Result<LinkAppearanceResult> result = LinkAppearance(images, nullptr, {}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->notes, ElementsAre(HasSubstr("3 components, 1 of them of one node")));
+  EXPECT_EQ(result->appearance.Kept().size(), 3u);
+  EXPECT_EQ(result->appearance.LowerBound(), 3);
+  result = LinkAppearance(images, nullptr, {.min_component_nodes = 3}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_THAT(result->appearance.Kept(), ElementsAre(1));
+  EXPECT_THAT(result->undominated, IsEmpty());
+}
+
+TEST(LinkAppearance, ASizeThatCannotDominateIsKeptExactlyAndTheMessageSaysWhatIsNeeded) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(PathGraph(12)), nullptr, {.num_kept = 4}, 0);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->appearance.Kept().size(), 4u);
+  EXPECT_EQ(result->undominated.size(), 6u);
+  EXPECT_THAT(result->notes,
+              ElementsAre(AllOf(HasSubstr("num_kept = 4 leaves 6 of 12"), HasSubstr("at least 10"))));
+}
+
+TEST(LinkAppearance, ALargerSizeDominatesAndIsKeptExactly) {
+  const ImageLinks images = ImagesOf(GeometricGraph(60, 8, 2));
+  for (const int size : {25, 40, 60}) {
+    const Result<LinkAppearanceResult> result = LinkAppearance(images, nullptr, {.num_kept = size}, 0);
+    ASSERT_TRUE(result.ok());
+    EXPECT_EQ(static_cast<int>(result->appearance.Kept().size()), size);
+    EXPECT_THAT(result->undominated, IsEmpty());
+  }
+  const Result<LinkAppearanceResult> all = LinkAppearance(images, nullptr, {.num_kept = 100}, 0);
+  ASSERT_TRUE(all.ok());
+  EXPECT_EQ(all->appearance.Kept().size(), 60u);
+  EXPECT_THAT(all->notes, Contains(HasSubstr("num_kept = 100: there are 60 nodes")));
+}
+
+TEST(LinkAppearance, NodesThatRestoreCyclesSaySo) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(PathGraph(12, true)), nullptr, {.max_detour_links = 5}, 0);
+  ASSERT_TRUE(result.ok());
+  int num_restored = 0;
+  for (const AppearanceNode& node : result->appearance.nodes)
+    num_restored += node.role == NodeRole::kRestored;
+  EXPECT_EQ(num_restored, 2);
+  EXPECT_EQ(result->appearance.LowerBound(), 10);
+}
+
+TEST(LinkAppearance, OptionsThatCannotBeMeantAreErrors) {
+  const ImageLinks images = ImagesOf(PathGraph(3));
+  for (const LinkAppearanceOptions& options :
+       {LinkAppearanceOptions{.num_dominators = 0}, LinkAppearanceOptions{.max_detour_links = 1},
+        LinkAppearanceOptions{.fuse = "guess"}, LinkAppearanceOptions{.algorithm = "online", .num_kept = 2},
+        LinkAppearanceOptions{.fuse = "place"}}) {
+    const Result<LinkAppearanceResult> result = LinkAppearance(images, nullptr, options, 0);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument) << result.error().message;
+  }
+}
+
+TEST(FuseImages, HeadingsOfAStationAreOneNodeAndTheirInliersAddUp) {
+  ImageLinks images;
+  for (const char* name : {"s0_h0.jpg", "s0_h1.jpg", "s1_h0.jpg", "s1_h1.jpg", "single"}) {
+    images.images.push_back({static_cast<ImageId>(images.images.size() + 1), name, 1});
+  }
+  images.links = {{0, 1, 50}, {0, 2, 20}, {1, 3, 30}, {3, 4, 40}};
+  const Result<std::vector<NodeIdx>> nodes = FuseImages(images.images, "name", 0.1, nullptr);
+  ASSERT_TRUE(nodes.ok());
+  EXPECT_THAT(*nodes, ElementsAre(0, 0, 1, 1, 2));
+  EXPECT_THAT(FusedGraph(images.links, *nodes).Links(),
+              ElementsAre(AppearanceLink{0, 1, 50}, AppearanceLink{1, 2, 40}));
+}
+
+TEST(FuseImages, ImagesTakenAtOnePlaceAreOneNode) {
+  Capture capture;
+  std::vector<DatabaseImage> images;
+  for (const double x : {0.0, 1.0, 0.05, 1.04}) {
+    const std::string name = fmt::format("{}.jpg", images.size());
+    images.push_back({static_cast<ImageId>(images.size() + 1), name, 1});
+    capture.images.push_back({name, 1, Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d(-x, 0, 0)}});
+  }
+  const Result<std::vector<NodeIdx>> nodes = FuseImages(images, "place", 0.1, &capture);
+  ASSERT_TRUE(nodes.ok());
+  EXPECT_THAT(*nodes, ElementsAre(0, 1, 0, 1));
+}
+
+TEST(ReadImageLinks, ReadsVerifiedPairsOfEnoughInliers) {
+  const std::string path = TemporaryPath("links.db");
+  const ImageLinks images = ImagesOf(AppearanceGraph(3, {{0, 1, 20}, {1, 2, 40}}));
+  WriteMatches(path, images, TwoViewConfig::kCalibrated);
+  const Result<ImageLinks> all = ReadImageLinks(path, 15);
+  ASSERT_TRUE(all.ok()) << all.error().message;
+  EXPECT_EQ(all->images.size(), 3u);
+  EXPECT_EQ(all->links, images.links);
+  EXPECT_THAT(ReadImageLinks(path, 30)->links, ElementsAre(AppearanceLink{1, 2, 40}));
+  WriteMatches(path, images, TwoViewConfig::kWatermark);
+  EXPECT_THAT(ReadImageLinks(path, 15)->links, IsEmpty());
+}
+
+TEST(ReadImageLinks, PairsOfUnknownImagesAreCorrupt) {
+  const std::string path = TemporaryPath("unknown.db");
+  WriteMatches(path, ImagesOf(PathGraph(3)), TwoViewConfig::kCalibrated);
+  SQLite::Database(path, SQLite::OPEN_READWRITE).exec("DELETE FROM images WHERE image_id = 2");
+  const Result<ImageLinks> links = ReadImageLinks(path, 15);
+  ASSERT_FALSE(links.ok());
+  EXPECT_EQ(links.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(links.error().message, HasSubstr("images 1 and 2"));
+}
+
+TEST(AppearanceDatabase, ReadsBackWhatWasWrittenAndHasTheSameBytesAgain) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(GeometricGraph(50, 6, 3)), nullptr, {.num_dominators = 2}, 7);
+  ASSERT_TRUE(result.ok());
+  const std::string path = TemporaryPath("appearance.db"), again = TemporaryPath("again.db");
+  ASSERT_TRUE(WriteAppearance(result->appearance, path).ok());
+  const Result<Appearance> read = ReadAppearance(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->nodes, result->appearance.nodes);
+  EXPECT_EQ(read->graph.Links(), result->appearance.graph.Links());
+  EXPECT_EQ(read->lower_bounds, result->appearance.lower_bounds);
+  EXPECT_EQ(read->num_dominators, 2);
+  ASSERT_TRUE(WriteAppearance(*read, again).ok());
+  EXPECT_EQ(*ReadFile(path), *ReadFile(again));
+}
+
+TEST(AppearanceDatabase, FilesThatAreNoneOrDamagedAreErrors) {
+  const Result<LinkAppearanceResult> result = LinkAppearance(ImagesOf(PathGraph(5)), nullptr, {}, 0);
+  const std::string path = TemporaryPath("damaged.db");
+  for (const char* damage :
+       {"UPDATE nodes SET role = 7 WHERE node_idx = 1", "DELETE FROM nodes WHERE node_idx = 2",
+        "UPDATE nodes SET neighbours = x'00000000' WHERE node_idx = 3",
+        "UPDATE nodes SET num_inliers = x'0000' WHERE node_idx = 0", "DELETE FROM components",
+        "UPDATE appearance SET num_links = 9", "DELETE FROM appearance"}) {
+    std::remove(path.c_str());
+    ASSERT_TRUE(WriteAppearance(result->appearance, path).ok());
+    SQLite::Database(path, SQLite::OPEN_READWRITE).exec(damage);
+    const Result<Appearance> read = ReadAppearance(path);
+    ASSERT_FALSE(read.ok()) << damage;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << damage;
+    EXPECT_THAT(read.error().message, HasSubstr("damaged.db"));
+  }
+  EXPECT_EQ(ReadAppearance(TemporaryPath("none.db")).error().code, ErrorCode::kNotFound);
+}
+
+TEST(CheckAppearance, CountsLeaveOneOutOnAHandSizedGraph) {
+  //  A path of five.  Without an end node the rest is a path of four: its inner two are kept, and the end's
+  //  neighbour is an end of it, not kept.  Without an inner node the rest falls apart and ...
+  //    without 0: 1-2-3-4 keeps 2 3, 0 sees 1: lost.          without 4: likewise, keeps 1 2, 4 sees 3: lost.
+  //    without 1: 0 | 2-3-4 keeps 0 3, 1 sees 0: located.     without 3: keeps 1 4, located.
+  //    without 2: 0-1 | 3-4 keeps 0 3, 2 sees 3: located.
+  const AppearanceGraph graph = PathGraph(5);
+  NoProgress progress;
+  const Result<AppearanceCheck> check =
+      CheckAppearance(graph, EachNodeLeftOut(graph), {.num_tries = 0}, {}, 0, 1, progress);
+  ASSERT_TRUE(check.ok());
+  EXPECT_EQ(check->num_left_out, 5);
+  EXPECT_EQ(check->set_names[0], "greedy");
+  EXPECT_EQ(check->sets[0].num_localized, 3);
+  EXPECT_DOUBLE_EQ(check->sets[0].num_kept, 2);
+  // Ends have one neighbour of four, the others two: 2 random ones of four hold it by 1/2, one of two by 5/6.
+  EXPECT_NEAR(check->sets[0].num_by_random, 2 * 0.5 + 3 * 5.0 / 6, 1e-9);
+}
+
+TEST(CheckAppearance, IsTheSameForAnyNumberOfThreads) {
+  const AppearanceGraph graph = GeometricGraph(60, 7, 5);
+  NoProgress progress;
+  const auto run = [&](int num_threads) {
+    return *CheckAppearance(graph, EachNodeLeftOut(graph), {.num_tries = 20}, {}, 3, num_threads, progress);
+  };
+  const AppearanceCheck one = run(1), four = run(4);
+  for (size_t i = 0; i < one.sets.size(); ++i) {
+    EXPECT_EQ(one.sets[i].num_localized, four.sets[i].num_localized);
+    EXPECT_EQ(one.sets[i].num_kept, four.sets[i].num_kept);
+  }
+}
+
+TEST(CheckAppearance, HeldOutImagesLeaveTheGraphAndKeepTheirLinks) {
+  const ImageLinks images = ImagesOf(PathGraph(5));
+  const Result<HeldOutSplit> split = HoldOut(images, {"image2.jpg"});
+  ASSERT_TRUE(split.ok());
+  EXPECT_EQ(split->survey.images.size(), 4u);
+  EXPECT_THAT(split->survey.links, ElementsAre(AppearanceLink{0, 1, 30}, AppearanceLink{2, 3, 30}));
+  EXPECT_THAT(split->linked, ElementsAre(ElementsAre(1, 2)));
+  EXPECT_EQ(HoldOut(images, {"nobody.jpg"}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(GraphOf(3, {{0, 1}, {1, 2}})), nullptr, {}, 0);
+  ASSERT_TRUE(result.ok());
+  const auto count = [](const std::string& text, const std::string& what) {
+    int num = 0;
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++num;
+    return num;
+  };
+  const std::string matrix = DrawAppearance(result->appearance, {});
+  EXPECT_THAT(matrix, HasSubstr("<g id=\"matrix\""));
+  EXPECT_THAT(matrix, HasSubstr("1 of 3 nodes kept</tspan>, at least 1 needed; 2 links, 1 component<"));
+  std::vector<std::optional<FloorPose>> places;
+  for (const double x : {0.0, 1.0, 2.0}) places.push_back(FloorPose{Eigen::Vector2d(x, 0), 0});
+  const std::string floor = DrawAppearance(result->appearance, places);
+  EXPECT_THAT(floor, HasSubstr("<g id=\"kept_links\""));
+  EXPECT_EQ(count(floor, "<path d=\"M") - 1, 2);  // links, beside the scale bar
+}
+
+}  // namespace
+}  // namespace cairn
