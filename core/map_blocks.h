@@ -28,8 +28,9 @@ enum class BlockKind : uint8_t {
   kWords = 5,
   kImages = 6,
   kLandmarks = 7,
+  kAppearance = 8,
 };
-inline constexpr int kNumBlockKinds = 8;    // 0 is none
+inline constexpr int kNumBlockKinds = 9;    // 0 is none
 const char* BlockKindName(BlockKind kind);  // "stations"
 
 // What the directory says of a block.
@@ -102,12 +103,18 @@ struct WordBlock {
   std::vector<std::vector<Posting>> postings;  // per word; documents are images
 };
 
+struct AppearanceBlock {
+  int32_t first = 0;  // index of the first node
+  std::vector<MapAppearanceNode> nodes;
+};
+
 // Blocks as bytes.  Same block, same bytes.
 std::string EncodeBlock(const LandmarkBlock& block);
 std::string EncodeBlock(const ImageBlock& block);
 std::string EncodeBlock(const StationBlock& block);
 std::string EncodeBlock(const RegionBlock& block);
 std::string EncodeBlock(const WordBlock& block);
+std::string EncodeBlock(const AppearanceBlock& block);
 std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
 std::string EncodeDocumentNorms(const std::vector<float>& norms);
 
@@ -123,6 +130,8 @@ Result<RegionBlock> DecodeRegionBlock(std::string_view bytes, const BlockEntry& 
                                       const MapDirectory& directory, const std::string& what);
 Result<WordBlock> DecodeWordBlock(std::string_view bytes, const BlockEntry& entry,
                                   const MapDirectory& directory, const std::string& what);
+Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const BlockEntry& entry,
+                                              const MapDirectory& directory, const std::string& what);
 // A tree with empty inverted files.
 Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry& entry,
                                         const MapDirectory& directory, const std::string& what);
@@ -135,6 +144,7 @@ int64_t NumBytes(const ImageBlock& block);
 int64_t NumBytes(const StationBlock& block);
 int64_t NumBytes(const RegionBlock& block);
 int64_t NumBytes(const WordBlock& block);
+int64_t NumBytes(const AppearanceBlock& block);
 int64_t NumBytes(const Vocabulary& vocabulary);
 int64_t NumBytes(const std::vector<float>& values);
 

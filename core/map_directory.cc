@@ -17,6 +17,7 @@ int64_t FewestBytes(BlockKind kind) {
     case BlockKind::kStations:
       return 5;
     case BlockKind::kDocumentNorms:
+    case BlockKind::kAppearance:
       return 4;
     case BlockKind::kRegions:
     case BlockKind::kWords:
@@ -49,6 +50,8 @@ const char* BlockKindName(BlockKind kind) {
       return "images";
     case BlockKind::kLandmarks:
       return "landmarks";
+    case BlockKind::kAppearance:
+      return "appearance";
   }
   return "other";
 }

@@ -1,4 +1,5 @@
 // Whole maps read: all blocks of a map file as rows.
+#include "core/map_documents.h"
 #include "core/map_file.h"
 #include "core/map_rows.h"
 
@@ -18,9 +19,7 @@ class RowsReader {
     for (int64_t block = 0; block < static_cast<int64_t>(directory.blocks().size()); ++block) {
       CAIRN_RETURN_IF_ERROR(ReadBlock(block, directory.blocks()[block]));
     }
-    for (const MapImage& image : rows_.images) {
-      if (!rows_.vocabulary.nodes.empty()) rows_.vocabulary.document_ids.push_back(image.image_id);
-    }
+    if (!rows_.vocabulary.nodes.empty()) CAIRN_RETURN_IF_ERROR(NameDocuments());
     WeightVocabulary(&rows_.vocabulary);
     CAIRN_ASSIGN_OR_RETURN(rows_.findings, file_.ReadFindings());
     return CheckMapRows(rows_);
@@ -58,8 +57,34 @@ class RowsReader {
       }
       case BlockKind::kLandmarks:
         return AddLandmarks(DecodeLandmarkBlock(bytes, entry, directory, what));
+      case BlockKind::kAppearance: {
+        CAIRN_ASSIGN_OR_RETURN(AppearanceBlock part, DecodeAppearanceBlock(bytes, entry, directory, what));
+        std::move(part.nodes.begin(), part.nodes.end(), std::back_inserter(rows_.appearance));
+        return Ok();
+      }
     }
     return Ok();  // of a later minor version
+  }
+
+  // Postings name images in a file, documents in rows.
+  Status NameDocuments() {
+    const std::vector<char> is_document = DocumentImages(rows_);
+    std::vector<int32_t> document_of_image(rows_.images.size(), -1);
+    for (size_t i = 0; i < rows_.images.size(); ++i) {
+      if (!is_document[i]) continue;
+      document_of_image[i] = static_cast<int32_t>(rows_.vocabulary.document_ids.size());
+      rows_.vocabulary.document_ids.push_back(rows_.images[i].image_id);
+    }
+    for (std::vector<Posting>& postings : rows_.vocabulary.inverted_files) {
+      for (Posting& posting : postings) {
+        const int32_t document = document_of_image[posting.document];
+        if (document < 0) {
+          return MakeError(ErrorCode::kCorrupt, "image {} has words, but is not kept", posting.document);
+        }
+        posting.document = document;
+      }
+    }
+    return Ok();
   }
 
   template <typename T>

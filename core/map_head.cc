@@ -87,6 +87,7 @@ Status ReadTables(SQLite::Database& database, const std::string& path, MapHead* 
     return Corrupt(path, "table meta: seed '{}', k '{}', tau '{}' or rho '{}' is not an integer",
                    meta["seed"], meta["k"], meta["tau"], meta["rho"]);
   }
+  if (meta.count("documents")) head->documents = meta["documents"];
   if (meta.count("lower_bound")) {
     head->lower_bound.emplace();
     if (!ParseNumber(meta["lower_bound"], &*head->lower_bound) ||
@@ -150,6 +151,9 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
   if (!head.sessions.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
                {{"sessions", fmt::format("{}", fmt::join(head.sessions, " "))}});
+  }
+  if (head.documents != "all") {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"documents", head.documents}});
   }
   if (head.lower_bound) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",

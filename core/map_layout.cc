@@ -12,6 +12,7 @@ constexpr size_t kStationsPerBlock = 1024;
 constexpr size_t kRegionsPerBlock = 1024;
 constexpr size_t kWordsPerBlock = 1024;
 constexpr size_t kPostingsPerBlock = 4096;
+constexpr size_t kAppearanceNodesPerBlock = 1024;
 
 }  // namespace
 
@@ -34,6 +35,7 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
     CutEvenly(BlockKind::kDocumentNorms, rows.images.size(), std::numeric_limits<int32_t>::max());
     CutWords();
   }
+  CutEvenly(BlockKind::kAppearance, rows.appearance.size(), kAppearanceNodesPerBlock);
   const size_t first_image_block = entries_.size();
   CutEvenly(BlockKind::kImages, rows.images.size(), kImagesPerBlock);
   for (size_t i = first_image_block; i < entries_.size(); ++i) {
@@ -172,6 +174,11 @@ WordBlock MapLayout::MakeWordBlock(const BlockEntry& entry) const {
   return block;
 }
 
+AppearanceBlock MapLayout::MakeAppearanceBlock(const BlockEntry& entry) const {
+  const auto begin = rows_.appearance.begin() + entry.first;
+  return {static_cast<int32_t>(entry.first), {begin, begin + entry.count}};
+}
+
 std::vector<float> MapLayout::MakeDocumentNorms() const {
   std::vector<float> norms(rows_.images.size(), 0);
   for (size_t document = 0; document < image_of_document_.size(); ++document) {
@@ -196,6 +203,8 @@ std::string MapLayout::Encode(const BlockEntry& entry) const {
       return EncodeBlock(MakeImageBlock(entry));
     case BlockKind::kLandmarks:
       return EncodeBlock(MakeLandmarkBlock(entry));
+    case BlockKind::kAppearance:
+      return EncodeBlock(MakeAppearanceBlock(entry));
   }
   return "";
 }

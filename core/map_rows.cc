@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/map_documents.h"
 #include "core/sessions.h"
 
 namespace cairn {
@@ -86,6 +87,33 @@ Status CheckRegions(const MapRows& rows) {
   return Ok();
 }
 
+Status CheckAppearance(const MapRows& rows) {
+  const auto num_nodes = static_cast<int64_t>(rows.appearance.size());
+  std::vector<char> is_taken(rows.images.size(), 0);
+  bool is_any_kept = false;
+  for (int64_t i = 0; i < num_nodes; ++i) {
+    const MapAppearanceNode& node = rows.appearance[i];
+    is_any_kept = is_any_kept || node.is_kept;
+    if (node.images.empty() || !IsAscending(node.images, rows.images.size())) {
+      return Invalid("appearance node {}: its images are not ascending below {}", i, rows.images.size());
+    }
+    for (const int32_t image : node.images) {
+      if (is_taken[image]) return Invalid("image {} is of two appearance nodes", image);
+      is_taken[image] = 1;
+    }
+    for (size_t k = 0; k < node.links.size(); ++k) {
+      const int64_t before = k == 0 ? i : node.links[k - 1].node;
+      const int64_t other = node.links[k].node;
+      if (other <= before || other >= num_nodes || node.links[k].num_inliers <= 0 ||
+          !(node.is_kept || rows.appearance[other].is_kept)) {
+        return Invalid("appearance node {}: link {} makes no sense", i, k);
+      }
+    }
+  }
+  if (rows.documents == "kept" && !is_any_kept) return Invalid("retrieval on kept images, but none is kept");
+  return Ok();
+}
+
 }  // namespace
 
 std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
@@ -123,6 +151,8 @@ Status CheckMapHead(const MapHead& head) {
       !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
     return Invalid("the noise of the stated poses is no valid number");
   }
+  if (head.documents != "all" && head.documents != "kept")
+    return Invalid("documents = '{}', expected all or kept", head.documents);
   for (const auto& [name, value] : head.self_test) {
     if (!std::isfinite(value)) return Invalid("self-test figure '{}' is not finite", name);
   }
@@ -132,6 +162,7 @@ Status CheckMapHead(const MapHead& head) {
 Status CheckMapRows(const MapRows& rows) {
   CAIRN_RETURN_IF_ERROR(CheckMapHead(rows));
   CAIRN_RETURN_IF_ERROR(CheckImages(rows));
+  CAIRN_RETURN_IF_ERROR(CheckAppearance(rows));
   CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
     return Invalid("{} landmarks, but {} descriptors", rows.landmarks.size(), rows.descriptors.rows());
@@ -146,12 +177,14 @@ Status CheckMapRows(const MapRows& rows) {
       return Invalid("landmark {} lies more than 200 km from the origin of its frame", i);
     }
   }
+  const std::vector<char> is_document = DocumentImages(rows);
   size_t image = 0;
   for (const ImageId image_id : rows.vocabulary.document_ids) {
     while (image < rows.images.size() && rows.images[image].image_id < image_id) ++image;
     if (image == rows.images.size() || rows.images[image].image_id != image_id) {
       return Invalid("the vocabulary knows image {}, which the map lacks", image_id);
     }
+    if (!is_document[image]) return Invalid("the vocabulary knows image {}, which is not kept", image_id);
   }
   return CheckMapFindings(rows.findings, rows.regions.size(), rows.stations.size());
 }

@@ -53,6 +53,21 @@ struct MapRegion {
   std::vector<LandmarkIdx> landmarks;  // ascending
 };
 
+// A node of the appearance graph: images of one place between which, and those of linked nodes, the relative
+// pose can be recovered.
+struct MapAppearanceNode {
+  struct Link {
+    int32_t node = 0;
+    int32_t num_inliers = 0;  // verified matches, > 0
+    friend bool operator==(const Link&, const Link&) = default;
+  };
+  std::vector<int32_t> images;  // by index, ascending; no image is of two nodes
+  bool is_kept = false;         // of the connected set that all other nodes are linked to
+  // To nodes of larger index, ascending; one of the two is kept.
+  std::vector<Link> links;
+  friend bool operator==(const MapAppearanceNode&, const MapAppearanceNode&) = default;
+};
+
 // What a map says of itself as a whole.
 struct MapHead {
   std::string name;
@@ -63,6 +78,8 @@ struct MapHead {
   bool sealed = false;  // checked, with its self-test figures
   // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
   std::string landmark_choice = "regions";
+  // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
+  std::string documents = "all";
   // How the regions were made.
   std::string algorithm;
   int k = 0;
@@ -97,14 +114,15 @@ struct MapRows : MapHead {
   std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
   std::vector<MapRegion> regions;
   std::vector<MapLandmark> landmarks;
-  DescriptorMatrix descriptors;  // row i: landmark i
+  DescriptorMatrix descriptors;               // row i: landmark i
+  std::vector<MapAppearanceNode> appearance;  // none: not known
   // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
   Vocabulary vocabulary;
   MapFindings findings;
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 1;
+inline constexpr int kMapVersionMinor = 2;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

@@ -7,6 +7,7 @@
 #include "pipeline/inspect_command.h"
 #include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
+#include "pipeline/route_command.h"
 #include "pipeline/seal_commands.h"
 #include "stages/build_vocabulary/command.h"
 #include "stages/check_map/command.h"
@@ -31,7 +32,7 @@ std::vector<Command> AllCommands() {
       ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
       JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
-      MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),
+      MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),  RouteCommand(),
   };
 }
 

@@ -47,11 +47,11 @@ struct StageFile {
   const char* file;
 };
 constexpr StageFile kStageFiles[] = {
-    {"simulate", "capture.stamp"},       {"extract_features", "features.db"},
-    {"match_features", "matches.db"},    {"reconstruct", "poses"},
-    {"group_classes", "classes.db"},     {"filter_visibility", "world.db"},
-    {"decompose_regions", "regions.db"}, {"build_vocabulary", "vocabulary.db"},
-    {"emit_map", "unsealed.cairn"}};
+    {"simulate", "capture.stamp"},        {"extract_features", "features.db"},
+    {"match_features", "matches.db"},     {"reconstruct", "poses"},
+    {"group_classes", "classes.db"},      {"filter_visibility", "world.db"},
+    {"decompose_regions", "regions.db"},  {"build_vocabulary", "vocabulary.db"},
+    {"link_appearance", "appearance.db"}, {"emit_map", "unsealed.cairn"}};
 
 Result<std::string> ProgramPath() {
   std::error_code error;

@@ -1,5 +1,6 @@
 #include "pipeline/inspect_command.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -92,6 +93,8 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                const std::vector<std::pair<std::string, int64_t>>& tables) {
   size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
   for (const auto& postings : rows.vocabulary.inverted_files) num_postings += postings.size();
+  const auto num_kept = std::count_if(rows.appearance.begin(), rows.appearance.end(),
+                                      [](const MapAppearanceNode& node) { return node.is_kept; });
   for (const MapStation& station : rows.stations) num_uncovered += station.is_covered ? 0 : 1;
   for (const MapRegion& region : rows.regions) num_region_landmarks += region.landmarks.size();
   nlohmann::ordered_json json = {{"name", rows.name},
@@ -118,6 +121,9 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"num_uncovered_stations", num_uncovered},
                                  {"num_images", rows.images.size()},
                                  {"num_cameras", rows.cameras.size()},
+                                 {"num_appearance_nodes", rows.appearance.size()},
+                                 {"num_kept_nodes", num_kept},
+                                 {"documents", rows.documents},
                                  {"num_words", rows.vocabulary.num_words()},
                                  {"vocabulary_depth", rows.vocabulary.depth},
                                  {"num_postings", num_postings}};

@@ -80,7 +80,8 @@ $(BUILD)/%: QUERIES := $(QUERIES)
 $(BUILD)/%: NAME := $(NAME)
 $(BUILD)/%: SEED := $(SEED)
 
-CAIRN_OUTPUTS := $(addprefix $(BUILD)/,features.db matches.db classes.db world.db regions.db vocabulary.db unsealed.cairn)
+CAIRN_OUTPUTS := $(addprefix $(BUILD)/,features.db matches.db classes.db world.db regions.db vocabulary.db \
+    appearance.db unsealed.cairn)
 ifeq ($(RECONSTRUCTED),yes)
 CAIRN_OUTPUTS += $(BUILD)/poses
 endif
@@ -254,18 +255,25 @@ $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabu
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
+# Held-out images of a reconstructed capture are linked in matches.db, but are no survey.
+$(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/options/link_appearance.toml $(BUILD)/options/seed \
+    $(PROGRAM_HASH) $(POSES_READY)
+	$(CAIRN_WHY)
+	$(CAIRN_LAUNCH) $(CAIRN) link-appearance $(@D)/matches.db --capture $(POSES) \
+	    --options $(@D)/options/link_appearance.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+
 SESSION_LIST := $(filter %/sessions.txt,$(CAPTURE_LISTS))
 $(BUILD)/%: SESSION_LIST := $(SESSION_LIST)
 # The map notes the options of every stage that made it.
 STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCTED)),reconstruct) group_classes \
-    filter_visibility decompose_regions build_vocabulary emit_map
+    filter_visibility decompose_regions build_vocabulary link_appearance emit_map
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
-    $(BUILD)/vocabulary.db $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) \
+    $(BUILD)/vocabulary.db $(BUILD)/appearance.db $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) \
     $(POSES_READY) $(SESSION_LIST)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) emit-map --matches $(@D)/matches.db --classes $(@D)/classes.db --world $(@D)/world.db \
-	    --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
+	    --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --appearance $(@D)/appearance.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
 	    $(addprefix --sessions ,$(SESSION_LIST)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)

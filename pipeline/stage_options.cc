@@ -7,6 +7,7 @@
 #include "stages/extract_features/extract_features.h"
 #include "stages/filter_visibility/filter_visibility.h"
 #include "stages/group_classes/group_classes.h"
+#include "stages/link_appearance/link_appearance.h"
 #include "stages/match_features/match_features.h"
 #include "stages/reconstruct/reconstruct.h"
 #include "stages/simulate/options.h"
@@ -23,6 +24,7 @@ std::vector<StageOptions> AllStageOptions() {
       MakeStageOptions<FilterVisibilityOptions>("filter_visibility"),
       MakeStageOptions<DecomposeRegionsOptions>("decompose_regions"),
       MakeStageOptions<BuildVocabularyOptions>("build_vocabulary"),
+      MakeStageOptions<LinkAppearanceOptions>("link_appearance"),
       MakeStageOptions<EmitMapOptions>("emit_map"),
       MakeStageOptions<CheckMapOptions>("check_map"),
   };

@@ -12,10 +12,18 @@ namespace {
 
 // In the cache, beside the numbers of blocks.
 constexpr int64_t kAllLandmarks = -1;
+constexpr int64_t kWholeAppearance = -2;
 
 int64_t NumBytes(const LandmarkSet& set) {
   return static_cast<int64_t>(set.idx.size() * (sizeof(LandmarkIdx) + sizeof(MapLandmark))) +
          set.descriptors.size() + set.packed.num_bytes();
+}
+
+int64_t NumBytes(const AppearanceMap& appearance) {
+  return appearance.graph.num_links() * int64_t{2 * sizeof(AppearanceGraph::Neighbour)} +
+         static_cast<int64_t>(appearance.is_kept.size() *
+                                  (1 + sizeof(std::vector<int32_t>) + sizeof(int64_t)) +
+                              appearance.node_of_image.size() * 2 * sizeof(int32_t));
 }
 
 }  // namespace
@@ -93,6 +101,36 @@ Result<std::shared_ptr<const std::vector<float>>> Map::DocumentNorms() const {
         return DecodeDocumentNorms(bytes, entry, what);
       },
       [](const MapLayout& layout, const auto&) { return layout.MakeDocumentNorms(); });
+}
+
+Result<std::shared_ptr<const AppearanceMap>> Map::Appearance() const {
+  if (auto found = cache_.Find(kWholeAppearance)) return std::static_pointer_cast<const AppearanceMap>(found);
+  auto appearance = std::make_shared<AppearanceMap>();
+  appearance->node_of_image.assign(num_images(), -1);
+  std::vector<AppearanceLink> links;
+  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kAppearance); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kAppearance, ordinal, DecodeAppearanceBlock,
+                                                  &MapLayout::MakeAppearanceBlock));
+    for (const MapAppearanceNode& node : block->nodes) {
+      const auto node_idx = static_cast<NodeIdx>(appearance->is_kept.size());
+      for (const int32_t image : node.images) {
+        if (appearance->node_of_image[image] >= 0) {
+          return MakeError(ErrorCode::kCorrupt, "map '{}': image {} is of two appearance nodes", head_.name,
+                           image);
+        }
+        appearance->node_of_image[image] = node_idx;
+      }
+      for (const MapAppearanceNode::Link& link : node.links)
+        links.push_back({node_idx, link.node, link.num_inliers});
+      if (node.is_kept) appearance->num_kept_images += static_cast<int>(node.images.size());
+      appearance->is_kept.push_back(node.is_kept ? 1 : 0);
+      appearance->node_images.push_back(node.images);
+    }
+  }
+  appearance->graph = AppearanceGraph(static_cast<int>(appearance->is_kept.size()), std::move(links));
+  const int64_t num_bytes = NumBytes(*appearance);
+  return std::static_pointer_cast<const AppearanceMap>(
+      cache_.Insert(kWholeAppearance, std::move(appearance), num_bytes));
 }
 
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/appearance_graph.h"
 #include "core/error.h"
 #include "core/map_file.h"
 #include "core/map_layout.h"
@@ -14,6 +15,15 @@
 #include "runtime/landmark_set.h"
 
 namespace cairn {
+
+// The appearance graph of a map's images, for who wants to go from one to another (runtime/route.h).
+struct AppearanceMap {
+  AppearanceGraph graph;                          // links with a kept node at one end
+  std::vector<std::vector<int32_t>> node_images;  // per node, indices of images, ascending
+  std::vector<char> is_kept;                      // per node
+  std::vector<NodeIdx> node_of_image;             // per image of the map; -1: of none
+  int num_kept_images = 0;
+};
 
 struct MapOptions {
   // What is loaded of a map and kept for later queries, at most.  What a query works on at the moment comes
@@ -56,6 +66,10 @@ class Map {
   // REQUIRES: has_words()
   Result<std::shared_ptr<const Vocabulary>> VocabularyTree() const;  // its inverted files: Words
   Result<std::shared_ptr<const std::vector<float>>> DocumentNorms() const;
+
+  // The appearance graph as a whole; nothing in it where the map has none.  Kept like a block.
+  // Errors: Corrupt, also where an image is of two nodes.
+  Result<std::shared_ptr<const AppearanceMap>> Appearance() const;
 
   // An image by its index.
   Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;

@@ -32,6 +32,25 @@ std::vector<Candidate> BestImages(const std::vector<double>& dots, double query_
   return scored;
 }
 
+// How many images are documents, and which where these are not all.
+struct Documents {
+  double count = 0;
+  std::shared_ptr<const AppearanceMap> kept;  // null: all images are
+  bool Has(int64_t image) const {
+    if (!kept) return true;
+    const NodeIdx node = kept->node_of_image[image];
+    return node >= 0 && kept->is_kept[node];
+  }
+};
+
+Result<Documents> DocumentsOf(const Map& map) {
+  Documents documents{.count = static_cast<double>(map.num_images())};
+  if (map.head().documents == "all") return documents;
+  CAIRN_ASSIGN_OR_RETURN(documents.kept, map.Appearance());
+  documents.count = documents.kept->num_kept_images;
+  return documents;
+}
+
 Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const DescriptorMatrix& descriptors,
                                                     const RetrieveOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
@@ -43,7 +62,7 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Descri
   std::sort(words.begin(), words.end());
 
   // Sums over the words in ascending order: the same for any order of the descriptors.
-  const auto num_images = static_cast<double>(map.num_images());
+  CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
   std::vector<double> dots(map.num_images(), 0.0);
   double squared_norm = 0;
   std::shared_ptr<const WordBlock> block;
@@ -55,7 +74,7 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Descri
     }
     const std::vector<Posting>& postings = block->postings[word - block->first];
     if (postings.empty()) continue;
-    const double idf = std::log(num_images / static_cast<double>(postings.size()));
+    const double idf = std::log(documents.count / static_cast<double>(postings.size()));
     const double query_weight = static_cast<double>(end - begin) * idf;
     squared_norm += query_weight * query_weight;
     for (const Posting& posting : postings) dots[posting.document] += query_weight * idf * posting.count;
@@ -76,6 +95,7 @@ Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& 
     if (DescriptorAngleRad(word.best) <= options.max_word_ratio * DescriptorAngleRad(word.second))
       ++counts[word.idx];
   }
+  CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
   // The plus keeps a landmark that every image sees from saying nothing: a map may have one image.
   std::vector<double> idf(counts.size());
   double squared_norm = 0;
@@ -88,6 +108,7 @@ Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& 
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
     for (size_t i = 0; i < block->images.size(); ++i) {
+      if (!documents.Has(static_cast<int64_t>(block->first + i))) continue;
       for (const LandmarkIdx landmark : block->images[i].landmarks) {
         const double squared_idf = idf[landmark] * idf[landmark];
         dots[block->first + i] += counts[landmark] * squared_idf;

@@ -18,15 +18,17 @@ int main(int argc, char** argv) {
   std::vector<int> sizes = {6250, 12500, 25000, 50000, 100000};
   double degree = 100;
   int num_runs = 3;
+  bool is_random = false;
   app.add_option("--nodes", sizes, "sizes of the graphs, ascending")->delimiter(',')->capture_default_str();
   app.add_option("--degree", degree, "neighbours of a node, about")->capture_default_str();
   app.add_option("--runs", num_runs, "runs, of which the median counts")->capture_default_str();
+  app.add_flag("--random-order", is_random, "number nodes at random, not in the order of a drive");
   CLI11_PARSE(app, argc, argv);
   fmt::print("{:>8}{:>12}{:>8}{:>16}{:>12}{:>14}\n", "nodes", "links", "kept", "processor, s", "2-fold, s",
              "peak, MiB");
   std::vector<double> seconds, links;
   for (const int size : sizes) {
-    const cairn::AppearanceGraph graph = cairn::SyntheticGraph(size, degree, 0);
+    const cairn::AppearanceGraph graph = cairn::SyntheticGraph(size, degree, 0, !is_random);
     const auto median_seconds = [&](int m, size_t* num_kept) {
       std::vector<double> runs;
       for (int run = 0; run < num_runs; ++run) {

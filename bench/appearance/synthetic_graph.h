@@ -8,14 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/appearance_graph.h"
 #include "core/random.h"
-#include "stages/link_appearance/appearance_graph.h"
 
 namespace cairn {
 
 // Places spread evenly over a square and linked up to a distance that gives about `degree` neighbours, as
-// images of one floor are; inliers fall with the distance.  O(links).
-inline AppearanceGraph SyntheticGraph(int num_nodes, double degree, uint64_t seed) {
+// images of one floor are; inliers fall with the distance.  Numbered as a robot takes them that sweeps the
+// floor in lanes as wide as that distance, to and fro, or at random.  O(links).
+inline AppearanceGraph SyntheticGraph(int num_nodes, double degree, uint64_t seed, bool is_swept = true) {
   Random random(seed);
   std::vector<std::pair<double, double>> places;
   for (int i = 0; i < num_nodes; ++i) {
@@ -23,6 +24,13 @@ inline AppearanceGraph SyntheticGraph(int num_nodes, double degree, uint64_t see
     places.emplace_back(x, random.Uniform());
   }
   const double radius = std::sqrt(degree / (num_nodes * std::numbers::pi));
+  if (is_swept) {
+    const auto way = [&](const std::pair<double, double>& place) {
+      const int lane = static_cast<int>(place.second / radius);
+      return std::pair(lane, lane % 2 == 0 ? place.first : -place.first);
+    };
+    std::sort(places.begin(), places.end(), [&](const auto& a, const auto& b) { return way(a) < way(b); });
+  }
   const int num_cells = std::max(1, static_cast<int>(1 / radius));
   const auto cell_of = [&](double x) { return std::min(num_cells - 1, static_cast<int>(x * num_cells)); };
   std::vector<std::vector<int>> cells(static_cast<size_t>(num_cells) * num_cells);

@@ -93,7 +93,8 @@ Status Make(const std::string& path, int num_rooms) {
                          GrowVocabulary(rows.descriptors.topRows(num_training), rows.descriptors.rows(),
                                         {.depth = 5, .min_num_descriptors_to_split = 8}, 0, 0, progress));
   const double landmarks_per_word = std::max(40.0, static_cast<double>(rows.descriptors.rows()) / 65536);
-  rows.vocabulary = CutVocabulary(tree, rows.descriptors, rows.images, landmarks_per_word);
+  rows.vocabulary = CutVocabulary(tree, rows.descriptors, rows.images,
+                                  std::vector<char>(rows.images.size(), 1), landmarks_per_word);
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, path));
   const KeyPair keys = MakeKeyPair();
   std::filesystem::remove(path + ".key");

@@ -207,6 +207,21 @@ Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
   return report;
 }
 
+void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse) {
+  const auto num_by_retrieval = [](const CheckMapReport& report) {
+    return static_cast<double>(
+        std::count_if(report.images.begin(), report.images.end(), [](const HeldOutResult& image) {
+          return image.has_fix() && image.localization.scope != Scope::kAll;
+        }));
+  };
+  sparse->figures["num_by_retrieval"] = num_by_retrieval(*sparse);
+  sparse->figures["all_images_num_by_retrieval"] = num_by_retrieval(full);
+  for (const char* name : {"num_localized", "localized_ratio", "precision_ratio"}) {
+    const auto figure = full.figures.find(name);
+    if (figure != full.figures.end()) sparse->figures[std::string("all_images_") + name] = figure->second;
+  }
+}
+
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
   const double most_asked =
       std::max({options.min_localized_ratio, options.min_precision_ratio, options.min_region_localized_ratio,

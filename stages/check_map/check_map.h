@@ -76,6 +76,10 @@ struct CheckMapReport {
   //   p90_error_deg, within_5cm_5deg_ratio, within_10cm_2deg_ratio, within_10cm_5deg_ratio, num_gross_errors,
   //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees of
   //   freedom)
+  // and of a map whose retrieval finds kept images alone, beside the same map's with all images
+  // (AddFullFigures):
+  //   num_by_retrieval, all_images_num_by_retrieval: fixes from landmarks that retrieval led to, not from all
+  //   landmarks of the map; all_images_num_localized, all_images_localized_ratio, all_images_precision_ratio
   std::map<std::string, double> figures;
   // The same by region, of images with a true pose: for SummarizeRegions (region_figures.h) to fill.
   std::vector<RegionSelfTest> regions;
@@ -90,6 +94,9 @@ struct CheckMapReport {
 Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
                                 const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
                                 int num_threads, Progress& progress);
+
+// Adds to a sparse map's figures what the same map would do with all images as documents.
+void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse);
 
 // Whether the figures pass the gate.  Errors: Gate, naming the figure, its region, what was found and what is
 // asked; also where something is asked and there was no image to find out.

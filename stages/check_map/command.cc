@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/capture.h"
+#include "core/map_documents.h"
 #include "stages/check_map/check_map.h"
 #include "stages/check_map/region_figures.h"
 #include "stages/check_map/report.h"
@@ -124,6 +125,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, rows));
     CAIRN_ASSIGN_OR_RETURN(
         held_out, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
+    if (rows.documents != "all") {
+      CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> full, Map::FromRows(WithAllDocuments(rows)));
+      CAIRN_ASSIGN_OR_RETURN(
+          const CheckMapReport all_images,
+          CheckMap(full, images, arguments.options, environment.num_threads, *environment.progress));
+      AddFullFigures(all_images, &held_out);
+    }
     held_out.regions = SummarizeRegions(rows, images, held_out.images, arguments.options);
     WarnOfRejects(held_out);
   }

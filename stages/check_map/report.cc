@@ -73,6 +73,14 @@ std::string ReportText(const PrintedReport& report) {
     const auto figure = [&](const char* name) { return Figure(held_out, name); };
     line("held-out images", fmt::format("{}", held_out.images.size()));
     line("localized", fmt::format("{} ({} %)", NumFixes(held_out), Text(figure("localized_ratio"), 0.01, 1)));
+    if (figure("num_by_retrieval")) {
+      line("with all images",
+           fmt::format("{} ({} %), precision {} %", Text(figure("all_images_num_localized"), 1, 0),
+                       Text(figure("all_images_localized_ratio"), 0.01, 1),
+                       Text(figure("all_images_precision_ratio"), 0.01, 1)));
+      line("by retrieval", fmt::format("{}, with all images {}", Text(figure("num_by_retrieval"), 1, 0),
+                                       Text(figure("all_images_num_by_retrieval"), 1, 0)));
+    }
     line("median error", fmt::format("{} cm, {} deg", Text(figure("median_error_m"), 0.01, 2),
                                      Text(figure("median_error_deg"), 1, 3)));
     line("90th percentile", fmt::format("{} cm, {} deg", Text(figure("p90_error_m"), 0.01, 2),

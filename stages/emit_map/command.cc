@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,7 @@ struct Arguments {
   std::string world_path;
   std::string regions_path;
   std::string vocabulary_path;
+  std::string appearance_path;
   std::string frame_path;
   std::string sessions_path;
   std::string name;
@@ -52,6 +54,9 @@ Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
         std::pair("regions.db", arguments.regions_path),
         std::pair("vocabulary.db", arguments.vocabulary_path)}) {
     CAIRN_ASSIGN_OR_RETURN(rows->input_hashes[name], HashFile(path));
+  }
+  if (!arguments.appearance_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes["appearance.db"], HashFile(arguments.appearance_path));
   }
   for (const std::string& text : arguments.stage_options) {
     const size_t equals = text.find('=');
@@ -99,7 +104,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world_path));
   CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions_path));
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary_path));
-  CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options));
+  std::optional<Appearance> appearance;
+  if (!arguments.appearance_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(appearance, ReadAppearance(arguments.appearance_path));
+  }
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options,
+                                               appearance ? &*appearance : nullptr));
   if (!arguments.frame_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.frame, ReadCaptureFrame(arguments.frame_path));
   }
@@ -137,6 +147,8 @@ Command EmitMapCommand() {
             app.add_option("--world", arguments->world_path, "world.db")->required();
             app.add_option("--regions", arguments->regions_path, "regions.db")->required();
             app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
+            app.add_option("--appearance", arguments->appearance_path,
+                           "appearance.db: which images see the same, and which are kept [not in the map]");
             app.add_option("--frame", arguments->frame_path,
                            "frame.json of the poses: unit and place on the Earth [metres, anywhere]");
             app.add_option("--sessions", arguments->sessions_path,

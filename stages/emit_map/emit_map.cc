@@ -5,6 +5,7 @@
 #include <map>
 #include <tuple>
 
+#include "core/map_documents.h"
 #include "core/pixel_ray.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
@@ -165,6 +166,28 @@ Status AddStations(const World& world, const Decomposition& decomposition, MapRo
   return Ok();
 }
 
+// Nodes with images of the map, and those of their links that have a kept one at an end.
+void AddAppearance(const Appearance& appearance, MapRows* rows) {
+  std::map<ImageId, int32_t> image_index;
+  for (size_t i = 0; i < rows->images.size(); ++i)
+    image_index[rows->images[i].image_id] = static_cast<int32_t>(i);
+  std::vector<int32_t> row_of_node;
+  for (const AppearanceNode& node : appearance.nodes) {
+    MapAppearanceNode row{.is_kept = node.role != NodeRole::kDropped};
+    for (const ImageId image_id : node.images) {
+      const auto found = image_index.find(image_id);
+      if (found != image_index.end()) row.images.push_back(found->second);
+    }
+    row_of_node.push_back(row.images.empty() ? -1 : static_cast<int32_t>(rows->appearance.size()));
+    if (!row.images.empty()) rows->appearance.push_back(std::move(row));
+  }
+  for (const AppearanceLink& link : appearance.graph.Links()) {
+    const int32_t row1 = row_of_node[link.node1], row2 = row_of_node[link.node2];
+    if (row1 < 0 || row2 < 0 || !(rows->appearance[row1].is_kept || rows->appearance[row2].is_kept)) continue;
+    rows->appearance[row1].links.push_back({row2, link.num_inliers});
+  }
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(EmitMapOptions* options) {
@@ -185,11 +208,16 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
            .value = &options->landmarks_per_word,
            .help = "most landmarks of a word that could be split",
            .min = 1},
-          {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1}};
+          {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1},
+          {.name = "documents",
+           .value = &options->documents,
+           .help = "survey images that retrieval finds: all, or those that link_appearance keeps",
+           .choices = {"all", "kept"}}};
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
-                        const Vocabulary& vocabulary, const EmitMapOptions& options) {
+                        const Vocabulary& vocabulary, const EmitMapOptions& options,
+                        const Appearance* appearance) {
   EmitMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
@@ -216,6 +244,16 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   rows.cameras = classes.cameras;
   CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
   CAIRN_RETURN_IF_ERROR(AddStations(world, decomposition, &rows));
+  if (appearance) AddAppearance(*appearance, &rows);
+  rows.documents = options.documents;
+  const std::vector<char> is_document = DocumentImages(rows);
+  if (std::count(is_document.begin(), is_document.end(), 1) == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: documents = \"kept\", but {}; give --appearance the file that link-appearance "
+        "wrote for these images, or choose documents = \"all\"",
+        appearance ? "no image is kept" : "no appearance graph is given");
+  }
 
   std::vector<LandmarkIdx> landmark_of_class(classes.classes.size(), -1);
   for (size_t i = 0; i < order.size(); ++i) landmark_of_class[order[i]] = static_cast<LandmarkIdx>(i);
@@ -231,7 +269,7 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   const auto num_landmarks = static_cast<double>(rows.landmarks.size());
   if (num_landmarks >= options.min_num_landmarks_for_words && !vocabulary.nodes.empty()) {
     rows.vocabulary =
-        CutVocabulary(vocabulary, rows.descriptors, rows.images,
+        CutVocabulary(vocabulary, rows.descriptors, rows.images, is_document,
                       std::max(options.landmarks_per_word, num_landmarks / options.max_num_words));
   }
   CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));

@@ -1,7 +1,8 @@
 #include "stages/emit_map/map_vocabulary.h"
 
 #include <algorithm>
-#include <map>
+
+#include "core/map_documents.h"
 
 namespace cairn {
 namespace {
@@ -24,7 +25,8 @@ std::vector<int64_t> CountLandmarks(const Vocabulary& tree, const DescriptorMatr
 }  // namespace
 
 Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmark_descriptors,
-                         const std::vector<MapImage>& images, double landmarks_per_word) {
+                         const std::vector<MapImage>& images, const std::vector<char>& is_document,
+                         double landmarks_per_word) {
   const std::vector<int64_t> counts = CountLandmarks(tree, landmark_descriptors);
   Vocabulary cut;
   std::vector<int32_t> kept = {0};  // nodes of `tree`, breadth first
@@ -47,19 +49,7 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
     cut.centres.row(static_cast<Eigen::Index>(i)) = tree.centres.row(kept[i]);
   (void)NumberVocabularyNodes(&cut);  // the counts are right by construction
 
-  std::vector<WordIdx> words(landmark_descriptors.rows());
-  for (Eigen::Index i = 0; i < landmark_descriptors.rows(); ++i) {
-    words[i] = QuantizeDescriptor(cut, landmark_descriptors.row(i).data());
-  }
-  for (size_t image = 0; image < images.size(); ++image) {
-    cut.document_ids.push_back(images[image].image_id);
-    std::map<WordIdx, int32_t> num_seen;
-    for (const LandmarkIdx landmark : images[image].landmarks) ++num_seen[words[landmark]];
-    for (const auto& [word, count] : num_seen) {
-      cut.inverted_files[word].push_back({static_cast<int32_t>(image), count});
-    }
-  }
-  WeightVocabulary(&cut);
+  AddDocuments(landmark_descriptors, images, is_document, &cut);
   return cut;
 }
 

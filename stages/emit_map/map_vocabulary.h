@@ -11,8 +11,9 @@ namespace cairn {
 // becomes a word, branches without any are left out, so that the depth follows the size of the map.  Inverted
 // files are those of the landmarks: which images see how many of a word's.  Differs from the source, whose
 // files hold every feature of an image: what is no landmark cannot lead to a fix. `landmarks_per_word`: a
-// node with at most so many is not split.
+// node with at most so many is not split.  `is_document`: per image.
 Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmark_descriptors,
-                         const std::vector<MapImage>& images, double landmarks_per_word);
+                         const std::vector<MapImage>& images, const std::vector<char>& is_document,
+                         double landmarks_per_word);
 
 }  // namespace cairn

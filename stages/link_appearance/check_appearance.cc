@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/panorama.h"
 #include "core/parallel.h"
 #include "stages/link_appearance/domination.h"
 #include "stages/link_appearance/greedy_dominating_set.h"
@@ -193,6 +194,8 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
   for (const double ratio : options.kept_ratios) {
     check.sizes.push_back(std::max(1, static_cast<int>(std::lround(ratio * check.num_nodes))));
   }
+  std::sort(check.sizes.begin(), check.sizes.end());
+  check.sizes.erase(std::unique(check.sizes.begin(), check.sizes.end()), check.sizes.end());
   const std::vector<Kind> sets = SetKinds(link_options, options), curves = CurveKinds(link_options, options);
   for (const Kind& kind : sets) check.set_names.push_back(kind.name);
   for (const Kind& kind : curves) check.curve_names.push_back(kind.name);
@@ -218,26 +221,41 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
 }
 
 Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::string>& names) {
-  std::map<std::string, int> index_of;
-  for (size_t i = 0; i < images.images.size(); ++i) index_of[images.images[i].name] = static_cast<int>(i);
-  std::vector<int> held_out(images.images.size(), -1), survey(images.images.size(), -1);
-  HeldOutSplit split;
-  for (const std::string& name : names) {
-    const auto found = index_of.find(name);
-    if (found == index_of.end()) {
-      return MakeError(ErrorCode::kNotFound,
-                       "held-out image {} is not in the database of matches; match it with the survey's",
-                       name);
+  std::map<std::string, bool> wanted;  // whether an image of the name, or of the folder, was met
+  for (const std::string& name : names) wanted[name] = false;
+  const auto is_wanted = [&](const std::string& name) {
+    bool found = false;
+    const auto meet = [&](const std::string& whole) {
+      const auto it = wanted.find(whole);
+      if (it == wanted.end()) return;
+      it->second = true;
+      found = true;
+    };
+    meet(name);
+    for (size_t end = name.find('/'); end != std::string::npos; end = name.find('/', end + 1)) {
+      meet(name.substr(0, end + 1));
     }
-    if (held_out[found->second] >= 0) continue;
-    held_out[found->second] = static_cast<int>(split.linked.size());
-    split.linked.emplace_back();
-  }
+    return found;
+  };
+  std::vector<int> held_out(images.images.size(), -1), survey(images.images.size(), -1);
+  std::map<std::string, int> held_out_of_name;
+  HeldOutSplit split;
   for (size_t i = 0; i < images.images.size(); ++i) {
-    if (held_out[i] >= 0) continue;
-    survey[i] = static_cast<int>(split.survey.images.size());
-    split.survey.images.push_back(images.images[i]);
+    const std::optional<PanoramaView> view = ParsePanoramaViewName(images.images[i].name);
+    const std::string& name = view ? view->panorama_name : images.images[i].name;
+    if (is_wanted(name)) {
+      held_out[i] = held_out_of_name.emplace(name, static_cast<int>(held_out_of_name.size())).first->second;
+    } else {
+      survey[i] = static_cast<int>(split.survey.images.size());
+      split.survey.images.push_back(images.images[i]);
+    }
   }
+  for (const auto& [name, is_met] : wanted) {
+    if (is_met) continue;
+    return MakeError(ErrorCode::kNotFound,
+                     "held-out image {} is not in the database of matches; match it with the survey's", name);
+  }
+  split.linked.resize(held_out_of_name.size());
   for (const AppearanceLink& link : images.links) {
     if (held_out[link.node1] < 0 && held_out[link.node2] < 0) {
       split.survey.links.push_back({survey[link.node1], survey[link.node2], link.num_inliers});
@@ -247,7 +265,10 @@ Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::st
       split.linked[held_out[link.node1]].push_back(survey[link.node2]);
     }
   }
-  for (std::vector<int>& linked : split.linked) std::sort(linked.begin(), linked.end());
+  for (std::vector<int>& linked : split.linked) {
+    std::sort(linked.begin(), linked.end());
+    linked.erase(std::unique(linked.begin(), linked.end()), linked.end());
+  }
   return split;
 }
 

@@ -62,8 +62,9 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
                                         const CheckAppearanceOptions& options, uint64_t seed, int num_threads,
                                         Progress& progress);
 
-// Takes images out of a survey by name: what is left, and what their links were.  Errors: NotFound (a name
-// that the survey does not have).
+// Takes images out of a survey by name, or by folder (a name with '/' at its end: a session of joined
+// captures): what is left, and what their links were.  A panorama's views are one held-out image.  Errors:
+// NotFound (a name that the survey does not have).
 struct HeldOutSplit {
   ImageLinks survey;
   std::vector<std::vector<int>> linked;  // per held-out image: indices of survey images, ascending

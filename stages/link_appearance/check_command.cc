@@ -101,6 +101,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 
 Command CheckAppearanceCommand() {
   const auto arguments = std::make_shared<Arguments>();
+  // Sets are chosen once for each image that is left out.
+  arguments->options.num_tries = 500;
   return {.name = "check-appearance",
           .summary = "Leave images out and count those that the kept ones of the rest still locate",
           .add_arguments =
@@ -110,10 +112,10 @@ Command CheckAppearanceCommand() {
                     ->type_name("matches.db");
                 app.add_option("--capture", arguments->capture,
                                "Capture folder with the survey's poses, for fuse = place");
-                app.add_option(
-                       "--held-out", arguments->held_out,
-                       "Images of the database that are no survey, names or queries.txt: these are left out "
-                       "together, instead of each image in turn")
+                app.add_option("--held-out", arguments->held_out,
+                               "Images of the database that are no survey: names, folders (ending in /) or "
+                               "queries.txt; these are left out "
+                               "together, instead of each image in turn")
                     ->type_name("FILE");
                 OptionTable table = DescribeOptions(&arguments->options);
                 for (Option& option : DescribeOptions(&arguments->check_options)) {

@@ -2,9 +2,9 @@
 
 #include <optional>
 
+#include "core/appearance.h"
 #include "core/capture.h"
 #include "core/file.h"
-#include "stages/link_appearance/appearance_database.h"
 #include "stages/link_appearance/link_appearance.h"
 #include "stages/link_appearance/picture.h"
 
@@ -40,8 +40,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
-  CAIRN_ASSIGN_OR_RETURN(const ImageLinks images,
+  CAIRN_ASSIGN_OR_RETURN(ImageLinks images,
                          ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
+  if (capture) images = SurveyImagesOf(*capture, images);
   CAIRN_ASSIGN_OR_RETURN(
       const LinkAppearanceResult result,
       LinkAppearance(images, capture ? &*capture : nullptr, arguments.options, environment.seed));
@@ -78,7 +79,9 @@ Command LinkAppearanceCommand() {
                 ->required()
                 ->type_name("matches.db");
             app.add_option("--capture", arguments->capture,
-                           "Capture folder with the survey's poses: for fuse = place and for the picture");
+                           "Capture folder: only images of its survey count, and its poses are there for "
+                           "fuse = place and "
+                           "for the picture [all images]");
             app.add_option("-o,--output", arguments->output, "File to write")
                 ->required()
                 ->type_name("appearance.db");

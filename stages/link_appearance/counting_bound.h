@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stages/link_appearance/appearance_graph.h"
+#include "core/appearance_graph.h"
 
 namespace cairn {
 

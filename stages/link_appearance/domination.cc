@@ -11,7 +11,10 @@ Domination::Domination(const AppearanceGraph& graph, const DominationOptions& op
     if (static_cast<int>(nodes.size()) < options.min_component_nodes) continue;
     for (const NodeIdx node : nodes) {
       int64_t most = 0;
-      for (const AppearanceGraph::Neighbour& n : graph.Neighbours(node)) most += Weight(n.num_inliers);
+      for (const AppearanceGraph::Neighbour& n : graph.Neighbours(node)) {
+        most += Weight(n.num_inliers);
+        if (most >= wanted) break;
+      }
       demands_[node] = std::max<int64_t>(1, std::min(wanted, most));
     }
   }

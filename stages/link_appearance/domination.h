@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/link_appearance/appearance_graph.h"
+#include "core/appearance_graph.h"
 
 namespace cairn {
 

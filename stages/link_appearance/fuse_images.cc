@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
+#include <string>
 
+#include "core/panorama.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -79,15 +82,35 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
   });
 }
 
+ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images) {
+  std::set<std::string> names;
+  for (const CaptureImage& image : capture.images) names.insert(image.name);
+  ImageLinks survey;
+  std::vector<int> index_of(images.images.size(), -1);
+  for (size_t i = 0; i < images.images.size(); ++i) {
+    const std::optional<PanoramaView> view = ParsePanoramaViewName(images.images[i].name);
+    if (!names.contains(view ? view->panorama_name : images.images[i].name)) continue;
+    index_of[i] = static_cast<int>(survey.images.size());
+    survey.images.push_back(images.images[i]);
+  }
+  for (const AppearanceLink& link : images.links) {
+    if (index_of[link.node1] < 0 || index_of[link.node2] < 0) continue;
+    survey.links.push_back({index_of[link.node1], index_of[link.node2], link.num_inliers});
+  }
+  return survey;
+}
+
 Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images, const std::string& fuse,
                                         double same_place_m, const Capture* capture) {
   if (fuse == "place") return FuseByPlace(images, same_place_m, capture);
   std::vector<NodeIdx> node_of_image;
   std::map<std::string, NodeIdx> nodes;
   for (const DatabaseImage& image : images) {
-    const size_t end = fuse == "name" ? image.name.rfind('_') : std::string::npos;
+    const std::optional<PanoramaView> view = ParsePanoramaViewName(image.name);
+    const std::string& name = view ? view->panorama_name : image.name;
+    const size_t end = fuse == "name" ? name.rfind('_') : std::string::npos;
     // Names without '_' are whole; a mark keeps them apart from beginnings of others.
-    const std::string key = end == std::string::npos ? image.name + '/' : image.name.substr(0, end);
+    const std::string key = end == std::string::npos ? name + '/' : name.substr(0, end);
     node_of_image.push_back(nodes.emplace(key, static_cast<NodeIdx>(nodes.size())).first->second);
   }
   return node_of_image;

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "core/appearance_graph.h"
 #include "core/capture.h"
 #include "core/colmap_database.h"
 #include "core/error.h"
-#include "stages/link_appearance/appearance_graph.h"
 
 namespace cairn {
 
@@ -22,11 +22,14 @@ struct ImageLinks {
 // of inliers that is none).
 Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_inliers);
 
+// Those of the images that a capture lists as its survey, a panorama's views by its name, and their links.
+ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images);
+
 // Which images are one node: per image the index of its node; nodes are numbered by their first images.
-// "none": each image is one.  "name": those whose names are equal up to the last '_', as those of a rig or of
-// several headings at one station often are.  "place": those whose cameras stand within `same_place_m` of a
-// node's first image, by the capture's poses.
-// Errors: InvalidArgument ("place" and an image without pose: `capture` is null, or has none for it).
+// The views of a panorama are always one.  "none": each image is one.  "name": those whose names are equal up
+// to the last '_', as those of a rig or of several headings at one station often are.  "place": those whose
+// cameras stand within `same_place_m` of a node's first image, by the capture's poses. Errors:
+// InvalidArgument ("place" and an image without pose: `capture` is null, or has none for it).
 Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images, const std::string& fuse,
                                         double same_place_m, const Capture* capture);
 

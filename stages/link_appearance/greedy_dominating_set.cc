@@ -1,11 +1,14 @@
 #include "stages/link_appearance/greedy_dominating_set.h"
 
 #include <algorithm>
+#include <limits>
 #include <queue>
 
 namespace cairn {
 namespace {
 
+// Count: of what is missing and gained; half the size is twice the nodes in the processor's nearest caches.
+template <typename Count>
 class Greedy {
  public:
   Greedy(const Domination& domination, size_t target_size)
@@ -26,7 +29,7 @@ class Greedy {
     SetMissing(node, 0);
     for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
       if (is_black_[n.node]) continue;
-      SetMissing(n.node, std::max<int64_t>(0, missing_[n.node] - domination_.Weight(n.num_inliers)));
+      SetMissing(n.node, std::max<Count>(0, missing_[n.node] - Weight(n)));
       if (is_gray_[n.node]) continue;
       is_gray_[n.node] = 1;
       if (is_running_) queue_.push({gains_[n.node], n.node});
@@ -37,12 +40,13 @@ class Greedy {
   void Run(const Domination& demands) {
     is_running_ = true;
     for (NodeIdx node = 0; node < graph_.num_nodes(); ++node) {
-      missing_[node] = demands.Shortfall(node, is_black_);
+      missing_[node] =
+          static_cast<Count>(order_.empty() ? demands.Demand(node) : demands.Shortfall(node, is_black_));
     }
     for (NodeIdx node = 0; node < graph_.num_nodes(); ++node) {
       gains_[node] = missing_[node];
       for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
-        gains_[node] += std::min(missing_[n.node], domination_.Weight(n.num_inliers));
+        gains_[node] += std::min(missing_[n.node], Weight(n));
       }
     }
     queue_ = {};
@@ -71,7 +75,7 @@ class Greedy {
 
  private:
   struct Candidate {
-    int64_t gain;
+    Count gain;
     NodeIdx node;
     bool operator<(const Candidate& other) const {
       return gain != other.gain ? gain < other.gain : node > other.node;
@@ -90,13 +94,17 @@ class Greedy {
     }
   }
 
-  void SetMissing(NodeIdx node, int64_t missing) {
-    const int64_t before = missing_[node];
+  Count Weight(const AppearanceGraph::Neighbour& n) const {
+    return static_cast<Count>(domination_.Weight(n.num_inliers));
+  }
+
+  void SetMissing(NodeIdx node, Count missing) {
+    const Count before = missing_[node];
     if (missing == before) return;
     missing_[node] = missing;
     gains_[node] -= before - missing;
     for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
-      const int64_t weight = domination_.Weight(n.num_inliers);
+      const Count weight = Weight(n);
       gains_[n.node] -= std::min(before, weight) - std::min(missing, weight);
     }
   }
@@ -104,28 +112,23 @@ class Greedy {
   const Domination& domination_;
   const AppearanceGraph& graph_;
   const size_t target_size_;
-  std::vector<int64_t> missing_;
-  std::vector<int64_t> gains_;  // what a node would give to itself and to its neighbours
+  std::vector<Count> missing_;
+  std::vector<Count> gains_;  // what a node would give to itself and to its neighbours
   std::vector<char> is_black_, is_gray_, is_started_;
   bool is_running_ = false;
   std::priority_queue<Candidate> queue_;
   std::vector<NodeIdx> order_;
 };
 
-}  // namespace
-
-std::vector<NodeIdx> GreedyDominatingSet(const Domination& domination, int target_size,
-                                         const std::vector<NodeIdx>& start) {
+template <typename Count>
+std::vector<NodeIdx> RunGreedy(const Domination& domination, int max_links, int target_size,
+                               const std::vector<NodeIdx>& start) {
   const int num_nodes = domination.graph().num_nodes();
-  Greedy greedy(domination, static_cast<size_t>(target_size < 0 ? num_nodes : target_size));
+  Greedy<Count> greedy(domination, static_cast<size_t>(target_size < 0 ? num_nodes : target_size));
   for (const NodeIdx node : start) greedy.Keep(node);
   greedy.Run(domination);
   if (target_size < 0) return greedy.TakeOrder();
   DominationOptions more = domination.options();
-  int max_links = 0;
-  for (NodeIdx node = 0; node < num_nodes; ++node) {
-    max_links = std::max(max_links, domination.graph().NumNeighbours(node));
-  }
   while (!greedy.IsFull() && more.num_dominators <= max_links) {
     ++more.num_dominators;
     greedy.Run(Domination(domination.graph(), more));
@@ -135,6 +138,21 @@ std::vector<NodeIdx> GreedyDominatingSet(const Domination& domination, int targe
     if (domination.IsIn(node)) greedy.Keep(node);
   }
   return greedy.TakeOrder();
+}
+
+}  // namespace
+
+std::vector<NodeIdx> GreedyDominatingSet(const Domination& domination, int target_size,
+                                         const std::vector<NodeIdx>& start) {
+  int max_links = 0;
+  for (NodeIdx node = 0; node < domination.graph().num_nodes(); ++node) {
+    max_links = std::max(max_links, domination.graph().NumNeighbours(node));
+  }
+  // Links to all neighbours, of the full weight, are the most that is ever counted.
+  const int64_t most = (int64_t{max_links} + 1) * domination.options().strong_num_inliers;
+  return most < std::numeric_limits<int32_t>::max()
+             ? RunGreedy<int32_t>(domination, max_links, target_size, start)
+             : RunGreedy<int64_t>(domination, max_links, target_size, start);
 }
 
 }  // namespace cairn

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "core/random.h"
+#include "stages/link_appearance/counting_bound.h"
 
 namespace cairn {
 namespace {
@@ -130,7 +131,8 @@ class LocalSearch {
     if (target_size_ < 0) Prune();
     std::vector<NodeIdx> best = set_.nodes();
     int64_t least_missing = set_.total_missing();
-    for (int i = 0; i < options_.num_tries && !best.empty(); ++i) {
+    const size_t least_size = target_size_ < 0 ? CountingBound(graph_) : 0;
+    for (int i = 0; i < options_.num_tries && best.size() > least_size; ++i) {
       TakeOut();
       const bool is_repaired = Repair(best.size());
       if (is_repaired && target_size_ < 0) Prune();

@@ -167,34 +167,6 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
   };
 }
 
-std::vector<NodeIdx> Appearance::Kept() const {
-  std::vector<NodeIdx> kept;
-  for (size_t i = 0; i < nodes.size(); ++i) {
-    if (nodes[i].role != NodeRole::kDropped) kept.push_back(static_cast<NodeIdx>(i));
-  }
-  return kept;
-}
-
-std::vector<ImageId> Appearance::KeptImages() const {
-  std::vector<ImageId> images;
-  for (const AppearanceNode& node : nodes) {
-    if (node.role != NodeRole::kDropped) images.insert(images.end(), node.images.begin(), node.images.end());
-  }
-  std::sort(images.begin(), images.end());
-  return images;
-}
-
-int Appearance::LowerBound() const {
-  std::vector<char> is_in(lower_bounds.size(), 0);
-  for (const AppearanceNode& node : nodes) is_in[node.component] |= node.role != NodeRole::kDropped;
-  int sum = 0;
-  for (size_t i = 0; i < lower_bounds.size(); ++i) {
-    if (is_in[i] && lower_bounds[i] == 0) return 0;
-    sum += lower_bounds[i];
-  }
-  return sum;
-}
-
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
                                  uint64_t seed, int* num_greedy) {
   const Domination domination(graph, DominationOf(options));

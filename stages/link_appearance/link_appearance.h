@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "core/appearance.h"
+#include "core/appearance_graph.h"
 #include "core/error.h"
 #include "core/ids.h"
 #include "core/options.h"
-#include "stages/link_appearance/appearance_graph.h"
 #include "stages/link_appearance/connected_bound.h"
 #include "stages/link_appearance/fuse_images.h"
 #include "stages/link_appearance/improve_dominating_set.h"
@@ -48,36 +49,6 @@ struct LinkAppearanceOptions {
   ConnectedBoundOptions bound;
 };
 OptionTable DescribeOptions(LinkAppearanceOptions* options);
-
-// Why a node is kept, or not.
-enum class NodeRole : int {
-  kDropped = 0,
-  kDominating = 1,
-  kRestored = 2,  // for a cycle
-};
-
-struct AppearanceNode {
-  std::vector<ImageId> images;  // ascending
-  int component = 0;
-  NodeRole role = NodeRole::kDropped;
-  friend bool operator==(const AppearanceNode&, const AppearanceNode&) = default;
-};
-
-// Content of appearance.db.
-struct Appearance {
-  std::vector<AppearanceNode> nodes;
-  AppearanceGraph graph;
-  // Per component: every connected set that meets its nodes' demands has at least so many; 0: not computed.
-  std::vector<int> lower_bounds;
-  int num_dominators = 1;
-  int strong_num_inliers = 1;
-  int max_detour_links = 0;
-
-  std::vector<NodeIdx> Kept() const;        // ascending
-  std::vector<ImageId> KeptImages() const;  // ascending
-  int NumComponents() const { return static_cast<int>(lower_bounds.size()); }
-  int LowerBound() const;  // of all components; 0: of some not computed
-};
 
 struct LinkAppearanceResult {
   Appearance appearance;

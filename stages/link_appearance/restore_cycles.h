@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "stages/link_appearance/appearance_graph.h"
+#include "core/appearance_graph.h"
 
 namespace cairn {
 

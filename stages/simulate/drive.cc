@@ -7,6 +7,8 @@
 #include <numbers>
 #include <queue>
 
+#include "core/random.h"
+
 namespace cairn {
 namespace {
 
@@ -18,19 +20,27 @@ constexpr double kVisitSpacingM = 1.5;
 constexpr double kComfortM = 0.7;
 constexpr double kNearCost = 4;
 constexpr int kSmoothingSteps = 40;
+// Runs other than the first prefer some squares of this edge, metres: in the others ways cost up to so much
+// more.
+constexpr double kPreferenceM = 0.8;
+constexpr double kPreferenceCost = 2;
 // Greatest turn between two images, rad: where the way turns faster, the camera turns on the spot.
 constexpr double kMaxTurnRad = 25 * std::numbers::pi / 180;
 
 class DrivePlanner {
  public:
-  DrivePlanner(const Building& building, const SimulateOptions& options)
-      : building_(building), options_(options) {
+  DrivePlanner(const Building& building, const SimulateOptions& options, uint64_t seed)
+      : building_(building), options_(options), random_(seed) {
     const Rect& bounds = building.layout.bounds;
     cols_ = static_cast<int>(bounds.width() / kCellM);
     rows_ = static_cast<int>(bounds.depth() / kCellM);
     for (int cell = 0; cell < cols_ * rows_; ++cell) {
       const Eigen::Vector2d place = Place(cell);
       clearance_.push_back(ClearanceM(building, place.x(), place.y()));
+      const auto square_x = static_cast<uint64_t>((place.x() - bounds.x0) / kPreferenceM);
+      const auto square_y = static_cast<uint64_t>((place.y() - bounds.y0) / kPreferenceM);
+      const double preference = Random(MixSeed(MixSeed(seed, square_x), square_y)).Uniform();
+      way_cost_.push_back(options.run == 0 ? 1 : 1 + kPreferenceCost * preference);
     }
   }
 
@@ -85,6 +95,7 @@ class DrivePlanner {
       }
       std::stable_sort(cells.begin(), cells.end(),
                        [&](int a, int b) { return clearance_[a] > clearance_[b]; });
+      if (options_.run > 0) Shuffle(&cells);
       for (const int cell : cells) {
         const bool is_far = std::none_of(places_.begin(), places_.end(), [&](const PlaceToVisit& other) {
           return other.room == r && (Place(other.cell) - Place(cell)).norm() < kVisitSpacingM;
@@ -92,7 +103,16 @@ class DrivePlanner {
         if (is_far) places_.push_back({cell, r});
       }
     }
+    // The drive begins and ends at the first one.
+    if (options_.run > 0) Shuffle(&places_);
     return Ok();
+  }
+
+  template <typename T>
+  void Shuffle(std::vector<T>* values) {
+    for (size_t k = values->size(); k > 1; --k) {
+      std::swap((*values)[k - 1], (*values)[random_.UniformInt(0, static_cast<int64_t>(k) - 1)]);
+    }
   }
 
   // Dijkstra from `*current` to the nearest cell of `goals`; appends the way.  Ties go to the smaller cell.
@@ -123,7 +143,7 @@ class DrivePlanner {
           const int next = cell + dy * cols_ + dx;
           if (!IsFree(next)) continue;
           const double crowding = kNearCost * std::max(0.0, kComfortM - clearance_[next]) / kComfortM;
-          const double next_cost = cell_cost + kCellM * std::hypot(dx, dy) * (1 + crowding);
+          const double next_cost = cell_cost + kCellM * std::hypot(dx, dy) * way_cost_[next] * (1 + crowding);
           if (next_cost < cost[next]) {
             cost[next] = next_cost;
             previous[next] = cell;
@@ -182,15 +202,18 @@ class DrivePlanner {
 
   const Building& building_;
   const SimulateOptions& options_;
+  Random random_;
   int cols_ = 0, rows_ = 0;
   std::vector<double> clearance_;  // per cell
+  std::vector<double> way_cost_;   // per cell: of a metre there, beside the comfort of its clearance
   std::vector<PlaceToVisit> places_;
 };
 
 }  // namespace
 
-Result<std::vector<DrivePose>> PlanDrive(const Building& building, const SimulateOptions& options) {
-  return DrivePlanner(building, options).Plan();
+Result<std::vector<DrivePose>> PlanDrive(const Building& building, const SimulateOptions& options,
+                                         uint64_t seed) {
+  return DrivePlanner(building, options, MixSeed(seed, 12)).Plan();
 }
 
 }  // namespace cairn

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,7 +16,10 @@ struct DrivePose {
 
 // A smooth round trip through all rooms and corridors: from the middle of one to the nearest one not yet
 // seen, along ways that keep away from walls, and back to the start; a pose every step_m of the way.  Every
-// pose keeps clearance_m. Errors: NoData when a room cannot be entered with that clearance.
-Result<std::vector<DrivePose>> PlanDrive(const Building& building, const SimulateOptions& options);
+// pose keeps clearance_m. Run 0 visits the roomiest places and prefers the middle of ways; others, by `seed`,
+// random places along ways that they prefer at random.  Errors: NoData when a room cannot be entered with
+// that clearance.
+Result<std::vector<DrivePose>> PlanDrive(const Building& building, const SimulateOptions& options,
+                                         uint64_t seed);
 
 }  // namespace cairn

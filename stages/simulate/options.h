@@ -66,6 +66,9 @@ struct SimulateOptions {
   int num_headings = 4;
   // Path length between two images of a driven survey.  REQUIRES: in [0.01, 5]
   double step_m = 0.15;
+  // Another run through the same building: other places in another order, other noise; a second survey of it,
+  // or a drive to localize along.  REQUIRES: >= 0
+  int run = 0;
   // Least distance of the camera from walls and furniture.  REQUIRES: in [0.05, 2]
   double clearance_m = 0.3;
   // Standard deviation of what images.txt says against where the camera was: per axis of position and of
@@ -74,6 +77,9 @@ struct SimulateOptions {
   double pose_noise_deg = 0;
   // Standard deviation of the grey noise of survey images, of 255.  REQUIRES: in [0, 50]
   double image_noise = 1.0;
+  // Brightness of all images before noise, as part of full light: the less, the more noise and rounding to
+  // grey values count.  REQUIRES: in [0.01, 1]
+  double light_ratio = 1;
   // Of all image files.  REQUIRES: in [1, 100]
   int jpeg_quality = 95;
 

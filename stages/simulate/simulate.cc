@@ -75,7 +75,8 @@ std::vector<CaptureImage> StatedImages(const std::vector<PlannedImage>& planned,
 Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std::string& path, uint64_t seed,
                                        int num_threads, Progress& progress) {
   CAIRN_ASSIGN_OR_RETURN(const Building building, MakeBuilding(options, seed, num_threads));
-  CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, seed));
+  const uint64_t survey_seed = options.run == 0 ? seed : MixSeed(MixSeed(seed, 21), options.run);
+  CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, survey_seed));
 
   CAIRN_RETURN_IF_ERROR(
       ReplaceFolderAtomically(path, "a capture", {"images.txt"}, [&](const std::string& folder) -> Status {
@@ -84,7 +85,7 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
           return WriteError(folder, "cannot be created", error.value());
         }
         CAIRN_RETURN_IF_ERROR(
-            WriteImages(building, survey, options, seed, folder + "/images", num_threads, progress));
+            WriteImages(building, survey, options, survey_seed, folder + "/images", num_threads, progress));
         CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt",
                                                {{survey.camera.camera_id, survey.camera},
                                                 {survey.query_camera.camera_id, survey.query_camera}}));

@@ -82,7 +82,7 @@ Status AddSurveyImages(const Building& building, const SimulateOptions& options,
           options.spacing_m, options.clearance_m);
     }
   } else {
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<DrivePose> drive, PlanDrive(building, options));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<DrivePose> drive, PlanDrive(building, options, seed));
     for (const DrivePose& pose : drive) {
       survey->stations.push_back(pose.position);
       headings->push_back(pose.heading_rad);
@@ -103,6 +103,7 @@ Status AddSurveyImages(const Building& building, const SimulateOptions& options,
       image.cam_from_world = MakePose({place.x(), place.y(), options.camera_height_m}, heading);
       image.stated_cam_from_world = AddPoseNoise(image.cam_from_world, options, random);
       image.noise = options.image_noise;
+      image.gain = options.light_ratio;
       survey->images.push_back(image);
     }
   }
@@ -147,7 +148,7 @@ Status AddQueries(const Building& building, const SimulateOptions& options, uint
     image.cam_from_world = MakePose({place.x(), place.y(), height}, heading, pitch, roll);
     image.stated_cam_from_world = image.cam_from_world;
     image.noise = options.query_noise;
-    image.gain = random.Uniform(1 - options.query_gain, 1 + options.query_gain);
+    image.gain = options.light_ratio * random.Uniform(1 - options.query_gain, 1 + options.query_gain);
     image.bias = random.Uniform(-options.query_bias, options.query_bias);
     const double blur_px = random.Uniform(0, options.query_blur_px);
     const double direction = random.Uniform(0, 2 * std::numbers::pi);

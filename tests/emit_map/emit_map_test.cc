@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/map_documents.h"
 #include "tests/emit_map/example.h"
 
 namespace cairn {
@@ -81,6 +82,37 @@ TEST(EmitMap, WordsAreNotSplitBelowTheirNumberOfLandmarks) {
       *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   EXPECT_EQ(rows.vocabulary.nodes.size(), 1u);  // the root is the only word
   EXPECT_EQ(rows.vocabulary.depth, 0);
+}
+
+TEST(EmitMap, AppearanceKeepsLinksOfKeptImagesAndLeavesOutOthers) {
+  const EmitExample example = MakeEmitExample();
+  const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
+                                &example.appearance);
+  // Image 3 has no pose; the others are images 0 to 2 of the map.
+  using Link = MapAppearanceNode::Link;
+  ASSERT_EQ(rows.appearance.size(), 3u);
+  EXPECT_EQ(rows.appearance[0], (MapAppearanceNode{{0}, false, {Link{1, 20}}}));
+  EXPECT_EQ(rows.appearance[1], (MapAppearanceNode{{1}, true, {Link{2, 30}}}));
+  EXPECT_EQ(rows.appearance[2], (MapAppearanceNode{{2}, false, {}}));
+}
+
+TEST(EmitMap, KeptDocumentsAloneHavePostings) {
+  const EmitExample example = MakeEmitExample();
+  EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"};
+  const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                options, &example.appearance);
+  EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(2));
+  EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 3}));
+  EXPECT_THAT(rows.images[0].landmarks, ElementsAre(2)) << "priors and regions still lead to every image";
+  const MapRows all = WithAllDocuments(rows);
+  EXPECT_THAT(all.vocabulary.document_ids, ElementsAre(1, 2, 4));
+  EXPECT_THAT(all.vocabulary.inverted_files[0], ElementsAre(Posting{0, 1}, Posting{1, 3}, Posting{2, 2}));
+
+  const Result<MapRows> without =
+      EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
+  ASSERT_FALSE(without.ok());
+  EXPECT_EQ(without.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(without.error().message, HasSubstr("--appearance"));
 }
 
 TEST(QuantizeDescriptorValues, FewValuesStayAsTheyAre) {

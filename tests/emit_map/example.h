@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/appearance.h"
 #include "core/decomposition.h"
 #include "core/feature_class.h"
 #include "core/vocabulary_tree.h"
@@ -19,6 +20,8 @@ struct EmitExample {
   World world;
   Decomposition decomposition;
   Vocabulary vocabulary;
+  // A path 1 - 2 - 4 with image 3 at its end; image 2 is kept.
+  Appearance appearance;
 };
 
 inline EmitExample MakeEmitExample() {
@@ -63,6 +66,11 @@ inline EmitExample MakeEmitExample() {
   example.decomposition.regions = {{.features = {1, 2}, .stations = {1, 2}},
                                    {.features = {0, 1}, .stations = {0, 1}}};
   example.decomposition.uncovered = {2};
+
+  for (const ImageId image_id : {1u, 2u, 3u, 4u}) example.appearance.nodes.push_back({.images = {image_id}});
+  example.appearance.nodes[1].role = NodeRole::kDominating;
+  example.appearance.graph = AppearanceGraph(4, {{0, 1, 20}, {1, 3, 30}, {2, 3, 40}});
+  example.appearance.lower_bounds = {1};
 
   Vocabulary& vocabulary = example.vocabulary;
   vocabulary.branching = 2;

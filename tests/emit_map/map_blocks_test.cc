@@ -1,5 +1,7 @@
 #include "core/map_blocks.h"
 
+#include <functional>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +19,7 @@ using testing::Pair;
 MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
   return *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                  {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1});
+                  {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1}, &example.appearance);
 }
 
 // Landmarks in regions of these sizes, one after the other, and some in none.
@@ -112,6 +114,9 @@ struct EncodedBlocks {
       case BlockKind::kLandmarks:
         CAIRN_RETURN_IF_ERROR(DecodeLandmarkBlock(changed, entry, directory, "block"));
         return Ok();
+      case BlockKind::kAppearance:
+        CAIRN_RETURN_IF_ERROR(DecodeAppearanceBlock(changed, entry, directory, "block"));
+        return Ok();
     }
     return Ok();
   }
@@ -119,7 +124,7 @@ struct EncodedBlocks {
 
 TEST(MapBlocks, EveryTruncationIsRefused) {
   const EncodedBlocks blocks;
-  ASSERT_EQ(blocks.bytes.size(), 7u);
+  ASSERT_EQ(blocks.bytes.size(), 8u);
   for (size_t block = 0; block < blocks.bytes.size(); ++block) {
     const std::string& bytes = blocks.bytes[block];
     EXPECT_TRUE(blocks.Decode(block, bytes).ok());
@@ -158,6 +163,23 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
       images = layout.MakeImageBlock(entry);
       images.images[1].station = 3;
       EXPECT_FALSE(blocks.Decode(i, EncodeBlock(images)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kAppearance)) {
+      for (const auto& change : std::vector<std::function<void(MapAppearanceNode&)>>{
+               [](MapAppearanceNode& node) { node.images = {3}; },
+               [](MapAppearanceNode& node) { node.images.clear(); },
+               [](MapAppearanceNode& node) {
+                 node.links = {{3, 1}};
+               },
+               [](MapAppearanceNode& node) {
+                 node.links = {{0, 1}};
+               },
+               [](MapAppearanceNode& node) {
+                 node.links = {{1, 0}};
+               }}) {
+        AppearanceBlock nodes = layout.MakeAppearanceBlock(entry);
+        change(nodes.nodes[0]);
+        EXPECT_FALSE(blocks.Decode(i, EncodeBlock(nodes)).ok());
+      }
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
       WordBlock words = layout.MakeWordBlock(entry);
       words.postings[0].back().document = 3;

@@ -165,6 +165,26 @@ TEST(MapFile, ChangedRowsAreRefused) {
   }
 }
 
+TEST(MapFile, SparseMapsReadBackAsTheyWere) {
+  const EmitExample example = MakeEmitExample();
+  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                          {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"},
+                          &example.appearance);
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("sparse.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("sparse.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->documents, "kept");
+  EXPECT_EQ(read->appearance, rows.appearance);
+  EXPECT_EQ(read->vocabulary.document_ids, rows.vocabulary.document_ids);
+  EXPECT_EQ(read->vocabulary.inverted_files, rows.vocabulary.inverted_files);
+  EXPECT_EQ(read->vocabulary.document_norms, rows.vocabulary.document_norms);
+
+  rows.appearance[0].images = {1};
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "image 1 is of two nodes";
+  rows.appearance.clear();
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "nothing is kept";
+}
+
 TEST(MapFile, FailedWriteLeavesTheOldFile) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("kept.cairn")).ok());
   const std::string before = *ReadFile(MapPath("kept.cairn"));

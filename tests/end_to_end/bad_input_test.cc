@@ -177,6 +177,7 @@ TEST_F(BadInput, DamagedStageFilesAreNamed) {
         Case{"filter-visibility " + Path("features.db") + " -o " + Path("out.db"), 4},
         Case{"decompose-regions " + Path("features.db") + " -o " + Path("out.db"), 4},
         Case{"build-vocabulary " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"link-appearance " + Path("features.db") + " -o " + Path("out.db"), 4},
         Case{"check-map " + Path("features.db") + " -o " + Path("out.cairn"), 11},
         Case{"inspect " + Path("features.db"), 11}}) {
     const ProgramRun run = RunShell("cairn " + command);

@@ -134,7 +134,7 @@ TEST_F(Compile, CleanBuildWithOneThreadElsewhereGivesTheSameBytes) {
                                   " && cairn compile other.toml -o map.cairn --build-dir b --threads 1 -j 2");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   for (const char* file : {"features.db", "matches.db", "classes.db", "world.db", "regions.db",
-                           "vocabulary.db", "unsealed.cairn"}) {
+                           "vocabulary.db", "appearance.db", "unsealed.cairn"}) {
     EXPECT_EQ(Hash(std::string("elsewhere/b/") + file), Hash(std::string("tiny.build/") + file)) << file;
   }
   EXPECT_EQ(Hash("elsewhere/map.cairn"), Hash("tiny.cairn"));

@@ -41,6 +41,7 @@ const std::vector<Stage>& Line() {
       {"filter-visibility", "world.db", "world.db"},
       {"decompose-regions", "regions.db", "regions.db"},
       {"build-vocabulary", "vocabulary.db", "vocabulary.db"},
+      {"link-appearance", "appearance.db", "appearance.db"},
       {"emit-map", "unsealed.cairn", "unsealed.cairn"},
       {"check-map", "../small.cairn", "map"},
   };
@@ -344,7 +345,8 @@ std::vector<std::string> StageCommands(const Workplace& workplace, const std::st
       command("group-classes " + workplace.Build("matches.db") + " --capture " + capture, "group_classes"),
       command("filter-visibility " + workplace.Build("classes.db"), "filter_visibility"),
       command("decompose-regions " + workplace.Build("world.db"), "decompose_regions"),
-      command("build-vocabulary " + workplace.Build("features.db"), "build_vocabulary")};
+      command("build-vocabulary " + workplace.Build("features.db"), "build_vocabulary"),
+      command("link-appearance " + workplace.Build("matches.db"), "link_appearance")};
 }
 
 TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {

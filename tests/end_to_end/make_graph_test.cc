@@ -189,7 +189,7 @@ TEST_F(MakeGraph, BuildFolderOfAnotherProgramIsMadeAgainNotRead) {
   RunShell("cp -a " + Path("tiny.toml") + " " + Path("older.toml"));
   std::vector<std::string> hashes;
   const std::vector<std::string> files = {"features.db", "matches.db",    "classes.db",    "world.db",
-                                          "regions.db",  "vocabulary.db", "unsealed.cairn"};
+                                          "regions.db",  "vocabulary.db", "appearance.db", "unsealed.cairn"};
   for (size_t i = 0; i < files.size(); ++i) {
     hashes.push_back(Hash("tiny.build/" + files[i]));
     const std::string path = Path("older.build/" + files[i]);

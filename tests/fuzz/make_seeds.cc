@@ -14,9 +14,11 @@ int main(int argc, char** argv) {
   const std::string folder = argv[1];
   const EmitExample example = MakeEmitExample();
   for (const int min_num_landmarks_for_words : {0, 100}) {
-    auto rows =
-        EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                {.min_num_landmarks_for_words = min_num_landmarks_for_words, .landmarks_per_word = 1});
+    auto rows = EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                        {.min_num_landmarks_for_words = min_num_landmarks_for_words,
+                         .landmarks_per_word = 1,
+                         .documents = "kept"},
+                        &example.appearance);
     if (!rows.ok()) return 1;
     rows->findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                         {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
@@ -28,16 +30,16 @@ int main(int argc, char** argv) {
     if (!file.ok()) return 1;
     for (size_t i = 0; min_num_landmarks_for_words == 0 && i < file->directory().blocks().size(); ++i) {
       const BlockEntry& entry = file->directory().blocks()[i];
-      std::string counts(8, '\0');  // of each kind, less 1
+      std::string counts(kNumBlockKinds, '\0');  // of each kind, less 1
       for (int kind = 1; kind < kNumBlockKinds; ++kind) {
         counts[kind] = static_cast<char>(file->directory().Count(static_cast<BlockKind>(kind)) - 1);
       }
       const std::string seed = std::string(1, static_cast<char>(entry.kind)) + counts + *file->ReadBlock(i);
       if (!WriteFileAtomically(fmt::format("{}/block_{}", folder, entry.kind), seed).ok()) return 1;
     }
-    if (!WriteFileAtomically(folder + "/directory", "\x08" + file->directory().Encode()).ok()) return 1;
+    if (!WriteFileAtomically(folder + "/directory", "\x09" + file->directory().Encode()).ok()) return 1;
     if (!WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok()) return 1;
   }
   const auto old = ReadFile(argv[2]);
-  return old.ok() && WriteFileAtomically(folder + "/map_version1", "\x09" + *old).ok() ? 0 : 1;
+  return old.ok() && WriteFileAtomically(folder + "/map_version1", "\x0a" + *old).ok() ? 0 : 1;
 }

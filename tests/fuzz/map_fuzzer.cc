@@ -1,7 +1,7 @@
 // What a robot reads, fed with any bytes: libFuzzer's entry.  The first byte chooses: 0 a whole map file,
-// opened, read and asked for a place; 1 to 7 a block of that kind, the next 8 bytes being the counts that its
-// directory states; 8 a directory; 9 a map of format 1.  Built with the preset `fuzz`, hashes are not
-// compared, so that what lies behind them is reached.
+// opened, read and asked for a place and a way; 1 to 8 a block of that kind, the next 9 bytes being the
+// counts that its directory states; 9 a directory; 10 a map of format 1.  Built with the preset `fuzz`,
+// hashes are not compared, so that what lies behind them is reached.
 #include <unistd.h>
 
 #include <cstdio>
@@ -12,11 +12,13 @@
 #include "core/map_file.h"
 #include "core/random.h"
 #include "runtime/localizer.h"
+#include "runtime/route.h"
 
 namespace cairn {
 namespace {
 
 constexpr int kImageSide = 400;
+constexpr size_t kCountBytes = kNumBlockKinds;
 
 // Features that any map may be asked about.
 const Features& SomeFeatures() {
@@ -57,6 +59,7 @@ void TryFile(std::string_view bytes) {
   Localizer localizer(*map);
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera).ok();
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera, PosePrior{}).ok();
+  (void)PlanRoute(**map, 0, static_cast<int32_t>((*map)->num_images()) - 1).ok();
 }
 
 // Counts as the directory of a small map would state them: from the bytes.
@@ -76,10 +79,10 @@ MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_by
 }
 
 void TryBlock(BlockKind kind, std::string_view bytes) {
-  if (bytes.size() < 8) return;
-  const MapDirectory directory = DirectoryFor(kind, bytes.substr(0, 8), bytes.size() - 8);
+  if (bytes.size() < kCountBytes) return;
+  const MapDirectory directory = DirectoryFor(kind, bytes.substr(0, kCountBytes), bytes.size() - kCountBytes);
   const BlockEntry& entry = directory.Entry(kind, 0);
-  bytes.remove_prefix(8);
+  bytes.remove_prefix(kCountBytes);
   switch (kind) {
     case BlockKind::kStations:
       (void)DecodeStationBlock(bytes, entry, directory, "block").ok();
@@ -111,6 +114,12 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
       }
       break;
     }
+    case BlockKind::kAppearance: {
+      const auto nodes = DecodeAppearanceBlock(bytes, entry, directory, "block");
+      if (nodes.ok() && !DecodeAppearanceBlock(EncodeBlock(*nodes), entry, directory, "block").ok())
+        std::abort();
+      break;
+    }
   }
 }
 
@@ -120,12 +129,12 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   if (size == 0) return 0;
   const std::string_view rest(reinterpret_cast<const char*>(bytes) + 1, size - 1);
-  const int choice = bytes[0] % 10;
+  const int choice = bytes[0] % 11;
   if (choice == 0) {
     cairn::TryFile(rest);
   } else if (choice < cairn::kNumBlockKinds) {
     cairn::TryBlock(static_cast<cairn::BlockKind>(choice), rest);
-  } else if (choice == 8) {
+  } else if (choice == 9) {
     (void)cairn::MapDirectory::Decode(rest, 1 << 20).ok();
   } else {
     (void)cairn::ReadMapRowsVersion1(cairn::WriteTemporary(rest)).ok();

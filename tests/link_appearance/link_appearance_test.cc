@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/appearance.h"
 #include "core/file.h"
-#include "stages/link_appearance/appearance_database.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/picture.h"
 #include "tests/link_appearance/graphs.h"
@@ -265,6 +265,37 @@ TEST(CheckAppearance, HeldOutImagesLeaveTheGraphAndKeepTheirLinks) {
   EXPECT_THAT(split->survey.links, ElementsAre(AppearanceLink{0, 1, 30}, AppearanceLink{2, 3, 30}));
   EXPECT_THAT(split->linked, ElementsAre(ElementsAre(1, 2)));
   EXPECT_EQ(HoldOut(images, {"nobody.jpg"}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(CheckAppearance, FoldersAndPanoramasAreHeldOutWhole) {
+  ImageLinks images = ImagesOf(PathGraph(5));
+  const std::vector<std::string> names = {"a/0.jpg", "b/1.jpg#0of3", "b/1.jpg#1of3", "b/2.jpg", "c.jpg"};
+  for (size_t i = 0; i < names.size(); ++i) images.images[i].name = names[i];
+  const Result<HeldOutSplit> folder = HoldOut(images, {"b/"});
+  ASSERT_TRUE(folder.ok());
+  EXPECT_EQ(folder->survey.images.size(), 2u);
+  EXPECT_THAT(folder->linked, ElementsAre(ElementsAre(0), ElementsAre(1)));  // the panorama, 2.jpg
+  const Result<HeldOutSplit> panorama = HoldOut(images, {"b/1.jpg"});
+  ASSERT_TRUE(panorama.ok());
+  EXPECT_THAT(panorama->linked, ElementsAre(ElementsAre(0, 1)));
+  EXPECT_EQ(HoldOut(images, {"b"}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(FuseImages, ViewsOfAPanoramaAreOneNode) {
+  ImageLinks images = ImagesOf(PathGraph(3));
+  images.images[0].name = "p.jpg#0of2";
+  images.images[1].name = "p.jpg#1of2";
+  images.images[2].name = "q.jpg";
+  EXPECT_THAT(*FuseImages(images.images, "none", 0.1, nullptr), ElementsAre(0, 0, 1));
+}
+
+TEST(SurveyImagesOf, LeavesOutImagesThatTheCaptureDoesNotList) {
+  ImageLinks images = ImagesOf(PathGraph(4));
+  Capture capture;
+  for (const int i : {0, 1, 3}) capture.images.push_back({.name = images.images[i].name});
+  const ImageLinks survey = SurveyImagesOf(capture, images);
+  EXPECT_EQ(survey.images.size(), 3u);
+  EXPECT_THAT(survey.links, ElementsAre(AppearanceLink{0, 1, 30}));
 }
 
 TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {

@@ -160,6 +160,42 @@ TEST(PlanSurvey, DrivesThroughAllRooms) {
   }
 }
 
+TEST(PlanSurvey, AnotherRunDrivesElsewhereThroughAllRooms) {
+  SimulateOptions options = QuickOptions();
+  options.survey = "driven";
+  options.num_queries = 0;
+  const Building building = *MakeBuilding(options, 1);
+  const Survey first = *PlanSurvey(building, options, 1);
+  options.run = 1;
+  const Survey second = *PlanSurvey(building, options, 7);
+  std::set<std::string> visited;
+  double farthest_m = 0;
+  for (const PlannedImage& image : second.images) {
+    const Eigen::Vector3d centre = image.cam_from_world.Center();
+    EXPECT_GE(ClearanceM(building, centre.x(), centre.y()), options.clearance_m);
+    for (const Room& room : building.layout.rooms) {
+      if (DistanceToRect(room.rect, centre.x(), centre.y()) == 0) visited.insert(room.name);
+    }
+    double nearest_m = 1e9;
+    for (const PlannedImage& other : first.images) {
+      nearest_m = std::min(nearest_m, CenterErrorM(image.cam_from_world, other.cam_from_world));
+    }
+    farthest_m = std::max(farthest_m, nearest_m);
+  }
+  EXPECT_EQ(visited.size(), building.layout.rooms.size());
+  EXPECT_GT(farthest_m, 2 * options.step_m);
+}
+
+TEST(PlanSurvey, LightDarkensAllImages) {
+  SimulateOptions options = QuickOptions();
+  options.light_ratio = 0.25;
+  options.query_gain = 0;
+  const Building building = *MakeBuilding(options, 0);
+  const Survey survey = *PlanSurvey(building, options, 0);
+  EXPECT_EQ(survey.images[0].gain, 0.25);
+  EXPECT_EQ(survey.queries[0].gain, 0.25);
+}
+
 TEST(PlanSurvey, SaysWhatLeavesNoPlace) {
   const Building building = *MakeBuilding(QuickOptions(), 0);
   SimulateOptions wide = QuickOptions();

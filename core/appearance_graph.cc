@@ -1,4 +1,4 @@
-#include "stages/link_appearance/appearance_graph.h"
+#include "core/appearance_graph.h"
 
 #include <algorithm>
 #include <tuple>

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/appearance_graph.h"
+#include "core/error.h"
+#include "core/ids.h"
+
+namespace cairn {
+
+// Why a node is kept, or not.
+enum class NodeRole : int {
+  kDropped = 0,
+  kDominating = 1,
+  kRestored = 2,  // for a cycle
+};
+
+struct AppearanceNode {
+  std::vector<ImageId> images;  // ascending
+  int component = 0;
+  NodeRole role = NodeRole::kDropped;
+  friend bool operator==(const AppearanceNode&, const AppearanceNode&) = default;
+};
+
+// Content of appearance.db.
+struct Appearance {
+  std::vector<AppearanceNode> nodes;
+  AppearanceGraph graph;
+  // Per component: every connected set that meets its nodes' demands has at least so many; 0: not computed.
+  std::vector<int> lower_bounds;
+  int num_dominators = 1;
+  int strong_num_inliers = 1;
+  int max_detour_links = 0;
+
+  std::vector<NodeIdx> Kept() const;        // ascending
+  std::vector<ImageId> KeptImages() const;  // ascending
+  int NumComponents() const { return static_cast<int>(lower_bounds.size()); }
+  int LowerBound() const;  // of all components; 0: of some not computed
+};
+
+// appearance.db (schemas/appearance.sql).
+Status WriteAppearance(const Appearance& appearance, const std::string& path);
+// Errors: as OpenDatabaseReadOnly; Corrupt (another file, or rows that do not fit together; says which),
+// Unsupported (a version that this program does not read).
+Result<Appearance> ReadAppearance(const std::string& path);
+
+}  // namespace cairn

@@ -1,0 +1,70 @@
+// Blocks of the appearance graph as bytes: drawn in schemas/FORMAT.md.
+#include <limits>
+
+#include "core/blob.h"
+#include "core/map_blocks.h"
+#include "core/map_codes.h"
+
+namespace cairn {
+namespace {
+
+constexpr int64_t kMaxListElements = 1 << 22;
+
+}  // namespace
+
+std::string EncodeBlock(const AppearanceBlock& block) {
+  BlobWriter writer;
+  for (const MapAppearanceNode& node : block.nodes) {
+    writer.UInt8(node.is_kept ? 1 : 0);
+    WriteRuns(node.images, &writer);
+    std::vector<int32_t> linked;
+    for (const MapAppearanceNode::Link& link : node.links) linked.push_back(link.node);
+    WriteRuns(linked, &writer);
+    for (const MapAppearanceNode::Link& link : node.links)
+      writer.Varint(static_cast<uint64_t>(link.num_inliers));
+  }
+  return writer.Take();
+}
+
+Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const BlockEntry& entry,
+                                              const MapDirectory& directory, const std::string& what) {
+  BlobReader reader(bytes);
+  AppearanceBlock block;
+  block.first = static_cast<int32_t>(entry.first);
+  int64_t max_num_values = kMaxListElements;
+  for (uint32_t i = 0; i < entry.count; ++i) {
+    const int64_t node_idx = int64_t{entry.first} + i;
+    MapAppearanceNode& node = block.nodes.emplace_back();
+    std::vector<int32_t> linked;
+    const uint8_t flags = reader.UInt8();
+    node.is_kept = flags == 1;
+    if (flags > 1 || !ReadRuns(&reader, directory.Count(BlockKind::kImages), &max_num_values, &node.images) ||
+        !ReadRuns(&reader, directory.Count(BlockKind::kAppearance), &max_num_values, &linked) ||
+        node.images.empty()) {
+      return Corrupt(what, "the images or links of node {} make no sense", node_idx);
+    }
+    if (!linked.empty() && linked.front() <= node_idx) {
+      return Corrupt(what, "node {} is linked to one that is not larger", node_idx);
+    }
+    for (const int32_t other : linked) {
+      const uint64_t num_inliers = reader.Varint();
+      if (num_inliers == 0 || num_inliers > std::numeric_limits<int32_t>::max()) {
+        return Corrupt(what, "a link of node {} has {} inliers", node_idx, num_inliers);
+      }
+      node.links.push_back({other, static_cast<int32_t>(num_inliers)});
+    }
+  }
+  if (!reader.Finished()) return Corrupt(what, "bytes are left after {} nodes", entry.count);
+  return block;
+}
+
+int64_t NumBytes(const AppearanceBlock& block) {
+  int64_t num_bytes = sizeof(block);
+  for (const MapAppearanceNode& node : block.nodes) {
+    num_bytes += static_cast<int64_t>(sizeof(node) + node.images.size() * sizeof(int32_t) +
+                                      node.links.size() * sizeof(MapAppearanceNode::Link));
+  }
+  return num_bytes;
+}
+
+}  // namespace cairn

@@ -1,0 +1,76 @@
+#include "pipeline/route_command.h"
+
+#include <memory>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "core/floor_pose.h"
+#include "runtime/map.h"
+#include "runtime/route.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string map_path;
+  std::string from;
+  std::string to;
+  bool json = false;
+};
+
+Result<int32_t> FindImage(const Map& map, const std::string& map_path, const std::string& name) {
+  for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
+    for (size_t i = 0; i < block->images.size(); ++i) {
+      if (block->images[i].name == name) return block->first + static_cast<int32_t>(i);
+    }
+  }
+  return MakeError(ErrorCode::kNotFound, "{}: has no survey image '{}'; `cairn export` lists their names",
+                   map_path, name);
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.map_path, arguments.from));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.map_path, arguments.to));
+  CAIRN_ASSIGN_OR_RETURN(const Route route, PlanRoute(*map, from, to));
+  auto json =
+      nlohmann::ordered_json{{"num_links", route.num_links}, {"images", nlohmann::ordered_json::array()}};
+  std::string text = fmt::format("{:>4}  {:>9} {:>9} {:>8}  {}\n", "", "x, m", "y, m", "heading", "image");
+  for (const int32_t index : route.images) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map->Image(index));
+    const FloorPose place = FloorPoseOf(image->cam_from_world, map->head().floor_from_world);
+    text += fmt::format("{:>4}  {:>9.2f} {:>9.2f} {:>8.1f}  {}\n", json["images"].size(), place.position.x(),
+                        place.position.y(), place.heading_deg, image->name);
+    json["images"].push_back({{"name", image->name},
+                              {"x_m", place.position.x()},
+                              {"y_m", place.position.y()},
+                              {"heading_deg", place.heading_deg}});
+  }
+  *environment.out << (arguments.json ? json.dump(2) + "\n" : text);
+  return Ok();
+}
+
+}  // namespace
+
+Command RouteCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "route",
+      .summary =
+          "Lists the images on the way from one survey image to another, over those that the map keeps",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_option("from", arguments->from, "Survey image to start at")
+                ->required()
+                ->type_name("IMAGE");
+            app.add_option("to", arguments->to, "Survey image to go to")->required()->type_name("IMAGE");
+            app.add_flag("--json", arguments->json, "Print JSON");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn
