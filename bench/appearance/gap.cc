@@ -50,6 +50,7 @@ void MeasurePaths(const AppearanceGraph& graph, const std::vector<NodeIdx>& kept
   const std::vector<char> marks = NodeMarks(graph.num_nodes(), all_kept), all(graph.num_nodes(), 1);
   std::vector<double> ratios;
   std::vector<int> neighbours;  // links between former neighbours
+  int num_beyond = 0;           // longer than the bound of restore_cycles.h
   for (NodeIdx from = 0; from < graph.num_nodes(); ++from) {
     const std::vector<int> full = PathLengths(graph, from, all, graph.num_nodes());
     const std::vector<int> over_kept = PathLengths(graph, from, marks, graph.num_nodes());
@@ -63,6 +64,7 @@ void MeasurePaths(const AppearanceGraph& graph, const std::vector<NodeIdx>& kept
       }
       ratios.push_back(static_cast<double>(length) / full[to]);
       if (full[to] == 1) neighbours.push_back(length);
+      num_beyond += c > 0 && length > (c - 1) * full[to] + 2;
     }
   }
   std::sort(ratios.begin(), ratios.end());
@@ -70,9 +72,10 @@ void MeasurePaths(const AppearanceGraph& graph, const std::vector<NodeIdx>& kept
   const auto part = [](const auto& sorted, double p) {
     return sorted[static_cast<size_t>(p * static_cast<double>(sorted.size() - 1))];
   };
-  fmt::print("{:>4}{:>7}{:>10.2f}{:>8.2f}{:>8.2f}{:>8.2f}{:>12}{:>6}{:>6}{:>9}\n", c, all_kept.size(),
+  fmt::print("{:>4}{:>7}{:>10.2f}{:>8.2f}{:>8.2f}{:>8.2f}{:>12}{:>6}{:>6}{:>9}{:>8}\n", c, all_kept.size(),
              part(ratios, 0.5), part(ratios, 0.9), part(ratios, 0.99), ratios.back(), part(neighbours, 0.5),
-             part(neighbours, 0.9), neighbours.back(), c > 0 ? std::to_string(c + 1) : "-");
+             part(neighbours, 0.9), neighbours.back(), c > 0 ? std::to_string(c + 1) : "-",
+             c > 0 ? std::to_string(num_beyond) : "-");
   std::fflush(stdout);
 }
 
@@ -104,8 +107,8 @@ int main(int argc, char** argv) {
     }
   }
   if (path_nodes == 0) return 0;
-  fmt::print("\n{:>4}{:>7}{:>10}{:>8}{:>8}{:>8}{:>12}{:>6}{:>6}{:>9}\n", "c", "kept", "median", "90 %",
-             "99 %", "most", "neighbours:", "90 %", "most", "allowed");
+  fmt::print("\n{:>4}{:>7}{:>10}{:>8}{:>8}{:>8}{:>12}{:>6}{:>6}{:>9}{:>8}\n", "c", "kept", "median", "90 %",
+             "99 %", "most", "neighbours:", "90 %", "most", "allowed", "beyond");
   const cairn::AppearanceGraph graph = cairn::LargestComponent(cairn::SyntheticGraph(path_nodes, 8, 0));
   const cairn::Domination domination(graph, {});
   const std::vector<cairn::NodeIdx> kept = cairn::ImproveDominatingSet(

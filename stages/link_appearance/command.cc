@@ -5,11 +5,15 @@
 #include "core/appearance.h"
 #include "core/capture.h"
 #include "core/file.h"
+#include "core/memory.h"
 #include "stages/link_appearance/link_appearance.h"
 #include "stages/link_appearance/picture.h"
 
 namespace cairn {
 namespace {
+
+// Bytes: links as read, of the survey, fused, and of the graph both ways.
+constexpr int64_t kMemoryPerPair = 96;
 
 struct Arguments {
   std::string matches;
@@ -40,6 +44,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
+  CAIRN_ASSIGN_OR_RETURN(const int64_t num_pairs, CountPairs(arguments.matches));
+  CAIRN_RETURN_IF_ERROR(CheckMemory(fmt::format("linking the {} pairs of {}", num_pairs, arguments.matches),
+                                    num_pairs * kMemoryPerPair, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images,
                          ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
   if (capture) images = SurveyImagesOf(*capture, images);

@@ -13,7 +13,7 @@ struct ConnectedBoundOptions {
   // components of at most max_num_program_links, else counting.
   std::string lower_bound = "auto";
   // auto: most links of a component that gets a program.  REQUIRES: >= 0
-  int max_num_program_links = 6000;
+  int max_num_program_links = 2000;
   // Most rounds of cuts before branching.  REQUIRES: >= 0
   int max_num_cut_rounds = 60;
   // Most nodes of the branching tree; 0: the linear program alone.  REQUIRES: >= 0

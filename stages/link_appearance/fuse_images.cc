@@ -82,6 +82,13 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
   });
 }
 
+Result<int64_t> CountPairs(const std::string& matches_path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
+  return WithDatabaseErrors(matches_path, [&]() -> Result<int64_t> {
+    return database.execAndGet("SELECT count(*) FROM two_view_geometries").getInt64();
+  });
+}
+
 ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images) {
   std::set<std::string> names;
   for (const CaptureImage& image : capture.images) names.insert(image.name);

@@ -22,6 +22,9 @@ struct ImageLinks {
 // of inliers that is none).
 Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_inliers);
 
+// Rows that ReadImageLinks would look at.  Errors: as OpenColmapDatabase.
+Result<int64_t> CountPairs(const std::string& matches_path);
+
 // Those of the images that a capture lists as its survey, a panorama's views by its name, and their links.
 ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images);
 

@@ -17,47 +17,30 @@ class ChangingSet {
         graph_(domination.graph()),
         kept_(graph_.num_nodes(), 0),
         counted_(graph_.num_nodes(), 0),
+        missing_(graph_.num_nodes(), 0),
+        gains_(graph_.num_nodes(), 0),
         part_(graph_.num_nodes(), -1) {
-    for (NodeIdx node = 0; node < graph_.num_nodes(); ++node) total_missing_ += Missing(node);
+    for (NodeIdx node = 0; node < graph_.num_nodes(); ++node) SetMissing(node);
     for (const NodeIdx node : kept) Add(node);
   }
 
   bool Has(NodeIdx node) const { return kept_[node]; }
   const std::vector<NodeIdx>& nodes() const { return nodes_; }
   int64_t total_missing() const { return total_missing_; }
-  int64_t Missing(NodeIdx node) const {
-    return kept_[node] ? 0 : std::max<int64_t>(0, domination_.Demand(node) - counted_[node]);
-  }
+  // What a node outside of the set would take from total_missing().
+  int64_t Gain(NodeIdx node) const { return gains_[node]; }
 
   void Add(NodeIdx node) {
-    total_missing_ -= Missing(node);
     kept_[node] = 1;
     nodes_.insert(std::lower_bound(nodes_.begin(), nodes_.end(), node), node);
-    for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
-      total_missing_ -= Missing(n.node);
-      counted_[n.node] += domination_.Weight(n.num_inliers);
-      total_missing_ += Missing(n.node);
-    }
+    Count(node, 1);
   }
   void Remove(NodeIdx node) {
     kept_[node] = 0;
-    total_missing_ += Missing(node);
     nodes_.erase(std::lower_bound(nodes_.begin(), nodes_.end(), node));
-    for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
-      total_missing_ -= Missing(n.node);
-      counted_[n.node] -= domination_.Weight(n.num_inliers);
-      total_missing_ += Missing(n.node);
-    }
+    Count(node, -1);
   }
 
-  // What the node would take from total_missing().
-  int64_t Gain(NodeIdx node) const {
-    int64_t gain = Missing(node);
-    for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
-      gain += std::min(Missing(n.node), domination_.Weight(n.num_inliers));
-    }
-    return gain;
-  }
   // What would be missing more without a kept node.
   int64_t Loss(NodeIdx node) const {
     int64_t loss = std::max<int64_t>(0, domination_.Demand(node) - counted_[node]);
@@ -103,10 +86,32 @@ class ChangingSet {
   }
 
  private:
+  void Count(NodeIdx node, int sign) {
+    SetMissing(node);
+    for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
+      counted_[n.node] += sign * domination_.Weight(n.num_inliers);
+      SetMissing(n.node);
+    }
+  }
+  void SetMissing(NodeIdx node) {
+    const int64_t before = missing_[node];
+    const int64_t now = kept_[node] ? 0 : std::max<int64_t>(0, domination_.Demand(node) - counted_[node]);
+    if (now == before) return;
+    missing_[node] = now;
+    total_missing_ += now - before;
+    gains_[node] += now - before;
+    for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
+      const int64_t weight = domination_.Weight(n.num_inliers);
+      gains_[n.node] += std::min(now, weight) - std::min(before, weight);
+    }
+  }
+
   const Domination& domination_;
   const AppearanceGraph& graph_;
   std::vector<char> kept_;
   std::vector<int64_t> counted_;  // by links to kept nodes
+  std::vector<int64_t> missing_;  // 0 at kept nodes
+  std::vector<int64_t> gains_;    // of a node and its neighbours
   std::vector<int> part_;
   std::vector<NodeIdx> nodes_;  // ascending
   int64_t total_missing_ = 0;
@@ -193,7 +198,10 @@ class LocalSearch {
       int64_t best_gain = 0;
       int num_equal = 0;
       for (const NodeIdx node : near_) {
-        if (set_.Has(node)) continue;
+        // Joining all parts is the most that its links to them can bring.
+        if (set_.Has(node) ||
+            set_.Gain(node) + unit * (std::max(1, num_parts) - 1) < std::max<int64_t>(1, best_gain))
+          continue;
         const int num_around = set_.NumPartsAround(node);
         const int64_t gain = set_.Gain(node) + unit * (num_around - 1);
         if (gain <= 0 || gain < best_gain) continue;

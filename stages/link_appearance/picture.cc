@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/panorama.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -26,8 +27,7 @@ class Picture {
   std::string OverFloor(const std::vector<std::optional<FloorPose>>& places) {
     SetView(places);
     Begin(width_px_, height_px_);
-    DrawLinks(false);
-    DrawLinks(true);
+    DrawLinks();
     DrawNodes();
     DrawFloorLegend();
     return End();
@@ -122,17 +122,49 @@ class Picture {
     height_px_ = kTitlePx + size.y() * px_per_m + kMarginPx + kLegendPx;
   }
 
-  void DrawLinks(bool among_kept) {
-    Write("<g id=\"{}\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{}\">\n",
-          among_kept ? "kept_links" : "links", among_kept ? kKeptColour : "#999999", among_kept ? 2.2 : 0.5,
-          among_kept ? "0.9" : "0.35");
-    for (const AppearanceLink& link : appearance_.graph.Links()) {
-      if ((IsKept(link.node1) && IsKept(link.node2)) != among_kept) continue;
-      if (!pixels_[link.node1] || !pixels_[link.node2]) continue;
-      const Eigen::Vector2d &a = *pixels_[link.node1], &b = *pixels_[link.node2];
-      Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
+  // Per dropped node: the kept one that it has most inliers with; -1: none.
+  std::vector<NodeIdx> Dominators() const {
+    std::vector<NodeIdx> dominators(appearance_.nodes.size(), -1);
+    for (NodeIdx node = 0; node < appearance_.graph.num_nodes(); ++node) {
+      int32_t most = 0;
+      for (const AppearanceGraph::Neighbour& n : appearance_.graph.Neighbours(node)) {
+        if (IsKept(node) || !IsKept(n.node) || n.num_inliers <= most) continue;
+        most = n.num_inliers;
+        dominators[node] = n.node;
+      }
     }
-    Write("</g>\n");
+    return dominators;
+  }
+
+  // All links pale, the more there are the paler; each dropped node's best link to a kept one; links of kept
+  // ones.
+  void DrawLinks() {
+    const std::vector<NodeIdx> dominators = Dominators();
+    const double opacity =
+        std::clamp(1500.0 / static_cast<double>(appearance_.graph.num_links() + 1), 0.03, 0.4);
+    struct Layer {
+      const char* id;
+      const char* colour;
+      double width, opacity;
+    };
+    enum { kOther, kDominating, kKept, kNumLayers };
+    constexpr const char* kOtherColour = "#888888";
+    const Layer layers[kNumLayers] = {{"links", kOtherColour, 0.5, opacity},
+                                      {"dominating_links", kKeptColour, 0.8, 0.45},
+                                      {"kept_links", kKeptColour, 2.2, 0.9}};
+    for (int layer = 0; layer < kNumLayers; ++layer) {
+      Write("<g id=\"{}\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{:.2f}\">\n", layers[layer].id,
+            layers[layer].colour, layers[layer].width, layers[layer].opacity);
+      for (const AppearanceLink& link : appearance_.graph.Links()) {
+        const bool dominates = dominators[link.node1] == link.node2 || dominators[link.node2] == link.node1;
+        const bool both_kept = IsKept(link.node1) && IsKept(link.node2);
+        if ((both_kept ? kKept : dominates ? kDominating : kOther) != layer) continue;
+        if (!pixels_[link.node1] || !pixels_[link.node2]) continue;
+        const Eigen::Vector2d &a = *pixels_[link.node1], &b = *pixels_[link.node2];
+        Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
+      }
+      Write("</g>\n");
+    }
   }
 
   void DrawMark(double x, double y, NodeRole role) {
@@ -171,13 +203,21 @@ class Picture {
         kMarginPx, y - 6, length_m * px_per_m_, kMarginPx + length_m * px_per_m_ + 8, y + 5, length_m);
     radius_px_ = 5;
     double x = 270;
+    const bool is_restored =
+        std::any_of(appearance_.nodes.begin(), appearance_.nodes.end(),
+                    [](const AppearanceNode& node) { return node.role == NodeRole::kRestored; });
     for (const auto& [role, label] :
          {std::pair(NodeRole::kDominating, "kept"), std::pair(NodeRole::kDropped, "dropped"),
           std::pair(NodeRole::kRestored, "kept for a cycle")}) {
+      if (role == NodeRole::kRestored && !is_restored) continue;
       DrawMark(x, y, role);
       Write("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 12, y + 5, label);
       x += 95;
     }
+    if (is_restored) x += 60;
+    Write("<path d=\"M{0:.1f} {1:.1f}h24\" stroke=\"{2}\" stroke-width=\"0.8\" stroke-opacity=\"0.6\"/>",
+          x - 6, y, kKeptColour);
+    Write("<text x=\"{:.1f}\" y=\"{:.1f}\">located from there</text>\n", x + 24, y + 5);
   }
 
   double MatrixX(NodeIdx node) const { return kMarginPx + node * cell_px_; }
@@ -254,8 +294,8 @@ std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
   if (up.norm() > 1e-9) floor_from_world.rotation.setFromTwoVectors(up, Eigen::Vector3d::UnitZ());
   std::map<ImageId, FloorPose> places;
   for (const DatabaseImage& image : images) {
-    const auto pose = poses.find(image.name);
-    if (pose != poses.end()) places.emplace(image.image_id, FloorPoseOf(pose->second, floor_from_world));
+    const std::optional<Pose> pose = FindPose(poses, image.name);
+    if (pose) places.emplace(image.image_id, FloorPoseOf(*pose, floor_from_world));
   }
   std::vector<std::optional<FloorPose>> node_places;
   for (const AppearanceNode& node : appearance.nodes) {

@@ -1,9 +1,16 @@
 #include "stages/match_features/estimate_models.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
 #include <vector>
 
+#include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+
+#include "core/random.h"
 
 namespace cairn {
 namespace {
@@ -60,7 +67,78 @@ std::optional<Eigen::Matrix3d> Run(const PointPairs& pairs, size_t min_num_point
   }
 }
 
+// Chance that one of the samples drawn was free of outliers.
+constexpr double kConfidence = 0.999;
+constexpr int kSampleSize = 8;
+
+std::optional<Eigen::Matrix3d> FitEightPoints(const PointPairs& pairs, bool is_essential) {
+  const auto F = Run(pairs, kSampleSize,
+                     [&] { return cv::findFundamentalMat(pairs.points1, pairs.points2, cv::FM_8POINT); });
+  if (!F || !is_essential) return F;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(*F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * Eigen::Vector3d(1, 1, 0).asDiagonal() * svd.matrixV().transpose() / std::sqrt(2.0);
+}
+
+std::vector<int> SampsonInliers(const Eigen::Matrix3d& M, const Correspondences& c, double max_error_rad) {
+  std::vector<int> inliers;
+  for (int i = 0; i < c.size(); ++i) {
+    if (SquaredSampsonError(M, c.bearings1[i], c.bearings2[i]) <= max_error_rad * max_error_rad)
+      inliers.push_back(i);
+  }
+  return inliers;
+}
+
+PointPairs Select(const PointPairs& pairs, const std::vector<int>& indices) {
+  PointPairs selected;
+  for (const int i : indices) {
+    selected.points1.push_back(pairs.points1[i]);
+    selected.points2.push_back(pairs.points2[i]);
+  }
+  return selected;
+}
+
 }  // namespace
+
+std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& correspondences,
+                                                     bool is_essential, const EstimateModelOptions& options) {
+  Correspondences ahead;
+  for (int i = 0; i < correspondences.size(); ++i) {
+    const Eigen::Vector3d &b1 = correspondences.bearings1[i], &b2 = correspondences.bearings2[i];
+    if (b1.z() >= kMinCosine && b2.z() >= kMinCosine) ahead.Add(b1, b2, i);
+  }
+  const PointPairs pairs = PerspectivePoints(ahead, 1);
+  if (ahead.size() < kSampleSize) return std::nullopt;
+  Random random(0);
+  std::optional<Eigen::Matrix3d> best;
+  std::vector<int> best_inliers;
+  double num_wanted = options.max_num_iterations;
+  std::vector<int> sample(ahead.size());
+  std::iota(sample.begin(), sample.end(), 0);
+  for (int iteration = 0; iteration < num_wanted; ++iteration) {
+    for (int i = 0; i < kSampleSize; ++i)
+      std::swap(sample[i], sample[random.UniformInt(i, ahead.size() - 1)]);
+    const auto model =
+        FitEightPoints(Select(pairs, {sample.begin(), sample.begin() + kSampleSize}), is_essential);
+    if (!model) continue;
+    std::vector<int> inliers = SampsonInliers(*model, ahead, options.max_error_rad);
+    if (inliers.size() <= best_inliers.size()) continue;
+    best = model;
+    best_inliers = std::move(inliers);
+    const double good = std::pow(static_cast<double>(best_inliers.size()) / ahead.size(), kSampleSize);
+    if (good > 1e-12)
+      num_wanted = std::min(num_wanted, good < 1 ? std::log(1 - kConfidence) / std::log1p(-good) : 0);
+  }
+  // Estimated again as long as that finds more inliers.
+  while (best_inliers.size() > kSampleSize) {
+    const auto again = FitEightPoints(Select(pairs, best_inliers), is_essential);
+    if (!again) break;
+    std::vector<int> inliers = SampsonInliers(*again, ahead, options.max_error_rad);
+    if (inliers.size() <= best_inliers.size()) break;
+    best = again;
+    best_inliers = std::move(inliers);
+  }
+  return best;
+}
 
 std::optional<Eigen::Matrix3d> EstimateEssentialMatrix(const Correspondences& correspondences,
                                                        const EstimateModelOptions& options) {

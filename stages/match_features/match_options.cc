@@ -82,6 +82,12 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .help = "largest angle between matched descriptors, radians",
        .min = 0,
        .max = 3.2},
+      {.name = "two_view",
+       .value = &o->verification.two_view,
+       .help = "how pairs are verified: by stated poses or five points, or, poses or not, by eight points in "
+               "plain RANSAC "
+               "[Booij06]",
+       .choices = {"five_point", "eight_point"}},
       {.name = "max_epipolar_error_px",
        .value = &o->verification.max_epipolar_error_px,
        .help = "largest distance of an inlier to its epipolar line, pixels",

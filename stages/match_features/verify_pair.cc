@@ -186,6 +186,16 @@ Model UnposedCameras(bool has_intrinsics, const Correspondences& c, const Limits
   return model;
 }
 
+Model EightPointCameras(bool has_intrinsics, const Correspondences& c, const Limits& limits) {
+  Model model;
+  const auto M = EstimateByEightPoints(c, has_intrinsics, {.max_error_rad = limits.epipolar});
+  if (!M) return model;
+  (has_intrinsics ? model.E : model.F) = M;
+  model.inliers = EpipolarInliers(*M, c, limits.epipolar);
+  model.config = has_intrinsics ? TwoViewConfig::kCalibrated : TwoViewConfig::kUncalibrated;
+  return model;
+}
+
 std::vector<Match> GuidedInliers(const ViewForVerification& view1, const ViewForVerification& view2,
                                  const Model& model, const Limits& limits, const std::vector<Match>& inliers,
                                  const VerifyPairOptions& options) {
@@ -253,7 +263,9 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
   const double focal_px = 0.5 * (view1.camera->MeanFocal() + view2.camera->MeanFocal());
   const Limits limits{options.max_epipolar_error_px / focal_px, options.max_homography_error_px / focal_px,
                       options.max_prior_error_px / focal_px};
-  const std::optional<Pose> stated = StatedRelativePose(view1.cam_from_world, view2.cam_from_world);
+  const bool is_eight_point = options.two_view == "eight_point";
+  const std::optional<Pose> stated =
+      is_eight_point ? std::nullopt : StatedRelativePose(view1.cam_from_world, view2.cam_from_world);
   const auto cannot_meet = [&](const Match& match) {
     return stated &&
            !CanMeet(*stated, (*view1.bearings)[match.idx1], (*view2.bearings)[match.idx2], limits, options);
@@ -261,9 +273,10 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
   std::vector<Match> candidates = matches;
   std::erase_if(candidates, cannot_meet);
   const Correspondences c = CollectCorrespondences(view1, view2, candidates);
-  const Model model = stated ? PosedCameras(*stated, c, limits, options)
-                             : UnposedCameras(view1.camera->has_focal_prior && view2.camera->has_focal_prior,
-                                              c, limits, options);
+  const bool has_intrinsics = view1.camera->has_focal_prior && view2.camera->has_focal_prior;
+  const Model model = is_eight_point ? EightPointCameras(has_intrinsics, c, limits)
+                      : stated       ? PosedCameras(*stated, c, limits, options)
+                                     : UnposedCameras(has_intrinsics, c, limits, options);
 
   TwoViewGeometry geometry;
   geometry.config = TwoViewConfig::kDegenerate;

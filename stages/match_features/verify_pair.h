@@ -15,6 +15,9 @@
 namespace cairn {
 
 struct VerifyPairOptions {
+  // "five_point": by stated poses where there are any, else five points or seven; "eight_point": normalised
+  // eight points and RANSAC, whether poses are stated or not [Booij06 §III], the reference beside it.
+  std::string two_view = "five_point";
   // Largest distance of an inlier to its epipolar line, pixels (Sampson distance; as an angle: over the mean
   // focal length).  REQUIRES: > 0
   double max_epipolar_error_px = 2.0;
@@ -75,6 +78,9 @@ struct ViewForVerification {
 //   (src/estimators/two_view_geometry.cc there): kCalibrated, kUncalibrated (E explains too little of what F
 //   does), kPlanarOrPanoramic. Differs from it: inliers are those of E also where F has more, so that they
 //   obey the known intrinsics.
+// - two_view = "eight_point", in place of all that: eight points (estimate_models.h), poses not read;
+// kCalibrated or,
+//   where a focal length is guessed, kUncalibrated.
 // - focal length guessed: fundamental matrix by USAC; kUncalibrated or kPlanarOrPanoramic.
 // Then guided matching adds what the geometry allows (guided_match.h).
 //

@@ -313,8 +313,8 @@ TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
   std::vector<std::optional<FloorPose>> places;
   for (const double x : {0.0, 1.0, 2.0}) places.push_back(FloorPose{Eigen::Vector2d(x, 0), 0});
   const std::string floor = DrawAppearance(result->appearance, places);
-  EXPECT_THAT(floor, HasSubstr("<g id=\"kept_links\""));
-  EXPECT_EQ(count(floor, "<path d=\"M") - 1, 2);  // links, beside the scale bar
+  EXPECT_THAT(floor, HasSubstr("<g id=\"dominating_links\""));
+  EXPECT_EQ(count(floor, "<path d=\"M"), 2 + 2);  // links, scale bar and legend
 }
 
 }  // namespace

@@ -93,6 +93,25 @@ TEST(VerifyPair, WithoutPosesTheFivePointEstimatorFindsTheInliers) {
   EXPECT_NEAR(singular[2], 0, 1e-9);
 }
 
+TEST(VerifyPair, EightPointsFindTheInliersWithoutReadingPoses) {
+  TwoViewScene scene = MakeTwoViewScene({.num_outliers = 60, .noise_px = 0.5});
+  const VerifyPairOptions options{.two_view = "eight_point"};
+  const TwoViewGeometry geometry = Verify(scene, std::nullopt, std::nullopt, options);
+  EXPECT_EQ(geometry.config, TwoViewConfig::kCalibrated);
+  EXPECT_GE(NumTrueInliers(geometry, 100), 90);
+  EXPECT_LE(geometry.inliers.size(), 100u + 10u);
+  const Eigen::Vector3d singular = geometry.E.jacobiSvd().singularValues();
+  EXPECT_NEAR(singular[0], singular[1], 1e-9);
+  EXPECT_NEAR(singular[2], 0, 1e-9);
+  // Stated poses, wrong ones at that, change nothing.
+  EXPECT_EQ(Verify(scene, scene.cam2_from_world, scene.cam1_from_world, options).inliers, geometry.inliers);
+  scene.camera.has_focal_prior = false;
+  const TwoViewGeometry uncalibrated = Verify(scene, std::nullopt, std::nullopt, options);
+  EXPECT_EQ(uncalibrated.config, TwoViewConfig::kUncalibrated);
+  EXPECT_GE(NumTrueInliers(uncalibrated, 100), 90);
+  EXPECT_EQ(uncalibrated.E.norm(), 0);
+}
+
 TEST(VerifyPair, GuessedFocalLengthGivesAFundamentalMatrix) {
   TwoViewScene scene = MakeTwoViewScene({.num_outliers = 40});
   scene.camera.has_focal_prior = false;
