@@ -26,10 +26,7 @@ ImageLinks ImagesOf(const AppearanceGraph& graph) {
   return images;
 }
 
-std::string TemporaryPath(const std::string& name) {
-  const char* folder = std::getenv("TEST_TMPDIR");
-  return std::string(folder ? folder : ".") + "/" + name;
-}
+std::string TemporaryPath(const std::string& name) { return testing::TempDir() + "/" + name; }
 
 // A COLMAP database of images and verified pairs without features.
 void WriteMatches(const std::string& path, const ImageLinks& images, TwoViewConfig config) {
@@ -192,7 +189,8 @@ TEST(ReadImageLinks, PairsOfUnknownImagesAreCorrupt) {
 
 TEST(AppearanceDatabase, ReadsBackWhatWasWrittenAndHasTheSameBytesAgain) {
   const Result<LinkAppearanceResult> result =
-      LinkAppearance(ImagesOf(GeometricGraph(50, 6, 3)), nullptr, {.num_dominators = 2}, 7);
+      LinkAppearance(ImagesOf(GeometricGraph(50, 6, 3)), nullptr,
+                     {.num_dominators = 2, .bound = {.lower_bound = "counting"}}, 7);
   ASSERT_TRUE(result.ok());
   const std::string path = TemporaryPath("appearance.db"), again = TemporaryPath("again.db");
   ASSERT_TRUE(WriteAppearance(result->appearance, path).ok());
