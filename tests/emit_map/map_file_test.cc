@@ -230,5 +230,16 @@ TEST(GoldenMap, Version2IsRead) {
   EXPECT_EQ(rows->vocabulary.num_words(), 1);
 }
 
+// Version 2.2 as the program of that version wrote a sparse example.
+TEST(GoldenMap, Version2_2IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.2.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->documents, "kept");
+  ASSERT_EQ(rows->appearance.size(), 3u);
+  EXPECT_EQ(rows->appearance[1], (MapAppearanceNode{{1}, true, {{2, 30}}}));
+  EXPECT_THAT(rows->vocabulary.document_ids, ElementsAre(2));
+  EXPECT_THAT(rows->images[1].landmarks, ElementsAre(0, 1, 2));
+}
+
 }  // namespace
 }  // namespace cairn
