@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "core/panorama.h"
@@ -118,7 +119,7 @@ Outcome Locate(const LeftOutImage& image, const ChosenSets& chosen) {
         std::any_of(image.linked.begin(), image.linked.end(), [&](NodeIdx node) { return kept[node] != 0; }));
   }
   for (const std::vector<int>& position : chosen.position) {
-    int first = static_cast<int>(position.size());
+    int first = std::numeric_limits<int>::max();
     for (const NodeIdx node : image.linked) first = std::min(first, position[node]);
     outcome.position_by_curve.push_back(first);
   }
@@ -186,6 +187,8 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
   CheckAppearanceOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (left_out.empty()) return MakeError(ErrorCode::kNoData, "no image is left out: nothing to check");
+  if (graph.num_nodes() == 0)
+    return MakeError(ErrorCode::kNoData, "all images are held out: no survey is left to keep images of");
   AppearanceCheck check;
   const bool is_of_graph = left_out[0].node >= 0;
   check.num_nodes = graph.num_nodes() - (is_of_graph ? 1 : 0);

@@ -55,7 +55,7 @@ std::vector<LeftOutImage> EachNodeLeftOut(const AppearanceGraph& graph);
 // domination; and of the curve's sizes, greedily.  Random sets of the same size are expected to locate an
 // image of d neighbours among n with 1 - C(n - d, k) / C(n, k), no sampling.
 // Same figures for any number of threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options),
-// NoData (nothing is left out), Cancelled.
+// NoData (nothing, or all, is left out), Cancelled.
 Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
                                         const std::vector<LeftOutImage>& left_out,
                                         const LinkAppearanceOptions& link_options,

@@ -265,6 +265,25 @@ TEST(CheckAppearance, HeldOutImagesLeaveTheGraphAndKeepTheirLinks) {
   EXPECT_EQ(HoldOut(images, {"nobody.jpg"}).error().code, ErrorCode::kNotFound);
 }
 
+TEST(CheckAppearance, NothingOrEverythingLeftOutIsAnError) {
+  NoProgress progress;
+  const auto check = [&](const AppearanceGraph& graph, const std::vector<LeftOutImage>& left_out) {
+    return CheckAppearance(graph, left_out, {}, {}, 0, 1, progress);
+  };
+  EXPECT_EQ(check(PathGraph(3), {}).error().code, ErrorCode::kNoData);
+  EXPECT_EQ(check(AppearanceGraph(), {LeftOutImage{}}).error().code, ErrorCode::kNoData);
+}
+
+TEST(CheckAppearance, AnImageWithoutLinksIsNeverLocated) {
+  NoProgress progress;
+  const Result<AppearanceCheck> check = CheckAppearance(PathGraph(3), {LeftOutImage{}}, {.num_tries = 10},
+                                                        {.kept_ratios = {1}}, 0, 1, progress);
+  ASSERT_TRUE(check.ok());
+  EXPECT_EQ(check->num_linked, 0);
+  for (const auto& curve : check->curves) EXPECT_EQ(curve[0].num_localized, 0);
+  for (const AppearanceFigure& set : check->sets) EXPECT_EQ(set.num_localized, 0);
+}
+
 TEST(CheckAppearance, FoldersAndPanoramasAreHeldOutWhole) {
   ImageLinks images = ImagesOf(PathGraph(5));
   const std::vector<std::string> names = {"a/0.jpg", "b/1.jpg#0of3", "b/1.jpg#1of3", "b/2.jpg", "c.jpg"};
