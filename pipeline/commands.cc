@@ -12,6 +12,7 @@
 #include "stages/build_vocabulary/command.h"
 #include "stages/check_map/command.h"
 #include "stages/decompose_regions/command.h"
+#include "stages/decompose_views/command.h"
 #include "stages/emit_map/command.h"
 #include "stages/extract_features/command.h"
 #include "stages/filter_visibility/command.h"
@@ -33,6 +34,7 @@ std::vector<Command> AllCommands() {
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
       JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
       MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),  RouteCommand(),
+      DecomposeViewsCommand(),
   };
 }
 

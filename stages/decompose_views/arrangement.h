@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/error.h"
+#include "core/floor_plan.h"
+#include "core/progress.h"
+#include "stages/decompose_views/view_boundaries.h"
+
+namespace cairn {
+
+// The planar graph of walls and view boundaries, and its faces [Simsarian96 §2.2, steps II and IV].
+struct Arrangement {
+  // A line between two vertices, start < end.
+  struct Edge {
+    int32_t start = 0, end = 0;
+    bool is_wall = false;
+    // The face on the left and on the right of start -> end, -1: outside of the domain.
+    int32_t left = -1, right = -1;
+    // View boundaries on it: crossings[first_crossing .. the next edge's).
+    int64_t first_crossing = 0;
+  };
+  struct Crossing {
+    int32_t boundary = 0;
+    bool reversed = false;  // the boundary runs end -> start
+  };
+
+  std::vector<GridPoint> vertices;
+  std::vector<Edge> edges;  // ascending by (start, end)
+  std::vector<Crossing> crossings;
+  // Faces of the domain: counter-clockwise corners.
+  std::vector<int64_t> face_offsets{0};
+  std::vector<int32_t> face_vertices;
+
+  int32_t num_faces() const { return static_cast<int32_t>(face_offsets.size()) - 1; }
+  int64_t CrossingsEnd(size_t edge) const {
+    return edge + 1 < edges.size() ? edges[edge + 1].first_crossing : static_cast<int64_t>(crossings.size());
+  }
+};
+
+// Nodes the lines on the plan's grid and walks around the faces, turning as sharply left as possible.
+// O((B + I) log(B + I)) for B boundaries with I intersections.  Errors: Cancelled, Failed.
+Result<Arrangement> Arrange(const FloorPlan& plan, const std::vector<ViewBoundary>& boundaries,
+                            const Progress& progress);
+
+// About how many edges the arrangement will have: crossings of `num_samples` pairs of boundaries drawn at
+// random, scaled up.
+double EstimateNumEdges(const std::vector<ViewBoundary>& boundaries, int num_samples);
+
+}  // namespace cairn

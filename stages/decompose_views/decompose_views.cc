@@ -1,0 +1,131 @@
+#include "stages/decompose_views/decompose_views.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "core/visible_walls.h"
+#include "stages/decompose_views/arrangement.h"
+#include "stages/decompose_views/label_faces.h"
+#include "stages/decompose_views/view_boundaries.h"
+#include "stages/decompose_views/wall_rays.h"
+
+namespace cairn {
+namespace {
+
+// Bytes of memory for an edge of the arrangement while it is noded, measured (bench/README.md).
+constexpr double kBytesPerEdge = 1000;
+constexpr int kNumCrossingSamples = 200000;
+constexpr int64_t kFacesPerBlock = 1024;
+
+// Index values from the centroids.  Blocks begin with a label set of their own.
+Status AddIndex(Views* views, int num_threads, Progress& progress) {
+  const int64_t num_blocks = (views->num_faces() + kFacesPerBlock - 1) / kFacesPerBlock;
+  views->index.resize(views->num_faces());
+  progress.Begin("views", num_blocks, "blocks of regions");
+  ParallelFor(num_blocks, num_threads, [&](int64_t block) {
+    if (progress.Cancelled()) return;
+    const auto first = static_cast<FaceIdx>(block * kFacesPerBlock);
+    const FaceIdx end = std::min<FaceIdx>(views->num_faces(), first + kFacesPerBlock);
+    std::vector<std::vector<LabelIdx>> sets(end - first);
+    for (FaceIdx face = first; face < end; ++face) {
+      std::vector<LabelIdx>& labels = sets[face - first];
+      const FaceIdx parent = views->parents[face];
+      if (parent >= first) {
+        labels = sets[parent - first];
+        ToggleLabels(views->toggled_labels.data() + views->toggle_offsets[face],
+                     views->toggled_labels.data() + views->toggle_offsets[face + 1], &labels);
+      } else {
+        labels = views->LabelSet(face);
+      }
+      ViewIndex& index = views->index[face];
+      index.num_labels = static_cast<int32_t>(labels.size());
+      double walls = 0, length = 0, area = 0, longest = 0;
+      for (const LabelIdx label : labels) walls += views->plan.walls[WallOf(label)].Length();
+      const Eigen::Vector2d centre = views->Centroid(face);
+      for (const VisibleStretch& stretch : VisibleStretches(views->plan, labels, centre)) {
+        length += stretch.Length();
+        longest = std::max(longest, stretch.Length());
+        const Eigen::Vector2d a = stretch.start - centre, b = stretch.end - centre;
+        area += 0.5 * (a.x() * b.y() - a.y() * b.x());
+      }
+      index.wall_length_m = static_cast<float>(walls);
+      index.visible_length_m = static_cast<float>(length);
+      index.visible_area_m2 = static_cast<float>(area);
+      index.longest_m = static_cast<float>(longest);
+    }
+    progress.Advance();
+  });
+  progress.End();
+  return progress.Cancelled() ? Status(MakeError(ErrorCode::kCancelled, "cancelled")) : Ok();
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(DecomposeViewsOptions* o) {
+  return {
+      {.name = "grid_m",
+       .value = &o->clean.grid_m,
+       .help = "unit that all coordinates are rounded to, metres",
+       .min = 1e-6,
+       .max = 0.01},
+      {.name = "snap_m",
+       .value = &o->clean.snap_m,
+       .help = "ends of walls this close to each other, or to another wall, are moved together, metres",
+       .min = 0,
+       .max = 1},
+      {.name = "simplify_m",
+       .value = &o->clean.simplify_m,
+       .help =
+           "walls that continue each other become one where no point lies farther than this from it, metres",
+       .min = 0,
+       .max = 1},
+      {.name = "margin_m",
+       .value = &o->clean.margin_m,
+       .help = "how far the domain reaches beyond walls that are no polygons, metres",
+       .min = 0.01,
+       .max = 1000},
+      {.name = "min_region_area_m2",
+       .value = &o->min_region_area_m2,
+       .help = "regions smaller than this are joined to a neighbour, square metres; 0: none",
+       .min = 0,
+       .max = 1e6},
+  };
+}
+
+Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
+                                            int num_threads, int64_t memory_mib, Progress& progress) {
+  DecomposeViewsOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_ASSIGN_OR_RETURN(CleanPlanResult cleaned, CleanPlan(input, options.clean, progress));
+  const FloorPlan& plan = cleaned.plan;
+  const WallRays rays(plan);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ViewBoundary> boundaries,
+                         FindViewBoundaries(plan, rays, num_threads, progress));
+  const double num_edges = EstimateNumEdges(boundaries, kNumCrossingSamples);
+  CAIRN_RETURN_IF_ERROR(
+      CheckMemory(fmt::format("dividing {} walls by {} view boundaries into about {:.0f} regions",
+                              plan.num_walls(), boundaries.size(), 0.5 * num_edges),
+                  static_cast<int64_t>(num_edges * kBytesPerEdge), memory_mib));
+  if (num_edges > 0.8 * std::numeric_limits<int32_t>::max()) {
+    return MakeError(ErrorCode::kUnsupported, "about {:.0f} regions are more than 32 bits can number",
+                     num_edges);
+  }
+  progress.Begin("regions", 1, "arrangements");
+  auto arrangement = Arrange(plan, boundaries, progress);
+  progress.Advance();
+  progress.End();
+  if (!arrangement.ok()) return arrangement.error();
+  CAIRN_ASSIGN_OR_RETURN(LabelFacesResult labelled,
+                         LabelFaces(plan, rays, boundaries, std::move(arrangement).value(), progress));
+  CAIRN_RETURN_IF_ERROR(AddIndex(&labelled.views, num_threads, progress));
+  DecomposeViewsResult result;
+  result.views = std::move(labelled.views);
+  result.num_disagreements = labelled.num_disagreements;
+  result.changes = std::move(cleaned.changes);
+  result.num_boundaries = static_cast<int64_t>(boundaries.size());
+  return result;
+}
+
+}  // namespace cairn

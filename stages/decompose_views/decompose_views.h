@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/error.h"
+#include "core/options.h"
+#include "core/progress.h"
+#include "core/views.h"
+#include "stages/decompose_views/clean_plan.h"
+#include "stages/decompose_views/read_plan.h"
+
+namespace cairn {
+
+// Divides a floor plan into the regions from all points of which a laser sees the same walls
+// (view-invariant regions, VIRs).  Before: a floor plan.  After: localization with laser scans (runtime).
+// Implements [Simsarian96 §2.2].  Differs from it: walls may stand anywhere, are seen from both sides (a
+// label is one side of one wall) and through several windows (view_boundaries.h); in a polygon that is the
+// source's definition.  Regions are faces of the arrangement: with walls that stand free two faces can have
+// one label set without all of the segments between their points having it.
+//
+// | paper                          | here                                                 |
+// | point visibility scan (I)      | FindViewBoundaries: rays from every vertex           |
+// | intersections (II)             | Arrange: snap rounding by GEOS                       |
+// | traversal of boundaries (III)  | LabelFaces: a walk over the regions' borders         |
+// | faces (IV)                     | Arrange                                              |
+struct DecomposeViewsOptions {
+  CleanPlanOptions clean;
+  // Regions smaller than this are joined to a neighbour, whose labels they get; 0: none.  What that loses is
+  // reported.  REQUIRES: >= 0
+  double min_region_area_m2 = 0;
+};
+OptionTable DescribeOptions(DecomposeViewsOptions* options);
+
+struct MergeLoss {
+  int64_t num_regions = 0;  // joined to others
+  double area_m2 = 0;       // of these
+  int64_t num_labels = 0;   // that they have and the region that they joined has not, or the reverse
+};
+
+struct DecomposeViewsResult {
+  Views views;
+  std::vector<PlanChange> changes;  // of the plan, by cleaning
+  int64_t num_boundaries = 0;
+  // Regions whose label sets do not differ from their neighbours' by what lies between them; 0 but for
+  // rounding.
+  int64_t num_disagreements = 0;
+  MergeLoss loss;
+};
+
+// Pure: same plan and options, same result for any number of threads.  O(n^2 log n + I log I) for n walls
+// whose boundaries cross I times; memory is proportional to I, estimated first, and refused beyond
+// `memory_mib`.
+// Errors: those of CleanPlan, InvalidArgument (options), Failed (memory), Cancelled.
+Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
+                                            int num_threads, int64_t memory_mib, Progress& progress);
+
+}  // namespace cairn

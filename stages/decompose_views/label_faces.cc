@@ -1,0 +1,250 @@
+#include "stages/decompose_views/label_faces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+#include "core/random.h"
+
+namespace cairn {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+// Directions closer than this are one, rad.
+constexpr double kSameDirection = 1e-12;
+
+Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
+
+class FaceLabeller {
+ public:
+  FaceLabeller(const FloorPlan& plan, const WallRays& rays, const std::vector<ViewBoundary>& boundaries,
+               const Arrangement& arrangement)
+      : plan_(plan), rays_(rays), boundaries_(boundaries), arrangement_(arrangement) {
+    num_faces_ = arrangement.num_faces();
+    windows_.assign(plan.num_labels(), 0);
+    for (LabelIdx label = 0; label < plan.num_labels(); ++label) keys_.push_back(MixSeed(0, label));
+  }
+
+  Status Run(Progress& progress, LabelFacesResult* result) {
+    result_ = result;
+    ListBorders();
+    new_index_.assign(num_faces_, -1);
+    hashes_.assign(num_faces_, 0);
+    std::vector<int32_t> roots(num_faces_);
+    std::iota(roots.begin(), roots.end(), 0);
+    std::vector<double> areas(num_faces_);
+    for (int32_t face = 0; face < num_faces_; ++face) areas[face] = Area(face);
+    std::stable_sort(roots.begin(), roots.end(), [&](int32_t a, int32_t b) { return areas[a] > areas[b]; });
+    progress.Begin("label sets", num_faces_, "regions");
+    for (const int32_t root : roots) {
+      if (new_index_[root] >= 0) continue;
+      if (!Walk(root, progress)) {
+        progress.End();
+        return MakeError(ErrorCode::kCancelled, "cancelled");
+      }
+    }
+    progress.End();
+    TakeLinks();
+    return Ok();
+  }
+
+ private:
+  struct Border {
+    int64_t edge;
+    int32_t other;
+  };
+
+  // For each face the edges to others, shared ends first in the order of edges.
+  void ListBorders() {
+    border_offsets_.assign(num_faces_ + 1, 0);
+    const auto is_link = [](const Arrangement::Edge& edge) {
+      return !edge.is_wall && edge.left >= 0 && edge.right >= 0 && edge.left != edge.right;
+    };
+    for (const Arrangement::Edge& edge : arrangement_.edges) {
+      if (!is_link(edge)) continue;
+      ++border_offsets_[edge.left + 1];
+      ++border_offsets_[edge.right + 1];
+    }
+    std::partial_sum(border_offsets_.begin(), border_offsets_.end(), border_offsets_.begin());
+    borders_.resize(border_offsets_.back());
+    std::vector<int64_t> next(border_offsets_.begin(), border_offsets_.end() - 1);
+    for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
+      const Arrangement::Edge& edge = arrangement_.edges[i];
+      if (!is_link(edge)) continue;
+      borders_[next[edge.left]++] = {static_cast<int64_t>(i), edge.right};
+      borders_[next[edge.right]++] = {static_cast<int64_t>(i), edge.left};
+    }
+  }
+
+  double Area(int32_t face) const {
+    const int64_t first = arrangement_.face_offsets[face];
+    const GridPoint& origin = Corner(first);
+    double twice = 0;
+    for (int64_t i = first + 1; i + 1 < arrangement_.face_offsets[face + 1]; ++i)
+      twice += static_cast<double>(Orientation(origin, Corner(i), Corner(i + 1)));
+    return 0.5 * twice;
+  }
+
+  const GridPoint& Corner(int64_t i) const { return arrangement_.vertices[arrangement_.face_vertices[i]]; }
+
+  Vec2 Centre(int32_t face) const {
+    const int64_t first = arrangement_.face_offsets[face], end = arrangement_.face_offsets[face + 1];
+    Vec2 sum = Vec2::Zero();
+    for (int64_t i = first; i < end; ++i) sum += Real(Corner(i));
+    return sum / static_cast<double>(end - first);
+  }
+
+  // Visits what changes from one side of an edge to the other: visit(label, windows).
+  template <typename Visit>
+  void VisitChanges(int64_t edge_idx, bool to_left, Visit&& visit) const {
+    for (int64_t i = arrangement_.edges[edge_idx].first_crossing; i < arrangement_.CrossingsEnd(edge_idx);
+         ++i) {
+      const Arrangement::Crossing& crossing = arrangement_.crossings[i];
+      const int sign = crossing.reversed == to_left ? -1 : 1;
+      for (const WindowChange& change : boundaries_[crossing.boundary].changes)
+        visit(change.label, sign * change.windows);
+    }
+  }
+
+  // Crosses an edge with the counts of windows; the labels that become or cease to be visible, ascending.
+  std::vector<LabelIdx> Cross(int64_t edge, bool to_left) {
+    std::vector<LabelIdx> touched;
+    VisitChanges(edge, to_left, [&](LabelIdx label, int) { touched.push_back(label); });
+    std::sort(touched.begin(), touched.end());
+    touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+    std::vector<bool> before;
+    for (const LabelIdx label : touched) before.push_back(windows_[label] > 0);
+    VisitChanges(edge, to_left, [&](LabelIdx label, int windows) {
+      windows_[label] += windows;
+      hash_ += keys_[label] * static_cast<uint64_t>(static_cast<int64_t>(windows));
+    });
+    std::vector<LabelIdx> toggled;
+    for (size_t i = 0; i < touched.size(); ++i) {
+      if (before[i] != (windows_[touched[i]] > 0)) toggled.push_back(touched[i]);
+    }
+    return toggled;
+  }
+
+  void Take(int32_t face, int32_t parent, const std::vector<LabelIdx>& toggled) {
+    Views& views = result_->views;
+    new_index_[face] = views.num_faces();
+    hashes_[face] = hash_;
+    views.parents.push_back(parent);
+    views.toggled_labels.insert(views.toggled_labels.end(), toggled.begin(), toggled.end());
+    views.toggle_offsets.push_back(static_cast<int64_t>(views.toggled_labels.size()));
+    for (int64_t i = arrangement_.face_offsets[face]; i < arrangement_.face_offsets[face + 1]; ++i)
+      views.face_vertices.push_back(arrangement_.face_vertices[i]);
+    views.face_offsets.push_back(static_cast<int64_t>(views.face_vertices.size()));
+  }
+
+  // Depth first over a connected part, carrying the counts of windows along.
+  bool Walk(int32_t root, Progress& progress) {
+    std::fill(windows_.begin(), windows_.end(), 0);
+    hash_ = 0;
+    std::vector<LabelIdx> labels;
+    for (const WindowChange& count : CountWindows(plan_, rays_, Centre(root))) {
+      windows_[count.label] = count.windows;
+      hash_ += keys_[count.label] * static_cast<uint64_t>(count.windows);
+      labels.push_back(count.label);
+    }
+    Take(root, -1, labels);
+    struct Step {
+      int32_t face;
+      int64_t next_border, entered_by;
+    };
+    std::vector<Step> path{{root, border_offsets_[root], -1}};
+    int64_t steps = 0;
+    while (!path.empty()) {
+      if ((++steps & 0xffff) == 0 && progress.Cancelled()) return false;
+      Step& step = path.back();
+      if (step.next_border == border_offsets_[step.face + 1]) {
+        if (step.entered_by >= 0)
+          Cross(step.entered_by, arrangement_.edges[step.entered_by].right == step.face);
+        path.pop_back();
+        progress.Advance();
+        continue;
+      }
+      const Border border = borders_[step.next_border++];
+      const bool to_left = arrangement_.edges[border.edge].left == border.other;
+      if (new_index_[border.other] >= 0) {
+        uint64_t hash = hash_;
+        VisitChanges(border.edge, to_left, [&](LabelIdx label, int windows) {
+          hash += keys_[label] * static_cast<uint64_t>(static_cast<int64_t>(windows));
+        });
+        if (hash != hashes_[border.other]) ++result_->num_disagreements;
+        continue;
+      }
+      const std::vector<LabelIdx> toggled = Cross(border.edge, to_left);
+      Take(border.other, new_index_[step.face], toggled);
+      path.push_back({border.other, border_offsets_[border.other], border.edge});
+    }
+    return true;
+  }
+
+  void TakeLinks() {
+    Views& views = result_->views;
+    for (const Arrangement::Edge& edge : arrangement_.edges) {
+      if (edge.is_wall || edge.left < 0 || edge.right < 0 || edge.left == edge.right) continue;
+      const FaceIdx left = new_index_[edge.left], right = new_index_[edge.right];
+      views.links.push_back(left < right ? ViewLink{left, right, edge.start, edge.end}
+                                         : ViewLink{right, left, edge.end, edge.start});
+    }
+    std::sort(views.links.begin(), views.links.end());
+  }
+
+  const FloorPlan& plan_;
+  const WallRays& rays_;
+  const std::vector<ViewBoundary>& boundaries_;
+  const Arrangement& arrangement_;
+  int32_t num_faces_ = 0;
+  std::vector<int32_t> windows_;  // of the face that the walk is at
+  uint64_t hash_ = 0;             // of these counts
+  std::vector<uint64_t> keys_;    // per label
+  std::vector<uint64_t> hashes_;  // per face
+  std::vector<FaceIdx> new_index_;
+  std::vector<int64_t> border_offsets_;
+  std::vector<Border> borders_;
+  LabelFacesResult* result_ = nullptr;
+};
+
+}  // namespace
+
+std::vector<WindowChange> CountWindows(const FloorPlan& plan, const WallRays& rays, const Vec2& place) {
+  std::vector<double> angles;
+  for (const GridPoint& vertex : plan.vertices) {
+    const Vec2 to = Real(vertex) - place;
+    angles.push_back(std::atan2(to.y(), to.x()));
+  }
+  std::sort(angles.begin(), angles.end());
+  std::vector<LabelIdx> seen;
+  for (size_t i = 0; i < angles.size(); ++i) {
+    const double next = i + 1 < angles.size() ? angles[i + 1] : angles[0] + 2 * std::numbers::pi;
+    if (next - angles[i] < kSameDirection) continue;
+    const double middle = 0.5 * (angles[i] + next);
+    const LabelIdx label = rays.Look(place, {std::cos(middle), std::sin(middle)});
+    if (seen.empty() || seen.back() != label) seen.push_back(label);
+  }
+  if (seen.size() > 1 && seen.front() == seen.back()) seen.pop_back();
+  std::map<LabelIdx, int32_t> counts;
+  for (const LabelIdx label : seen) {
+    if (label >= 0) ++counts[label];
+  }
+  std::vector<WindowChange> windows;
+  for (const auto& [label, count] : counts) windows.push_back({label, count});
+  return windows;
+}
+
+Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
+                                    const std::vector<ViewBoundary>& boundaries, Arrangement arrangement,
+                                    Progress& progress) {
+  LabelFacesResult result;
+  CAIRN_RETURN_IF_ERROR(FaceLabeller(plan, rays, boundaries, arrangement).Run(progress, &result));
+  result.views.plan = plan;
+  result.views.vertices = std::move(arrangement.vertices);
+  return result;
+}
+
+}  // namespace cairn

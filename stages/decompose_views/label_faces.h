@@ -1,0 +1,33 @@
+#pragma once
+
+#include <vector>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "core/views.h"
+#include "stages/decompose_views/arrangement.h"
+#include "stages/decompose_views/view_boundaries.h"
+#include "stages/decompose_views/wall_rays.h"
+
+namespace cairn {
+
+// How many windows each label is seen through from a point, by looking between all vertices: labels
+// ascending.  The oracle for label sets, and their beginning.  `place`: grid coordinates.  O(n) rays.
+std::vector<WindowChange> CountWindows(const FloorPlan& plan, const WallRays& rays,
+                                       const Eigen::Vector2d& place);
+
+struct LabelFacesResult {
+  Views views;  // without index
+  // Borders across which the label sets of their two regions do not differ by what their boundaries say:
+  // never, up to rounding.
+  int64_t num_disagreements = 0;
+};
+
+// Gives the faces their label sets: those of the largest of each connected part by looking around, the others
+// by what changes on the borders on the way [Simsarian96 §2.2, step III].  Faces are renumbered in the order
+// of the walk.  O(faces + changes).  Errors: Cancelled.
+Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
+                                    const std::vector<ViewBoundary>& boundaries, Arrangement arrangement,
+                                    Progress& progress);
+
+}  // namespace cairn
