@@ -32,8 +32,8 @@ struct ViewLink {
 // the same walls' sides (labels) are visible.
 //
 // Label sets are stored as differences along a tree over the adjacency graph: a region's set is its parent's
-// with some labels toggled; regions without a parent toggle the empty set.  Parents come before their
-// children.
+// with some labels toggled; regions without a parent toggle the empty set, and there is one every so often.
+// Parents come before their children.
 struct Views {
   FloorPlan plan;
   std::vector<GridPoint> vertices;  // of all regions
@@ -50,7 +50,7 @@ struct Views {
   std::vector<ViewLink> links;  // ascending
 
   FaceIdx num_faces() const { return static_cast<FaceIdx>(parents.size()); }
-  // Label set of one region, ascending.  O(depth in the tree).
+  // Label set of one region, ascending.  O(depth in the tree), some hundred at most.
   std::vector<LabelIdx> LabelSet(FaceIdx face) const;
   // Calls visit(face, labels) for all regions in order; `labels` ascending.
   template <typename Visit>

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
-#include <unordered_map>
 
 #include "stages/decompose_views/check_rings.h"
 #include "stages/decompose_views/join_walls.h"
@@ -19,6 +19,7 @@ using Vec2 = Eigen::Vector2d;
 struct Wall {
   GridPoint start, end;
   int line = 0;
+  std::vector<GridPoint> through;  // ends of other walls on it: it bends to go through them
 };
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
@@ -79,7 +80,7 @@ class Cleaner {
           (high - low).maxCoeff(), 1.9 * kMaxGridCoordinate * options_.grid_m, options_.grid_m);
     }
     for (const InputSegment& segment : segments) {
-      const Wall wall{Round(segment.start), Round(segment.end), segment.line};
+      const Wall wall{Round(segment.start), Round(segment.end), segment.line, {}};
       if (wall.start == wall.end) {
         Note(PlanChangeKind::kNoLength, wall.line, wall.start);
       } else {
@@ -147,36 +148,59 @@ class Cleaner {
     }
     for (const auto& [place, users] : ends) {
       if (progress_.Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
-      GridPoint nearest = place;
+      Wall* nearest = nullptr;
+      GridPoint nearest_place;
       double nearest_distance = snap;
-      for (const Wall& wall : walls_) {
-        const GridPoint onto = NearestInside(wall, place, snap);
-        const double distance = (Real(onto) - Real(place)).norm();
-        if (onto == place || distance > nearest_distance) continue;
-        nearest = onto;
+      for (Wall& wall : walls_) {
+        const std::optional<GridPoint> onto = NearestInside(wall, place, snap);
+        if (!onto) continue;
+        const double distance = (Real(*onto) - Real(place)).norm();
+        if (distance > nearest_distance) continue;
+        nearest = &wall;
+        nearest_place = *onto;
         nearest_distance = distance;
       }
-      if (nearest == place) continue;
+      if (nearest == nullptr) continue;
+      nearest->through.push_back(nearest_place);
+      if (nearest_place == place) continue;
       Note(PlanChangeKind::kEndOnWall, walls_[users[0].first].line, place, nearest_distance);
-      for (const auto& [wall, is_end] : users) (is_end ? walls_[wall].end : walls_[wall].start) = nearest;
+      for (const auto& [wall, is_end] : users)
+        (is_end ? walls_[wall].end : walls_[wall].start) = nearest_place;
     }
     DropWithoutLength();
     return Ok();
   }
 
-  // The grid point nearest to the foot of `place` on the wall; `place` itself where that is not inside of it.
-  static GridPoint NearestInside(const Wall& wall, const GridPoint& place, double snap) {
-    const Vec2 start = Real(wall.start), along = Real(wall.end) - start, point = Real(place);
-    const Vec2 low = start.cwiseMin(Real(wall.end)).array() - snap,
-               high = start.cwiseMax(Real(wall.end)).array() + snap;
-    if ((point.array() < low.array()).any() || (point.array() > high.array()).any()) return place;
-    if (place == wall.start || place == wall.end) return place;
+  // The grid point nearest to the foot of `place` on the wall, if that is inside of the wall and near.
+  static std::optional<GridPoint> NearestInside(const Wall& wall, const GridPoint& place, double snap) {
+    const Vec2 start = Real(wall.start), end = Real(wall.end), along = end - start, point = Real(place);
+    const Vec2 low = start.cwiseMin(end).array() - snap, high = start.cwiseMax(end).array() + snap;
+    if ((point.array() < low.array()).any() || (point.array() > high.array()).any()) return std::nullopt;
+    if (place == wall.start || place == wall.end) return std::nullopt;
     const double share = (point - start).dot(along) / along.squaredNorm();
-    if (share <= 0 || share >= 1) return place;
+    if (share <= 0 || share >= 1) return std::nullopt;
     const Vec2 foot = start + share * along;
-    // Closer than the grid can tell.
+    // Closer than the grid can tell: it lies on the wall as it is.
     if ((foot - point).cwiseAbs().maxCoeff() <= 0.5) return place;
-    return {std::llround(foot.x()), std::llround(foot.y())};
+    return GridPoint{std::llround(foot.x()), std::llround(foot.y())};
+  }
+
+  // The wall from end to end through what was moved onto it.
+  void AddSegments(int32_t index, std::vector<TaggedSegment>* segments) const {
+    const Wall& wall = walls_[index];
+    const Vec2 start = Real(wall.start), along = Real(wall.end) - start;
+    std::vector<std::pair<double, Vec2>> stops;
+    for (const GridPoint& point : wall.through) {
+      const double share = (Real(point) - start).dot(along) / along.squaredNorm();
+      if (share > 0 && share < 1) stops.push_back({share, Real(point)});
+    }
+    std::sort(stops.begin(), stops.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    stops.push_back({1, Real(wall.end)});
+    Vec2 from = start;
+    for (const auto& [share, to] : stops) {
+      if (to != from) segments->push_back({from, to, index});
+      from = to;
+    }
   }
 
   void DropDuplicates() {
@@ -191,8 +215,7 @@ class Cleaner {
   // Pieces between the places where walls meet; walls that continue each other become one.
   Status Divide() {
     std::vector<TaggedSegment> segments;
-    for (size_t i = 0; i < walls_.size(); ++i)
-      segments.push_back({Real(walls_[i].start), Real(walls_[i].end), static_cast<int32_t>(i)});
+    for (size_t i = 0; i < walls_.size(); ++i) AddSegments(static_cast<int32_t>(i), &segments);
     CAIRN_ASSIGN_OR_RETURN(NodedSegments noded, NodeSegments(segments, progress_));
     NoteCrossings(noded);
     std::vector<PlanPiece> pieces = WithoutOverlaps(noded, /*note=*/true);
@@ -216,7 +239,10 @@ class Cleaner {
   // Vertices that no wall ended at.
   void NoteCrossings(const NodedSegments& noded) {
     std::set<GridPoint> ends;
-    for (const Wall& wall : walls_) ends.insert({wall.start, wall.end});
+    for (const Wall& wall : walls_) {
+      ends.insert({wall.start, wall.end});
+      ends.insert(wall.through.begin(), wall.through.end());
+    }
     for (const GridPoint& vertex : noded.vertices) {
       if (!ends.contains(vertex)) Note(PlanChangeKind::kCrossing, 0, vertex);
     }

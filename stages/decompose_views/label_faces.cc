@@ -15,6 +15,8 @@ using Vec2 = Eigen::Vector2d;
 
 // Directions closer than this are one, rad.
 constexpr double kSameDirection = 1e-12;
+// Regions so deep in the tree begin one of their own, so that a label set is found in few steps.
+constexpr int kMaxDepth = 128;
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
 
@@ -154,8 +156,9 @@ class FaceLabeller {
     struct Step {
       int32_t face;
       int64_t next_border, entered_by;
+      int depth;  // below a region without a parent
     };
-    std::vector<Step> path{{root, border_offsets_[root], -1}};
+    std::vector<Step> path{{root, border_offsets_[root], -1, 0}};
     int64_t steps = 0;
     while (!path.empty()) {
       if ((++steps & 0xffff) == 0 && progress.Cancelled()) return false;
@@ -178,10 +181,23 @@ class FaceLabeller {
         continue;
       }
       const std::vector<LabelIdx> toggled = Cross(border.edge, to_left);
-      Take(border.other, new_index_[step.face], toggled);
-      path.push_back({border.other, border_offsets_[border.other], border.edge});
+      const int depth = step.depth + 1 < kMaxDepth ? step.depth + 1 : 0;
+      if (depth > 0) {
+        Take(border.other, new_index_[step.face], toggled);
+      } else {
+        Take(border.other, -1, LabelsNow());
+      }
+      path.push_back({border.other, border_offsets_[border.other], border.edge, depth});
     }
     return true;
+  }
+
+  std::vector<LabelIdx> LabelsNow() const {
+    std::vector<LabelIdx> labels;
+    for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
+      if (windows_[label] > 0) labels.push_back(label);
+    }
+    return labels;
   }
 
   void TakeLinks() {

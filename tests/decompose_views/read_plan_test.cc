@@ -1,0 +1,70 @@
+#include "stages/decompose_views/read_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+Error ErrorOf(const std::string& text) {
+  const auto input = ParsePlan(text, "plan");
+  EXPECT_FALSE(input.ok());
+  return input.ok() ? Error{} : input.error();
+}
+
+TEST(ReadPlan, ReadsSegmentsWithBlanksAndComments) {
+  const auto input = ParsePlan("# walls\n  0, 1.5,2 ,-3e0\n\n1,1,1,1", "plan");
+  ASSERT_TRUE(input.ok());
+  EXPECT_FALSE(input->closed());
+  ASSERT_EQ(input->segments.size(), 2u);
+  EXPECT_EQ(input->segments[0].start, Eigen::Vector2d(0, 1.5));
+  EXPECT_EQ(input->segments[0].end, Eigen::Vector2d(2, -3));
+  EXPECT_EQ(input->segments[1].line, 4);
+}
+
+TEST(ReadPlan, NamesTheLineThatIsNoSegment) {
+  for (const char* line : {"1,2,3", "1,2,3,x", "1,2,3,nan", "1,2,3,inf", "1,2,3,4,5", "1 2 3 4"}) {
+    const Error error = ErrorOf(std::string("0,0,1,1\n") + line);
+    EXPECT_EQ(error.code, ErrorCode::kCorrupt);
+    EXPECT_THAT(error.message, HasSubstr("plan: line 2: "));
+  }
+}
+
+TEST(ReadPlan, AFileWithoutWallsIsNoPlan) {
+  EXPECT_EQ(ErrorOf("").code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOf("# nothing\n").code, ErrorCode::kNoData);
+  EXPECT_EQ(ErrorOf("{\"type\": \"FeatureCollection\", \"features\": []}").code, ErrorCode::kNoData);
+}
+
+TEST(ReadPlan, TurnsRingsSoThatTheInteriorIsToTheirLeft) {
+  // The outer ring is clockwise, the hole counter-clockwise.
+  const auto input = ParsePlan(
+      "{\"type\": \"Feature\", \"geometry\": {\"type\": \"MultiPolygon\", \"coordinates\": "
+      "[[[[0,0],[0,9],[9,9],[9,0],[0,0]], [[1,1],[2,1],[2,2],[1,1]]]]}}",
+      "plan");
+  ASSERT_TRUE(input.ok());
+  ASSERT_EQ(input->rings.size(), 2u);
+  EXPECT_EQ(input->rings[0][1], Eigen::Vector2d(9, 9));
+  EXPECT_EQ(input->rings[1][1], Eigen::Vector2d(2, 1));
+  EXPECT_EQ(input->rings[1][2], Eigen::Vector2d(1, 1));
+}
+
+TEST(ReadPlan, RefusesWhatIsNoPolygon) {
+  EXPECT_EQ(ErrorOf("{\"type\": \"Point\", \"coordinates\": [0, 0]}").code, ErrorCode::kUnsupported);
+  EXPECT_EQ(ErrorOf("{ not json").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOf("{}").code, ErrorCode::kUnsupported);
+  EXPECT_EQ(ErrorOf("{\"type\": \"Polygon\"}").code, ErrorCode::kCorrupt);
+  EXPECT_EQ(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1],[1,1],[0,0]]]}").code,
+            ErrorCode::kCorrupt);
+  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}").message,
+              HasSubstr("ring 1 is open"));
+  std::string nested = "{\"type\": \"Polygon\", \"coordinates\": []}";
+  for (int i = 0; i < 1000; ++i)
+    nested = "{\"type\": \"GeometryCollection\", \"geometries\": [" + nested + "]}";
+  EXPECT_EQ(ErrorOf(nested).code, ErrorCode::kCorrupt);
+}
+
+}  // namespace
+}  // namespace cairn
