@@ -1,0 +1,197 @@
+// views_search NUM_POSITIONS noise-free|noisy|all PLAN...: nodes of the standard interpretation tree and of
+// the VIR search, and right poses.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "bench/views/simulated_scan.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "runtime/interpretation_tree.h"
+#include "stages/decompose_views/decompose_views.h"
+
+namespace {
+
+using namespace cairn;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+struct Sample {
+  bool valid = false;
+  double num_segments = 0, candidates = 0;
+  double standard_first = 0, standard_all = 0, vir_first = 0, vir_ranked = 0, vir_all = 0;
+  bool listed = false, first_right = false, ambiguous = false, complete = true;
+  double seconds = 0;
+};
+
+struct Mean {
+  double sum = 0, squares = 0;
+  int count = 0;
+  void Add(double value) {
+    sum += value;
+    squares += value * value;
+    ++count;
+  }
+  double mean() const { return count > 0 ? sum / count : 0; }
+  double sd() const {
+    return count > 1 ? std::sqrt(std::max(0.0, (squares - sum * sum / count) / (count - 1))) : 0;
+  }
+};
+
+bool IsRight(const Interpretation& found, const PlanarPose& pose, double metres, double degrees) {
+  return (found.pose.position - pose.position).norm() <= metres &&
+         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) <= degrees * kDegree;
+}
+
+double Seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool noisy, bool with_standard,
+                uint64_t seed) {
+  Random random(seed);
+  Sample sample;
+  const Views& views = index.views();
+  const auto pose = RandomPose(views, locator, 0.2, &random);
+  if (!pose) return sample;
+  const FaceIdx face = locator.Find(pose->position);
+  SimulatedScanOptions scan_options;
+  if (noisy)
+    scan_options = {.sigma_m = 0.02, .missing_ratio = 0.2, .spurious_ratio = 0.1, .min_length_m = 0.3};
+  const std::vector<ScanSegment> segments = SimulateScan(views, face, *pose, scan_options, &random);
+  if (segments.size() < 3) return sample;
+  sample.valid = true;
+  sample.num_segments = static_cast<double>(segments.size());
+  InterpretationTreeOptions options;
+  if (noisy) {
+    options.max_null_ratio = 0.25;
+    options.one_segment_per_wall = false;
+    options.max_num_nodes = 2e7;
+  } else {
+    options.angle_tolerance_deg = 0.01;
+    options.position_tolerance_m = 1e-3;
+    options.length_tolerance_m = 1e-3;
+    options.fix_pose_early = false;
+    options.max_num_nodes = 1e8;
+  }
+  const auto run = [&](const char* search, bool first, int growth) {
+    options.search = search;
+    options.first_only = first;
+    options.rank_growth = growth;
+    return *SearchInterpretations(index, segments, options);
+  };
+  if (with_standard) {
+    sample.standard_first = static_cast<double>(run("standard", true, 1).num_nodes);
+    sample.standard_all = static_cast<double>(run("standard", false, 1).num_nodes);
+  }
+  sample.vir_first = static_cast<double>(run("vir", true, 1).num_nodes);
+  sample.vir_ranked = static_cast<double>(run("vir", true, 4).num_nodes);
+  const double start = Seconds();
+  const InterpretationTreeResult all = run("vir", false, 1);
+  sample.seconds = Seconds() - start;
+  sample.vir_all = static_cast<double>(all.num_nodes);
+  sample.candidates = static_cast<double>(all.num_candidates);
+  sample.complete = all.complete;
+  const double metres = noisy ? 0.1 : 0.01, degrees = noisy ? 2 : 0.1;
+  for (size_t i = 0; i < all.solutions.size(); ++i) {
+    const bool right =
+        all.solutions[i].determined
+            ? IsRight(all.solutions[i], *pose, metres, degrees)
+            : std::abs(WrapAngle(all.solutions[i].pose.heading_rad - pose->heading_rad)) <= degrees * kDegree;
+    sample.listed = sample.listed || right;
+    sample.first_right = sample.first_right || (i == 0 && right);
+  }
+  // Ambiguous: without noise the same portions fit elsewhere too, or nowhere in particular.
+  Random again(seed);
+  const auto same = RandomPose(views, locator, 0.2, &again);
+  const auto exact = SimulateScan(views, face, *same, {}, &again);
+  InterpretationTreeOptions exact_options;
+  exact_options.angle_tolerance_deg = noisy ? 2 : 0.01;
+  exact_options.position_tolerance_m = noisy ? 0.1 : 1e-3;
+  exact_options.length_tolerance_m = noisy ? 0.1 : 1e-3;
+  exact_options.max_num_nodes = 2e7;
+  const auto twins = *SearchInterpretations(index, exact, exact_options);
+  sample.ambiguous = twins.solutions.size() != 1 || !twins.solutions[0].determined;
+  return sample;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 4) {
+    std::fprintf(stderr, "usage: views_search NUM_POSITIONS noise-free|noisy PLAN...\n");
+    return 2;
+  }
+  const int num_positions = std::atoi(argv[1]);
+  const bool noisy = std::strcmp(argv[2], "noisy") == 0,
+             with_standard = std::strcmp(argv[2], "noise-free") == 0;
+  std::printf(
+      "| plan | walls N | regions | positions | segments | candidates | standard, first | standard, all | "
+      "VIR, first | VIR ranked, first | VIR, all | all: ratio | ms | truth listed | first right | "
+      "unambiguous: first right |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  std::vector<std::array<double, 4>> curve;
+  for (int i = 3; i < argc; ++i) {
+    const std::string path = argv[i];
+    const auto input = ReadPlan(path);
+    NoProgress progress;
+    const auto result = input.ok() ? DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress)
+                                   : Result<DecomposeViewsResult>(input.error());
+    if (!result.ok()) {
+      std::fprintf(stderr, "%s: %s\n", argv[i], result.error().message.c_str());
+      return 1;
+    }
+    const ViewSearchIndex index(result->views);
+    const FaceLocator locator(result->views);
+    std::vector<Sample> samples(num_positions);
+    ParallelFor(num_positions, 0, [&](int64_t k) {
+      samples[k] = TryPlace(index, locator, noisy, with_standard, MixSeed(11, k));
+    });
+    Mean segments, candidates, standard_first, standard_all, vir_first, vir_ranked, vir_all, ms;
+    int num = 0, listed = 0, first = 0, unambiguous = 0, unambiguous_right = 0, incomplete = 0;
+    for (const Sample& sample : samples) {
+      if (!sample.valid) continue;
+      ++num;
+      segments.Add(sample.num_segments);
+      candidates.Add(sample.candidates);
+      standard_first.Add(sample.standard_first);
+      standard_all.Add(sample.standard_all);
+      vir_first.Add(sample.vir_first);
+      vir_ranked.Add(sample.vir_ranked);
+      vir_all.Add(sample.vir_all);
+      ms.Add(1e3 * sample.seconds);
+      listed += sample.listed;
+      first += sample.first_right;
+      unambiguous += !sample.ambiguous;
+      unambiguous_right += !sample.ambiguous && sample.first_right;
+      incomplete += !sample.complete;
+    }
+    std::printf(
+        "| %s | %d | %d | %d | %.1f ± %.1f | %.0f | %.0f ± %.0f | %.0f ± %.0f | %.0f ± %.0f | %.0f ± %.0f | "
+        "%.0f ± %.0f | %.1f | %.1f | %d | %d | %d of %d |%s\n",
+        path.substr(path.rfind('/') + 1).c_str(), result->views.plan.num_walls(), result->views.num_faces(),
+        num, segments.mean(), segments.sd(), candidates.mean(), standard_first.mean(), standard_first.sd(),
+        standard_all.mean(), standard_all.sd(), vir_first.mean(), vir_first.sd(), vir_ranked.mean(),
+        vir_ranked.sd(), vir_all.mean(), vir_all.sd(), standard_all.mean() / vir_all.mean(), ms.mean(),
+        listed, first, unambiguous_right, unambiguous, incomplete > 0 ? " (not all complete)" : "");
+    std::fflush(stdout);
+    curve.push_back({std::log(result->views.plan.num_walls()), std::log(std::max(1.0, standard_all.mean())),
+                     std::log(std::max(1.0, vir_all.mean())), std::log(std::max(1.0, vir_ranked.mean()))});
+  }
+  if (curve.size() < 2) return 0;
+  for (const auto& [name, column] :
+       {std::pair{"standard, all", 1}, {"VIR, all", 2}, {"VIR ranked, first", 3}}) {
+    double x = 0, y = 0, xx = 0, xy = 0;
+    const auto n = static_cast<double>(curve.size());
+    for (const auto& point : curve) {
+      x += point[0];
+      y += point[column];
+      xx += point[0] * point[0];
+      xy += point[0] * point[column];
+    }
+    std::printf("%s: nodes grow with N^%.2f\n", name, (n * xy - x * y) / (n * xx - x * x));
+  }
+  return 0;
+}

@@ -1,0 +1,512 @@
+#include "runtime/interpretation_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+
+namespace cairn {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+constexpr double kPi = std::numbers::pi;
+// Two walls at less than this are parallel: they do not fix a place.
+constexpr double kMinCrossing = 0.26;  // sine of 15 degrees
+constexpr LabelIdx kNull = -1, kOpen = -2;
+
+double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// What one pairing of a segment with a label says about the pose.
+struct Pairing {
+  bool possible = false;
+  double heading = 0;
+  Vec2 from = Vec2::Zero(), to = Vec2::Zero();  // places of the robot: a line
+};
+
+double PointToLine(const Vec2& point, const Vec2& from, const Vec2& to) {
+  const Vec2 along = to - from;
+  const double squared = along.squaredNorm();
+  const double share = squared > 0 ? std::clamp((point - from).dot(along) / squared, 0.0, 1.0) : 0;
+  return (point - from - share * along).norm();
+}
+
+double LineToLine(const Pairing& a, const Pairing& b) {
+  const Vec2 u = a.to - a.from, v = b.to - b.from;
+  const double denominator = Cross(u, v);
+  if (denominator != 0) {
+    const double s = Cross(b.from - a.from, v) / denominator, t = Cross(b.from - a.from, u) / denominator;
+    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) return 0;
+  }
+  return std::min({PointToLine(a.from, b.from, b.to), PointToLine(a.to, b.from, b.to),
+                   PointToLine(b.from, a.from, a.to), PointToLine(b.to, a.from, a.to)});
+}
+
+class TreeSearch {
+ public:
+  TreeSearch(const ViewSearchIndex& index, const std::vector<ScanSegment>& segments,
+             const InterpretationTreeOptions& options)
+      : index_(index), plan_(index.views().plan), segments_(segments), options_(options) {
+    const int num_segments = static_cast<int>(segments.size());
+    order_.resize(num_segments);
+    std::iota(order_.begin(), order_.end(), 0);
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](int a, int b) { return segments[a].Length() > segments[b].Length(); });
+    max_nulls_ = static_cast<int>(std::floor(options.max_null_ratio * num_segments));
+    labels_.assign(num_segments, kOpen);
+    for (const ScanSegment& segment : segments) {
+      angle_tolerance_.push_back(options.num_sigmas * segment.sigma_angle_rad);
+      // The line's offset at the robot, where its angle counts with the distance along it.
+      const Vec2 along = (segment.end - segment.start).normalized();
+      const double lever = std::abs(along.dot(segment.Middle()));
+      place_tolerance_.push_back(options.num_sigmas *
+                                 std::hypot(segment.sigma_offset_m, lever * segment.sigma_angle_rad));
+    }
+    MakePairings();
+  }
+
+  Result<InterpretationTreeResult> Run() {
+    if (options_.search == "vir") {
+      SearchCandidates();
+    } else {
+      all_labels_.resize(plan_.num_labels());
+      std::iota(all_labels_.begin(), all_labels_.end(), 0);
+      Descend(0, 0, nullptr, all_labels_);
+    }
+    std::stable_sort(result_.solutions.begin(), result_.solutions.end(),
+                     [](const Interpretation& a, const Interpretation& b) {
+                       if (std::abs(a.matched_length_m - b.matched_length_m) > 1e-6)
+                         return a.matched_length_m > b.matched_length_m;
+                       return a.rms_m < b.rms_m;
+                     });
+    return std::move(result_);
+  }
+
+ private:
+  void MakePairings() {
+    pairings_.resize(segments_.size() * plan_.num_labels());
+    for (size_t i = 0; i < segments_.size(); ++i) {
+      for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
+        const ScanSegment& segment = segments_[i];
+        Pairing& pairing = pairings_[i * plan_.num_labels() + label];
+        const Vec2 start = LabelStart(plan_, label), along = LabelEnd(plan_, label) - start;
+        const double spare = along.norm() - segment.Length();
+        pairing.possible = spare >= -options_.length_tolerance_m;
+        pairing.heading = std::atan2(along.y(), along.x()) - segment.Angle();
+        pairing.from = start - Eigen::Rotation2Dd(pairing.heading) * segment.start;
+        if (spare < 0) pairing.from += 0.5 * spare * along.normalized();
+        pairing.to = pairing.from + std::max(0.0, spare) * along.normalized();
+      }
+    }
+  }
+
+  const Pairing& PairingOf(int segment, LabelIdx label) const {
+    return pairings_[static_cast<size_t>(segment) * plan_.num_labels() + label];
+  }
+
+  // Whether two pairings can both be true.
+  bool Agree(int a, LabelIdx label_a, int b, LabelIdx label_b) const {
+    const Pairing &pa = PairingOf(a, label_a), &pb = PairingOf(b, label_b);
+    const double angle =
+        std::hypot(angle_tolerance_[a], angle_tolerance_[b]) + options_.angle_tolerance_deg * kPi / 180;
+    if (std::abs(WrapAngle(pa.heading - pb.heading)) > angle) return false;
+    const double place = std::hypot(place_tolerance_[a], place_tolerance_[b]) + options_.position_tolerance_m;
+    return LineToLine(pa, pb) <= place;
+  }
+
+  bool AgreesWithAll(int depth, int segment, LabelIdx label) const {
+    for (int i = 0; i < depth; ++i) {
+      const int other = order_[i];
+      if (labels_[other] >= 0 && !Agree(segment, label, other, labels_[other])) return false;
+    }
+    return true;
+  }
+
+  // Index functions (a) and (b), the number of walls by length, and the spread of their directions.
+  FaceSet Candidates(std::vector<std::pair<double, FaceIdx>>* ranked) const {
+    const Views& views = index_.views();
+    const auto num = static_cast<double>(segments_.size());
+    double observed = 0;
+    ViewSearchIndex::LengthCounts longer{};
+    std::vector<double> angles;
+    for (const ScanSegment& segment : segments_) {
+      angles.push_back(segment.Angle());
+      observed += segment.Length();
+      for (size_t i = 0; i < longer.size(); ++i)
+        longer[i] += segment.Length() - options_.length_tolerance_m >= ViewSearchIndex::kLengths[i];
+    }
+    const double least = std::floor(num * (1 - options_.max_null_ratio)),
+                 most = std::ceil(num / (1 - options_.max_missing_ratio));
+    const auto spectrum = DirectionSpectrum(angles);
+    // What tolerances of angle may change in the first harmonic.
+    const double blur = std::accumulate(angle_tolerance_.begin(), angle_tolerance_.end(), 0.0) +
+                        num * options_.angle_tolerance_deg * kPi / 180;
+    FaceSet set;
+    for (FaceIdx face = 0; face < views.num_faces(); ++face) {
+      const ViewIndex& values = views.index[face];
+      if (values.wall_length_m < (1 - options_.max_null_ratio) * observed - num * options_.length_tolerance_m)
+        continue;
+      bool fits = true;
+      if (options_.one_segment_per_wall) {
+        fits = values.num_labels >= least && values.num_labels <= most;
+        const ViewSearchIndex::LengthCounts& walls = index_.WallsByLength(face);
+        for (size_t i = 0; i < longer.size() && fits; ++i) fits = walls[i] + max_nulls_ >= longer[i];
+        // Segments of no wall, and walls without a segment.
+        const double others = 2 * max_nulls_ + std::max(0.0, values.num_labels - num);
+        const ViewSearchIndex::Spectrum& expected = index_.SpectrumOf(face);
+        for (int m = 0; m < ViewSearchIndex::kNumHarmonics && fits; ++m)
+          fits = std::abs(expected[m] - spectrum[m]) <= others + (m + 1) * blur + 1e-3;
+      }
+      if (!fits) continue;
+      if (set.words.empty() || set.words.back().block != face / 64) set.words.push_back({face / 64, 0});
+      set.words.back().bits |= uint64_t{1} << (face % 64);
+      const double ratio =
+          std::log(std::max(1e-3, static_cast<double>(values.visible_length_m)) / std::max(1e-3, observed));
+      ranked->push_back({std::abs(ratio), face});
+    }
+    return set;
+  }
+
+  void SearchCandidates() {
+    std::vector<std::pair<double, FaceIdx>> ranked;
+    const FaceSet all = Candidates(&ranked);
+    result_.num_candidates = static_cast<int64_t>(ranked.size());
+    if (ranked.empty()) return;
+    if (options_.rank_growth == 1) {
+      SearchGroup(all);
+      return;
+    }
+    std::stable_sort(ranked.begin(), ranked.end());
+    size_t size = 1;
+    for (size_t share = ranked.size(); share > 64; share /= options_.rank_growth)
+      size = ranked.size() / share;
+    for (size_t first = 0; first < ranked.size() && !done_;) {
+      const size_t end = std::min(ranked.size(), first + size);
+      std::vector<FaceIdx> faces;
+      for (size_t i = first; i < end; ++i) faces.push_back(ranked[i].second);
+      std::sort(faces.begin(), faces.end());
+      FaceSet group;
+      for (const FaceIdx face : faces) {
+        if (group.words.empty() || group.words.back().block != face / 64)
+          group.words.push_back({face / 64, 0});
+        group.words.back().bits |= uint64_t{1} << (face % 64);
+      }
+      SearchGroup(group);
+      first = end;
+      size *= options_.rank_growth;
+    }
+  }
+
+  void SearchGroup(const FaceSet& candidates) {
+    std::vector<LabelIdx> labels;
+    for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
+      if (Intersects(candidates, index_.FacesOf(label))) labels.push_back(label);
+    }
+    Descend(0, 0, &candidates, labels);
+  }
+
+  bool CountNode() {
+    if (static_cast<double>(++result_.num_nodes) > options_.max_num_nodes) {
+      done_ = true;
+      result_.complete = false;
+    }
+    return !done_;
+  }
+
+  // `labels`: the union of the candidates' label sets, or all.
+  void Descend(int depth, int num_nulls, const FaceSet* candidates, const std::vector<LabelIdx>& labels) {
+    if (depth == static_cast<int>(order_.size())) {
+      Finish();
+      return;
+    }
+    if (options_.fix_pose_early && FixesPose(depth)) {
+      PairAtPose(depth, num_nulls, candidates, labels);
+      return;
+    }
+    const int segment = order_[depth];
+    for (const LabelIdx label : labels) {
+      if (!CountNode()) return;
+      if (!PairingOf(segment, label).possible || !AgreesWithAll(depth, segment, label)) continue;
+      ++result_.num_expanded;
+      labels_[segment] = label;
+      if (candidates == nullptr) {
+        Descend(depth + 1, num_nulls, nullptr, labels);
+      } else {
+        const FaceSet left = Intersection(*candidates, index_.FacesOf(label));
+        std::vector<LabelIdx> beside;
+        for (const LabelIdx other : labels) {
+          if (index_.SeenTogether(label, other) && Intersects(left, index_.FacesOf(other)))
+            beside.push_back(other);
+        }
+        Descend(depth + 1, num_nulls, &left, beside);
+      }
+      labels_[segment] = kOpen;
+      if (done_) return;
+    }
+    if (num_nulls < max_nulls_ && CountNode()) {
+      labels_[segment] = kNull;
+      Descend(depth + 1, num_nulls + 1, candidates, labels);
+      labels_[segment] = kOpen;
+    }
+  }
+
+  // Three pairings, two of them not parallel.
+  bool FixesPose(int depth) const {
+    int num_paired = 0;
+    bool crossing = false;
+    Vec2 first = Vec2::Zero();
+    for (int i = 0; i < depth; ++i) {
+      if (labels_[order_[i]] < 0) continue;
+      const ScanSegment& segment = segments_[order_[i]];
+      const Vec2 along = (segment.end - segment.start).normalized();
+      if (num_paired++ == 0) first = along;
+      crossing = crossing || std::abs(Cross(first, along)) > kMinCrossing;
+    }
+    return crossing && num_paired >= 2;
+  }
+
+  // The pairing of each further segment that comes closest, or none.
+  void PairAtPose(int depth, int num_nulls, const FaceSet* candidates, const std::vector<LabelIdx>& labels) {
+    Interpretation estimate;
+    estimate.labels = labels_;
+    FitPose(plan_, segments_, &estimate);
+    FaceSet left = candidates == nullptr ? FaceSet{} : *candidates;
+    for (int i = depth; i < static_cast<int>(order_.size()); ++i) {
+      const int segment = order_[i];
+      LabelIdx best = kNull;
+      double best_distance = std::numeric_limits<double>::infinity();
+      for (const LabelIdx label : labels) {
+        if (!CountNode()) return;
+        if (!PairingOf(segment, label).possible || !AgreesWithAll(i, segment, label)) continue;
+        if (candidates != nullptr && !Intersects(left, index_.FacesOf(label))) continue;
+        const Pairing& pairing = PairingOf(segment, label);
+        const double distance = PointToLine(estimate.pose.position, pairing.from, pairing.to);
+        if (distance >= best_distance) continue;
+        best = label;
+        best_distance = distance;
+      }
+      if (best == kNull && ++num_nulls > max_nulls_) break;
+      if (best != kNull) {
+        ++result_.num_expanded;
+        if (candidates != nullptr) left = Intersection(left, index_.FacesOf(best));
+      }
+      labels_[segment] = best;
+    }
+    if (num_nulls <= max_nulls_) Finish();
+    for (int i = depth; i < static_cast<int>(order_.size()); ++i) labels_[order_[i]] = kOpen;
+  }
+
+  // Accepts a complete interpretation whose walls are seen from its pose.
+  void Finish() {
+    Interpretation found;
+    found.labels = labels_;
+    FitPose(plan_, segments_, &found);
+    if (found.num_matched < std::min<int>(2, static_cast<int>(segments_.size()))) return;
+    if (found.determined && !SeesItsWalls(found)) return;
+    for (Interpretation& other : result_.solutions) {
+      if (other.determined != found.determined ||
+          (other.pose.position - found.pose.position).norm() > 2 * options_.position_tolerance_m ||
+          std::abs(WrapAngle(other.pose.heading_rad - found.pose.heading_rad)) >
+              2 * options_.angle_tolerance_deg * kPi / 180) {
+        continue;
+      }
+      if (found.matched_length_m > other.matched_length_m + 1e-6 ||
+          (found.matched_length_m > other.matched_length_m - 1e-6 && found.rms_m < other.rms_m)) {
+        other = std::move(found);
+      }
+      return;
+    }
+    result_.solutions.push_back(std::move(found));
+    if (options_.first_only) done_ = true;
+  }
+
+  // Nothing stands before the middle of a matched segment, and the segment lies on its wall.
+  bool SeesItsWalls(const Interpretation& found) const {
+    for (size_t i = 0; i < segments_.size(); ++i) {
+      if (found.labels[i] < 0) continue;
+      const double tolerance = place_tolerance_[i] + options_.position_tolerance_m;
+      const Vec2 middle = found.pose.FloorFromRobot(segments_[i].Middle());
+      const Vec2 start = LabelStart(plan_, found.labels[i]), end = LabelEnd(plan_, found.labels[i]);
+      if (PointToLine(middle, start, end) > tolerance) return false;
+      const Vec2 ray = middle - found.pose.position;
+      const double reach = ray.norm();
+      for (const PlanWall& wall : plan_.walls) {
+        const double side_a = Cross(ray, wall.start - found.pose.position),
+                     side_b = Cross(ray, wall.end - found.pose.position);
+        if ((side_a > 0) == (side_b > 0)) continue;
+        const Vec2 hit =
+            wall.start + (wall.end - wall.start) * (side_a / (side_a - side_b)) - found.pose.position;
+        const double distance = hit.dot(ray) / reach;
+        if (distance > 0 && distance < reach - tolerance &&
+            PointToLine(middle, wall.start, wall.end) > tolerance)
+          return false;
+      }
+    }
+    return true;
+  }
+
+  const ViewSearchIndex& index_;
+  const FloorPlan& plan_;
+  const std::vector<ScanSegment>& segments_;
+  const InterpretationTreeOptions& options_;
+  std::vector<int> order_;  // of segments: longest first
+  std::vector<double> angle_tolerance_, place_tolerance_;
+  std::vector<Pairing> pairings_;
+  int max_nulls_ = 0;
+  std::vector<LabelIdx> all_labels_;
+  std::vector<LabelIdx> labels_;  // per segment, on the way down
+  bool done_ = false;
+  InterpretationTreeResult result_;
+};
+
+}  // namespace
+
+OptionTable DescribeOptions(InterpretationTreeOptions* o) {
+  return {
+      {.name = "search",
+       .value = &o->search,
+       .help = "how the plan is searched",
+       .choices = {"vir", "standard"}},
+      {.name = "first_only", .value = &o->first_only, .help = "end with the first complete interpretation"},
+      {.name = "angle_tolerance_deg",
+       .value = &o->angle_tolerance_deg,
+       .help = "headings of two pairings may differ by this and what the fits allow, degrees",
+       .min = 1e-6,
+       .max = 45},
+      {.name = "position_tolerance_m",
+       .value = &o->position_tolerance_m,
+       .help = "places of two pairings may lie this far apart, and what the fits allow, metres",
+       .min = 1e-6,
+       .max = 10},
+      {.name = "length_tolerance_m",
+       .value = &o->length_tolerance_m,
+       .help = "a segment may be longer than its wall by this, metres",
+       .min = 0,
+       .max = 10},
+      {.name = "num_sigmas",
+       .value = &o->num_sigmas,
+       .help = "standard deviations of a fit that count as tolerance",
+       .min = 0,
+       .max = 10},
+      {.name = "max_null_ratio",
+       .value = &o->max_null_ratio,
+       .help = "largest share of the segments that may belong to no wall of the plan",
+       .min = 0,
+       .max = 0.95},
+      {.name = "max_missing_ratio",
+       .value = &o->max_missing_ratio,
+       .help = "largest share of the visible walls that may be missing among the segments",
+       .min = 0,
+       .max = 0.95},
+      {.name = "one_segment_per_wall",
+       .value = &o->one_segment_per_wall,
+       .help = "regions must see as many walls as there are segments, within the two ratios"},
+      {.name = "rank_growth",
+       .value = &o->rank_growth,
+       .help = "candidates are searched in groups, the better ranked first, each so many times larger; 1: "
+               "all at once",
+       .min = 1,
+       .max = 64},
+      {.name = "fix_pose_early",
+       .value = &o->fix_pose_early,
+       .help = "pair the other segments at the pose once pairings fix it, without branching"},
+      {.name = "max_num_nodes",
+       .value = &o->max_num_nodes,
+       .help = "the search ends after this many pairings",
+       .min = 1,
+       .max = 1e15},
+  };
+}
+
+void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
+             Interpretation* interpretation) {
+  Interpretation& found = *interpretation;
+  found.num_matched = 0;
+  found.matched_length_m = 0;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  // Heading: weighted mean of those of the pairings.
+  double weight_sum = 0, reference = 0, heading = 0;
+  for (size_t i = 0; i < segments.size(); ++i) {
+    if (found.labels[i] < 0) continue;
+    const Vec2 along = LabelEnd(plan, found.labels[i]) - LabelStart(plan, found.labels[i]);
+    const double angle = std::atan2(along.y(), along.x()) - segments[i].Angle();
+    const double weight = 1 / std::pow(std::max(1e-6, segments[i].sigma_angle_rad), 2);
+    if (found.num_matched == 0) reference = angle;
+    heading += weight * WrapAngle(angle - reference);
+    weight_sum += weight;
+    ++found.num_matched;
+    found.matched_length_m += segments[i].Length();
+  }
+  if (found.num_matched == 0) return;
+  found.pose.heading_rad = WrapAngle(reference + heading / weight_sum);
+  // Offsets: x and heading together, two steps of Gauss-Newton.
+  Vec2 middle_of_range = Vec2::Zero();
+  for (int step = 0; step < 3; ++step) {
+    information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    middle_of_range = Vec2::Zero();
+    const Eigen::Rotation2Dd rotation(found.pose.heading_rad);
+    for (size_t i = 0; i < segments.size(); ++i) {
+      if (found.labels[i] < 0) continue;
+      const Vec2 start = LabelStart(plan, found.labels[i]), end = LabelEnd(plan, found.labels[i]);
+      const Vec2 along = (end - start).normalized(), normal(-along.y(), along.x());
+      const Vec2 arm = rotation * segments[i].Middle();
+      middle_of_range += (0.5 * (start + end) - arm) / found.num_matched;
+      const double angle_weight = 1 / std::pow(std::max(1e-6, segments[i].sigma_angle_rad), 2);
+      const double angle =
+          WrapAngle(std::atan2(along.y(), along.x()) - segments[i].Angle() - found.pose.heading_rad);
+      information(2, 2) += angle_weight;
+      gradient[2] += angle_weight * angle;
+      const double offset_weight = 1 / std::pow(std::max(1e-6, segments[i].sigma_offset_m), 2);
+      const double offset = -normal.dot(found.pose.position + arm - start);
+      const Eigen::Vector3d row(normal.x(), normal.y(), normal.dot(Vec2(-arm.y(), arm.x())));
+      information += offset_weight * row * row.transpose();
+      gradient += offset_weight * row * offset;
+    }
+    // A direction that nothing fixes is left to the middle of where the segments may lie.
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information.topLeftCorner<2, 2>().eval());
+    found.determined = solver.eigenvalues()[0] > 1e-3 * solver.eigenvalues()[1];
+    if (!found.determined) {
+      const Vec2 free = solver.eigenvectors().col(0);
+      double range = 1;
+      for (size_t i = 0; i < segments.size(); ++i) {
+        if (found.labels[i] < 0) continue;
+        range = std::max(range, (LabelEnd(plan, found.labels[i]) - LabelStart(plan, found.labels[i])).norm() -
+                                    segments[i].Length());
+      }
+      const Eigen::Vector3d row(free.x(), free.y(), 0);
+      const double weight = 1 / (range * range);
+      information += weight * row * row.transpose();
+      gradient += weight * row * free.dot(middle_of_range - found.pose.position);
+    }
+    const Eigen::Vector3d change = information.ldlt().solve(gradient);
+    found.pose.position += change.head<2>();
+    found.pose.heading_rad = WrapAngle(found.pose.heading_rad + change[2]);
+  }
+  found.covariance = information.inverse();
+  double sum = 0;
+  for (size_t i = 0; i < segments.size(); ++i) {
+    if (found.labels[i] < 0) continue;
+    const Vec2 start = LabelStart(plan, found.labels[i]),
+               along = (LabelEnd(plan, found.labels[i]) - start).normalized();
+    for (const Vec2& end : {segments[i].start, segments[i].end})
+      sum += std::pow(Cross(along, found.pose.FloorFromRobot(end) - start), 2);
+  }
+  found.rms_m = std::sqrt(sum / (2 * found.num_matched));
+}
+
+Result<InterpretationTreeResult> SearchInterpretations(const ViewSearchIndex& index,
+                                                       const std::vector<ScanSegment>& segments,
+                                                       const InterpretationTreeOptions& options) {
+  InterpretationTreeOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  if (segments.size() < 2) {
+    return MakeError(ErrorCode::kNoData,
+                     "{} straight stretches of walls; a pose needs at least two that are not parallel",
+                     segments.size());
+  }
+  return TreeSearch(index, segments, options).Run();
+}
+
+}  // namespace cairn

@@ -1,0 +1,90 @@
+#include "runtime/view_search_index.h"
+
+#include <bit>
+#include <complex>
+
+namespace cairn {
+
+int64_t FaceSet::Count() const {
+  int64_t count = 0;
+  for (const Word& word : words) count += std::popcount(word.bits);
+  return count;
+}
+
+FaceSet Intersection(const FaceSet& a, const FaceSet& b) {
+  FaceSet both;
+  for (size_t i = 0, j = 0; i < a.words.size() && j < b.words.size();) {
+    if (a.words[i].block < b.words[j].block) {
+      ++i;
+    } else if (a.words[i].block > b.words[j].block) {
+      ++j;
+    } else {
+      const uint64_t bits = a.words[i].bits & b.words[j].bits;
+      if (bits != 0) both.words.push_back({a.words[i].block, bits});
+      ++i;
+      ++j;
+    }
+  }
+  return both;
+}
+
+bool Intersects(const FaceSet& a, const FaceSet& b) {
+  for (size_t i = 0, j = 0; i < a.words.size() && j < b.words.size();) {
+    if (a.words[i].block < b.words[j].block) {
+      ++i;
+    } else if (a.words[i].block > b.words[j].block) {
+      ++j;
+    } else {
+      if ((a.words[i].bits & b.words[j].bits) != 0) return true;
+      ++i;
+      ++j;
+    }
+  }
+  return false;
+}
+
+std::array<double, ViewSearchIndex::kNumHarmonics> DirectionSpectrum(const std::vector<double>& angles_rad) {
+  std::array<double, ViewSearchIndex::kNumHarmonics> spectrum{};
+  for (int m = 1; m <= ViewSearchIndex::kNumHarmonics; ++m) {
+    std::complex<double> sum = 0;
+    for (const double angle : angles_rad) sum += std::polar(1.0, m * angle);
+    spectrum[m - 1] = std::abs(sum);
+  }
+  return spectrum;
+}
+
+ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
+  const int num_labels = views.plan.num_labels();
+  faces_.resize(num_labels);
+  words_per_label_ = (static_cast<size_t>(num_labels) + 63) / 64;
+  together_.assign(words_per_label_ * num_labels, 0);
+  walls_by_length_.assign(views.num_faces(), {});
+  spectra_.resize(views.num_faces());
+  std::vector<std::complex<double>> turns;
+  for (LabelIdx label = 0; label < num_labels; ++label) {
+    const Eigen::Vector2d along = LabelEnd(views.plan, label) - LabelStart(views.plan, label);
+    turns.push_back(std::polar(1.0, std::atan2(along.y(), along.x())));
+  }
+  std::vector<uint64_t> bits(words_per_label_);
+  views.ForEachLabelSet([&](FaceIdx face, const std::vector<LabelIdx>& labels) {
+    std::fill(bits.begin(), bits.end(), 0);
+    std::array<std::complex<double>, kNumHarmonics> sums{};
+    for (const LabelIdx label : labels) {
+      bits[label / 64] |= uint64_t{1} << (label % 64);
+      std::vector<FaceSet::Word>& words = faces_[label].words;
+      if (words.empty() || words.back().block != face / 64) words.push_back({face / 64, 0});
+      words.back().bits |= uint64_t{1} << (face % 64);
+      std::complex<double> power = 1;
+      for (std::complex<double>& sum : sums) sum += power *= turns[label];
+      const double length = views.plan.walls[WallOf(label)].Length();
+      for (size_t i = 0; i < kLengths.size() && length >= kLengths[i]; ++i) ++walls_by_length_[face][i];
+    }
+    for (int m = 0; m < kNumHarmonics; ++m) spectra_[face][m] = static_cast<float>(std::abs(sums[m]));
+    for (const LabelIdx label : labels) {
+      uint64_t* row = together_.data() + label * words_per_label_;
+      for (size_t i = 0; i < words_per_label_; ++i) row[i] |= bits[i];
+    }
+  });
+}
+
+}  // namespace cairn
