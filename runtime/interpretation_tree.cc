@@ -221,7 +221,7 @@ class TreeSearch {
       return;
     }
     if (options_.fix_pose_early && FixesPose(depth)) {
-      PairAtPose(depth, num_nulls, candidates, labels);
+      PairAtPose(depth, num_nulls, labels);
       return;
     }
     const int segment = order_[depth];
@@ -251,7 +251,7 @@ class TreeSearch {
     }
   }
 
-  // Three pairings, two of them not parallel.
+  // Two pairings that are not parallel.
   bool FixesPose(int depth) const {
     int num_paired = 0;
     bool crossing = false;
@@ -266,35 +266,57 @@ class TreeSearch {
     return crossing && num_paired >= 2;
   }
 
-  // The pairing of each further segment that comes closest, or none.
-  void PairAtPose(int depth, int num_nulls, const FaceSet* candidates, const std::vector<LabelIdx>& labels) {
-    Interpretation estimate;
-    estimate.labels = labels_;
-    FitPose(plan_, segments_, &estimate);
-    FaceSet left = candidates == nullptr ? FaceSet{} : *candidates;
-    for (int i = depth; i < static_cast<int>(order_.size()); ++i) {
+  // How far a segment lies from a label's wall at a pose, in units of what is allowed: > 1 is too far.
+  double Misfit(const Interpretation& found, int segment, LabelIdx label) const {
+    const ScanSegment& seen = segments_[segment];
+    const Vec2 start = LabelStart(plan_, label), end = LabelEnd(plan_, label);
+    const Vec2 along = (end - start).normalized(), normal(-along.y(), along.x());
+    const double angle = WrapAngle(std::atan2(along.y(), along.x()) - seen.Angle() - found.pose.heading_rad);
+    const double angle_sigma = std::hypot(seen.sigma_angle_rad, std::sqrt(found.covariance(2, 2)));
+    const double angle_allowed = options_.num_sigmas * angle_sigma + options_.angle_tolerance_deg * kPi / 180;
+    const Vec2 middle = found.pose.FloorFromRobot(seen.Middle()), arm = middle - found.pose.position;
+    const auto allowed = [&](const Vec2& direction) {
+      const Eigen::Vector3d row(direction.x(), direction.y(), direction.dot(Vec2(-arm.y(), arm.x())));
+      const double variance = row.dot(found.covariance * row) + std::pow(seen.sigma_offset_m, 2);
+      return options_.num_sigmas * std::sqrt(variance) + options_.position_tolerance_m;
+    };
+    const double offset = std::abs(normal.dot(middle - start)) / allowed(normal);
+    const double half = 0.5 * seen.Length(), place = along.dot(middle - start), length = (end - start).norm();
+    const double beyond =
+        std::max({0.0, half - place, place + half - length}) / (allowed(along) + options_.length_tolerance_m);
+    return std::max({std::abs(angle) / angle_allowed, offset, beyond});
+  }
+
+  // The label of each further segment that fits best at the pose so far, or none.
+  void PairAtPose(int depth, int num_nulls, const std::vector<LabelIdx>& labels) {
+    Interpretation found;
+    found.labels = labels_;
+    FitPose(plan_, segments_, &found);
+    for (int i = depth; i < static_cast<int>(order_.size()) && num_nulls <= max_nulls_; ++i) {
       const int segment = order_[i];
       LabelIdx best = kNull;
-      double best_distance = std::numeric_limits<double>::infinity();
+      double best_misfit = 1;
       for (const LabelIdx label : labels) {
         if (!CountNode()) return;
-        if (!PairingOf(segment, label).possible || !AgreesWithAll(i, segment, label)) continue;
-        if (candidates != nullptr && !Intersects(left, index_.FacesOf(label))) continue;
-        const Pairing& pairing = PairingOf(segment, label);
-        const double distance = PointToLine(estimate.pose.position, pairing.from, pairing.to);
-        if (distance >= best_distance) continue;
+        if (!PairingOf(segment, label).possible) continue;
+        const double misfit = Misfit(found, segment, label);
+        if (misfit >= best_misfit) continue;
         best = label;
-        best_distance = distance;
+        best_misfit = misfit;
       }
-      if (best == kNull && ++num_nulls > max_nulls_) break;
-      if (best != kNull) {
-        ++result_.num_expanded;
-        if (candidates != nullptr) left = Intersection(left, index_.FacesOf(best));
+      found.labels[segment] = best;
+      if (best == kNull) {
+        ++num_nulls;
+        continue;
       }
-      labels_[segment] = best;
+      ++result_.num_expanded;
+      FitPose(plan_, segments_, &found);
     }
-    if (num_nulls <= max_nulls_) Finish();
-    for (int i = depth; i < static_cast<int>(order_.size()); ++i) labels_[order_[i]] = kOpen;
+    if (num_nulls > max_nulls_) return;
+    const std::vector<LabelIdx> before = labels_;
+    labels_ = found.labels;
+    Finish();
+    labels_ = before;
   }
 
   // Accepts a complete interpretation whose walls are seen from its pose.
@@ -321,26 +343,32 @@ class TreeSearch {
     if (options_.first_only) done_ = true;
   }
 
-  // Nothing stands before the middle of a matched segment, and the segment lies on its wall.
+  // Matched segments lie on their walls, and of each some point is seen with nothing before it.
   bool SeesItsWalls(const Interpretation& found) const {
     for (size_t i = 0; i < segments_.size(); ++i) {
       if (found.labels[i] < 0) continue;
-      const double tolerance = place_tolerance_[i] + options_.position_tolerance_m;
-      const Vec2 middle = found.pose.FloorFromRobot(segments_[i].Middle());
-      const Vec2 start = LabelStart(plan_, found.labels[i]), end = LabelEnd(plan_, found.labels[i]);
-      if (PointToLine(middle, start, end) > tolerance) return false;
-      const Vec2 ray = middle - found.pose.position;
-      const double reach = ray.norm();
-      for (const PlanWall& wall : plan_.walls) {
-        const double side_a = Cross(ray, wall.start - found.pose.position),
-                     side_b = Cross(ray, wall.end - found.pose.position);
-        if ((side_a > 0) == (side_b > 0)) continue;
-        const Vec2 hit =
-            wall.start + (wall.end - wall.start) * (side_a / (side_a - side_b)) - found.pose.position;
-        const double distance = hit.dot(ray) / reach;
-        if (distance > 0 && distance < reach - tolerance &&
-            PointToLine(middle, wall.start, wall.end) > tolerance)
-          return false;
+      if (Misfit(found, static_cast<int>(i), found.labels[i]) > 1) return false;
+      bool seen = false;
+      for (double share = 0.1; share < 1 && !seen; share += 0.2)
+        seen = Sees(found, segments_[i].start + share * (segments_[i].end - segments_[i].start));
+      if (!seen) return false;
+    }
+    return true;
+  }
+
+  bool Sees(const Interpretation& found, const Vec2& point) const {
+    const Vec2 target = found.pose.FloorFromRobot(point), ray = target - found.pose.position;
+    const double reach = ray.norm();
+    for (const PlanWall& wall : plan_.walls) {
+      const double side_a = Cross(ray, wall.start - found.pose.position);
+      const double side_b = Cross(ray, wall.end - found.pose.position);
+      if ((side_a > 0) == (side_b > 0)) continue;
+      const Vec2 hit =
+          wall.start + (wall.end - wall.start) * (side_a / (side_a - side_b)) - found.pose.position;
+      const double distance = hit.dot(ray) / reach;
+      if (distance > 0 && distance < reach - 2 * options_.position_tolerance_m &&
+          PointToLine(target, wall.start, wall.end) > 2 * options_.position_tolerance_m) {
+        return false;
       }
     }
     return true;

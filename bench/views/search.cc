@@ -106,14 +106,27 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
   // Ambiguous: without noise the same portions fit elsewhere too, or nowhere in particular.
   Random again(seed);
   const auto same = RandomPose(views, locator, 0.2, &again);
-  const auto exact = SimulateScan(views, face, *same, {}, &again);
+  scan_options.sigma_m = scan_options.spurious_ratio = 0;
+  const auto exact = SimulateScan(views, face, *same, scan_options, &again);
   InterpretationTreeOptions exact_options;
   exact_options.angle_tolerance_deg = noisy ? 2 : 0.01;
   exact_options.position_tolerance_m = noisy ? 0.1 : 1e-3;
   exact_options.length_tolerance_m = noisy ? 0.1 : 1e-3;
   exact_options.max_num_nodes = 2e7;
-  const auto twins = *SearchInterpretations(index, exact, exact_options);
-  sample.ambiguous = twins.solutions.size() != 1 || !twins.solutions[0].determined;
+  exact_options.one_segment_per_wall = !noisy;
+  const auto twins = SearchInterpretations(index, exact, exact_options);
+  sample.ambiguous = !twins.ok() || twins->solutions.size() != 1 || !twins->solutions[0].determined;
+  if (noisy && !sample.ambiguous && !sample.first_right && std::getenv("SHOW_FAILURES") != nullptr) {
+    std::printf("seed %llu: %zu segments, %zu solutions, listed %d\n", static_cast<unsigned long long>(seed),
+                segments.size(), all.solutions.size(), sample.listed);
+    for (size_t i = 0; i < std::min<size_t>(4, all.solutions.size()); ++i)
+      std::printf("   off by %.3f m %.2f deg, determined %d, matched %d %.2f m, rms %.3f, sd %.3f\n",
+                  (all.solutions[i].pose.position - pose->position).norm(),
+                  std::abs(WrapAngle(all.solutions[i].pose.heading_rad - pose->heading_rad)) / kDegree,
+                  all.solutions[i].determined, all.solutions[i].num_matched,
+                  all.solutions[i].matched_length_m, all.solutions[i].rms_m,
+                  std::sqrt(all.solutions[i].covariance.topLeftCorner<2, 2>().trace()));
+  }
   return sample;
 }
 

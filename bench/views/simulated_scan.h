@@ -53,6 +53,8 @@ inline std::vector<ScanSegment> SimulateScan(const Views& views, FaceIdx face, c
     }
   }
   std::vector<ScanSegment> segments;
+  // Noise and spurious segments have random numbers of their own: without them the portions are the same.
+  Random noise(MixSeed(random->Bits(), 1)), stray(MixSeed(random->Bits(), 2));
   const auto add = [&](const Eigen::Vector2d& start, const Eigen::Vector2d& end) {
     const Eigen::Vector2d a = pose.RobotFromFloor(start), b = pose.RobotFromFloor(end);
     if (options.sigma_m == 0) {
@@ -63,24 +65,23 @@ inline std::vector<ScanSegment> SimulateScan(const Views& views, FaceIdx face, c
     std::vector<Eigen::Vector2d> points;
     const int num_points = std::clamp(static_cast<int>((b - a).norm() / 0.05), 6, 200);
     for (int i = 0; i < num_points; ++i)
-      points.push_back(a + (b - a) * i / (num_points - 1) + normal * random->Normal(0, options.sigma_m));
+      points.push_back(a + (b - a) * i / (num_points - 1) + normal * noise.Normal(0, options.sigma_m));
     segments.push_back(FitSegment(points, options.sigma_m));
   };
   for (const VisibleStretch& stretch : longest) {
-    if (stretch.Length() < options.min_length_m || random->Uniform() < options.missing_ratio) continue;
+    const bool missing = random->Uniform() < options.missing_ratio;
     const double share = random->Uniform(0.5, 1), from = random->Uniform(0, 1 - share);
+    if (stretch.Length() < options.min_length_m || missing) continue;
     const Eigen::Vector2d along = stretch.end - stretch.start;
     add(stretch.start + from * along, stretch.start + (from + share) * along);
   }
   const auto num_spurious =
       static_cast<int>(std::lround(options.spurious_ratio * static_cast<double>(segments.size())));
   for (int i = 0; i < num_spurious; ++i) {
-    const double distance = random->Uniform(1, 6),
-                 angle = random->Uniform(-std::numbers::pi, std::numbers::pi);
+    const double distance = stray.Uniform(1, 6), angle = stray.Uniform(-std::numbers::pi, std::numbers::pi);
     const Eigen::Vector2d middle =
         pose.position + distance * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    const double turn = angle + std::numbers::pi / 2 + random->Uniform(-1, 1),
-                 length = random->Uniform(0.3, 2);
+    const double turn = angle + std::numbers::pi / 2 + stray.Uniform(-1, 1), length = stray.Uniform(0.3, 2);
     const Eigen::Vector2d half = 0.5 * length * Eigen::Vector2d(std::cos(turn), std::sin(turn));
     add(middle - half, middle + half);
   }
