@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "core/views_database.h"
 #include "stages/decompose_views/decompose_views.h"
+#include "stages/decompose_views/picture.h"
 
 namespace cairn {
 namespace {
@@ -14,6 +15,7 @@ namespace {
 struct Arguments {
   std::string plan;
   std::string output;
+  std::string svg;
   DecomposeViewsOptions options;
   OptionArguments option_arguments;
 };
@@ -73,6 +75,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     spdlog::warn("{} borders of {} do not agree with the label sets beside them", result->num_disagreements,
                  views.links.size());
   }
+  if (!arguments.svg.empty()) CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawViews(views)));
   return WriteViews(views, arguments.output, [&](SQLite::Database& database) -> Status {
     WriteChanges(database, result->changes);
     return Ok();
@@ -94,6 +97,7 @@ Command DecomposeViewsCommand() {
     app.add_option("-o,--output", arguments->output, "regions to write (views.db)")
         ->required()
         ->type_name("FILE");
+    app.add_option("--svg", arguments->svg, "also draw the regions as SVG")->type_name("FILE.svg");
     arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
