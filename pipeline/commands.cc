@@ -8,6 +8,7 @@
 #include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
 #include "pipeline/locate_scan_command.h"
+#include "pipeline/plan_path_command.h"
 #include "pipeline/route_command.h"
 #include "pipeline/seal_commands.h"
 #include "stages/build_vocabulary/command.h"
@@ -35,7 +36,7 @@ std::vector<Command> AllCommands() {
       CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
       JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
       MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),  RouteCommand(),
-      DecomposeViewsCommand(),  LocateScanCommand(),
+      DecomposeViewsCommand(),  LocateScanCommand(),       PlanPathCommand(),         TellApartCommand(),
   };
 }
 

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <vector>
+
+#include "core/error.h"
+#include "core/options.h"
+#include "runtime/plan_space.h"
+
+namespace cairn {
+
+struct PlanPathOptions {
+  // Radius of the robot, metres.  REQUIRES: >= 0
+  double radius_m = 0.2;
+  // About how many regions have their middles as turning and looking places: the largest of each cell of a
+  // grid over the plan.  REQUIRES: >= 1
+  int max_num_places = 1500;
+  // Search paths: share of the area that can be seen at all, counted by cells of that grid.
+  // REQUIRES: in (0, 1]
+  double seen_ratio = 1;
+};
+OptionTable DescribeOptions(PlanPathOptions* options);
+
+struct PlanPath {
+  std::vector<Eigen::Vector2d> points;  // floor frame, metres, start and goal included
+  double length_m = 0;
+  int num_links() const { return points.empty() ? 0 : static_cast<int>(points.size()) - 1; }
+};
+
+// A short path over the adjacency graph of the regions [Simsarian96 §4]: A* from border to border, then drawn
+// tight.  Errors: InvalidArgument (options, a place outside of the domain), NoData (no way for this radius).
+Result<PlanPath> FindPath(const PlanSpace& space, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                          const PlanPathOptions& options);
+
+// A path with few straight links: breadth first over what is seen from start, from there, and so on, turns
+// being made in the middles of regions.  No path that turns there only has fewer links; one that turns
+// elsewhere may.  Errors: as FindPath.
+Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Eigen::Vector2d& from,
+                                     const Eigen::Vector2d& to, const PlanPathOptions& options);
+
+struct SearchPath {
+  PlanPath path;
+  std::vector<Eigen::Vector2d> places;  // to look around from, in the order of the path
+  double seen_area_m2 = 0, reachable_area_m2 = 0;
+};
+// A path from which every point is seen: looking places chosen greedily by the area that they add, visited in
+// the order of a tour that 2-opt has shortened.  A region counts as seen with its middle and its corners; in
+// plans of more than max_num_places regions the largest of each cell stands for the others there.
+// Errors: as FindPath.
+Result<SearchPath> FindSearchPath(const PlanSpace& space, const Eigen::Vector2d& from,
+                                  const PlanPathOptions& options);
+
+}  // namespace cairn

@@ -1,0 +1,177 @@
+#include "runtime/interpretation_tree.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "bench/views/simulated_scan.h"
+#include "tests/decompose_views/plan_fixture.h"
+
+namespace cairn {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+constexpr double kDegree = std::numbers::pi / 180;
+
+// A flat of three rooms of different shape, with doors, a niche and a pillar.
+const char* const kFlat =
+    "0,0,9,0\n9,0,9,6\n9,6,0,6\n0,6,0,0\n"
+    "4,0,4,2\n4,3,4,6\n4,3.5,6,3.5\n7,3.5,9,3.5\n"
+    "1,1,1.5,1\n1.5,1,1.5,1.6\n1.5,1.6,1,1.6\n1,1.6,1,1\n"
+    "2,6,2,5.5\n7.5,1,8.2,1.7\n";
+
+struct Flat {
+  Views views = Decomposed(kFlat).views;
+  ViewSearchIndex index{views};
+  FaceLocator locator{views};
+};
+
+InterpretationTreeOptions Exact() {
+  InterpretationTreeOptions options;
+  options.angle_tolerance_deg = 0.01;
+  options.position_tolerance_m = 1e-3;
+  options.length_tolerance_m = 1e-3;
+  return options;
+}
+
+bool IsRight(const Interpretation& found, const PlanarPose& pose, double metres, double degrees) {
+  return (found.pose.position - pose.position).norm() <= metres &&
+         std::abs(WrapAngle(found.pose.heading_rad - pose.heading_rad)) <= degrees * kDegree;
+}
+
+TEST(InterpretationTree, BothSearchesListThePlaceOfEveryNoiseFreeScan) {
+  const Flat flat;
+  int tried = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    Random random(seed);
+    const auto pose = RandomPose(flat.views, flat.locator, 0.1, &random);
+    const auto segments = SimulateScan(flat.views, flat.locator.Find(pose->position), *pose, {}, &random);
+    if (segments.size() < 3) continue;
+    ++tried;
+    std::array<int64_t, 2> nodes{};
+    for (const bool vir : {false, true}) {
+      InterpretationTreeOptions options = Exact();
+      options.search = vir ? "vir" : "standard";
+      options.fix_pose_early = seed % 2 == 0;
+      const auto result = SearchInterpretations(flat.index, segments, options);
+      ASSERT_TRUE(result.ok());
+      nodes[vir] = result->num_nodes;
+      const bool listed =
+          std::any_of(result->solutions.begin(), result->solutions.end(), [&](const Interpretation& found) {
+            return found.determined ? IsRight(found, *pose, 0.005, 0.1) : true;
+          });
+      EXPECT_TRUE(listed) << "seed " << seed << ", " << options.search;
+    }
+    EXPECT_LT(nodes[1], nodes[0]);
+  }
+  EXPECT_GT(tried, 30);
+}
+
+TEST(InterpretationTree, NullMatchesTakeSegmentsThatBelongToNoWall) {
+  const Flat flat;
+  Random random(4);
+  const PlanarPose pose{{2.5, 2.7}, 0.4};
+  auto segments = SimulateScan(flat.views, flat.locator.Find(pose.position), pose, {}, &random);
+  segments.push_back({{1.0, -0.35}, {1.2, 0.3}, 1e-6, 1e-6, 10});
+  InterpretationTreeOptions options = Exact();
+  options.one_segment_per_wall = false;
+  EXPECT_TRUE(SearchInterpretations(flat.index, segments, options)->solutions.empty());
+  options.max_null_ratio = 0.2;
+  const auto result = SearchInterpretations(flat.index, segments, options);
+  ASSERT_FALSE(result->solutions.empty());
+  EXPECT_TRUE(IsRight(result->solutions[0], pose, 0.005, 0.1));
+  EXPECT_EQ(result->solutions[0].labels.back(), -1);
+}
+
+TEST(InterpretationTree, IdenticalRoomsGiveASolutionEach) {
+  // Three rooms of 4 x 3 m without doors: in each, two poses half a turn apart.
+  const Views views = Decomposed("0,0,12,0\n12,0,12,3\n12,3,0,3\n0,3,0,0\n4,0,4,3\n8,0,8,3").views;
+  const ViewSearchIndex index(views);
+  const FaceLocator locator(views);
+  const PlanarPose pose{{1, 1}, 0};
+  Random random(0);
+  // The long walls are 12 m: the portion seen does not tell which room it is in.
+  const auto segments = SimulateScan(views, locator.Find(pose.position), pose, {}, &random);
+  const auto result = SearchInterpretations(index, segments, Exact());
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->solutions.size(), 6u);
+  InterpretationTreeOptions first = Exact();
+  first.first_only = true;
+  EXPECT_EQ(SearchInterpretations(index, segments, first)->solutions.size(), 1u);
+}
+
+TEST(InterpretationTree, ParallelWallsLeaveThePlaceAlongThemOpen) {
+  const Views views = Decomposed("0,0,10,0\n0,2,10,2").views;
+  const ViewSearchIndex index(views);
+  // In the middle between them, 4 m of each.
+  const std::vector<ScanSegment> segments = {{{-2, -1}, {2, -1}, 1e-3, 1e-3, 10},
+                                             {{2, 1}, {-2, 1}, 1e-3, 1e-3, 10}};
+  const auto result = SearchInterpretations(index, segments, {});
+  ASSERT_FALSE(result->solutions.empty());
+  EXPECT_FALSE(result->solutions[0].determined);
+  EXPECT_GT(result->solutions[0].covariance(0, 0), 1);
+  EXPECT_LT(result->solutions[0].covariance(1, 1), 1e-4);
+}
+
+TEST(InterpretationTree, TooFewSegmentsAreRefused) {
+  const Flat flat;
+  EXPECT_EQ(SearchInterpretations(flat.index, {}, {}).error().code, ErrorCode::kNoData);
+  EXPECT_EQ(SearchInterpretations(flat.index, {{{1, 0}, {1, 1}, 0.01, 0.01, 5}}, {}).error().code,
+            ErrorCode::kNoData);
+}
+
+TEST(InterpretationTree, AnExhaustedBudgetIsSaid) {
+  const Flat flat;
+  Random random(4);
+  const PlanarPose pose{{2.5, 2.7}, 0.4};
+  const auto segments = SimulateScan(flat.views, flat.locator.Find(pose.position), pose, {}, &random);
+  InterpretationTreeOptions options = Exact();
+  options.max_num_nodes = 3;
+  EXPECT_FALSE(SearchInterpretations(flat.index, segments, options)->complete);
+}
+
+TEST(InterpretationTree, TheCovarianceTellsTheError) {
+  // Normalised error squared of x, y and heading: 3 in the mean.
+  const Flat flat;
+  const PlanarPose pose{{2.5, 2.7}, 0.4};
+  double sum = 0;
+  const int num = 300;
+  for (int seed = 0; seed < num; ++seed) {
+    Random random(seed);
+    Interpretation found;
+    const FaceIdx face = flat.locator.Find(pose.position);
+    auto segments = SimulateScan(flat.views, face, pose, {.sigma_m = 0.02, .min_length_m = 0.3}, &random);
+    // The labels in the order of the segments: those of the exact scan with the same portions.
+    std::erase_if(segments, [](const ScanSegment& segment) { return segment.num_points < 6; });
+    const auto result =
+        SearchInterpretations(flat.index, segments, {.max_null_ratio = 0.2, .one_segment_per_wall = false});
+    ASSERT_FALSE(result->solutions.empty());
+    found = result->solutions[0];
+    Eigen::Vector3d error;
+    error << found.pose.position - pose.position, WrapAngle(found.pose.heading_rad - pose.heading_rad);
+    sum += error.dot(found.covariance.inverse() * error);
+  }
+  EXPECT_GT(sum / num, 1.5);
+  EXPECT_LT(sum / num, 4.5);
+}
+
+TEST(ViewSearchIndex, SetsOfRegionsAreThoseOfTheLabels) {
+  const Flat flat;
+  for (FaceIdx face = 0; face < flat.views.num_faces(); face += 7) {
+    const auto labels = flat.views.LabelSet(face);
+    for (LabelIdx label = 0; label < flat.views.plan.num_labels(); ++label) {
+      const bool seen = std::binary_search(labels.begin(), labels.end(), label);
+      FaceSet one{{{face / 64, uint64_t{1} << (face % 64)}}};
+      EXPECT_EQ(Intersects(flat.index.FacesOf(label), one), seen);
+      EXPECT_EQ(Intersection(flat.index.FacesOf(label), one).Count(), seen ? 1 : 0);
+      for (const LabelIdx other : labels) EXPECT_TRUE(!seen || flat.index.SeenTogether(label, other));
+    }
+  }
+}
+
+TEST(DirectionSpectrum, DoesNotDependOnTheHeading) {
+  const auto a = DirectionSpectrum({0.1, 0.7, 2.0, -1}), b = DirectionSpectrum({1.1, 1.7, 3.0, 0});
+  for (size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-9);
+}
+
+}  // namespace
+}  // namespace cairn
