@@ -71,6 +71,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       views.plan.num_walls(), result->num_boundaries, views.num_faces(),
       num_labels / std::max(1, views.num_faces()),
       static_cast<double>(views.toggled_labels.size()) / std::max(1, views.num_faces()));
+  if (result->loss.num_regions > 0) {
+    *environment.out << fmt::format(
+        "decompose_views: {} regions of {:.3f} m2 together joined to neighbours, whose label sets differ "
+        "from theirs by "
+        "{:.2f} labels in the mean\n",
+        result->loss.num_regions, result->loss.area_m2,
+        static_cast<double>(result->loss.num_labels) / static_cast<double>(result->loss.num_regions));
+  }
   if (result->num_disagreements > 0) {
     spdlog::warn("{} borders of {} do not agree with the label sets beside them", result->num_disagreements,
                  views.links.size());

@@ -121,6 +121,8 @@ Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const Decomp
                          LabelFaces(plan, rays, boundaries, std::move(arrangement).value(), progress));
   CAIRN_RETURN_IF_ERROR(AddIndex(&labelled.views, num_threads, progress));
   DecomposeViewsResult result;
+  if (options.min_region_area_m2 > 0)
+    result.loss = MergeSmallRegions(options.min_region_area_m2, &labelled.views);
   result.views = std::move(labelled.views);
   result.num_disagreements = labelled.num_disagreements;
   result.changes = std::move(cleaned.changes);

@@ -8,6 +8,7 @@
 #include "core/progress.h"
 #include "core/views.h"
 #include "stages/decompose_views/clean_plan.h"
+#include "stages/decompose_views/merge_regions.h"
 #include "stages/decompose_views/read_plan.h"
 
 namespace cairn {
@@ -31,12 +32,6 @@ struct DecomposeViewsOptions {
   double min_region_area_m2 = 0;
 };
 OptionTable DescribeOptions(DecomposeViewsOptions* options);
-
-struct MergeLoss {
-  int64_t num_regions = 0;  // joined to others
-  double area_m2 = 0;       // of these
-  int64_t num_labels = 0;   // that they have and the region that they joined has not, or the reverse
-};
 
 struct DecomposeViewsResult {
   Views views;

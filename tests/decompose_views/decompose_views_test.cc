@@ -314,6 +314,32 @@ TEST(DecomposeViews, RealPlansHaveTheLabelsThatAreSeen) {
   }
 }
 
+TEST(DecomposeViews, SmallRegionsAreJoinedOnRequestAndTheLossIsSaid) {
+  const std::string text = PolygonText(
+      {{{0, 0}, {10, 0}, {10, 6}, {6, 6}, {6, 4}, {5, 4}, {5, 6}, {0, 6}}, {{2, 2}, {2, 3}, {3, 3}, {3, 2}}});
+  const auto exact = Decomposed(text), merged = Decomposed(text, {.min_region_area_m2 = 0.2});
+  EXPECT_EQ(exact.loss.num_regions, 0);
+  EXPECT_GT(merged.loss.num_regions, 10);
+  EXPECT_GT(merged.loss.num_labels, 0);
+  EXPECT_EQ(merged.views.num_faces() + merged.loss.num_regions, exact.views.num_faces());
+  EXPECT_NEAR(TotalArea(merged.views), TotalArea(exact.views), 1e-6);
+  EXPECT_TRUE(CheckViews(merged.views, "merged").ok());
+  // Large regions keep their labels, and all area but what was joined sees what it saw.
+  const FaceLocator in_exact(exact.views), in_merged(merged.views);
+  Random random(0);
+  int same = 0, num = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Vec2 place(random.Uniform(0, 10), random.Uniform(0, 6));
+    const FaceIdx a = in_exact.Find(place), b = in_merged.Find(place);
+    EXPECT_EQ(a < 0, b < 0);
+    if (a < 0) continue;
+    ++num;
+    same += exact.views.LabelSet(a) == merged.views.LabelSet(b);
+  }
+  EXPECT_GE(same, (1 - merged.loss.area_m2 / TotalArea(exact.views)) * num - 60);
+  EXPECT_LT(same, num);
+}
+
 TEST(VisibleStretches, HideWhatIsBehindAndAreInOrder) {
   // A screen before the upper wall of a room.
   const auto result = Decomposed("0,0,4,0\n4,0,4,4\n4,4,0,4\n0,4,0,0\n1,3,3,3");

@@ -1,0 +1,122 @@
+// views_growth: time and regions of the decomposition over polygons of growing size, with and without holes;
+// and the source's experiment, nodes of both searches, on seven plans of growing size.
+//   views_growth time | plans FOLDER
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "core/file.h"
+#include "core/memory.h"
+#include "core/random.h"
+#include "stages/decompose_views/arrangement.h"
+#include "stages/decompose_views/decompose_views.h"
+
+namespace {
+
+using namespace cairn;
+using Vec2 = Eigen::Vector2d;
+
+double Seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// A corridor with rooms of different width and depth on both sides, joined by doors: 8 corners a room.
+std::vector<Vec2> Office(int num_rooms, uint64_t seed) {
+  Random random(seed);
+  const int below = num_rooms / 2, above = num_rooms - below;
+  const double length = 4.5 * std::max(below, above) + 1;
+  std::vector<Vec2> ring;
+  const auto side = [&](int rooms, bool up) {
+    const double pitch = length / rooms;
+    for (int i = 0; i < rooms; ++i) {
+      const double x0 = i * pitch + random.Uniform(0.2, 0.6), x1 = (i + 1) * pitch - random.Uniform(0.2, 0.6);
+      const double depth = random.Uniform(2.5, 6), door = random.Uniform(x0 + 0.3, x1 - 1.3), wall = 0.2;
+      const std::vector<Vec2> corners = {{door, 0},    {door, -wall}, {x0, -wall},       {x0, -depth},
+                                         {x1, -depth}, {x1, -wall},   {door + 1, -wall}, {door + 1, 0}};
+      for (const Vec2& corner : corners)
+        ring.push_back(up ? Vec2(length - corner.x(), 2 - corner.y()) : corner);
+    }
+  };
+  ring.push_back({0, 0});
+  side(below, false);
+  ring.push_back({length, 0});
+  ring.push_back({length, 2});
+  side(above, true);
+  ring.push_back({0, 2});
+  return ring;
+}
+
+// Pillars of four corners in the corridor.
+std::vector<std::vector<Vec2>> Pillars(int num, double length, uint64_t seed) {
+  Random random(seed);
+  std::vector<std::vector<Vec2>> rings;
+  for (int i = 0; i < num; ++i) {
+    const double x = length * (i + random.Uniform(0.3, 0.7)) / num, y = random.Uniform(0.5, 1.2),
+                 size = random.Uniform(0.15, 0.4);
+    rings.push_back({{x, y}, {x, y + size}, {x + size, y + size}, {x + size, y}});
+  }
+  return rings;
+}
+
+std::string GeoJson(const std::vector<std::vector<Vec2>>& rings) {
+  std::string text = "{\"type\": \"Polygon\", \"coordinates\": [";
+  for (size_t i = 0; i < rings.size(); ++i) {
+    text += i > 0 ? ",\n[" : "[";
+    for (const Vec2& point : rings[i]) text += fmt::format("[{:.4f},{:.4f}],", point.x(), point.y());
+    text += fmt::format("[{:.4f},{:.4f}]]", rings[i][0].x(), rings[i][0].y());
+  }
+  return text + "]}\n";
+}
+
+int Time() {
+  std::printf(
+      "| vertices n | holes | boundaries | edges I | regions | s | s / (n² log n + I), ns "
+      "|\n|---|---|---|---|---|---|---|\n");
+  for (const bool holes : {false, true}) {
+    for (const int rooms : {2, 4, 8, 16, 24, 36, 48}) {
+      std::vector<std::vector<Vec2>> rings{Office(rooms, rooms)};
+      const double length = 4.5 * ((rooms + 1) / 2) + 1;
+      if (holes) {
+        for (auto& ring : Pillars(std::max(1, rooms / 4), length, rooms)) rings.push_back(ring);
+      }
+      const auto input = ParsePlan(GeoJson(rings), "office");
+      NoProgress progress;
+      double seconds = 1e9;
+      Result<DecomposeViewsResult> result = MakeError(ErrorCode::kFailed, "not run");
+      for (int run = 0; run < 3; ++run) {
+        const double start = Seconds();
+        result = DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress);
+        seconds = std::min(seconds, Seconds() - start);
+      }
+      if (!result.ok()) {
+        std::fprintf(stderr, "%s\n", result.error().message.c_str());
+        return 1;
+      }
+      const auto n = static_cast<double>(result->views.plan.vertices.size());
+      const auto edges = static_cast<double>(result->views.links.size());
+      std::printf("| %.0f | %zu | %lld | %.0f | %d | %.3f | %.0f |\n", n, rings.size() - 1,
+                  static_cast<long long>(result->num_boundaries), edges, result->views.num_faces(), seconds,
+                  1e9 * seconds / (n * n * std::log2(n) + edges));
+      std::fflush(stdout);
+    }
+  }
+  return 0;
+}
+
+int Plans(const std::string& folder) {
+  for (const int rooms : {2, 4, 6, 10, 16, 24, 36}) {
+    const std::string path = fmt::format("{}/office_{:02}.geojson", folder, rooms);
+    if (!WriteFileAtomically(path, GeoJson({Office(rooms, rooms)})).ok()) return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 2 && std::strcmp(argv[1], "time") == 0) return Time();
+  if (argc == 3 && std::strcmp(argv[1], "plans") == 0) return Plans(argv[2]);
+  std::fprintf(stderr, "usage: views_growth time | plans FOLDER\n");
+  return 2;
+}
