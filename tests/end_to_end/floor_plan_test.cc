@@ -1,0 +1,96 @@
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+// A flat of two rooms with a door, as a file of wall segments.
+class FloorPlan : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(WriteFileAtomically(Path("plan.txt"),
+                                    "0,0,6,0\n6,0,6,4\n6,4,0,4\n0,4,0,0\n3.5,0,3.5,1.5\n3.5,2.5,3.5,4\n")
+                    .ok());
+  }
+  std::string Path(const std::string& name) const { return folder_ / name; }
+  ProgramRun Run(const std::string& arguments) const {
+    return RunShell("cd " + folder_.string() + " && cairn " + arguments);
+  }
+
+  TemporaryFolder folder_{"floor_plan_test"};
+};
+
+TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
+  const ProgramRun made = Run("decompose-views plan.txt -o views.db --svg views.svg");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("regions"));
+  EXPECT_THAT(*ReadFile(Path("views.svg")), HasSubstr("</svg>"));
+
+  // From (1, 1), heading +x: the left room's three outer walls and the lower part of the inner one.
+  ASSERT_TRUE(
+      WriteFileAtomically(Path("scan.txt"), "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n").ok());
+  const ProgramRun located = Run("locate-scan views.db scan.txt --svg scan.svg");
+  ASSERT_EQ(located.exit_code, 0) << located.err;
+  const json found = json::parse(located.out);
+  ASSERT_FALSE(found["solutions"].empty());
+  EXPECT_NEAR(found["solutions"][0]["x"].get<double>(), 1, 0.01);
+  EXPECT_NEAR(found["solutions"][0]["y"].get<double>(), 1, 0.01);
+  EXPECT_NEAR(found["solutions"][0]["heading_deg"].get<double>(), 0, 0.5);
+  EXPECT_TRUE(fs::exists(Path("scan.svg")));
+
+  const ProgramRun path = Run("plan-path views.db --from 1,1 --to 5,1");
+  ASSERT_EQ(path.exit_code, 0) << path.err;
+  EXPECT_GT(json::parse(path.out)["length_m"].get<double>(), 4);
+  const ProgramRun search = Run("plan-path views.db --from 1,1 --kind search");
+  ASSERT_EQ(search.exit_code, 0) << search.err;
+  const ProgramRun apart = Run("tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
+  ASSERT_EQ(apart.exit_code, 0) << apart.err;
+  EXPECT_GT(json::parse(apart.out)["case"].get<int>(), 0);
+}
+
+TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
+  ASSERT_EQ(Run("decompose-views plan.txt -o views.db").exit_code, 0);
+  const auto write = [&](const char* name, const std::string& text) {
+    ASSERT_TRUE(WriteFileAtomically(Path(name), text).ok());
+  };
+  write("line.txt", "0,0,1\n");
+  write("empty.txt", "");
+  write("open.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}");
+  write("crossing.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[2,2],[2,0],[0,2],[0,0]]]}");
+  write("one.txt", "1,-1,1,1\n");
+  struct Case {
+    std::string arguments;
+    int exit_code;
+    std::string message;
+  };
+  for (const auto& [arguments, exit_code, message] : {
+           Case{"decompose-views line.txt -o out.db", 4, "line 1"},
+           Case{"decompose-views empty.txt -o out.db", 6, "no walls"},
+           Case{"decompose-views open.json -o out.db", 4, "open"},
+           Case{"decompose-views crossing.json -o out.db", 4, "Self-intersection"},
+           Case{"decompose-views none.txt -o out.db", 3, "none.txt"},
+           Case{"decompose-views plan.txt -o out.db --grid-m 1", 2, "grid_m"},
+           Case{"locate-scan views.db one.txt", 6, "at least two"},
+           Case{"locate-scan plan.txt one.txt", 4, "plan.txt"},
+           Case{"plan-path views.db --from 1,1", 2, "--to"},
+           Case{"plan-path views.db --from 1,1 --to 50,1", 2, "no region"},
+       }) {
+    const ProgramRun run = Run(arguments);
+    EXPECT_EQ(run.exit_code, exit_code) << arguments << "\n" << run.err;
+    EXPECT_THAT(run.err, HasSubstr(message)) << arguments;
+    EXPECT_FALSE(fs::exists(Path("out.db"))) << arguments;
+  }
+}
+
+}  // namespace
+}  // namespace cairn
