@@ -13,7 +13,10 @@ Status CheckFloorPlan(const FloorPlan& plan, const std::string& what) {
     if (!on_grid(vertex)) return Corrupt(what, "vertex ({}, {}) is off the grid", vertex.x, vertex.y);
   }
   const auto num_vertices = static_cast<int32_t>(plan.vertices.size());
+  int32_t last_wall = 0;
   for (const PlanPiece& piece : plan.pieces) {
+    if (piece.wall < last_wall) return Corrupt(what, "pieces of walls are out of order");
+    last_wall = piece.wall;
     if (piece.start < 0 || piece.end < 0 || piece.start >= num_vertices || piece.end >= num_vertices ||
         piece.start == piece.end || piece.wall < 0 || piece.wall >= plan.num_walls()) {
       return Corrupt(what, "a piece of wall {} joins vertices {} and {} of {}", piece.wall, piece.start,

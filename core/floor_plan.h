@@ -54,7 +54,7 @@ struct FloorPlan {
   bool closed = false;
   GridPoint low, high;
   std::vector<GridPoint> vertices;
-  std::vector<PlanPiece> pieces;
+  std::vector<PlanPiece> pieces;  // ascending by wall
   std::vector<PlanWall> walls;
 
   int num_walls() const { return static_cast<int>(walls.size()); }

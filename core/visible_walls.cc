@@ -32,11 +32,18 @@ std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::v
   std::vector<Side> sides;
   std::vector<double> angles;
   for (const LabelIdx label : labels) {
-    const Vec2 start = LabelStart(plan, label) - place, end = LabelEnd(plan, label) - place;
-    if (Cross(start, end) <= 0) continue;
-    sides.push_back({start, end - start, label});
-    angles.push_back(std::atan2(start.y(), start.x()));
-    angles.push_back(std::atan2(end.y(), end.x()));
+    const auto first =
+        std::lower_bound(plan.pieces.begin(), plan.pieces.end(), WallOf(label),
+                         [](const PlanPiece& piece, int32_t wall) { return piece.wall < wall; });
+    for (auto piece = first; piece != plan.pieces.end() && piece->wall == WallOf(label); ++piece) {
+      Vec2 start = plan.Metres(plan.vertices[piece->start]) - place;
+      Vec2 end = plan.Metres(plan.vertices[piece->end]) - place;
+      if (IsRightSide(label)) std::swap(start, end);
+      if (Cross(start, end) <= 0) continue;
+      sides.push_back({start, end - start, label});
+      angles.push_back(std::atan2(start.y(), start.x()));
+      angles.push_back(std::atan2(end.y(), end.x()));
+    }
   }
   std::sort(angles.begin(), angles.end());
   std::vector<VisibleStretch> stretches;

@@ -1,6 +1,7 @@
 #include "runtime/interpretation_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -55,6 +56,7 @@ class TreeSearch {
                      [&](int a, int b) { return segments[a].Length() > segments[b].Length(); });
     max_nulls_ = static_cast<int>(std::floor(options.max_null_ratio * num_segments));
     labels_.assign(num_segments, kOpen);
+    used_.assign(plan_.num_labels(), false);
     for (const ScanSegment& segment : segments) {
       angle_tolerance_.push_back(options.num_sigmas * segment.sigma_angle_rad);
       // The line's offset at the robot, where its angle counts with the distance along it.
@@ -124,7 +126,7 @@ class TreeSearch {
   }
 
   // Index functions (a) and (b), the number of walls by length, and the spread of their directions.
-  FaceSet Candidates(std::vector<std::pair<double, FaceIdx>>* ranked) const {
+  FaceSet Candidates(std::vector<std::pair<double, FaceIdx>>* ranked) {
     const Views& views = index_.views();
     const auto num = static_cast<double>(segments_.size());
     double observed = 0;
@@ -138,10 +140,9 @@ class TreeSearch {
     }
     const double least = std::floor(num * (1 - options_.max_null_ratio)),
                  most = std::ceil(num / (1 - options_.max_missing_ratio));
-    const auto spectrum = DirectionSpectrum(angles);
-    // What tolerances of angle may change in the first harmonic.
-    const double blur = std::accumulate(angle_tolerance_.begin(), angle_tolerance_.end(), 0.0) +
-                        num * options_.angle_tolerance_deg * kPi / 180;
+    spectrum_ = DirectionSpectrum(angles);
+    blur_ = std::accumulate(angle_tolerance_.begin(), angle_tolerance_.end(), 0.0) +
+            num * options_.angle_tolerance_deg * kPi / 180;
     FaceSet set;
     for (FaceIdx face = 0; face < views.num_faces(); ++face) {
       const ViewIndex& values = views.index[face];
@@ -152,11 +153,10 @@ class TreeSearch {
         fits = values.num_labels >= least && values.num_labels <= most;
         const ViewSearchIndex::LengthCounts& walls = index_.WallsByLength(face);
         for (size_t i = 0; i < longer.size() && fits; ++i) fits = walls[i] + max_nulls_ >= longer[i];
-        // Segments of no wall, and walls without a segment.
-        const double others = 2 * max_nulls_ + std::max(0.0, values.num_labels - num);
+        const double others = NumOthers(face);
         const ViewSearchIndex::Spectrum& expected = index_.SpectrumOf(face);
         for (int m = 0; m < ViewSearchIndex::kNumHarmonics && fits; ++m)
-          fits = std::abs(expected[m] - spectrum[m]) <= others + (m + 1) * blur + 1e-3;
+          fits = std::abs(std::abs(expected[m]) - std::abs(spectrum_[m])) <= others + (m + 1) * blur_ + 1e-3;
       }
       if (!fits) continue;
       if (set.words.empty() || set.words.back().block != face / 64) set.words.push_back({face / 64, 0});
@@ -166,6 +166,61 @@ class TreeSearch {
       ranked->push_back({std::abs(ratio), face});
     }
     return set;
+  }
+
+  // Segments of no wall, and walls without a segment, at most.
+  double NumOthers(FaceIdx face) const {
+    return 2.0 * max_nulls_ +
+           std::max(0.0, index_.views().index[face].num_labels - static_cast<double>(segments_.size()));
+  }
+
+  // Candidates that see a label and can hold the robot if a segment is its: some of the pairing's places lie
+  // in the region's box, and with its heading the directions of all segments are those of the region's
+  // labels.
+  FaceSet Seeing(const FaceSet& candidates, int segment, LabelIdx label) const {
+    const Pairing& pairing = PairingOf(segment, label);
+    const double reach = place_tolerance_[segment] + options_.position_tolerance_m;
+    FaceSet left = Intersection(candidates, index_.FacesOf(label));
+    for (FaceSet::Word& word : left.words) {
+      for (uint64_t bits = word.bits; bits != 0; bits &= bits - 1) {
+        const int bit = std::countr_zero(bits);
+        const FaceIdx face = word.block * 64 + bit;
+        if (!Touches(index_.BoxOf(face), pairing, reach) || !HasDirections(face, pairing.heading))
+          word.bits &= ~(uint64_t{1} << bit);
+      }
+    }
+    std::erase_if(left.words, [](const FaceSet::Word& word) { return word.bits == 0; });
+    return left;
+  }
+
+  bool HasDirections(FaceIdx face, double heading) const {
+    if (!options_.one_segment_per_wall) return true;
+    const ViewSearchIndex::Spectrum& expected = index_.SpectrumOf(face);
+    const double others = NumOthers(face);
+    for (int m = 0; m < ViewSearchIndex::kNumHarmonics; ++m) {
+      const auto turn = std::polar(1.0F, static_cast<float>((m + 1) * heading));
+      // The heading itself is uncertain too.
+      if (std::abs(expected[m] - turn * spectrum_[m]) > others + 2 * (m + 1) * blur_ + 1e-3) return false;
+    }
+    return true;
+  }
+
+  // Whether a pairing's line of places comes within `reach` of a box.
+  static bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach) {
+    double first = 0, last = 1;
+    const Vec2 along = pairing.to - pairing.from;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double low = box.min()[axis] - reach - pairing.from[axis],
+                   high = box.max()[axis] + reach - pairing.from[axis];
+      if (std::abs(along[axis]) < 1e-12) {
+        if (low > 0 || high < 0) return false;
+        continue;
+      }
+      const double a = low / along[axis], b = high / along[axis];
+      first = std::max(first, std::min(a, b));
+      last = std::min(last, std::max(a, b));
+    }
+    return first <= last;
   }
 
   void SearchCandidates() {
@@ -226,22 +281,25 @@ class TreeSearch {
     }
     const int segment = order_[depth];
     for (const LabelIdx label : labels) {
+      if (options_.one_segment_per_wall && used_[label]) continue;
       if (!CountNode()) return;
       if (!PairingOf(segment, label).possible || !AgreesWithAll(depth, segment, label)) continue;
       ++result_.num_expanded;
       labels_[segment] = label;
+      used_[label] = true;
       if (candidates == nullptr) {
         Descend(depth + 1, num_nulls, nullptr, labels);
       } else {
-        const FaceSet left = Intersection(*candidates, index_.FacesOf(label));
+        const FaceSet left = Seeing(*candidates, segment, label);
         std::vector<LabelIdx> beside;
         for (const LabelIdx other : labels) {
           if (index_.SeenTogether(label, other) && Intersects(left, index_.FacesOf(other)))
             beside.push_back(other);
         }
-        Descend(depth + 1, num_nulls, &left, beside);
+        if (!left.empty()) Descend(depth + 1, num_nulls, &left, beside);
       }
       labels_[segment] = kOpen;
+      used_[label] = false;
       if (done_) return;
     }
     if (num_nulls < max_nulls_ && CountNode()) {
@@ -382,8 +440,11 @@ class TreeSearch {
   std::vector<double> angle_tolerance_, place_tolerance_;
   std::vector<Pairing> pairings_;
   int max_nulls_ = 0;
+  ViewSearchIndex::Spectrum spectrum_{};  // of the segments
+  double blur_ = 0;                       // what tolerances of angle may change in its first harmonic
   std::vector<LabelIdx> all_labels_;
   std::vector<LabelIdx> labels_;  // per segment, on the way down
+  std::vector<bool> used_;        // per label
   bool done_ = false;
   InterpretationTreeResult result_;
 };

@@ -23,7 +23,8 @@ namespace cairn {
 //
 // The standard search branches over all labels.  The VIR search starts with the candidates among the regions
 // (index functions), branches over the union of their label sets, and after each pairing provisionally drops
-// the candidates that do not see its label; ranked, better candidates come first.
+// the candidates that do not see its label, in which none of its places lies, or whose labels with its
+// heading are not spread as the segments are; ranked, better candidates come first.
 //
 // Once two pairings that are not parallel fix the pose, and `fix_pose_early`, the others are paired at that
 // pose without branching.
@@ -45,7 +46,7 @@ struct InterpretationTreeOptions {
   // Largest share of a place's visible walls that may be missing among the segments.  REQUIRES: in [0, 1)
   double max_missing_ratio = 0;
   // Index functions: regions must see as many walls as there are segments (within the two ratios), and enough
-  // of each length.  False: walls seen as several segments, or not all around.
+  // of each length, and no label has two segments.  False: walls seen as several segments, or not all around.
   bool one_segment_per_wall = true;
   // Candidates are searched in groups, the better ranked first, each group this many times larger than the
   // one before; 1: all at once.  REQUIRES: >= 1

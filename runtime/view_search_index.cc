@@ -1,7 +1,6 @@
 #include "runtime/view_search_index.h"
 
 #include <bit>
-#include <complex>
 
 namespace cairn {
 
@@ -43,12 +42,12 @@ bool Intersects(const FaceSet& a, const FaceSet& b) {
   return false;
 }
 
-std::array<double, ViewSearchIndex::kNumHarmonics> DirectionSpectrum(const std::vector<double>& angles_rad) {
-  std::array<double, ViewSearchIndex::kNumHarmonics> spectrum{};
+ViewSearchIndex::Spectrum DirectionSpectrum(const std::vector<double>& angles_rad) {
+  ViewSearchIndex::Spectrum spectrum{};
   for (int m = 1; m <= ViewSearchIndex::kNumHarmonics; ++m) {
     std::complex<double> sum = 0;
     for (const double angle : angles_rad) sum += std::polar(1.0, m * angle);
-    spectrum[m - 1] = std::abs(sum);
+    spectrum[m - 1] = std::complex<float>(sum);
   }
   return spectrum;
 }
@@ -60,6 +59,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
   together_.assign(words_per_label_ * num_labels, 0);
   walls_by_length_.assign(views.num_faces(), {});
   spectra_.resize(views.num_faces());
+  boxes_.resize(views.num_faces());
   std::vector<std::complex<double>> turns;
   for (LabelIdx label = 0; label < num_labels; ++label) {
     const Eigen::Vector2d along = LabelEnd(views.plan, label) - LabelStart(views.plan, label);
@@ -67,6 +67,8 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
   }
   std::vector<uint64_t> bits(words_per_label_);
   views.ForEachLabelSet([&](FaceIdx face, const std::vector<LabelIdx>& labels) {
+    for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i)
+      boxes_[face].extend(views.plan.Metres(views.vertices[views.face_vertices[i]]).cast<float>());
     std::fill(bits.begin(), bits.end(), 0);
     std::array<std::complex<double>, kNumHarmonics> sums{};
     for (const LabelIdx label : labels) {
@@ -79,7 +81,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
       const double length = views.plan.walls[WallOf(label)].Length();
       for (size_t i = 0; i < kLengths.size() && length >= kLengths[i]; ++i) ++walls_by_length_[face][i];
     }
-    for (int m = 0; m < kNumHarmonics; ++m) spectra_[face][m] = static_cast<float>(std::abs(sums[m]));
+    for (int m = 0; m < kNumHarmonics; ++m) spectra_[face][m] = std::complex<float>(sums[m]);
     for (const LabelIdx label : labels) {
       uint64_t* row = together_.data() + label * words_per_label_;
       for (size_t i = 0; i < words_per_label_; ++i) row[i] |= bits[i];

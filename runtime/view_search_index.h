@@ -1,9 +1,12 @@
 #pragma once
 
 #include <array>
+#include <complex>
 #include <cstdint>
 #include <memory>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "core/views.h"
 
@@ -40,11 +43,13 @@ class ViewSearchIndex {
   bool SeenTogether(LabelIdx a, LabelIdx b) const {
     return (together_[static_cast<size_t>(a) * words_per_label_ + b / 64] >> (b % 64) & 1) != 0;
   }
-  // Direction spectrum of a region's labels, whatever the heading: |sum over labels of exp(i m angle)|, m = 1
-  // to kNumHarmonics.  One label more or less changes each by 1 at most.
+  // Direction spectrum of a region's labels: sum over labels of exp(i m angle), m = 1 to kNumHarmonics.  A
+  // heading turns it, its magnitudes are the same for all; one label more or less changes each by 1 at most.
   static constexpr int kNumHarmonics = 6;
-  using Spectrum = std::array<float, kNumHarmonics>;
+  using Spectrum = std::array<std::complex<float>, kNumHarmonics>;
   const Spectrum& SpectrumOf(FaceIdx face) const { return spectra_[face]; }
+  // The box around a region, metres.
+  const Eigen::AlignedBox2f& BoxOf(FaceIdx face) const { return boxes_[face]; }
   // How many of a region's walls are at least so long.
   const LengthCounts& WallsByLength(FaceIdx face) const { return walls_by_length_[face]; }
 
@@ -55,9 +60,10 @@ class ViewSearchIndex {
   std::vector<uint64_t> together_;
   std::vector<LengthCounts> walls_by_length_;
   std::vector<Spectrum> spectra_;
+  std::vector<Eigen::AlignedBox2f> boxes_;
 };
 
 // The same of any directions.
-std::array<double, ViewSearchIndex::kNumHarmonics> DirectionSpectrum(const std::vector<double>& angles_rad);
+ViewSearchIndex::Spectrum DirectionSpectrum(const std::vector<double>& angles_rad);
 
 }  // namespace cairn

@@ -72,8 +72,14 @@ inline std::vector<ScanSegment> SimulateScan(const Views& views, FaceIdx face, c
     const bool missing = random->Uniform() < options.missing_ratio;
     const double share = random->Uniform(0.5, 1), from = random->Uniform(0, 1 - share);
     if (stretch.Length() < options.min_length_m || missing) continue;
+    // On the wall's straight line, from which its pieces may lie off by what cleaning allows.
+    const Eigen::Vector2d wall_start = LabelStart(views.plan, stretch.label);
+    const Eigen::Vector2d wall_along = (LabelEnd(views.plan, stretch.label) - wall_start).normalized();
+    const auto on_wall = [&](const Eigen::Vector2d& point) {
+      return Eigen::Vector2d(wall_start + wall_along.dot(point - wall_start) * wall_along);
+    };
     const Eigen::Vector2d along = stretch.end - stretch.start;
-    add(stretch.start + from * along, stretch.start + (from + share) * along);
+    add(on_wall(stretch.start + from * along), on_wall(stretch.start + (from + share) * along));
   }
   const auto num_spurious =
       static_cast<int>(std::lround(options.spurious_ratio * static_cast<double>(segments.size())));
