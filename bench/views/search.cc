@@ -6,11 +6,11 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "bench/views/simulated_scan.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "runtime/interpretation_tree.h"
 #include "stages/decompose_views/decompose_views.h"
+#include "tests/runtime/simulated_scan.h"
 
 namespace {
 

@@ -145,8 +145,8 @@ class Picture {
           "<circle cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"7\" fill=\"{2}\" stroke=\"white\" stroke-width=\"1.5\"/>"
           "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{3:.1f}\" y2=\"{4:.1f}\" stroke=\"{2}\" "
           "stroke-width=\"3\"/>"
-          "<text x=\"{5:.1f}\" y=\"{6:.1f}\" fill=\"{2}\" stroke=\"white\" stroke-width=\"3\" "
-          "paint-order=\"stroke\">{7}</text>\n",
+          "<text x=\"{5:.1f}\" y=\"{6:.1f}\" fill=\"{2}\" "
+          "font-weight=\"bold\">{7}</text>\n",
           at.x(), at.y(), colour, at.x() + 16 * ahead.x(), at.y() + 16 * ahead.y(), at.x() + 10, at.y() - 9,
           robot.caption);
     }

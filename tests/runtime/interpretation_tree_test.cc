@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bench/views/simulated_scan.h"
 #include "tests/decompose_views/plan_fixture.h"
+#include "tests/runtime/simulated_scan.h"
 
 namespace cairn {
 namespace {

@@ -1,0 +1,62 @@
+#include "runtime/interpretation_tree.h"
+
+namespace cairn {
+
+OptionTable DescribeOptions(InterpretationTreeOptions* o) {
+  return {
+      {.name = "search",
+       .value = &o->search,
+       .help = "how the plan is searched",
+       .choices = {"vir", "standard"}},
+      {.name = "first_only", .value = &o->first_only, .help = "end with the first complete interpretation"},
+      {.name = "angle_tolerance_deg",
+       .value = &o->angle_tolerance_deg,
+       .help = "headings of two pairings may differ by this and what the fits allow, degrees",
+       .min = 1e-6,
+       .max = 45},
+      {.name = "position_tolerance_m",
+       .value = &o->position_tolerance_m,
+       .help = "places of two pairings may lie this far apart, and what the fits allow, metres",
+       .min = 1e-6,
+       .max = 10},
+      {.name = "length_tolerance_m",
+       .value = &o->length_tolerance_m,
+       .help = "a segment may be longer than its wall by this, metres",
+       .min = 0,
+       .max = 10},
+      {.name = "num_sigmas",
+       .value = &o->num_sigmas,
+       .help = "standard deviations of a fit that count as tolerance",
+       .min = 0,
+       .max = 10},
+      {.name = "max_null_ratio",
+       .value = &o->max_null_ratio,
+       .help = "largest share of the segments that may belong to no wall of the plan",
+       .min = 0,
+       .max = 0.95},
+      {.name = "max_missing_ratio",
+       .value = &o->max_missing_ratio,
+       .help = "largest share of the visible walls that may be missing among the segments",
+       .min = 0,
+       .max = 0.95},
+      {.name = "one_segment_per_wall",
+       .value = &o->one_segment_per_wall,
+       .help = "regions must see as many walls as there are segments, within the two ratios"},
+      {.name = "rank_growth",
+       .value = &o->rank_growth,
+       .help = "candidates are searched in groups, the better ranked first, each so many times larger; 1: "
+               "all at once",
+       .min = 1,
+       .max = 64},
+      {.name = "fix_pose_early",
+       .value = &o->fix_pose_early,
+       .help = "pair the other segments at the pose once pairings fix it, without branching"},
+      {.name = "max_num_nodes",
+       .value = &o->max_num_nodes,
+       .help = "the search ends after this many pairings",
+       .min = 1,
+       .max = 1e15},
+  };
+}
+
+}  // namespace cairn
