@@ -58,7 +58,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.svg.empty()) {
     const std::vector<std::optional<FloorPose>> places =
         capture ? NodePlaces(appearance, images.images, *capture) : std::vector<std::optional<FloorPose>>();
-    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawAppearance(appearance, places)));
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+        arguments.svg, DrawAppearance(appearance, NodeNames(appearance, images.images), places)));
   }
   environment.report->in = {{"images", static_cast<int64_t>(images.images.size())},
                             {"pairs", static_cast<int64_t>(images.links.size())}};

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -33,8 +35,16 @@ class Picture {
     return End();
   }
 
-  std::string AsMatrix() {
+  // Rows in the order of the names, numbers in them by their values: as the images were taken.
+  std::string AsMatrix(const std::vector<std::string>& names) {
     const int num_nodes = appearance_.graph.num_nodes();
+    std::vector<NodeIdx> order(num_nodes);
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](NodeIdx a, NodeIdx b) {
+      return strverscmp(names[a].c_str(), names[b].c_str()) < 0;
+    });
+    row_.resize(num_nodes);
+    for (int i = 0; i < num_nodes; ++i) row_[order[i]] = i;
     cell_px_ = std::min(kMaxCellPx, kLongSidePx / std::max(1, num_nodes));
     width_px_ = std::max(520.0, num_nodes * cell_px_ + 2 * kMarginPx);
     height_px_ = num_nodes * cell_px_ + kTitlePx + kMarginPx + kLegendPx;
@@ -220,8 +230,8 @@ class Picture {
     Write("<text x=\"{:.1f}\" y=\"{:.1f}\">located from there</text>\n", x + 24, y + 5);
   }
 
-  double MatrixX(NodeIdx node) const { return kMarginPx + node * cell_px_; }
-  double MatrixY(NodeIdx node) const { return kTitlePx + kMarginPx / 2 + node * cell_px_; }
+  double MatrixX(NodeIdx node) const { return kMarginPx + row_[node] * cell_px_; }
+  double MatrixY(NodeIdx node) const { return kTitlePx + kMarginPx / 2 + row_[node] * cell_px_; }
 
   void DrawMatrix() {
     const int num_nodes = appearance_.graph.num_nodes();
@@ -231,7 +241,7 @@ class Picture {
     Write(
         "<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"none\" "
         "stroke=\"#888888\"/>\n<g id=\"matrix\" shape-rendering=\"crispEdges\">\n",
-        MatrixX(0), MatrixY(0), num_nodes * cell_px_);
+        kMarginPx, kTitlePx + kMarginPx / 2, num_nodes * cell_px_);
     for (const AppearanceLink& link : appearance_.graph.Links()) {
       const bool both = IsKept(link.node1) && IsKept(link.node2);
       // Rank among all links: the darkest tenth is black.
@@ -249,8 +259,8 @@ class Picture {
     for (const NodeIdx node : appearance_.Kept()) {
       const double thick = std::max(cell_px_, 2.0);
       Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"10\" fill=\"{}\"/>\n", MatrixX(node),
-            MatrixY(0) - 14, thick, Colour(node));
-      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"10\" height=\"{:.2f}\" fill=\"{}\"/>\n", MatrixX(0) - 14,
+            kTitlePx + kMarginPx / 2 - 14, thick, Colour(node));
+      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"10\" height=\"{:.2f}\" fill=\"{}\"/>\n", kMarginPx - 14,
             MatrixY(node), thick, Colour(node));
     }
     Write("</g>\n");
@@ -275,10 +285,19 @@ class Picture {
   const Appearance& appearance_;
   double width_px_ = 0, height_px_ = 0, radius_px_ = 4, px_per_m_ = 1, cell_px_ = 1;
   std::vector<std::optional<Eigen::Vector2d>> pixels_;
+  std::vector<int> row_;  // of the matrix, per node
   fmt::memory_buffer text_;
 };
 
 }  // namespace
+
+std::vector<std::string> NodeNames(const Appearance& appearance, const std::vector<DatabaseImage>& images) {
+  std::map<ImageId, std::string> name_of;
+  for (const DatabaseImage& image : images) name_of[image.image_id] = image.name;
+  std::vector<std::string> names;
+  for (const AppearanceNode& node : appearance.nodes) names.push_back(name_of[node.images.front()]);
+  return names;
+}
 
 std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
                                                  const std::vector<DatabaseImage>& images,
@@ -318,12 +337,12 @@ std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
   return node_places;
 }
 
-std::string DrawAppearance(const Appearance& appearance,
+std::string DrawAppearance(const Appearance& appearance, const std::vector<std::string>& names,
                            const std::vector<std::optional<FloorPose>>& places) {
   const bool has_places =
       std::any_of(places.begin(), places.end(), [](const auto& place) { return place.has_value(); });
   Picture picture(appearance);
-  return has_places ? picture.OverFloor(places) : picture.AsMatrix();
+  return has_places ? picture.OverFloor(places) : picture.AsMatrix(names);
 }
 
 }  // namespace cairn

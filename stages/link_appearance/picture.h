@@ -16,11 +16,16 @@ std::vector<std::optional<FloorPose>> NodePlaces(const Appearance& appearance,
                                                  const std::vector<DatabaseImage>& images,
                                                  const Capture& capture);
 
-// A picture of the graph as SVG.  With places (one per node, metres): a top view, links thin, those among
-// kept nodes bold, kept nodes full, others hollow, nodes that restore cycles square; nodes of several
-// headings at one place are moved apart along these.  Without: the connectivity matrix [Booij06 Fig. 8], row
-// and column i of node i, a dot where two nodes are linked, darker for more inliers, kept nodes marked along
-// the sides and their links coloured.  Same input, same bytes.
-std::string DrawAppearance(const Appearance& appearance, const std::vector<std::optional<FloorPose>>& places);
+// The name of each node's first image.
+std::vector<std::string> NodeNames(const Appearance& appearance, const std::vector<DatabaseImage>& images);
+
+// A picture of the graph as SVG.  With places (one per node, metres): a top view, links pale, each dropped
+// node's best one to a kept node thin, those among kept nodes bold, kept nodes full, others hollow, nodes
+// that restore cycles square; nodes of several headings at one place are moved apart along these.  Without:
+// the connectivity matrix [Booij06 Fig. 8], a row and a column per node in the order of `names`, numbers in
+// them by value, a dot where two nodes are linked, darker for more inliers, kept nodes marked along the sides
+// and their links coloured.  Same input, same bytes.
+std::string DrawAppearance(const Appearance& appearance, const std::vector<std::string>& names,
+                           const std::vector<std::optional<FloorPose>>& places);
 
 }  // namespace cairn

@@ -324,12 +324,14 @@ TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
     for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++num;
     return num;
   };
-  const std::string matrix = DrawAppearance(result->appearance, {});
+  const std::string matrix = DrawAppearance(result->appearance, {"1.jpg", "10.jpg", "9.jpg"}, {});
   EXPECT_THAT(matrix, HasSubstr("<g id=\"matrix\""));
   EXPECT_THAT(matrix, HasSubstr("1 of 3 nodes kept</tspan>, at least 1 needed; 2 links, 1 component<"));
   std::vector<std::optional<FloorPose>> places;
   for (const double x : {0.0, 1.0, 2.0}) places.push_back(FloorPose{Eigen::Vector2d(x, 0), 0});
-  const std::string floor = DrawAppearance(result->appearance, places);
+  // Node 1 is kept; its image is the last by number: the marks above and beside the third column and row.
+  EXPECT_THAT(matrix, HasSubstr("<g id=\"kept\">\n<rect x=\"64.00\""));
+  const std::string floor = DrawAppearance(result->appearance, {"a", "b", "c"}, places);
   EXPECT_THAT(floor, HasSubstr("<g id=\"dominating_links\""));
   EXPECT_EQ(count(floor, "<path d=\"M"), 2 + 2);  // links, scale bar and legend
 }
