@@ -77,11 +77,25 @@ struct ChosenSets {
   std::vector<std::vector<int>> position;
 };
 
+// What is left out is reported, not the tries of each search.
+class CancelOnly final : public Progress {
+ public:
+  explicit CancelOnly(const Progress& progress) : progress_(progress) {}
+  void Begin(std::string_view, int64_t, std::string_view) override {}
+  void Advance(int64_t) override {}
+  void End() override {}
+  bool Cancelled() const override { return progress_.Cancelled(); }
+
+ private:
+  const Progress& progress_;
+};
+
 ChosenSets Choose(const AppearanceGraph& graph, NodeIdx left_out, const std::vector<Kind>& sets,
-                  const std::vector<Kind>& curves, int max_size, uint64_t seed) {
+                  const std::vector<Kind>& curves, int max_size, uint64_t seed, Progress& progress) {
   ChosenSets chosen;
+  CancelOnly quiet(progress);
   for (const Kind& kind : sets) {
-    const std::vector<NodeRole> roles = ChooseKept(graph, kind.options, seed, nullptr);
+    const std::vector<NodeRole> roles = ChooseKept(graph, kind.options, seed, nullptr, &quiet);
     std::vector<char> kept(graph.num_nodes(), 0);
     int num_kept = 0;
     for (NodeIdx node = 0; node < graph.num_nodes(); ++node) {
@@ -210,11 +224,12 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
     ParallelFor(static_cast<int64_t>(left_out.size()), num_threads, [&](int64_t i) {
       if (progress.Cancelled()) return;
       const AppearanceGraph rest = WithoutLinksOf(graph, left_out[i].node);
-      outcomes[i] = Locate(left_out[i], Choose(rest, left_out[i].node, sets, curves, max_size, seed));
+      outcomes[i] =
+          Locate(left_out[i], Choose(rest, left_out[i].node, sets, curves, max_size, seed, progress));
       progress.Advance();
     });
   } else {
-    const ChosenSets chosen = Choose(graph, -1, sets, curves, max_size, seed);
+    const ChosenSets chosen = Choose(graph, -1, sets, curves, max_size, seed, progress);
     for (size_t i = 0; i < left_out.size(); ++i) outcomes[i] = Locate(left_out[i], chosen);
   }
   progress.End();

@@ -50,9 +50,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images,
                          ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
   if (capture) images = SurveyImagesOf(*capture, images);
-  CAIRN_ASSIGN_OR_RETURN(
-      const LinkAppearanceResult result,
-      LinkAppearance(images, capture ? &*capture : nullptr, arguments.options, environment.seed));
+  CAIRN_ASSIGN_OR_RETURN(const LinkAppearanceResult result,
+                         LinkAppearance(images, capture ? &*capture : nullptr, arguments.options,
+                                        environment.seed, environment.progress));
   const Appearance& appearance = result.appearance;
   CAIRN_RETURN_IF_ERROR(WriteAppearance(appearance, arguments.output));
   if (!arguments.svg.empty()) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include <CbcEventHandler.hpp>
 #include <CbcModel.hpp>
 #include <CglCutGenerator.hpp>
 #include <OsiClpSolverInterface.hpp>
@@ -98,6 +99,16 @@ class TreeCutGenerator : public CglCutGenerator {
   const TreeColumns* program_;
 };
 
+class StopWhenCancelled : public CbcEventHandler {
+ public:
+  explicit StopWhenCancelled(const Progress* progress) : progress_(progress) {}
+  CbcAction event(CbcEvent) override { return progress_ && progress_->Cancelled() ? stop : noAction; }
+  CbcEventHandler* clone() const override { return new StopWhenCancelled(*this); }
+
+ private:
+  const Progress* progress_;
+};
+
 // Nodes that some smallest set does without: another node's neighbourhood holds theirs.
 std::vector<char> FindReplaceable(const AppearanceGraph& graph) {
   std::vector<char> replaceable(graph.num_nodes(), 0);
@@ -121,8 +132,8 @@ std::vector<char> FindReplaceable(const AppearanceGraph& graph) {
 class ProgramSolver {
  public:
   // The graph has one component, and one node does not suffice.
-  ProgramSolver(const Domination& domination, int known_size)
-      : domination_(domination), known_size_(known_size), program_(domination.graph()) {
+  ProgramSolver(const Domination& domination, int known_size, Progress* progress)
+      : domination_(domination), known_size_(known_size), progress_(progress), program_(domination.graph()) {
     lp_.messageHandler()->setLogLevel(0);
     lp_.setHintParam(OsiDoReducePrint, true, OsiHintTry);
     AddColumns();
@@ -136,6 +147,7 @@ class ProgramSolver {
     const int num_fixed_rows = lp_.getNumRows();
     double last_cleanup = lp_.getObjValue();
     for (int round = 1; round <= max_num_rounds && !IsDone(); ++round) {
+      if (progress_ && progress_->Cancelled()) return;
       const std::vector<OsiRowCut> rows = FindRows(domination_.graph(), program_, lp_.getColSolution());
       if (rows.empty()) return;
       // Rows that do not bind go once the bound has risen: the same point does not come again.
@@ -153,7 +165,8 @@ class ProgramSolver {
   }
 
   void Branch(int max_num_branches) {
-    if (IsDone() || max_num_branches == 0 || !lp_.isProvenOptimal()) return;
+    if (IsDone() || max_num_branches == 0 || (progress_ && progress_->Cancelled()) || !lp_.isProvenOptimal())
+      return;
     for (NodeIdx node = 0; node < program_.num_nodes; ++node) lp_.setInteger(node);
     CbcModel model(lp_);
     model.setLogLevel(0);
@@ -162,6 +175,8 @@ class ProgramSolver {
     model.setDblParam(CbcModel::CbcCutoffIncrement, 0.999);
     TreeCutGenerator generator(&domination_.graph(), &program_);
     model.addCutGenerator(&generator, 1, "tree");
+    StopWhenCancelled stop(progress_);
+    model.passInEventHandler(&stop);
     model.branchAndBound();
     if (model.isProvenInfeasible() || (model.status() == 0 && model.bestSolution() == nullptr)) {
       bound_ = known_size_;
@@ -249,6 +264,7 @@ class ProgramSolver {
 
   const Domination& domination_;
   const int known_size_;
+  Progress* const progress_;
   const TreeColumns program_;
   OsiClpSolverInterface lp_;
   int bound_ = 0;
@@ -258,7 +274,7 @@ class ProgramSolver {
 }  // namespace
 
 ConnectedBound BoundConnectedSet(const Domination& domination, const std::vector<NodeIdx>& kept,
-                                 const ConnectedBoundOptions& options) {
+                                 const ConnectedBoundOptions& options, Progress* progress) {
   const AppearanceGraph& graph = domination.graph();
   ConnectedBound result;
   if (options.lower_bound == "none" || kept.empty()) return result;
@@ -274,7 +290,7 @@ ConnectedBound BoundConnectedSet(const Domination& domination, const std::vector
       return result;
     }
   }
-  ProgramSolver solver(domination, static_cast<int>(kept.size()));
+  ProgramSolver solver(domination, static_cast<int>(kept.size()), progress);
   solver.Cut(options.max_num_cut_rounds);
   solver.Branch(options.max_num_branches);
   result.lower_bound = std::max(result.lower_bound, solver.bound());

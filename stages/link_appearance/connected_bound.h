@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/progress.h"
 #include "stages/link_appearance/domination.h"
 
 namespace cairn {
@@ -13,7 +14,7 @@ struct ConnectedBoundOptions {
   // components of at most max_num_program_links, else counting.
   std::string lower_bound = "auto";
   // auto: most links of a component that gets a program.  REQUIRES: >= 0
-  int max_num_program_links = 2000;
+  int max_num_program_links = 1000;
   // Most rounds of cuts before branching.  REQUIRES: >= 0
   int max_num_cut_rounds = 60;
   // Most nodes of the branching tree; 0: the linear program alone.  REQUIRES: >= 0
@@ -42,8 +43,9 @@ struct ConnectedBound {
 // that this bound is well above that of domination or of separating node sets alone.  Where a node suffices
 // of two that count alike (m = 1), one whose neighbours are all dominated by the other is left out.
 //
+// `progress` (may be null) can cancel it.
 // Every bound that it stops at is valid.  It stops by counts, not by time: same input, same bound.
 ConnectedBound BoundConnectedSet(const Domination& domination, const std::vector<NodeIdx>& kept,
-                                 const ConnectedBoundOptions& options);
+                                 const ConnectedBoundOptions& options, Progress* progress = nullptr);
 
 }  // namespace cairn

@@ -123,12 +123,13 @@ class LocalSearch {
  public:
   // The set's nodes are all in one component of the graph.
   LocalSearch(const Domination& domination, const std::vector<NodeIdx>& kept, const ImproveOptions& options,
-              uint64_t seed, int target_size)
+              uint64_t seed, int target_size, Progress* progress)
       : domination_(domination),
         graph_(domination.graph()),
         options_(options),
         random_(seed),
         target_size_(target_size),
+        progress_(progress),
         set_(domination, kept),
         is_near_(graph_.num_nodes(), 0) {}
 
@@ -138,6 +139,8 @@ class LocalSearch {
     int64_t least_missing = set_.total_missing();
     const size_t least_size = target_size_ < 0 ? CountingBound(graph_) : 0;
     for (int i = 0; i < options_.num_tries && best.size() > least_size; ++i) {
+      if (progress_ && progress_->Cancelled()) break;
+      if (progress_) progress_->Advance();
       TakeOut();
       const bool is_repaired = Repair(best.size());
       if (is_repaired && target_size_ < 0) Prune();
@@ -279,6 +282,7 @@ class LocalSearch {
   const ImproveOptions& options_;
   Random random_;
   const int target_size_;
+  Progress* const progress_;
   ChangingSet set_;
   std::vector<NodeIdx> near_, ring_;
   std::vector<char> is_near_;
@@ -287,7 +291,8 @@ class LocalSearch {
 }  // namespace
 
 std::vector<NodeIdx> ImproveDominatingSet(const Domination& domination, const std::vector<NodeIdx>& kept,
-                                          const ImproveOptions& options, uint64_t seed, int target_size) {
+                                          const ImproveOptions& options, uint64_t seed, int target_size,
+                                          Progress* progress) {
   const AppearanceComponents& components = domination.components();
   std::vector<std::vector<NodeIdx>> kept_of(components.nodes.size());
   for (const NodeIdx node : kept) kept_of[components.component_of[node]].push_back(node);
@@ -306,7 +311,7 @@ std::vector<NodeIdx> ImproveDominatingSet(const Domination& domination, const st
       part_kept.push_back(static_cast<NodeIdx>(found - components.nodes[i].begin()));
     }
     const int part_target = target_size < 0 ? -1 : static_cast<int>(part_kept.size());
-    LocalSearch search(part, part_kept, options, MixSeed(seed, i), part_target);
+    LocalSearch search(part, part_kept, options, MixSeed(seed, i), part_target, progress);
     for (const NodeIdx node : search.Run()) improved.push_back(components.nodes[i][node]);
   }
   std::sort(improved.begin(), improved.end());

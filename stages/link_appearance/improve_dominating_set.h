@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/progress.h"
 #include "stages/link_appearance/domination.h"
 
 namespace cairn {
@@ -21,8 +22,10 @@ struct ImproveOptions {
 //
 // With `target_size` >= 0 `kept` has that many nodes and need not dominate: the result has as many, is
 // connected, and misses no more in all.
+// `progress` (may be null) advances by a try; where it is cancelled, the best set so far comes back.
 // Same set for the same seed.  A try costs O(nodes + links of kept nodes).
 std::vector<NodeIdx> ImproveDominatingSet(const Domination& domination, const std::vector<NodeIdx>& kept,
-                                          const ImproveOptions& options, uint64_t seed, int target_size = -1);
+                                          const ImproveOptions& options, uint64_t seed, int target_size = -1,
+                                          Progress* progress = nullptr);
 
 }  // namespace cairn

@@ -31,13 +31,15 @@ std::vector<NodeIdx> ArriveOneByOne(const AppearanceGraph& graph, int max_num_dr
 // A set of exactly num_kept nodes, as far as there are so many: a dominating one, and more, where that many
 // suffice; otherwise the connected one that misses least.
 std::vector<NodeIdx> ChooseExactly(const Domination& domination, const LinkAppearanceOptions& options,
-                                   const std::vector<NodeIdx>& dominating, uint64_t seed) {
+                                   const std::vector<NodeIdx>& dominating, uint64_t seed,
+                                   Progress* progress) {
   const ImproveOptions improve{.num_tries = options.num_tries};
   const int target = options.num_kept;
   if (static_cast<int>(dominating.size()) <= target) {
     return GreedyDominatingSet(domination, target, dominating);
   }
-  return ImproveDominatingSet(domination, GreedyDominatingSet(domination, target), improve, seed, target);
+  return ImproveDominatingSet(domination, GreedyDominatingSet(domination, target), improve, seed, target,
+                              progress);
 }
 
 Status CheckTogether(const LinkAppearanceOptions& options) {
@@ -55,19 +57,28 @@ Status CheckTogether(const LinkAppearanceOptions& options) {
   return Ok();
 }
 
+// Most tries of the local search in all components.
+int64_t NumTries(const Domination& domination, const LinkAppearanceOptions& options) {
+  int64_t num_searches = 0;
+  for (const std::vector<NodeIdx>& nodes : domination.components().nodes) num_searches += nodes.size() > 1;
+  return num_searches * options.num_tries * (options.num_kept > 0 ? 2 : 1);
+}
+
 // The bound of one component; shrinks the kept nodes where the search for it finds fewer.
-int BoundComponent(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
+int BoundComponent(const AppearanceGraph& graph, const LinkAppearanceOptions& options, Progress* progress,
                    std::vector<NodeIdx>* kept) {
   const Domination domination(graph, DominationOf(options));
-  const ConnectedBound bound = BoundConnectedSet(domination, *kept, options.bound);
+  const ConnectedBound bound = BoundConnectedSet(domination, *kept, options.bound, progress);
   if (!bound.smaller.empty()) *kept = bound.smaller;
   return bound.lower_bound;
 }
 
 // Bounds all components; where no size is given, better sets replace the kept ones.
-void BoundAll(const Domination& domination, const LinkAppearanceOptions& options, Appearance* appearance) {
+void BoundAll(const Domination& domination, const LinkAppearanceOptions& options, Progress* progress,
+              Appearance* appearance) {
   const AppearanceComponents& components = domination.components();
   for (const std::vector<NodeIdx>& nodes : components.nodes) {
+    if (progress) progress->Advance();
     if (!domination.IsIn(nodes[0])) {
       appearance->lower_bounds.push_back(0);
       continue;
@@ -82,7 +93,7 @@ void BoundAll(const Domination& domination, const LinkAppearanceOptions& options
     const bool is_chosen = options.num_kept == 0;
     if (!is_chosen) kept = GreedyDominatingSet(part);
     const size_t size_before = kept.size();
-    appearance->lower_bounds.push_back(BoundComponent(graph, options, &kept));
+    appearance->lower_bounds.push_back(BoundComponent(graph, options, progress, &kept));
     if (!is_chosen || kept.size() == size_before) continue;
     for (const NodeIdx node : nodes) appearance->nodes[node].role = NodeRole::kDropped;
     for (const NodeIdx node : kept) appearance->nodes[nodes[node]].role = NodeRole::kDominating;
@@ -168,16 +179,16 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
 }
 
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
-                                 uint64_t seed, int* num_greedy) {
+                                 uint64_t seed, int* num_greedy, Progress* progress) {
   const Domination domination(graph, DominationOf(options));
   std::vector<NodeIdx> kept = options.algorithm == "online" ? ArriveOneByOne(graph, options.max_num_dropped)
                                                             : GreedyDominatingSet(domination);
   std::erase_if(kept, [&](NodeIdx node) { return !domination.IsIn(node); });
   if (num_greedy) *num_greedy = static_cast<int>(kept.size());
   if (options.num_tries > 0 && options.algorithm == "greedy") {
-    kept = ImproveDominatingSet(domination, kept, {.num_tries = options.num_tries}, seed);
+    kept = ImproveDominatingSet(domination, kept, {.num_tries = options.num_tries}, seed, -1, progress);
   }
-  if (options.num_kept > 0) kept = ChooseExactly(domination, options, kept, seed);
+  if (options.num_kept > 0) kept = ChooseExactly(domination, options, kept, seed, progress);
   std::vector<NodeRole> roles(graph.num_nodes(), NodeRole::kDropped);
   for (const NodeIdx node : kept) roles[node] = NodeRole::kDominating;
   if (options.max_detour_links > 0 && options.num_kept == 0) Restore(graph, options.max_detour_links, &roles);
@@ -185,7 +196,8 @@ std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppeara
 }
 
 Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
-                                            const LinkAppearanceOptions& options, uint64_t seed) {
+                                            const LinkAppearanceOptions& options, uint64_t seed,
+                                            Progress* progress) {
   LinkAppearanceOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   CAIRN_RETURN_IF_ERROR(CheckTogether(options));
@@ -208,12 +220,22 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
   // The bound is that of dominating sets, before cycles are restored.
   LinkAppearanceOptions without_cycles = options;
   without_cycles.max_detour_links = 0;
-  std::vector<NodeRole> roles = ChooseKept(appearance.graph, without_cycles, seed, &result.num_greedy);
+  const auto is_cancelled = [&] { return progress && progress->Cancelled(); };
+  const Error cancelled = MakeError(ErrorCode::kCancelled, "linking images was stopped");
+  if (progress) progress->Begin("choose images", NumTries(domination, options), "tries");
+  std::vector<NodeRole> roles =
+      ChooseKept(appearance.graph, without_cycles, seed, &result.num_greedy, progress);
+  if (progress) progress->End();
+  if (is_cancelled()) return cancelled;
   for (size_t i = 0; i < roles.size(); ++i) {
     appearance.nodes[i].component = domination.components().component_of[i];
     appearance.nodes[i].role = roles[i];
   }
-  BoundAll(domination, options, &appearance);
+  const auto num_components = static_cast<int64_t>(domination.components().nodes.size());
+  if (progress) progress->Begin("bound", num_components, "components");
+  BoundAll(domination, options, progress, &appearance);
+  if (progress) progress->End();
+  if (is_cancelled()) return cancelled;
   if (appearance.max_detour_links > 0) {
     for (size_t i = 0; i < roles.size(); ++i) roles[i] = appearance.nodes[i].role;
     Restore(appearance.graph, appearance.max_detour_links, &roles);

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/ids.h"
 #include "core/options.h"
+#include "core/progress.h"
 #include "stages/link_appearance/connected_bound.h"
 #include "stages/link_appearance/fuse_images.h"
 #include "stages/link_appearance/improve_dominating_set.h"
@@ -60,11 +61,12 @@ struct LinkAppearanceResult {
 // The kept nodes of a graph, by the options, without bound: what is done for a survey as well as for a
 // left-out image (check_appearance.h).  Roles per node.  `num_greedy` may be null.
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
-                                 uint64_t seed, int* num_greedy);
+                                 uint64_t seed, int* num_greedy, Progress* progress = nullptr);
 
 // Pure: no files, no clock; same result for the same seed.  `capture` is for fuse = "place" and may be null.
-// Errors: InvalidArgument (an option), NoData (no image).
+// `progress` may be null.  Errors: InvalidArgument (an option), NoData (no image), Cancelled.
 Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
-                                            const LinkAppearanceOptions& options, uint64_t seed);
+                                            const LinkAppearanceOptions& options, uint64_t seed,
+                                            Progress* progress = nullptr);
 
 }  // namespace cairn

@@ -265,6 +265,22 @@ TEST(CheckAppearance, HeldOutImagesLeaveTheGraphAndKeepTheirLinks) {
   EXPECT_EQ(HoldOut(images, {"nobody.jpg"}).error().code, ErrorCode::kNotFound);
 }
 
+TEST(LinkAppearance, CanBeStopped) {
+  class Stopped final : public Progress {
+   public:
+    void Begin(std::string_view, int64_t, std::string_view) override {}
+    void Advance(int64_t) override { ++num_advances; }
+    void End() override {}
+    bool Cancelled() const override { return num_advances >= 10; }
+    int num_advances = 0;
+  } progress;
+  const Result<LinkAppearanceResult> result =
+      LinkAppearance(ImagesOf(GeometricGraph(60, 7, 5)), nullptr, {.num_tries = 1'000'000}, 0, &progress);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+  EXPECT_EQ(progress.num_advances, 10);
+}
+
 TEST(CheckAppearance, NothingOrEverythingLeftOutIsAnError) {
   NoProgress progress;
   const auto check = [&](const AppearanceGraph& graph, const std::vector<LeftOutImage>& left_out) {
