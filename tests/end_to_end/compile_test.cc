@@ -316,6 +316,48 @@ TEST_F(Compile, RejectedImagesAreCountedInTheMap) {
   EXPECT_THAT(rows.findings.drops[0].at_stations, IsEmpty());
 }
 
+TEST_F(Compile, SparseMapIsComparedWithAllImagesAndLeadsFromOneToAnother) {
+  const std::string build = Path("tiny.build/");
+  const ProgramRun emit =
+      RunShell("cairn emit-map --classes " + build + "classes.db --world " + build + "world.db --regions " +
+               build + "regions.db --vocabulary " + build + "vocabulary.db --appearance " + build +
+               "appearance.db --options " + build +
+               "options/emit_map.toml --documents kept --name sparse -o " + Path("sparse.cairn"));
+  ASSERT_EQ(emit.exit_code, 0) << emit.err;
+  const ProgramRun check = RunShell("cairn check-map " + Path("sparse.cairn") + " --queries " + build +
+                                    "capture/queries.txt --json");
+  ASSERT_EQ(check.exit_code, 0) << check.err;
+  const auto figures = nlohmann::json::parse(check.out);
+  const auto full = nlohmann::json::parse(
+      RunShell("cairn check-map " + Path("tiny.cairn") + " --queries " + build + "capture/queries.txt --json")
+          .out);
+  EXPECT_EQ(figures["all_images_num_localized"], full["num_localized"]);
+  EXPECT_LE(figures["num_by_retrieval"], figures["num_localized"]);
+
+  const MapRows rows = *ReadMapRows(Path("tiny.cairn"));
+  const auto name = [&](bool is_kept) {
+    const auto node =
+        std::find_if(rows.appearance.begin(), rows.appearance.end(),
+                     [&](const MapAppearanceNode& n) { return n.is_kept == is_kept && !n.links.empty(); });
+    return node == rows.appearance.end() ? std::string() : rows.images[node->images[0]].name;
+  };
+  const std::string from = name(false), to = name(true);
+  ASSERT_NE(from, "");
+  ASSERT_NE(to, "");
+  const ProgramRun route = RunShell("cairn route " + Path("tiny.cairn") + " " + from + " " + to + " --json");
+  ASSERT_EQ(route.exit_code, 0) << route.err;
+  const auto images = nlohmann::json::parse(route.out)["images"];
+  EXPECT_EQ(images.front()["name"], from);
+  EXPECT_EQ(images.back()["name"], to);
+  const ProgramRun nowhere = RunShell("cairn route " + Path("tiny.cairn") + " " + from + " nobody.jpg");
+  EXPECT_EQ(nowhere.exit_code, 3);
+  EXPECT_THAT(nowhere.err, HasSubstr("has no survey image 'nobody.jpg'"));
+
+  const ProgramRun left_out = RunShell("cairn check-appearance " + build + "matches.db --num-tries 20");
+  ASSERT_EQ(left_out.exit_code, 0) << left_out.err;
+  EXPECT_THAT(left_out.out, HasSubstr("left-out images"));
+}
+
 TEST_F(Compile, GateOfRegionsKeepsAMapFromBeingWritten) {
   // Nothing is localized to better than a nanometre: every fix is a gross error.
   const std::string check = "cairn check-map " + Path("tiny.build/unsealed.cairn") + " --queries " +
