@@ -5,7 +5,6 @@
 #include <limits>
 #include <map>
 
-#include "core/panorama.h"
 #include "core/parallel.h"
 #include "stages/link_appearance/domination.h"
 #include "stages/link_appearance/greedy_dominating_set.h"
@@ -256,16 +255,16 @@ Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::st
     return found;
   };
   std::vector<int> held_out(images.images.size(), -1), survey(images.images.size(), -1);
+  std::vector<char> is_survey(images.images.size(), 0);
   std::map<std::string, int> held_out_of_name;
-  HeldOutSplit split;
+  int num_survey = 0;
   for (size_t i = 0; i < images.images.size(); ++i) {
-    const std::optional<PanoramaView> view = ParsePanoramaViewName(images.images[i].name);
-    const std::string& name = view ? view->panorama_name : images.images[i].name;
-    if (is_wanted(name)) {
-      held_out[i] = held_out_of_name.emplace(name, static_cast<int>(held_out_of_name.size())).first->second;
+    const std::string name = CapturedName(images.images[i].name);
+    is_survey[i] = !is_wanted(name);
+    if (is_survey[i]) {
+      survey[i] = num_survey++;
     } else {
-      survey[i] = static_cast<int>(split.survey.images.size());
-      split.survey.images.push_back(images.images[i]);
+      held_out[i] = held_out_of_name.emplace(name, static_cast<int>(held_out_of_name.size())).first->second;
     }
   }
   for (const auto& [name, is_met] : wanted) {
@@ -273,15 +272,13 @@ Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::st
     return MakeError(ErrorCode::kNotFound,
                      "held-out image {} is not in the database of matches; match it with the survey's", name);
   }
+  HeldOutSplit split{.survey = SubsetOf(images, is_survey)};
   split.linked.resize(held_out_of_name.size());
   for (const AppearanceLink& link : images.links) {
-    if (held_out[link.node1] < 0 && held_out[link.node2] < 0) {
-      split.survey.links.push_back({survey[link.node1], survey[link.node2], link.num_inliers});
-    } else if (held_out[link.node1] < 0) {
-      split.linked[held_out[link.node2]].push_back(survey[link.node1]);
-    } else if (held_out[link.node2] < 0) {
-      split.linked[held_out[link.node1]].push_back(survey[link.node2]);
-    }
+    if (is_survey[link.node1] == is_survey[link.node2]) continue;
+    const auto [inside, outside] =
+        is_survey[link.node1] ? std::pair(link.node1, link.node2) : std::pair(link.node2, link.node1);
+    split.linked[held_out[outside]].push_back(survey[inside]);
   }
   for (std::vector<int>& linked : split.linked) {
     std::sort(linked.begin(), linked.end());

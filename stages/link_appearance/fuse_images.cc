@@ -89,22 +89,33 @@ Result<int64_t> CountPairs(const std::string& matches_path) {
   });
 }
 
+std::string CapturedName(const std::string& image_name) {
+  const std::optional<PanoramaView> view = ParsePanoramaViewName(image_name);
+  return view ? view->panorama_name : image_name;
+}
+
+ImageLinks SubsetOf(const ImageLinks& images, const std::vector<char>& is_in) {
+  ImageLinks subset;
+  std::vector<int> index_of(images.images.size(), -1);
+  for (size_t i = 0; i < images.images.size(); ++i) {
+    if (!is_in[i]) continue;
+    index_of[i] = static_cast<int>(subset.images.size());
+    subset.images.push_back(images.images[i]);
+  }
+  for (const AppearanceLink& link : images.links) {
+    if (!is_in[link.node1] || !is_in[link.node2]) continue;
+    subset.links.push_back({index_of[link.node1], index_of[link.node2], link.num_inliers});
+  }
+  return subset;
+}
+
 ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images) {
   std::set<std::string> names;
   for (const CaptureImage& image : capture.images) names.insert(image.name);
-  ImageLinks survey;
-  std::vector<int> index_of(images.images.size(), -1);
-  for (size_t i = 0; i < images.images.size(); ++i) {
-    const std::optional<PanoramaView> view = ParsePanoramaViewName(images.images[i].name);
-    if (!names.contains(view ? view->panorama_name : images.images[i].name)) continue;
-    index_of[i] = static_cast<int>(survey.images.size());
-    survey.images.push_back(images.images[i]);
-  }
-  for (const AppearanceLink& link : images.links) {
-    if (index_of[link.node1] < 0 || index_of[link.node2] < 0) continue;
-    survey.links.push_back({index_of[link.node1], index_of[link.node2], link.num_inliers});
-  }
-  return survey;
+  std::vector<char> is_listed;
+  for (const DatabaseImage& image : images.images)
+    is_listed.push_back(names.contains(CapturedName(image.name)));
+  return SubsetOf(images, is_listed);
 }
 
 Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images, const std::string& fuse,
@@ -113,8 +124,7 @@ Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images
   std::vector<NodeIdx> node_of_image;
   std::map<std::string, NodeIdx> nodes;
   for (const DatabaseImage& image : images) {
-    const std::optional<PanoramaView> view = ParsePanoramaViewName(image.name);
-    const std::string& name = view ? view->panorama_name : image.name;
+    const std::string name = CapturedName(image.name);
     const size_t end = fuse == "name" ? name.rfind('_') : std::string::npos;
     // Names without '_' are whole; a mark keeps them apart from beginnings of others.
     const std::string key = end == std::string::npos ? name + '/' : name.substr(0, end);

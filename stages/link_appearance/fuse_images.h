@@ -25,6 +25,12 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
 // Rows that ReadImageLinks would look at.  Errors: as OpenColmapDatabase.
 Result<int64_t> CountPairs(const std::string& matches_path);
 
+// The name of the file that an image was taken in: its own, or the panorama's that it is a view of.
+std::string CapturedName(const std::string& image_name);
+
+// Some of the images (a mark per image), and the links among them.
+ImageLinks SubsetOf(const ImageLinks& images, const std::vector<char>& is_in);
+
 // Those of the images that a capture lists as its survey, a panorama's views by its name, and their links.
 ImageLinks SurveyImagesOf(const Capture& capture, const ImageLinks& images);
 
