@@ -14,6 +14,11 @@ inline Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
   return matrix;
 }
 
+// The z of the cross product of two vectors in the plane: > 0 where b points left of a.
+inline double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 // Two unit vectors, at right angles to each other, that span the plane orthogonal to the unit vector v.
 inline Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
   const Eigen::Vector3d axis = std::abs(v.x()) < 0.6 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();

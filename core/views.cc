@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 }  // namespace
 

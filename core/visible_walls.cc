@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
@@ -12,8 +14,6 @@ using Vec2 = Eigen::Vector2d;
 constexpr double kPi = std::numbers::pi;
 // Directions closer than this are one, rad.
 constexpr double kSameDirection = 1e-11;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 struct Side {
   Vec2 start, along;  // relative to the place

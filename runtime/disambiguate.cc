@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <queue>
 #include <unordered_map>
+
+#include "core/pose.h"
 
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
-constexpr double kDegree = std::numbers::pi / 180;
 
 // A stretch of wall in the robot's frame that one of two views has and the other has not.
 struct Feature {
@@ -64,7 +64,7 @@ class Planner {
       std::vector<std::pair<double, double>> covered;
       for (const auto& [from, to] : other) {
         const Vec2 direction = (to - from).normalized();
-        if (along.dot(direction) < std::cos(options_.same_wall_deg * kDegree)) continue;
+        if (along.dot(direction) < std::cos(RadFromDeg(options_.same_wall_deg))) continue;
         const double low = along.dot(from - start), high = along.dot(to - start);
         if (high < 0 || low > length ||
             std::abs(normal.dot(0.5 * (from + to) - start)) > options_.same_wall_m)
@@ -154,14 +154,7 @@ class Planner {
     std::vector<Vec2> places;
     for (int i = at; i >= 0; i = steps_[i].before) places.push_back(steps_[i].place);
     std::reverse(places.begin(), places.end());
-    std::vector<Vec2> path{places[0]};
-    for (size_t i = 0; i + 1 < places.size();) {
-      size_t next = places.size() - 1;
-      while (next > i + 1 && !IsFree(places[i], places[next])) --next;
-      path.push_back(places[next]);
-      i = next;
-    }
-    return path;
+    return Tightened(places, [&](const Vec2& from, const Vec2& to) { return IsFree(from, to); });
   }
 
   void Fill(int kind, const std::vector<Vec2>& path, const Feature& feature, DisambiguationPlan* plan) const {
@@ -230,12 +223,8 @@ Result<DisambiguationPlan> PlanDisambiguation(const PlanSpace& space, const Plan
                                               const PlanarPose& b, const DisambiguateOptions& options) {
   DisambiguateOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  for (const PlanarPose& pose : {a, b}) {
-    if (space.FaceAt(pose.position) < 0) {
-      return MakeError(ErrorCode::kInvalidArgument, "the place ({:g}, {:g}) lies in no region of the plan",
-                       pose.position.x(), pose.position.y());
-    }
-  }
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(a.position));
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(b.position));
   return Planner(space, a, b, options).Run();
 }
 

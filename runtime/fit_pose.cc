@@ -5,14 +5,13 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "core/vector_geometry.h"
 #include "runtime/interpretation_tree.h"
 
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 }  // namespace
 

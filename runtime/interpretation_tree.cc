@@ -6,41 +6,17 @@
 #include <limits>
 #include <numeric>
 
+#include "core/pose.h"
+#include "core/vector_geometry.h"
+#include "runtime/pairing.h"
+
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
-constexpr double kPi = std::numbers::pi;
 // Two walls at less than this are parallel: they do not fix a place.
 constexpr double kMinCrossing = 0.26;  // sine of 15 degrees
 constexpr LabelIdx kNull = -1, kOpen = -2;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-// What one pairing of a segment with a label says about the pose.
-struct Pairing {
-  bool possible = false;
-  double heading = 0;
-  Vec2 from = Vec2::Zero(), to = Vec2::Zero();  // places of the robot: a line
-};
-
-double PointToLine(const Vec2& point, const Vec2& from, const Vec2& to) {
-  const Vec2 along = to - from;
-  const double squared = along.squaredNorm();
-  const double share = squared > 0 ? std::clamp((point - from).dot(along) / squared, 0.0, 1.0) : 0;
-  return (point - from - share * along).norm();
-}
-
-double LineToLine(const Pairing& a, const Pairing& b) {
-  const Vec2 u = a.to - a.from, v = b.to - b.from;
-  const double denominator = Cross(u, v);
-  if (denominator != 0) {
-    const double s = Cross(b.from - a.from, v) / denominator, t = Cross(b.from - a.from, u) / denominator;
-    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) return 0;
-  }
-  return std::min({PointToLine(a.from, b.from, b.to), PointToLine(a.to, b.from, b.to),
-                   PointToLine(b.from, a.from, a.to), PointToLine(b.to, a.from, a.to)});
-}
 
 class TreeSearch {
  public:
@@ -89,14 +65,8 @@ class TreeSearch {
     for (size_t i = 0; i < segments_.size(); ++i) {
       for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
         const ScanSegment& segment = segments_[i];
-        Pairing& pairing = pairings_[i * plan_.num_labels() + label];
-        const Vec2 start = LabelStart(plan_, label), along = LabelEnd(plan_, label) - start;
-        const double spare = along.norm() - segment.Length();
-        pairing.possible = spare >= -options_.length_tolerance_m;
-        pairing.heading = std::atan2(along.y(), along.x()) - segment.Angle();
-        pairing.from = start - Eigen::Rotation2Dd(pairing.heading) * segment.start;
-        if (spare < 0) pairing.from += 0.5 * spare * along.normalized();
-        pairing.to = pairing.from + std::max(0.0, spare) * along.normalized();
+        pairings_[i * plan_.num_labels() + label] =
+            MakePairing(plan_, segment, label, options_.length_tolerance_m);
       }
     }
   }
@@ -109,7 +79,7 @@ class TreeSearch {
   bool Agree(int a, LabelIdx label_a, int b, LabelIdx label_b) const {
     const Pairing &pa = PairingOf(a, label_a), &pb = PairingOf(b, label_b);
     const double angle =
-        std::hypot(angle_tolerance_[a], angle_tolerance_[b]) + options_.angle_tolerance_deg * kPi / 180;
+        std::hypot(angle_tolerance_[a], angle_tolerance_[b]) + RadFromDeg(options_.angle_tolerance_deg);
     if (std::abs(WrapAngle(pa.heading - pb.heading)) > angle) return false;
     const double place = std::hypot(place_tolerance_[a], place_tolerance_[b]) + options_.position_tolerance_m;
     return LineToLine(pa, pb) <= place;
@@ -140,7 +110,7 @@ class TreeSearch {
                  most = std::ceil(num / (1 - options_.max_missing_ratio));
     spectrum_ = DirectionSpectrum(angles);
     blur_ = std::accumulate(angle_tolerance_.begin(), angle_tolerance_.end(), 0.0) +
-            num * options_.angle_tolerance_deg * kPi / 180;
+            RadFromDeg(num * options_.angle_tolerance_deg);
     FaceSet set;
     for (FaceIdx face = 0; face < views.num_faces(); ++face) {
       const ViewIndex& values = views.index[face];
@@ -157,8 +127,7 @@ class TreeSearch {
           fits = std::abs(std::abs(expected[m]) - std::abs(spectrum_[m])) <= others + (m + 1) * blur_ + 1e-3;
       }
       if (!fits) continue;
-      if (set.words.empty() || set.words.back().block != face / 64) set.words.push_back({face / 64, 0});
-      set.words.back().bits |= uint64_t{1} << (face % 64);
+      set.Add(face);
       const double ratio =
           std::log(std::max(1e-3, static_cast<double>(values.visible_length_m)) / std::max(1e-3, observed));
       ranked->push_back({std::abs(ratio), face});
@@ -203,24 +172,6 @@ class TreeSearch {
     return true;
   }
 
-  // Whether a pairing's line of places comes within `reach` of a box.
-  static bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach) {
-    double first = 0, last = 1;
-    const Vec2 along = pairing.to - pairing.from;
-    for (int axis = 0; axis < 2; ++axis) {
-      const double low = box.min()[axis] - reach - pairing.from[axis],
-                   high = box.max()[axis] + reach - pairing.from[axis];
-      if (std::abs(along[axis]) < 1e-12) {
-        if (low > 0 || high < 0) return false;
-        continue;
-      }
-      const double a = low / along[axis], b = high / along[axis];
-      first = std::max(first, std::min(a, b));
-      last = std::min(last, std::max(a, b));
-    }
-    return first <= last;
-  }
-
   void SearchCandidates() {
     std::vector<std::pair<double, FaceIdx>> ranked;
     const FaceSet all = Candidates(&ranked);
@@ -240,11 +191,7 @@ class TreeSearch {
       for (size_t i = first; i < end; ++i) faces.push_back(ranked[i].second);
       std::sort(faces.begin(), faces.end());
       FaceSet group;
-      for (const FaceIdx face : faces) {
-        if (group.words.empty() || group.words.back().block != face / 64)
-          group.words.push_back({face / 64, 0});
-        group.words.back().bits |= uint64_t{1} << (face % 64);
-      }
+      for (const FaceIdx face : faces) group.Add(face);
       SearchGroup(group);
       first = end;
       size *= options_.rank_growth;
@@ -329,7 +276,7 @@ class TreeSearch {
     const Vec2 along = (end - start).normalized(), normal(-along.y(), along.x());
     const double angle = WrapAngle(std::atan2(along.y(), along.x()) - seen.Angle() - found.pose.heading_rad);
     const double angle_sigma = std::hypot(seen.sigma_angle_rad, std::sqrt(found.covariance(2, 2)));
-    const double angle_allowed = options_.num_sigmas * angle_sigma + options_.angle_tolerance_deg * kPi / 180;
+    const double angle_allowed = options_.num_sigmas * angle_sigma + RadFromDeg(options_.angle_tolerance_deg);
     const Vec2 middle = found.pose.FloorFromRobot(seen.Middle()), arm = middle - found.pose.position;
     const auto allowed = [&](const Vec2& direction) {
       const Eigen::Vector3d row(direction.x(), direction.y(), direction.dot(Vec2(-arm.y(), arm.x())));
@@ -386,7 +333,7 @@ class TreeSearch {
       if (other.determined != found.determined ||
           (other.pose.position - found.pose.position).norm() > 2 * options_.position_tolerance_m ||
           std::abs(WrapAngle(other.pose.heading_rad - found.pose.heading_rad)) >
-              2 * options_.angle_tolerance_deg * kPi / 180) {
+              RadFromDeg(2 * options_.angle_tolerance_deg)) {
         continue;
       }
       if (found.matched_length_m > other.matched_length_m + 1e-6 ||

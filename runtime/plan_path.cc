@@ -13,11 +13,6 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-Error Outside(const Vec2& place) {
-  return MakeError(ErrorCode::kInvalidArgument, "the place ({:g}, {:g}) lies in no region of the plan",
-                   place.x(), place.y());
-}
-
 Error NoWay(const Vec2& from, const Vec2& to, double radius_m) {
   return MakeError(ErrorCode::kNoData,
                    "no way from ({:g}, {:g}) to ({:g}, {:g}) for a robot of radius {:g} m", from.x(),
@@ -29,18 +24,6 @@ PlanPath Measured(std::vector<Vec2> points) {
   for (size_t i = 0; i + 1 < path.points.size(); ++i)
     path.length_m += (path.points[i + 1] - path.points[i]).norm();
   return path;
-}
-
-// Leaves out points as long as the way stays free.
-std::vector<Vec2> Tightened(const PlanSpace& space, const std::vector<Vec2>& points, double radius_m) {
-  std::vector<Vec2> tight{points[0]};
-  for (size_t i = 0; i + 1 < points.size();) {
-    size_t next = points.size() - 1;
-    while (next > i + 1 && !space.IsFree(points[i], points[next], radius_m)) --next;
-    tight.push_back(points[next]);
-    i = next;
-  }
-  return tight;
 }
 
 // A region that stands for those around it.
@@ -248,9 +231,10 @@ Result<PlanPath> FindPath(const PlanSpace& space, const Vec2& from, const Vec2& 
                           const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(to));
+  const auto is_free = [&](const Vec2& a, const Vec2& b) { return space.IsFree(a, b, options.radius_m); };
   const FaceIdx first = space.FaceAt(from), goal = space.FaceAt(to);
-  if (first < 0) return Outside(from);
-  if (goal < 0) return Outside(to);
   if (space.IsFree(from, to, options.radius_m)) return Measured({from, to});
   struct Step {
     double length;
@@ -274,7 +258,7 @@ Result<PlanPath> FindPath(const PlanSpace& space, const Vec2& from, const Vec2& 
       std::vector<Vec2> points{to};
       for (int i = at; i >= 0; i = steps[i].before) points.push_back(steps[i].place);
       std::reverse(points.begin(), points.end());
-      return Measured(Tightened(space, points, options.radius_m));
+      return Measured(Tightened(points, is_free));
     }
     for (auto* next = space.NeighboursBegin(step.face); next != space.NeighboursEnd(step.face); ++next) {
       if (done[next->face] || !space.IsFree(step.place, next->middle, options.radius_m)) continue;
@@ -290,8 +274,8 @@ Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Vec2& from, c
                                      const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  if (space.FaceAt(from) < 0) return Outside(from);
-  if (space.FaceAt(to) < 0) return Outside(to);
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(to));
   std::vector<Vec2> places{from};
   for (const Spot& spot : SpreadSpots(space.views(), options.max_num_places)) places.push_back(spot.middle);
   std::vector<int> before(places.size(), -1), order{0};
@@ -325,7 +309,7 @@ Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Vec2& from, c
 Result<SearchPath> FindSearchPath(const PlanSpace& space, const Vec2& from, const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  if (space.FaceAt(from) < 0) return Outside(from);
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
   const std::vector<Spot> spots = SpreadSpots(space.views(), options.max_num_places);
   std::vector<Vec2> middles{from};
   for (const Spot& spot : spots) middles.push_back(spot.middle);
@@ -333,11 +317,12 @@ Result<SearchPath> FindSearchPath(const PlanSpace& space, const Vec2& from, cons
   SearchPath result;
   const std::vector<int> looks = ChooseLookingPlaces(space, roadmap, spots, options.seen_ratio, &result);
   const std::vector<int> tour = ShortTour(roadmap, looks);
+  const auto is_free = [&](const Vec2& a, const Vec2& b) { return space.IsFree(a, b, options.radius_m); };
   std::vector<Vec2> points{from};
   for (size_t i = 0; i < tour.size(); ++i) {
     result.places.push_back(roadmap.points()[tour[i]]);
     if (i == 0) continue;
-    const std::vector<Vec2> way = Tightened(space, roadmap.Way(tour[i - 1], tour[i]), options.radius_m);
+    const std::vector<Vec2> way = Tightened(roadmap.Way(tour[i - 1], tour[i]), is_free);
     points.insert(points.end(), way.begin() + 1, way.end());
   }
   result.path = Measured(std::move(points));

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 double PointToSegment(const Vec2& point, const Vec2& a, const Vec2& b) {
   const Vec2 along = b - a;
@@ -34,6 +34,12 @@ void PlanSpace::ListNeighbours() {
     neighbours_[next[link.a]++] = {link.b, middle};
     neighbours_[next[link.b]++] = {link.a, middle};
   }
+}
+
+Status PlanSpace::CheckInside(const Eigen::Vector2d& place) const {
+  if (FaceAt(place) >= 0) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "the place ({:g}, {:g}) lies in no region of the plan",
+                   place.x(), place.y());
 }
 
 std::vector<VisibleStretch> PlanSpace::ViewFrom(const Vec2& place) const {

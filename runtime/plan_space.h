@@ -10,6 +10,20 @@
 
 namespace cairn {
 
+// A path without the points that it can go straight past, where `is_free(from, to)` says so; of each point
+// the last that it reaches.
+template <typename IsFree>
+std::vector<Eigen::Vector2d> Tightened(const std::vector<Eigen::Vector2d>& points, const IsFree& is_free) {
+  std::vector<Eigen::Vector2d> tight{points[0]};
+  for (size_t i = 0; i + 1 < points.size();) {
+    size_t next = points.size() - 1;
+    while (next > i + 1 && !is_free(points[i], points[next])) --next;
+    tight.push_back(points[next]);
+    i = next;
+  }
+  return tight;
+}
+
 // The free space of a plan, to move and to look in.
 class PlanSpace {
  public:
@@ -22,6 +36,8 @@ class PlanSpace {
 
   const Views& views() const { return views_; }
   FaceIdx FaceAt(const Eigen::Vector2d& place) const { return locator_.Find(place); }
+  // Errors: InvalidArgument where a place lies in no region.
+  Status CheckInside(const Eigen::Vector2d& place) const;
   // What is visible from a place in the domain; nothing outside of it.
   std::vector<VisibleStretch> ViewFrom(const Eigen::Vector2d& place) const;
   // Whether a disc may move straight from a to b without touching a wall; radius 0: a point.

@@ -5,13 +5,13 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
 using Points = std::vector<Vec2>;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // Runs of beams whose points may belong to one surface.
 std::vector<Points> Runs(const RangeScan& scan, const ScanSegmentsOptions& options) {

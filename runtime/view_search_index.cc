@@ -73,9 +73,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
     std::array<std::complex<double>, kNumHarmonics> sums{};
     for (const LabelIdx label : labels) {
       bits[label / 64] |= uint64_t{1} << (label % 64);
-      std::vector<FaceSet::Word>& words = faces_[label].words;
-      if (words.empty() || words.back().block != face / 64) words.push_back({face / 64, 0});
-      words.back().bits |= uint64_t{1} << (face % 64);
+      faces_[label].Add(face);
       std::complex<double> power = 1;
       for (std::complex<double>& sum : sums) sum += power *= turns[label];
       const double length = views.plan.walls[WallOf(label)].Length();

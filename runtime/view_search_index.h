@@ -22,6 +22,11 @@ struct FaceSet {
 
   bool empty() const { return words.empty(); }
   int64_t Count() const;
+  // REQUIRES: larger than those in it
+  void Add(FaceIdx face) {
+    if (words.empty() || words.back().block != face / 64) words.push_back({face / 64, 0});
+    words.back().bits |= uint64_t{1} << (face % 64);
+  }
 };
 FaceSet Intersection(const FaceSet& a, const FaceSet& b);
 bool Intersects(const FaceSet& a, const FaceSet& b);

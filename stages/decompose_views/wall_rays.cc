@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/vector_geometry.h"
+
 namespace cairn {
 namespace {
 
@@ -12,8 +14,6 @@ using Vec2 = Eigen::Vector2d;
 constexpr double kSlack = 2;
 constexpr double kPiecesPerCell = 0.5;
 constexpr int kMaxCellsPerSide = 2048;
-
-double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // A ratio of numbers below 2^62 with a positive denominator.
 struct Ratio {
