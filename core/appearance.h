@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,18 @@ struct AppearanceNode {
   std::vector<ImageId> images;  // ascending
   int component = 0;
   NodeRole role = NodeRole::kDropped;
+  // How many places it could be taken for, as the entropy of its look-alikes' distribution, nats, in
+  // thousandths [Mariottini11 eq. 1]; none: not computed.
+  std::optional<double> entropy;
   friend bool operator==(const AppearanceNode&, const AppearanceNode&) = default;
+};
+
+// Two nodes that look alike and lie apart, node1 < node2.
+struct ConfusablePair {
+  NodeIdx node1 = 0;
+  NodeIdx node2 = 0;
+  double score = 0;  // of one as a query for the other, in (0, 1], in thousandths
+  friend bool operator==(const ConfusablePair&, const ConfusablePair&) = default;
 };
 
 // Content of appearance.db.
@@ -29,6 +41,7 @@ struct Appearance {
   AppearanceGraph graph;
   // Per component: every connected set that meets its nodes' demands has at least so many; 0: not computed.
   std::vector<int> lower_bounds;
+  std::vector<ConfusablePair> confusable;  // ascending
   int num_dominators = 1;
   int strong_num_inliers = 1;
   int max_detour_links = 0;

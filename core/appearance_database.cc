@@ -1,6 +1,7 @@
 #include "core/appearance.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/database.h"
 #include "schemas/appearance_sql.h"
@@ -9,7 +10,9 @@ namespace cairn {
 namespace {
 
 constexpr int kApplicationId = 0x63726167;
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
+// Entropies and scores are stored as integers.
+constexpr double kThousandths = 1000;
 
 template <typename T>
 void BindVector(SQLite::Statement& statement, int index, const std::vector<T>& values) {
@@ -37,7 +40,7 @@ void WriteComponents(SQLite::Database& database, const Appearance& appearance) {
 }
 
 void WriteNodes(SQLite::Database& database, const Appearance& appearance) {
-  SQLite::Statement row(database, "INSERT INTO nodes VALUES (?, ?, ?, ?, ?, ?)");
+  SQLite::Statement row(database, "INSERT INTO nodes VALUES (?, ?, ?, ?, ?, ?, ?)");
   std::vector<NodeIdx> neighbours;
   std::vector<int32_t> num_inliers;
   for (size_t i = 0; i < appearance.nodes.size(); ++i) {
@@ -55,9 +58,39 @@ void WriteNodes(SQLite::Database& database, const Appearance& appearance) {
     BindVector(row, 4, node.images);
     BindVector(row, 5, neighbours);
     BindVector(row, 6, num_inliers);
+    if (node.entropy) row.bind(7, int64_t{std::lround(*node.entropy * kThousandths)});
+    row.exec();
+    row.reset();
+    row.clearBindings();
+  }
+}
+
+void WriteConfusable(SQLite::Database& database, const Appearance& appearance) {
+  SQLite::Statement row(database, "INSERT INTO confusable VALUES (?, ?, ?)");
+  for (const ConfusablePair& pair : appearance.confusable) {
+    row.bind(1, pair.node1);
+    row.bind(2, pair.node2);
+    row.bind(3, int64_t{std::lround(pair.score * kThousandths)});
     row.exec();
     row.reset();
   }
+}
+
+Status ReadConfusable(SQLite::Database& database, const std::string& path, Appearance* appearance) {
+  SQLite::Statement rows(database, "SELECT node1, node2, score FROM confusable ORDER BY node1, node2");
+  const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
+  while (rows.executeStep()) {
+    const int64_t node1 = rows.getColumn(0).getInt64(), node2 = rows.getColumn(1).getInt64(),
+                  score = rows.getColumn(2).getInt64();
+    if (node1 < 0 || node2 <= node1 || node2 >= num_nodes || score <= 0 || score > kThousandths) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "{}: table confusable: nodes {} and {} of {} with a score of {} thousandths", path,
+                       node1, node2, num_nodes, score);
+    }
+    appearance->confusable.push_back({static_cast<NodeIdx>(node1), static_cast<NodeIdx>(node2),
+                                      static_cast<double>(score) / kThousandths});
+  }
+  return Ok();
 }
 
 // The nodes' rows; links go to `links`.
@@ -65,7 +98,8 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
                  Appearance* appearance, std::vector<AppearanceLink>* links) {
   SQLite::Statement rows(
       database,
-      "SELECT node_idx, component_idx, role, images, neighbours, num_inliers FROM nodes ORDER BY node_idx");
+      "SELECT node_idx, component_idx, role, images, neighbours, num_inliers, entropy FROM nodes ORDER "
+      "BY node_idx");
   for (NodeIdx i = 0; rows.executeStep(); ++i) {
     const std::string what = fmt::format("{}: table nodes, node {}", path, i);
     if (rows.getColumn(0).getInt64() != i || i >= num_nodes) {
@@ -97,6 +131,12 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
                          neighbours[k], num_inliers[k]);
       }
       links->push_back({i, neighbours[k], num_inliers[k]});
+    }
+    if (!rows.getColumn(6).isNull()) {
+      const int64_t entropy = rows.getColumn(6).getInt64();
+      if (entropy < 0 || entropy > 100 * kThousandths)
+        return MakeError(ErrorCode::kCorrupt, "{}: an entropy of {} thousandths", what, entropy);
+      node.entropy = static_cast<double>(entropy) / kThousandths;
     }
     appearance->nodes.push_back(std::move(node));
   }
@@ -139,6 +179,7 @@ Result<Appearance> ReadTables(SQLite::Database& database, const std::string& pat
                      num_links, num_components);
   }
   appearance.graph = AppearanceGraph(static_cast<int>(num_nodes), std::move(links));
+  CAIRN_RETURN_IF_ERROR(ReadConfusable(database, path, &appearance));
   return appearance;
 }
 
@@ -184,6 +225,7 @@ Status WriteAppearance(const Appearance& appearance, const std::string& path) {
     header.exec();
     WriteComponents(database, appearance);
     WriteNodes(database, appearance);
+    WriteConfusable(database, appearance);
     return Ok();
   });
 }

@@ -1,4 +1,5 @@
 // Blocks of the appearance graph as bytes: drawn in schemas/FORMAT.md.
+#include <cmath>
 #include <limits>
 
 #include "core/blob.h"
@@ -9,6 +10,8 @@ namespace cairn {
 namespace {
 
 constexpr int64_t kMaxListElements = 1 << 22;
+// Entropies and scores are stored as integers.
+constexpr double kThousandths = 1000;
 
 }  // namespace
 
@@ -56,6 +59,56 @@ Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const Bloc
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} nodes", entry.count);
   return block;
+}
+
+std::string EncodeBlock(const AmbiguityBlock& block) {
+  BlobWriter writer;
+  for (const AmbiguityBlock::Node& node : block.nodes) {
+    writer.Varint(static_cast<uint64_t>(std::lround(node.entropy * kThousandths)));
+    std::vector<int32_t> others;
+    for (const MapAppearanceNode::LookAlike& other : node.look_alikes) others.push_back(other.node);
+    WriteRuns(others, &writer);
+    for (const MapAppearanceNode::LookAlike& other : node.look_alikes)
+      writer.Varint(static_cast<uint64_t>(std::lround(other.score * kThousandths)));
+  }
+  return writer.Take();
+}
+
+Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockEntry& entry,
+                                            const MapDirectory& directory, const std::string& what) {
+  BlobReader reader(bytes);
+  AmbiguityBlock block;
+  block.first = static_cast<int32_t>(entry.first);
+  int64_t max_num_values = kMaxListElements;
+  for (uint32_t i = 0; i < entry.count; ++i) {
+    const int64_t node_idx = int64_t{entry.first} + i;
+    const uint64_t entropy = reader.Varint();
+    std::vector<int32_t> others;
+    if (!ReadRuns(&reader, directory.Count(BlockKind::kAppearance), &max_num_values, &others) ||
+        node_idx >= directory.Count(BlockKind::kAppearance) ||
+        (!others.empty() && others.front() <= node_idx) || entropy > kMaxEntropy * kThousandths) {
+      return Corrupt(what, "the entropy or look-alikes of node {} make no sense", node_idx);
+    }
+    AmbiguityBlock::Node& node = block.nodes.emplace_back();
+    node.entropy = static_cast<double>(entropy) / kThousandths;
+    for (const int32_t other : others) {
+      const uint64_t score = reader.Varint();
+      if (score == 0 || score > kThousandths)
+        return Corrupt(what, "a look-alike of node {} scores {} thousandths", node_idx, score);
+      node.look_alikes.push_back({other, static_cast<double>(score) / kThousandths});
+    }
+  }
+  if (!reader.Finished()) return Corrupt(what, "bytes are left after {} nodes", entry.count);
+  return block;
+}
+
+int64_t NumBytes(const AmbiguityBlock& block) {
+  int64_t num_bytes = sizeof(block);
+  for (const AmbiguityBlock::Node& node : block.nodes) {
+    num_bytes +=
+        static_cast<int64_t>(sizeof(node) + node.look_alikes.size() * sizeof(MapAppearanceNode::LookAlike));
+  }
+  return num_bytes;
 }
 
 int64_t NumBytes(const AppearanceBlock& block) {

@@ -29,8 +29,9 @@ enum class BlockKind : uint8_t {
   kImages = 6,
   kLandmarks = 7,
   kAppearance = 8,
+  kAmbiguity = 9,
 };
-inline constexpr int kNumBlockKinds = 9;    // 0 is none
+inline constexpr int kNumBlockKinds = 10;   // 0 is none
 const char* BlockKindName(BlockKind kind);  // "stations"
 
 // What the directory says of a block.
@@ -108,6 +109,16 @@ struct AppearanceBlock {
   std::vector<MapAppearanceNode> nodes;
 };
 
+// How well the places of nodes are told from others: their entropies and look-alikes.
+struct AmbiguityBlock {
+  struct Node {
+    double entropy = 0;
+    std::vector<MapAppearanceNode::LookAlike> look_alikes;
+  };
+  int32_t first = 0;  // index of the first node
+  std::vector<Node> nodes;
+};
+
 // Blocks as bytes.  Same block, same bytes.
 std::string EncodeBlock(const LandmarkBlock& block);
 std::string EncodeBlock(const ImageBlock& block);
@@ -115,6 +126,7 @@ std::string EncodeBlock(const StationBlock& block);
 std::string EncodeBlock(const RegionBlock& block);
 std::string EncodeBlock(const WordBlock& block);
 std::string EncodeBlock(const AppearanceBlock& block);
+std::string EncodeBlock(const AmbiguityBlock& block);
 std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
 std::string EncodeDocumentNorms(const std::vector<float>& norms);
 
@@ -132,6 +144,8 @@ Result<WordBlock> DecodeWordBlock(std::string_view bytes, const BlockEntry& entr
                                   const MapDirectory& directory, const std::string& what);
 Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const BlockEntry& entry,
                                               const MapDirectory& directory, const std::string& what);
+Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockEntry& entry,
+                                            const MapDirectory& directory, const std::string& what);
 // A tree with empty inverted files.
 Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry& entry,
                                         const MapDirectory& directory, const std::string& what);
@@ -145,6 +159,7 @@ int64_t NumBytes(const StationBlock& block);
 int64_t NumBytes(const RegionBlock& block);
 int64_t NumBytes(const WordBlock& block);
 int64_t NumBytes(const AppearanceBlock& block);
+int64_t NumBytes(const AmbiguityBlock& block);
 int64_t NumBytes(const Vocabulary& vocabulary);
 int64_t NumBytes(const std::vector<float>& values);
 

@@ -19,6 +19,8 @@ int64_t FewestBytes(BlockKind kind) {
     case BlockKind::kDocumentNorms:
     case BlockKind::kAppearance:
       return 4;
+    case BlockKind::kAmbiguity:
+      return 2;
     case BlockKind::kRegions:
     case BlockKind::kWords:
     case BlockKind::kVocabularyTree:
@@ -52,6 +54,8 @@ const char* BlockKindName(BlockKind kind) {
       return "landmarks";
     case BlockKind::kAppearance:
       return "appearance";
+    case BlockKind::kAmbiguity:
+      return "ambiguity";
   }
   return "other";
 }

@@ -62,6 +62,8 @@ class RowsReader {
         std::move(part.nodes.begin(), part.nodes.end(), std::back_inserter(rows_.appearance));
         return Ok();
       }
+      case BlockKind::kAmbiguity:  // stands after the nodes
+        return AddAmbiguity(DecodeAmbiguityBlock(bytes, entry, directory, what));
     }
     return Ok();  // of a later minor version
   }
@@ -100,6 +102,15 @@ class RowsReader {
       for (const StationIdx neighbour : block->neighbours[i])
         rows_.station_edges.emplace_back(station, neighbour);
       for (const RegionIdx region : block->regions[i]) rows_.regions[region].stations.push_back(station);
+    }
+    return Ok();
+  }
+
+  Status AddAmbiguity(Result<AmbiguityBlock> block) {
+    CAIRN_RETURN_IF_ERROR(block);
+    for (size_t i = 0; i < block->nodes.size() && block->first + i < rows_.appearance.size(); ++i) {
+      rows_.appearance[block->first + i].entropy = block->nodes[i].entropy;
+      rows_.appearance[block->first + i].look_alikes = std::move(block->nodes[i].look_alikes);
     }
     return Ok();
   }

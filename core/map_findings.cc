@@ -76,6 +76,16 @@ void WriteSelfTestRegions(SQLite::Database& database, const MapFindings& finding
   }
 }
 
+void WriteRegionEntropies(SQLite::Database& database, const MapFindings& findings) {
+  SQLite::Statement insert(database, "INSERT INTO region_entropies VALUES (?, ?)");
+  for (const RegionEntropy& row : findings.region_entropies) {
+    insert.bind(1, row.region);
+    insert.bind(2, row.entropy);
+    insert.exec();
+    insert.reset();
+  }
+}
+
 void WriteDropCounts(SQLite::Database& database, const MapFindings& findings) {
   SQLite::Statement insert(database, "INSERT INTO drop_reasons VALUES (?, ?, ?, ?, ?, ?, ?)");
   for (const DropCount& row : findings.drops) {
@@ -117,6 +127,17 @@ Status ReadSelfTestRegions(SQLite::Database& database, const std::string& path, 
   return Ok();
 }
 
+Status ReadRegionEntropies(SQLite::Database& database, const std::string& path, MapFindings* findings) {
+  SQLite::Statement query(database, "SELECT region_idx, entropy FROM region_entropies ORDER BY region_idx");
+  while (query.executeStep()) {
+    const int64_t region = query.getColumn(0).getInt64();
+    if (region < 0 || region > std::numeric_limits<RegionIdx>::max())
+      return Corrupt(path, "table region_entropies: region {}", region);
+    findings->region_entropies.push_back({static_cast<RegionIdx>(region), query.getColumn(1).getDouble()});
+  }
+  return Ok();
+}
+
 Status ReadDropCounts(SQLite::Database& database, const std::string& path, MapFindings* findings) {
   SQLite::Statement query(database,
                           "SELECT reason_id, stage, kind, name, text, num_dropped, at_stations FROM "
@@ -153,6 +174,13 @@ Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t 
       return Invalid("self-test of region {} is out of order", row.region);
     CAIRN_RETURN_IF_ERROR(CheckRegionSelfTest(row, num_regions));
   }
+  for (size_t i = 0; i < findings.region_entropies.size(); ++i) {
+    const RegionEntropy& row = findings.region_entropies[i];
+    if (row.region < 0 || static_cast<size_t>(row.region) >= num_regions ||
+        (i > 0 && row.region <= findings.region_entropies[i - 1].region) ||
+        !(row.entropy >= 0 && std::isfinite(row.entropy)))
+      return Invalid("an entropy of {} nats of region {} of {}", row.entropy, row.region, num_regions);
+  }
   for (size_t i = 0; i < findings.drops.size(); ++i) {
     const DropCount& row = findings.drops[i];
     if (i > 0 && row.reason_id <= findings.drops[i - 1].reason_id)
@@ -164,6 +192,7 @@ Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t 
 
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
   WriteSelfTestRegions(database, findings);
+  WriteRegionEntropies(database, findings);
   WriteDropCounts(database, findings);
 }
 
@@ -171,6 +200,10 @@ Status ReadMapFindings(SQLite::Database& database, const std::string& path, MapF
   if (HasTable(database, "self_test_regions")) {
     CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "self_test_regions"));
     CAIRN_RETURN_IF_ERROR(ReadSelfTestRegions(database, path, findings));
+  }
+  if (HasTable(database, "region_entropies")) {
+    CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "region_entropies"));
+    CAIRN_RETURN_IF_ERROR(ReadRegionEntropies(database, path, findings));
   }
   if (!HasTable(database, "drop_reasons")) return Ok();
   CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, "drop_reasons"));

@@ -54,10 +54,18 @@ struct DropCount {
   friend bool operator==(const DropCount&, const DropCount&) = default;
 };
 
+// How well a region's places are told from others.
+struct RegionEntropy {
+  RegionIdx region = 0;
+  double entropy = 0;  // mean of the images' at its stations, nats
+  friend bool operator==(const RegionEntropy&, const RegionEntropy&) = default;
+};
+
 // What the compilation found out about a map, for who judges it (schemas/map_findings.sql).  A robot does not
 // need it to localize.
 struct MapFindings {
   std::vector<RegionSelfTest> self_test_regions;  // those with held-out images, ascending region
+  std::vector<RegionEntropy> region_entropies;    // those with images of the appearance graph, ascending
   std::vector<DropCount> drops;                   // reasons that occurred, ascending
   friend bool operator==(const MapFindings&, const MapFindings&) = default;
 };

@@ -36,6 +36,8 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
     CutWords();
   }
   CutEvenly(BlockKind::kAppearance, rows.appearance.size(), kAppearanceNodesPerBlock);
+  if (!rows.appearance.empty() && rows.appearance[0].entropy)
+    CutEvenly(BlockKind::kAmbiguity, rows.appearance.size(), kAppearanceNodesPerBlock);
   const size_t first_image_block = entries_.size();
   CutEvenly(BlockKind::kImages, rows.images.size(), kImagesPerBlock);
   for (size_t i = first_image_block; i < entries_.size(); ++i) {
@@ -179,6 +181,13 @@ AppearanceBlock MapLayout::MakeAppearanceBlock(const BlockEntry& entry) const {
   return {static_cast<int32_t>(entry.first), {begin, begin + entry.count}};
 }
 
+AmbiguityBlock MapLayout::MakeAmbiguityBlock(const BlockEntry& entry) const {
+  AmbiguityBlock block{static_cast<int32_t>(entry.first), {}};
+  for (uint32_t i = entry.first; i < entry.first + entry.count; ++i)
+    block.nodes.push_back({*rows_.appearance[i].entropy, rows_.appearance[i].look_alikes});
+  return block;
+}
+
 std::vector<float> MapLayout::MakeDocumentNorms() const {
   std::vector<float> norms(rows_.images.size(), 0);
   for (size_t document = 0; document < image_of_document_.size(); ++document) {
@@ -205,6 +214,8 @@ std::string MapLayout::Encode(const BlockEntry& entry) const {
       return EncodeBlock(MakeLandmarkBlock(entry));
     case BlockKind::kAppearance:
       return EncodeBlock(MakeAppearanceBlock(entry));
+    case BlockKind::kAmbiguity:
+      return EncodeBlock(MakeAmbiguityBlock(entry));
   }
   return "";
 }

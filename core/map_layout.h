@@ -28,6 +28,7 @@ class MapLayout {
   RegionBlock MakeRegionBlock(const BlockEntry& entry) const;
   WordBlock MakeWordBlock(const BlockEntry& entry) const;
   AppearanceBlock MakeAppearanceBlock(const BlockEntry& entry) const;
+  AmbiguityBlock MakeAmbiguityBlock(const BlockEntry& entry) const;
   // Per image; 0 for one that is no document.
   std::vector<float> MakeDocumentNorms() const;
 

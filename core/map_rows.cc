@@ -87,6 +87,25 @@ Status CheckRegions(const MapRows& rows) {
   return Ok();
 }
 
+Status CheckAmbiguity(const MapRows& rows) {
+  const auto num_nodes = static_cast<int64_t>(rows.appearance.size());
+  for (int64_t i = 0; i < num_nodes; ++i) {
+    const MapAppearanceNode& node = rows.appearance[i];
+    if (node.entropy.has_value() != rows.appearance[0].entropy.has_value())
+      return Invalid("appearance node {}: some nodes have an entropy and others have none", i);
+    if (!(node.entropy.value_or(0) >= 0 && node.entropy.value_or(0) <= kMaxEntropy) ||
+        (!node.entropy && !node.look_alikes.empty()))
+      return Invalid("appearance node {}: an entropy of {} nats", i, node.entropy.value_or(0));
+    for (size_t k = 0; k < node.look_alikes.size(); ++k) {
+      const int64_t before = k == 0 ? i : node.look_alikes[k - 1].node;
+      const MapAppearanceNode::LookAlike& other = node.look_alikes[k];
+      if (other.node <= before || other.node >= num_nodes || !(other.score > 0 && other.score <= 1))
+        return Invalid("appearance node {}: look-alike {} makes no sense", i, k);
+    }
+  }
+  return Ok();
+}
+
 Status CheckAppearance(const MapRows& rows) {
   const auto num_nodes = static_cast<int64_t>(rows.appearance.size());
   std::vector<char> is_taken(rows.images.size(), 0);
@@ -110,6 +129,7 @@ Status CheckAppearance(const MapRows& rows) {
       }
     }
   }
+  CAIRN_RETURN_IF_ERROR(CheckAmbiguity(rows));
   if (rows.documents == "kept" && !is_any_kept) return Invalid("retrieval on kept images, but none is kept");
   return Ok();
 }

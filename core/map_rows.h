@@ -61,10 +61,19 @@ struct MapAppearanceNode {
     int32_t num_inliers = 0;  // verified matches, > 0
     friend bool operator==(const Link&, const Link&) = default;
   };
+  // A node that looks like this one and lies elsewhere.
+  struct LookAlike {
+    int32_t node = 0;
+    double score = 0;  // of one as a query for the other, in (0, 1]
+    friend bool operator==(const LookAlike&, const LookAlike&) = default;
+  };
   std::vector<int32_t> images;  // by index, ascending; no image is of two nodes
   bool is_kept = false;         // of the connected set that all other nodes are linked to
   // To nodes of larger index, ascending; one of the two is kept.
   std::vector<Link> links;
+  // Entropy of the places that it could be taken for, nats [Mariottini11 eq. 1]: of all nodes or of none.
+  std::optional<double> entropy;
+  std::vector<LookAlike> look_alikes;  // of larger index, ascending
   friend bool operator==(const MapAppearanceNode&, const MapAppearanceNode&) = default;
 };
 
@@ -122,10 +131,12 @@ struct MapRows : MapHead {
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 2;
+inline constexpr int kMapVersionMinor = 3;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;
+// Of a distribution over more places than there are, nats.
+inline constexpr double kMaxEntropy = 64;
 
 // Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
 // strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.

@@ -256,10 +256,10 @@ $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabu
 	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 # Held-out images of a reconstructed capture are linked in matches.db, but are no survey.
-$(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/options/link_appearance.toml $(BUILD)/options/seed \
+$(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(BUILD)/options/link_appearance.toml $(BUILD)/options/seed \
     $(PROGRAM_HASH) $(POSES_READY)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) link-appearance $(@D)/matches.db --capture $(POSES) \
+	$(CAIRN_LAUNCH) $(CAIRN) link-appearance $(@D)/matches.db $(@D)/vocabulary.db --capture $(POSES) \
 	    --options $(@D)/options/link_appearance.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 SESSION_LIST := $(filter %/sessions.txt,$(CAPTURE_LISTS))

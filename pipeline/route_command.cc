@@ -17,26 +17,18 @@ struct Arguments {
   std::string from;
   std::string to;
   bool json = false;
+  RouteOptions options;
+  OptionArguments option_arguments;
 };
 
-Result<int32_t> FindImage(const Map& map, const std::string& map_path, const std::string& name) {
-  for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
-    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
-    for (size_t i = 0; i < block->images.size(); ++i) {
-      if (block->images[i].name == name) return block->first + static_cast<int32_t>(i);
-    }
-  }
-  return MakeError(ErrorCode::kNotFound, "{}: has no survey image '{}'; `cairn export` lists their names",
-                   map_path, name);
-}
-
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
-  CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.map_path, arguments.from));
-  CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.map_path, arguments.to));
-  CAIRN_ASSIGN_OR_RETURN(const Route route, PlanRoute(*map, from, to));
-  auto json =
-      nlohmann::ordered_json{{"num_links", route.num_links}, {"images", nlohmann::ordered_json::array()}};
+  CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.from));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.to));
+  CAIRN_ASSIGN_OR_RETURN(const Route route, PlanRoute(*map, from, to, arguments.options));
+  auto json = nlohmann::ordered_json{
+      {"num_links", route.num_links}, {"cost", route.cost}, {"images", nlohmann::ordered_json::array()}};
   std::string text = fmt::format("{:>4}  {:>9} {:>9} {:>8}  {}\n", "", "x, m", "y, m", "heading", "image");
   for (const int32_t index : route.images) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map->Image(index));
@@ -68,6 +60,7 @@ Command RouteCommand() {
                 ->type_name("IMAGE");
             app.add_option("to", arguments->to, "Survey image to go to")->required()->type_name("IMAGE");
             app.add_flag("--json", arguments->json, "Print JSON");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
   };

@@ -1,5 +1,6 @@
 #include "runtime/map.h"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -21,9 +22,11 @@ int64_t NumBytes(const LandmarkSet& set) {
 
 int64_t NumBytes(const AppearanceMap& appearance) {
   return appearance.graph.num_links() * int64_t{2 * sizeof(AppearanceGraph::Neighbour)} +
-         static_cast<int64_t>(appearance.is_kept.size() *
-                                  (1 + sizeof(std::vector<int32_t>) + sizeof(int64_t)) +
-                              appearance.node_of_image.size() * 2 * sizeof(int32_t));
+         static_cast<int64_t>(
+             appearance.is_kept.size() * (1 + sizeof(std::vector<int32_t>) + sizeof(int64_t)) +
+             appearance.node_of_image.size() * 2 * sizeof(int32_t) +
+             appearance.entropy.size() * sizeof(double) +
+             appearance.look_alikes.size() * sizeof(std::vector<MapAppearanceNode::LookAlike>));
 }
 
 }  // namespace
@@ -128,9 +131,34 @@ Result<std::shared_ptr<const AppearanceMap>> Map::Appearance() const {
     }
   }
   appearance->graph = AppearanceGraph(static_cast<int>(appearance->is_kept.size()), std::move(links));
+  CAIRN_RETURN_IF_ERROR(AddAmbiguity(appearance.get()));
   const int64_t num_bytes = NumBytes(*appearance);
   return std::static_pointer_cast<const AppearanceMap>(
       cache_.Insert(kWholeAppearance, std::move(appearance), num_bytes));
+}
+
+Status Map::AddAmbiguity(AppearanceMap* appearance) const {
+  const int64_t num_blocks = directory_.NumBlocks(BlockKind::kAmbiguity);
+  if (num_blocks > 0) appearance->look_alikes.resize(appearance->is_kept.size());
+  for (int64_t ordinal = 0; ordinal < num_blocks; ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kAmbiguity, ordinal, DecodeAmbiguityBlock,
+                                                  &MapLayout::MakeAmbiguityBlock));
+    for (const AmbiguityBlock::Node& node : block->nodes) {
+      const auto node_idx = static_cast<int32_t>(appearance->entropy.size());
+      appearance->entropy.push_back(node.entropy);
+      for (const MapAppearanceNode::LookAlike& other : node.look_alikes) {
+        appearance->look_alikes[node_idx].push_back(other);
+        appearance->look_alikes[other.node].push_back({node_idx, other.score});
+      }
+    }
+  }
+  if (num_blocks > 0 && appearance->entropy.size() != appearance->is_kept.size()) {
+    return MakeError(ErrorCode::kCorrupt, "map '{}': entropies of {} appearance nodes of {}", head_.name,
+                     appearance->entropy.size(), appearance->is_kept.size());
+  }
+  for (auto& others : appearance->look_alikes)
+    std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
+  return Ok();
 }
 
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {

@@ -23,6 +23,9 @@ struct AppearanceMap {
   std::vector<char> is_kept;                      // per node
   std::vector<NodeIdx> node_of_image;             // per image of the map; -1: of none
   int num_kept_images = 0;
+  // Where the map tells how well places are told apart (else empty): per node.
+  std::vector<double> entropy;                                         // nats
+  std::vector<std::vector<MapAppearanceNode::LookAlike>> look_alikes;  // both ways, ascending by node
 };
 
 struct MapOptions {
@@ -91,6 +94,8 @@ class Map {
   template <typename Block, typename Make>
   Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
                                             const Make& make) const;
+
+  Status AddAmbiguity(AppearanceMap* appearance) const;
 
   MapHead head_;
   MapDirectory directory_;

@@ -1,30 +1,85 @@
 #include "runtime/route.h"
 
 #include <algorithm>
+#include <limits>
+#include <queue>
+#include <tuple>
 
 namespace cairn {
 namespace {
 
-// Predecessors on shortest paths from `start` over kept nodes; -1: not reached.  A path ends at a node that
-// is not kept. All links count alike: breadth first is Dijkstra's order.
-std::vector<NodeIdx> Predecessors(const AppearanceMap& appearance, NodeIdx start) {
-  std::vector<NodeIdx> came_from(appearance.is_kept.size(), -1);
-  came_from[start] = start;
-  std::vector<NodeIdx> reached = {start};
-  for (size_t i = 0; i < reached.size(); ++i) {
-    if (reached[i] != start && !appearance.is_kept[reached[i]]) continue;
-    for (const AppearanceGraph::Neighbour& n : appearance.graph.Neighbours(reached[i])) {
-      if (came_from[n.node] >= 0) continue;
-      came_from[n.node] = reached[i];
-      reached.push_back(n.node);
+double LinkWeight(const AppearanceMap& appearance, const RouteOptions& options, NodeIdx node,
+                  const AppearanceGraph::Neighbour& neighbour) {
+  if (options.weight == "matches") return 1.0 / neighbour.num_inliers;
+  if (options.weight == "entropy") return (appearance.entropy[node] + appearance.entropy[neighbour.node]) / 2;
+  return 1;
+}
+
+// Per node what the way to the goal costs and leads to next; -1: no way.
+struct Ways {
+  std::vector<double> cost;
+  std::vector<NodeIdx> next;
+};
+
+// Dijkstra from the goal; a way's inner nodes are kept ones.
+Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& options) {
+  const size_t num_nodes = appearance.is_kept.size();
+  Ways ways{std::vector<double>(num_nodes, std::numeric_limits<double>::infinity()),
+            std::vector<NodeIdx>(num_nodes, -1)};
+  using Entry = std::pair<double, NodeIdx>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  ways.cost[goal] = 0;
+  ways.next[goal] = goal;
+  open.emplace(0, goal);
+  while (!open.empty()) {
+    const auto [cost, node] = open.top();
+    open.pop();
+    if (cost > ways.cost[node] || (node != goal && !appearance.is_kept[node])) continue;
+    for (const AppearanceGraph::Neighbour& neighbour : appearance.graph.Neighbours(node)) {
+      const double through = cost + LinkWeight(appearance, options, node, neighbour);
+      const bool is_better =
+          std::tie(through, node) < std::tie(ways.cost[neighbour.node], ways.next[neighbour.node]);
+      if (neighbour.node == goal || !is_better) continue;
+      if (through < ways.cost[neighbour.node]) open.emplace(through, neighbour.node);
+      ways.cost[neighbour.node] = through;
+      ways.next[neighbour.node] = node;
     }
   }
-  return came_from;
+  return ways;
 }
 
 }  // namespace
 
-Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to) {
+OptionTable DescribeOptions(RouteOptions* options) {
+  return {{.name = "weight",
+           .value = &options->weight,
+           .help = "what is least on the way: links, 1 / matches of links, or the entropy of places",
+           .choices = {"links", "matches", "entropy"}}};
+}
+
+Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
+                                                       const std::vector<NodeIdx>& starts, NodeIdx goal,
+                                                       const RouteOptions& options) {
+  RouteOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  if (options.weight == "entropy" && appearance.entropy.empty()) {
+    return MakeError(
+        ErrorCode::kNotFound,
+        "route: the map does not tell how ambiguous its places are; compile it again, or plan by links "
+        "or matches");
+  }
+  const Ways ways = WaysTo(appearance, goal, options);
+  std::vector<std::optional<NodePath>> paths;
+  for (const NodeIdx start : starts) {
+    std::optional<NodePath>& path = paths.emplace_back();
+    if (ways.next[start] < 0) continue;
+    path = NodePath{.nodes = {start}, .cost = ways.cost[start]};
+    while (path->nodes.back() != goal) path->nodes.push_back(ways.next[path->nodes.back()]);
+  }
+  return paths;
+}
+
+Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOptions& options) {
   for (const int32_t image : {from, to}) {
     if (image < 0 || image >= map.num_images()) {
       return MakeError(ErrorCode::kInvalidArgument, "route: image {} of {}", image, map.num_images());
@@ -42,8 +97,9 @@ Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(start < 0 ? from : to));
     return MakeError(ErrorCode::kNotFound, "route: image {} is not in the appearance graph", image->name);
   }
-  const std::vector<NodeIdx> came_from = Predecessors(*appearance, start);
-  if (came_from[goal] < 0) {
+  if (from == to) return Route{.images = {from}};
+  CAIRN_ASSIGN_OR_RETURN(const auto paths, FindPaths(*appearance, {start}, goal, options));
+  if (!paths[0]) {
     CAIRN_ASSIGN_OR_RETURN(const auto first, map.Image(from));
     CAIRN_ASSIGN_OR_RETURN(const auto last, map.Image(to));
     return MakeError(
@@ -52,16 +108,24 @@ Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to) {
         "appearance graph: survey the way between them",
         first->name, last->name);
   }
-  Route route;
-  if (from == to) return Route{.images = {from}};
+  const std::vector<NodeIdx>& nodes = paths[0]->nodes;
+  Route route{.images = {from}, .num_links = static_cast<int>(nodes.size()) - 1, .cost = paths[0]->cost};
+  for (size_t i = 1; i + 1 < nodes.size(); ++i)
+    route.images.push_back(appearance->node_images[nodes[i]].front());
   route.images.push_back(to);
-  for (NodeIdx node = goal; node != start; node = came_from[node]) {
-    ++route.num_links;
-    if (node != goal) route.images.push_back(appearance->node_images[node].front());
-  }
-  route.images.push_back(from);
-  std::reverse(route.images.begin(), route.images.end());
   return route;
+}
+
+Result<int32_t> FindImage(const Map& map, const std::string& name) {
+  for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
+    for (size_t i = 0; i < block->images.size(); ++i) {
+      if (block->images[i].name == name) return block->first + static_cast<int32_t>(i);
+    }
+  }
+  return MakeError(ErrorCode::kNotFound,
+                   "map '{}' has no survey image '{}'; `cairn export` lists their names", map.head().name,
+                   name);
 }
 
 }  // namespace cairn

@@ -1,7 +1,7 @@
 -- appearance.db: the appearance graph and the images kept of it, output of link_appearance.  Page:
 -- schemas/appearance.md.  Blobs are arrays of little-endian 32-bit integers.
 PRAGMA application_id = 0x63726167;  -- 'crag'
-PRAGMA user_version = 1;
+PRAGMA user_version = 2;
 
 CREATE TABLE appearance (
   num_nodes          INTEGER NOT NULL,
@@ -25,5 +25,13 @@ CREATE TABLE nodes (
   role          INTEGER NOT NULL,       -- 0 dropped, 1 kept: dominating, 2 kept: restores a cycle
   images        BLOB NOT NULL,          -- image_id, ascending
   neighbours    BLOB NOT NULL,          -- nodes of larger index that are linked to this one, ascending
-  num_inliers   BLOB NOT NULL           -- verified inliers of these links
+  num_inliers   BLOB NOT NULL,          -- verified inliers of these links
+  entropy       INTEGER                 -- of its look-alikes' distribution, thousandths of a nat; NULL: not computed
 );
+
+CREATE TABLE confusable (               -- nodes that look alike and lie apart
+  node1 INTEGER NOT NULL,
+  node2 INTEGER NOT NULL,               -- > node1
+  score INTEGER NOT NULL,               -- thousandths, 1 to 1000
+  PRIMARY KEY (node1, node2)
+) WITHOUT ROWID;

@@ -14,6 +14,13 @@ CREATE TABLE self_test_regions (
   p90_error_deg    REAL
 );
 
+-- How well the places of a region are told from others by looking; regions without images of the appearance graph have no
+-- row.
+CREATE TABLE region_entropies (
+  region_idx INTEGER PRIMARY KEY,
+  entropy    REAL NOT NULL           -- mean of the images' at its stations, nats
+);
+
 -- What the stages dropped, by reason; only reasons that occurred.
 CREATE TABLE drop_reasons (
   reason_id   INTEGER PRIMARY KEY,

@@ -173,7 +173,7 @@ void AddAppearance(const Appearance& appearance, MapRows* rows) {
     image_index[rows->images[i].image_id] = static_cast<int32_t>(i);
   std::vector<int32_t> row_of_node;
   for (const AppearanceNode& node : appearance.nodes) {
-    MapAppearanceNode row{.is_kept = node.role != NodeRole::kDropped};
+    MapAppearanceNode row{.is_kept = node.role != NodeRole::kDropped, .entropy = node.entropy};
     for (const ImageId image_id : node.images) {
       const auto found = image_index.find(image_id);
       if (found != image_index.end()) row.images.push_back(found->second);
@@ -186,33 +186,64 @@ void AddAppearance(const Appearance& appearance, MapRows* rows) {
     if (row1 < 0 || row2 < 0 || !(rows->appearance[row1].is_kept || rows->appearance[row2].is_kept)) continue;
     rows->appearance[row1].links.push_back({row2, link.num_inliers});
   }
+  for (const ConfusablePair& pair : appearance.confusable) {
+    const int32_t row1 = row_of_node[pair.node1], row2 = row_of_node[pair.node2];
+    if (row1 >= 0 && row2 >= 0) rows->appearance[row1].look_alikes.push_back({row2, pair.score});
+  }
+}
+
+// The mean of the entropies of the images at each region's stations.
+void AddRegionEntropies(MapRows* rows) {
+  std::vector<std::vector<double>> at_station(rows->stations.size());
+  for (const MapAppearanceNode& node : rows->appearance) {
+    if (!node.entropy) return;
+    for (const int32_t image : node.images) {
+      if (rows->images[image].station >= 0) at_station[rows->images[image].station].push_back(*node.entropy);
+    }
+  }
+  for (size_t region = 0; region < rows->regions.size(); ++region) {
+    double sum = 0;
+    int num_images = 0;
+    for (const StationIdx station : rows->regions[region].stations) {
+      for (const double entropy : at_station[station]) sum += entropy;
+      num_images += static_cast<int>(at_station[station].size());
+    }
+    if (num_images > 0)
+      rows->findings.region_entropies.push_back({static_cast<RegionIdx>(region), sum / num_images});
+  }
 }
 
 }  // namespace
 
 OptionTable DescribeOptions(EmitMapOptions* options) {
-  return {{.name = "landmarks",
-           .value = &options->landmarks,
-           .help = "classes that become landmarks: those that regions keep, or all",
-           .choices = {"regions", "all"}},
-          {.name = "descriptor_bits",
-           .value = &options->descriptor_bits,
-           .help = "bits in which a value of a landmark's descriptor is stored; 8: as it is",
-           .min = 1,
-           .max = 8},
-          {.name = "min_num_landmarks_for_words",
-           .value = &options->min_num_landmarks_for_words,
-           .help = "least landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
-           .min = 0},
-          {.name = "landmarks_per_word",
-           .value = &options->landmarks_per_word,
-           .help = "most landmarks of a word that could be split",
-           .min = 1},
-          {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1},
-          {.name = "documents",
-           .value = &options->documents,
-           .help = "survey images that retrieval finds: all, or those that link_appearance keeps",
-           .choices = {"all", "kept"}}};
+  return {
+      {.name = "landmarks",
+       .value = &options->landmarks,
+       .help = "classes that become landmarks: those that regions keep, or all",
+       .choices = {"regions", "all"}},
+      {.name = "descriptor_bits",
+       .value = &options->descriptor_bits,
+       .help = "bits in which a value of a landmark's descriptor is stored; 8: as it is",
+       .min = 1,
+       .max = 8},
+      {.name = "min_num_landmarks_for_words",
+       .value = &options->min_num_landmarks_for_words,
+       .help = "least landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
+       .min = 0},
+      {.name = "landmarks_per_word",
+       .value = &options->landmarks_per_word,
+       .help = "most landmarks of a word that could be split",
+       .min = 1},
+      {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1},
+      {.name = "words",
+       .value = &options->words,
+       .help = "what words count: landmarks that an image sees, or all features of survey images (a larger "
+               "map that knows places better)",
+       .choices = {"landmarks", "survey"}},
+      {.name = "documents",
+       .value = &options->documents,
+       .help = "survey images that retrieval finds: all, or those that link_appearance keeps",
+       .choices = {"all", "kept"}}};
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
@@ -266,8 +297,16 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     rows.regions.push_back(std::move(row));
   }
   QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
+  AddRegionEntropies(&rows);
   const auto num_landmarks = static_cast<double>(rows.landmarks.size());
-  if (num_landmarks >= options.min_num_landmarks_for_words && !vocabulary.nodes.empty()) {
+  if (options.words == "survey" && options.documents == "kept") {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: words = \"survey\" with documents = \"kept\"; one of them must be the default");
+  }
+  if (options.words == "survey") {
+    rows.vocabulary = SurveyVocabulary(vocabulary, rows.images, is_document);
+  } else if (num_landmarks >= options.min_num_landmarks_for_words && !vocabulary.nodes.empty()) {
     rows.vocabulary =
         CutVocabulary(vocabulary, rows.descriptors, rows.images, is_document,
                       std::max(options.landmarks_per_word, num_landmarks / options.max_num_words));

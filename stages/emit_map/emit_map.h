@@ -30,6 +30,10 @@ struct EmitMapOptions {
   // Most landmarks of a word that could be split, and most words.  REQUIRES: >= 1
   double landmarks_per_word = 40;
   int max_num_words = 65536;
+  // What a word's inverted file counts: "landmarks" that an image sees, or, "survey", all features of survey
+  // images [Mariottini11 §IV]: a larger map that knows places better, for robots that find out where they are
+  // without a fix (runtime/place_model.h).
+  std::string words = "landmarks";
   // Survey images that retrieval finds: "all", or "kept": those of the connected dominating set alone.
   std::string documents = "all";
 };
@@ -37,11 +41,11 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 
 // Landmarks are ordered by the first region that has them (of no region: last), then by the first image that
 // sees them, then by class: a region's landmarks lie together.  `vocabulary` is a tree over the survey's
-// features; its inverted files are not used.  `appearance` may be null: the map then leads from no image to
-// another. Its images that `classes` lacks are left out.  The result has no name, seed, options or hashes:
-// those are the caller's. Pure.  O(observations). Errors: InvalidArgument (inputs that do not belong
-// together: a region's feature, a feature's class or a station's image does not exist; documents = "kept"
-// without kept images), NoData (no class is kept).
+// features, with its inverted files for words = "survey".  `appearance` may be null: the map then leads from
+// no image to another. Its images that `classes` lacks are left out.  The result has no name, seed, options
+// or hashes: those are the caller's. Pure.  O(observations). Errors: InvalidArgument (inputs that do not
+// belong together: a region's feature, a feature's class or a station's image does not exist; documents =
+// "kept" without kept images), NoData (no class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr);

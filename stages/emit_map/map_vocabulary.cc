@@ -53,4 +53,26 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
   return cut;
 }
 
+Vocabulary SurveyVocabulary(const Vocabulary& vocabulary, const std::vector<MapImage>& images,
+                            const std::vector<char>& is_document) {
+  Vocabulary survey = vocabulary;
+  survey.document_ids.clear();
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (is_document[i]) survey.document_ids.push_back(images[i].image_id);
+  }
+  std::vector<int32_t> new_of_old(vocabulary.document_ids.size(), -1);
+  for (size_t old = 0; old < vocabulary.document_ids.size(); ++old) {
+    const auto found = std::lower_bound(survey.document_ids.begin(), survey.document_ids.end(),
+                                        vocabulary.document_ids[old]);
+    if (found != survey.document_ids.end() && *found == vocabulary.document_ids[old])
+      new_of_old[old] = static_cast<int32_t>(found - survey.document_ids.begin());
+  }
+  for (std::vector<Posting>& postings : survey.inverted_files) {
+    for (Posting& posting : postings) posting.document = new_of_old[posting.document];
+    std::erase_if(postings, [](const Posting& posting) { return posting.document < 0; });
+  }
+  WeightVocabulary(&survey);
+  return survey;
+}
+
 }  // namespace cairn

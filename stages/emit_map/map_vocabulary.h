@@ -16,4 +16,9 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
                          const std::vector<MapImage>& images, const std::vector<char>& is_document,
                          double landmarks_per_word);
 
+// `vocabulary` with the images that are documents of the map [Mariottini11 §IV], the inverted files as they
+// are.
+Vocabulary SurveyVocabulary(const Vocabulary& vocabulary, const std::vector<MapImage>& images,
+                            const std::vector<char>& is_document);
+
 }  // namespace cairn

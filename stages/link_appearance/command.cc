@@ -17,6 +17,7 @@ constexpr int64_t kMemoryPerPair = 96;
 
 struct Arguments {
   std::string matches;
+  std::string vocabulary;
   std::string capture;
   std::string output;
   std::string svg;
@@ -50,14 +51,19 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images,
                          ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
   if (capture) images = SurveyImagesOf(*capture, images);
-  CAIRN_ASSIGN_OR_RETURN(const LinkAppearanceResult result,
+  CAIRN_ASSIGN_OR_RETURN(LinkAppearanceResult result,
                          LinkAppearance(images, capture ? &*capture : nullptr, arguments.options,
                                         environment.seed, environment.progress));
   const Appearance& appearance = result.appearance;
+  const std::vector<std::optional<FloorPose>> places =
+      capture ? NodePlaces(appearance, images.images, *capture) : std::vector<std::optional<FloorPose>>();
+  if (!arguments.vocabulary.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary));
+    CAIRN_RETURN_IF_ERROR(FindAmbiguity(vocabulary, places, arguments.options.ambiguity,
+                                        environment.num_threads, environment.progress, &result.appearance));
+  }
   CAIRN_RETURN_IF_ERROR(WriteAppearance(appearance, arguments.output));
   if (!arguments.svg.empty()) {
-    const std::vector<std::optional<FloorPose>> places =
-        capture ? NodePlaces(appearance, images.images, *capture) : std::vector<std::optional<FloorPose>>();
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
         arguments.svg, DrawAppearance(appearance, NodeNames(appearance, images.images), places)));
   }
@@ -86,6 +92,9 @@ Command LinkAppearanceCommand() {
             app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
                 ->required()
                 ->type_name("matches.db");
+            app.add_option("vocabulary", arguments->vocabulary,
+                           "visual words, to tell which places look alike [not told]")
+                ->type_name("vocabulary.db");
             app.add_option("--capture", arguments->capture,
                            "Capture folder: only images of its survey count, and its poses are there for "
                            "fuse = place and "

@@ -48,6 +48,10 @@ Status CheckTogether(const LinkAppearanceOptions& options) {
                      "option max_detour_links = 1: expected 0 (no cycles are restored) or at least 2, as two "
                      "kept neighbours of one image are linked by at least one link");
   }
+  if (options.algorithm == "all" && options.num_kept > 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option algorithm = 'all': num_kept must be 0; choose 'greedy' for a given size");
+  }
   if (options.algorithm == "online" &&
       (options.num_dominators > 1 || options.strong_num_inliers > 1 || options.num_kept > 0)) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -90,7 +94,7 @@ void BoundAll(const Domination& domination, const LinkAppearanceOptions& options
       if (appearance->nodes[nodes[i]].role == NodeRole::kDominating) kept.push_back(static_cast<NodeIdx>(i));
     }
     // With a size given the set may not dominate, or hold more than it takes: a set that does is bounded.
-    const bool is_chosen = options.num_kept == 0;
+    const bool is_chosen = options.num_kept == 0 && options.algorithm != "all";
     if (!is_chosen) kept = GreedyDominatingSet(part);
     const size_t size_before = kept.size();
     appearance->lower_bounds.push_back(BoundComponent(graph, options, progress, &kept));
@@ -140,7 +144,7 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
 
 OptionTable DescribeOptions(LinkAppearanceOptions* options) {
   ConnectedBoundOptions& bound = options->bound;
-  return {
+  OptionTable table = {
       {"min_num_inliers", &options->min_num_inliers, "fewest verified inliers of a link", 1},
       {.name = "fuse",
        .value = &options->fuse,
@@ -151,8 +155,10 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
        1e-6},
       {.name = "algorithm",
        .value = &options->algorithm,
-       .help = "how nodes are chosen: greedy [Booij06], or online: one by one in the order of their numbers",
-       .choices = {"greedy", "online"}},
+       .help =
+           "how nodes are chosen: greedy [Booij06], online: one by one in the order of their numbers, all: "
+           "every node is kept",
+       .choices = {"greedy", "online", "all"}},
       {"max_num_dropped", &options->max_num_dropped, "online: most kept nodes that an arrival drops", 0},
       {"num_dominators", &options->num_dominators,
        "how many kept neighbours every other node has, where it has that many neighbours [Booij06: 1]", 1},
@@ -176,10 +182,17 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
       {"max_num_cut_rounds", &bound.max_num_cut_rounds, "program: most rounds of cuts before branching", 0},
       {"max_num_branches", &bound.max_num_branches, "program: most nodes of the branching tree; 0: none", 0},
   };
+  const OptionTable ambiguity = DescribeOptions(&options->ambiguity);
+  table.insert(table.end(), ambiguity.begin(), ambiguity.end());
+  return table;
 }
 
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
                                  uint64_t seed, int* num_greedy, Progress* progress) {
+  if (options.algorithm == "all") {
+    if (num_greedy) *num_greedy = graph.num_nodes();
+    return std::vector<NodeRole>(graph.num_nodes(), NodeRole::kDominating);
+  }
   const Domination domination(graph, DominationOf(options));
   std::vector<NodeIdx> kept = options.algorithm == "online" ? ArriveOneByOne(graph, options.max_num_dropped)
                                                             : GreedyDominatingSet(domination);

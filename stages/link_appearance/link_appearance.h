@@ -11,6 +11,7 @@
 #include "core/options.h"
 #include "core/progress.h"
 #include "stages/link_appearance/connected_bound.h"
+#include "stages/link_appearance/find_ambiguity.h"
 #include "stages/link_appearance/fuse_images.h"
 #include "stages/link_appearance/improve_dominating_set.h"
 
@@ -24,8 +25,11 @@ namespace cairn {
 //   the greedy algorithm       greedy_dominating_set.h  §IV-B
 //   restoring cycles           restore_cycles.h     §IV-C
 //   leave-one-out              check_appearance.h   §V
-// and what it asks for: m-fold domination and weighted links (domination.h), a target size, images one by one
-// (online_dominating_set.h), local search (improve_dominating_set.h), and a bound (connected_bound.h).
+// and of [Mariottini11 §V] where a vocabulary is given:
+//   entropy, look-alikes       find_ambiguity.h     eq. 1
+// and what the former asks for: m-fold domination and weighted links (domination.h), a target size, images
+// one by one (online_dominating_set.h), local search (improve_dominating_set.h), and a bound
+// (connected_bound.h).
 struct LinkAppearanceOptions {
   // Fewest verified inliers of a link.  REQUIRES: >= 1
   int min_num_inliers = 15;
@@ -33,7 +37,8 @@ struct LinkAppearanceOptions {
   std::string fuse = "none";
   // Images within this distance were taken at one place.  REQUIRES: > 0
   double same_place_m = 0.1;
-  // How nodes are chosen: "greedy" [Booij06], or "online": one by one in the order of their numbers.
+  // How nodes are chosen: "greedy" [Booij06]; "online": one by one in the order of their numbers; "all":
+  // every node is kept, for robots that are led over all images.
   std::string algorithm = "greedy";
   // online: most kept nodes that an arrival drops.  REQUIRES: >= 0
   int max_num_dropped = 4;
@@ -48,6 +53,8 @@ struct LinkAppearanceOptions {
   // c of restore_cycles.h, for sets without given size; 0: no cycles are restored.  REQUIRES: >= 0, not 1
   int max_detour_links = 0;
   ConnectedBoundOptions bound;
+  // find_ambiguity.h
+  AmbiguityOptions ambiguity;
 };
 OptionTable DescribeOptions(LinkAppearanceOptions* options);
 

@@ -91,9 +91,39 @@ TEST(EmitMap, AppearanceKeepsLinksOfKeptImagesAndLeavesOutOthers) {
   // Image 3 has no pose; the others are images 0 to 2 of the map.
   using Link = MapAppearanceNode::Link;
   ASSERT_EQ(rows.appearance.size(), 3u);
-  EXPECT_EQ(rows.appearance[0], (MapAppearanceNode{{0}, false, {Link{1, 20}}}));
-  EXPECT_EQ(rows.appearance[1], (MapAppearanceNode{{1}, true, {Link{2, 30}}}));
-  EXPECT_EQ(rows.appearance[2], (MapAppearanceNode{{2}, false, {}}));
+  EXPECT_EQ(rows.appearance[0], (MapAppearanceNode{{0}, false, {Link{1, 20}}, 0.25, {{2, 0.5}}}));
+  EXPECT_EQ(rows.appearance[1], (MapAppearanceNode{{1}, true, {Link{2, 30}}, 0.5, {}}));
+  EXPECT_EQ(rows.appearance[2], (MapAppearanceNode{{2}, false, {}, 1, {}}));
+}
+
+TEST(EmitMap, RegionsHaveTheMeanEntropyOfTheirStationsImages) {
+  EmitExample example = MakeEmitExample();
+  // Stations 0, 1, 2 have images 1, 2, 4 with 0.25, 0.5 and 1; the regions stations 1, 2 and 0, 1.
+  EXPECT_THAT(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
+                      &example.appearance)
+                  ->findings.region_entropies,
+              ElementsAre(RegionEntropy{0, 0.75}, RegionEntropy{1, 0.375}));
+  for (AppearanceNode& node : example.appearance.nodes) node.entropy = std::nullopt;
+  example.appearance.confusable.clear();
+  EXPECT_TRUE(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
+                      &example.appearance)
+                  ->findings.region_entropies.empty());
+}
+
+TEST(EmitMap, SurveyWordsCountAllFeaturesOfTheMapsImages) {
+  const EmitExample example = MakeEmitExample();
+  const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                {.words = "survey"}, &example.appearance);
+  // Image 3 is not in the map; the documents are images 1, 2, 4.
+  EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(1, 2, 4));
+  EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 2}));
+  EXPECT_THAT(rows.vocabulary.inverted_files[1], ElementsAre(Posting{2, 1}));
+  EXPECT_EQ(rows.vocabulary.nodes.size(), 3u);
+  EXPECT_EQ(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                    {.words = "survey", .documents = "kept"}, &example.appearance)
+                .error()
+                .code,
+            ErrorCode::kInvalidArgument);
 }
 
 TEST(EmitMap, KeptDocumentsAloneHavePostings) {

@@ -71,6 +71,8 @@ inline EmitExample MakeEmitExample() {
   example.appearance.nodes[1].role = NodeRole::kDominating;
   example.appearance.graph = AppearanceGraph(4, {{0, 1, 20}, {1, 3, 30}, {2, 3, 40}});
   example.appearance.lower_bounds = {1};
+  for (int i = 0; i < 4; ++i) example.appearance.nodes[i].entropy = 0.25 * (i + 1);
+  example.appearance.confusable = {{0, 2, 0.75}, {0, 3, 0.5}};
 
   Vocabulary& vocabulary = example.vocabulary;
   vocabulary.branching = 2;

@@ -117,6 +117,9 @@ struct EncodedBlocks {
       case BlockKind::kAppearance:
         CAIRN_RETURN_IF_ERROR(DecodeAppearanceBlock(changed, entry, directory, "block"));
         return Ok();
+      case BlockKind::kAmbiguity:
+        CAIRN_RETURN_IF_ERROR(DecodeAmbiguityBlock(changed, entry, directory, "block"));
+        return Ok();
     }
     return Ok();
   }
@@ -124,7 +127,7 @@ struct EncodedBlocks {
 
 TEST(MapBlocks, EveryTruncationIsRefused) {
   const EncodedBlocks blocks;
-  ASSERT_EQ(blocks.bytes.size(), 8u);
+  ASSERT_EQ(blocks.bytes.size(), 9u);
   for (size_t block = 0; block < blocks.bytes.size(); ++block) {
     const std::string& bytes = blocks.bytes[block];
     EXPECT_TRUE(blocks.Decode(block, bytes).ok());
@@ -177,6 +180,25 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
                  node.links = {{1, 0}};
                }}) {
         AppearanceBlock nodes = layout.MakeAppearanceBlock(entry);
+        change(nodes.nodes[0]);
+        EXPECT_FALSE(blocks.Decode(i, EncodeBlock(nodes)).ok());
+      }
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kAmbiguity)) {
+      for (const auto& change : std::vector<std::function<void(AmbiguityBlock::Node&)>>{
+               [](AmbiguityBlock::Node& node) { node.entropy = 65; },
+               [](AmbiguityBlock::Node& node) {
+                 node.look_alikes = {{3, 0.5}};
+               },
+               [](AmbiguityBlock::Node& node) {
+                 node.look_alikes = {{0, 0.5}};
+               },
+               [](AmbiguityBlock::Node& node) {
+                 node.look_alikes = {{1, 0}};
+               },
+               [](AmbiguityBlock::Node& node) {
+                 node.look_alikes = {{1, 1.001}};
+               }}) {
+        AmbiguityBlock nodes = layout.MakeAmbiguityBlock(entry);
         change(nodes.nodes[0]);
         EXPECT_FALSE(blocks.Decode(i, EncodeBlock(nodes)).ok());
       }

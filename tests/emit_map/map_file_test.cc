@@ -179,6 +179,12 @@ TEST(MapFile, SparseMapsReadBackAsTheyWere) {
   EXPECT_EQ(read->vocabulary.inverted_files, rows.vocabulary.inverted_files);
   EXPECT_EQ(read->vocabulary.document_norms, rows.vocabulary.document_norms);
 
+  MapRows wrong = rows;
+  wrong.appearance[1].entropy = std::nullopt;
+  EXPECT_FALSE(WriteMapRows(wrong, MapPath("sparse.cairn")).ok()) << "a node without entropy";
+  wrong = rows;
+  wrong.appearance[0].look_alikes = {{0, 0.5}};
+  EXPECT_FALSE(WriteMapRows(wrong, MapPath("sparse.cairn")).ok()) << "a node like itself";
   rows.appearance[0].images = {1};
   EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "image 1 is of two nodes";
   rows.appearance.clear();

@@ -114,6 +114,12 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
       }
       break;
     }
+    case BlockKind::kAmbiguity: {
+      const auto nodes = DecodeAmbiguityBlock(bytes, entry, directory, "block");
+      if (nodes.ok() && !DecodeAmbiguityBlock(EncodeBlock(*nodes), entry, directory, "block").ok())
+        __builtin_trap();
+      break;
+    }
     case BlockKind::kAppearance: {
       const auto nodes = DecodeAppearanceBlock(bytes, entry, directory, "block");
       if (nodes.ok() && !DecodeAppearanceBlock(EncodeBlock(*nodes), entry, directory, "block").ok())

@@ -1,0 +1,170 @@
+#include "stages/link_appearance/find_ambiguity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "core/parallel.h"
+
+namespace cairn {
+namespace {
+
+// As stored: the last bits of sums may differ between machines.
+double ToThousandths(double value) { return std::round(value * 1000) / 1000; }
+
+// A node that looks like another one.
+struct LookAlike {
+  NodeIdx node = 0;
+  double score = 0;
+};
+
+// What a node's images, as queries, get.
+struct NodeScores {
+  double entropy = 0;
+  double best_other = 0;  // score of the best look-alike, itself apart
+  std::vector<LookAlike> apart;
+};
+
+class AmbiguitySearch {
+ public:
+  AmbiguitySearch(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
+                  const AmbiguityOptions& options, const Appearance& appearance)
+      : vocabulary_(vocabulary),
+        places_(places),
+        options_(options),
+        appearance_(appearance),
+        bags_(DocumentWords(vocabulary)),
+        node_of_document_(vocabulary.document_ids.size(), -1),
+        documents_(appearance.nodes.size()) {
+    std::unordered_map<ImageId, NodeIdx> node_of_image;
+    for (size_t node = 0; node < appearance.nodes.size(); ++node) {
+      for (const ImageId image : appearance.nodes[node].images)
+        node_of_image[image] = static_cast<NodeIdx>(node);
+    }
+    for (size_t document = 0; document < vocabulary.document_ids.size(); ++document) {
+      const auto found = node_of_image.find(vocabulary.document_ids[document]);
+      if (found == node_of_image.end()) continue;
+      node_of_document_[document] = found->second;
+      documents_[found->second].push_back(static_cast<int32_t>(document));
+    }
+  }
+
+  NodeScores Score(NodeIdx node) const {
+    const size_t num_nodes = appearance_.nodes.size();
+    std::vector<double> probabilities(num_nodes, 0.0), best(num_nodes, 0.0);
+    for (const int32_t document : documents_[node]) {
+      std::vector<double> scores = ScoreDocuments(vocabulary_, bags_[document]);
+      for (size_t i = 0; i < scores.size(); ++i) {
+        if (node_of_document_[i] < 0) scores[i] = 0;  // of no node: no survey image
+      }
+      const std::vector<double> p = ProbabilitiesOfScores(scores, options_.score_exponent);
+      for (size_t i = 0; i < scores.size(); ++i) {
+        const NodeIdx other = node_of_document_[i];
+        if (other < 0) continue;
+        probabilities[other] += p[i] / static_cast<double>(documents_[node].size());
+        best[other] = std::max(best[other], scores[i]);
+      }
+    }
+    double sum = 0;  // less than 1 where other documents share nothing either
+    for (const double p : probabilities) sum += p;
+    for (double& p : probabilities) p = sum > 0 ? p / sum : 1.0 / static_cast<double>(num_nodes);
+    NodeScores result{.entropy = Entropy(probabilities)};
+    best[node] = 0;
+    result.best_other = best.empty() ? 0 : *std::max_element(best.begin(), best.end());
+    result.apart = LookAlikesApart(node, best, options_.confusable_score_ratio * result.best_other);
+    return result;
+  }
+
+ private:
+  bool AreApart(NodeIdx a, NodeIdx b) const {
+    if (places_.empty() || !places_[a] || !places_[b]) return false;
+    return (places_[a]->position - places_[b]->position).norm() >= options_.confusable_distance_m &&
+           !appearance_.graph.AreLinked(a, b);
+  }
+
+  std::vector<LookAlike> LookAlikesApart(NodeIdx node, const std::vector<double>& scores,
+                                         double min_score) const {
+    std::vector<LookAlike> apart;
+    if (min_score <= 0) return apart;
+    for (size_t other = 0; other < scores.size(); ++other) {
+      if (scores[other] < min_score || !AreApart(node, static_cast<NodeIdx>(other))) continue;
+      apart.push_back({static_cast<NodeIdx>(other), scores[other]});
+    }
+    std::stable_sort(apart.begin(), apart.end(),
+                     [](const LookAlike& a, const LookAlike& b) { return a.score > b.score; });
+    if (apart.size() > static_cast<size_t>(options_.max_num_confusable))
+      apart.resize(options_.max_num_confusable);
+    return apart;
+  }
+
+  const Vocabulary& vocabulary_;
+  const std::vector<std::optional<FloorPose>>& places_;
+  const AmbiguityOptions& options_;
+  const Appearance& appearance_;
+  std::vector<BagOfWords> bags_;
+  std::vector<NodeIdx> node_of_document_;        // -1: of none
+  std::vector<std::vector<int32_t>> documents_;  // per node
+};
+
+}  // namespace
+
+OptionTable DescribeOptions(AmbiguityOptions* options) {
+  return {
+      {.name = "score_exponent",
+       .value = &options->score_exponent,
+       .help = "probabilities go with scores to this power; more: the best-looking place counts for more",
+       .min = 1e-3,
+       .max = 100},
+      {.name = "confusable_score_ratio",
+       .value = &options->confusable_score_ratio,
+       .help = "places are confusable when each scores at least this part of the other's best look-alike",
+       .min = 1e-3,
+       .max = 1},
+      {.name = "confusable_distance_m",
+       .value = &options->confusable_distance_m,
+       .help = "and when they lie at least so far apart, m",
+       .min = 1e-6},
+      {.name = "max_num_confusable",
+       .value = &options->max_num_confusable,
+       .help = "most confusable places of one",
+       .min = 0},
+  };
+}
+
+Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
+                     const AmbiguityOptions& options, int num_threads, Progress* progress,
+                     Appearance* appearance) {
+  AmbiguityOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  const AmbiguitySearch search(vocabulary, places, options, *appearance);
+  const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
+  std::vector<NodeScores> scores(num_nodes);
+  if (progress) progress->Begin("tell places apart", num_nodes, "nodes");
+  ParallelFor(num_nodes, num_threads, [&](int64_t node) {
+    if (progress && progress->Cancelled()) return;
+    scores[node] = search.Score(static_cast<NodeIdx>(node));
+    if (progress) progress->Advance();
+  });
+  if (progress) progress->End();
+  if (progress && progress->Cancelled())
+    return MakeError(ErrorCode::kCancelled, "telling places apart was stopped");
+  appearance->confusable.clear();
+  for (NodeIdx node = 0; node < num_nodes; ++node) {
+    appearance->nodes[node].entropy = ToThousandths(scores[node].entropy);
+    for (const LookAlike& other : scores[node].apart) {
+      const double score = ToThousandths(other.score);
+      const std::vector<LookAlike>& back = scores[other.node].apart;
+      const bool is_mutual = std::any_of(
+          back.begin(), back.end(), [&](const LookAlike& look_alike) { return look_alike.node == node; });
+      if (is_mutual && node < other.node && score > 0)
+        appearance->confusable.push_back({node, other.node, score});
+    }
+  }
+  std::sort(appearance->confusable.begin(), appearance->confusable.end(),
+            [](const ConfusablePair& a, const ConfusablePair& b) {
+              return std::pair(a.node1, a.node2) < std::pair(b.node1, b.node2);
+            });
+  return Ok();
+}
+
+}  // namespace cairn

@@ -1,0 +1,130 @@
+#include "stages/link_appearance/find_ambiguity.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/link_appearance/graphs.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// Images 1, 2, ... with these words, one of each.
+Vocabulary VocabularyOf(const std::vector<std::vector<WordIdx>>& words_of_image, int num_words) {
+  Vocabulary vocabulary;
+  vocabulary.inverted_files.resize(num_words);
+  for (size_t i = 0; i < words_of_image.size(); ++i) {
+    vocabulary.document_ids.push_back(static_cast<ImageId>(i + 1));
+    for (const WordIdx word : words_of_image[i])
+      vocabulary.inverted_files[word].push_back({static_cast<int32_t>(i), 1});
+  }
+  WeightVocabulary(&vocabulary);
+  return vocabulary;
+}
+
+Appearance NodesWithAnImageEach(int num_nodes, const std::vector<std::pair<NodeIdx, NodeIdx>>& links) {
+  Appearance appearance;
+  for (int i = 0; i < num_nodes; ++i) appearance.nodes.push_back({.images = {static_cast<ImageId>(i + 1)}});
+  appearance.graph = GraphOf(num_nodes, links);
+  appearance.lower_bounds = {0};
+  return appearance;
+}
+
+std::vector<std::optional<FloorPose>> PlacesAt(const std::vector<double>& xs) {
+  std::vector<std::optional<FloorPose>> places;
+  for (const double x : xs) places.push_back(FloorPose{{x, 0}, 0});
+  return places;
+}
+
+// Images 0 and 2 are twins; 1 is like no other; 3 shares a word with 1.
+const std::vector<std::vector<WordIdx>> kTwins = {{0, 1, 2}, {3, 4, 5, 6}, {0, 1, 2}, {6, 7, 8, 9}};
+
+TEST(FindAmbiguity, TwinsHaveTheEntropyOfTwoPlacesAndAreConfusable) {
+  Appearance appearance = NodesWithAnImageEach(4, {{0, 1}, {1, 2}, {2, 3}});
+  ASSERT_TRUE(
+      FindAmbiguity(VocabularyOf(kTwins, 10), PlacesAt({0, 5, 10, 15}), {}, 1, nullptr, &appearance).ok());
+  EXPECT_EQ(appearance.nodes[0].entropy, 0.693);  // ln 2
+  EXPECT_EQ(appearance.nodes[2].entropy, 0.693);
+  EXPECT_LT(*appearance.nodes[1].entropy, 0.01);
+  EXPECT_EQ(appearance.confusable[0], (ConfusablePair{0, 2, 1}));
+}
+
+TEST(FindAmbiguity, WhatIsNearLinkedOrWithoutPlaceIsNotConfusable) {
+  const auto pairs = [](const std::vector<std::optional<FloorPose>>& places, bool linked) {
+    Appearance appearance = NodesWithAnImageEach(4, {{0, 1}, {linked ? 0 : 1, 2}, {1, 3}});
+    EXPECT_TRUE(FindAmbiguity(VocabularyOf(kTwins, 10), places, {}, 1, nullptr, &appearance).ok());
+    return appearance.confusable;
+  };
+  EXPECT_THAT(pairs(PlacesAt({0, 5, 2.9, 5.1}), false), IsEmpty());
+  EXPECT_THAT(pairs(PlacesAt({0, 5, 3, 5.1}), false), ElementsAre(ConfusablePair{0, 2, 1}));
+  EXPECT_THAT(pairs(PlacesAt({0, 5, 3, 5.1}), true), IsEmpty());
+  EXPECT_THAT(pairs({}, false), IsEmpty());
+  EXPECT_THAT(pairs({std::nullopt, std::nullopt, std::nullopt, std::nullopt}, false), IsEmpty());
+}
+
+TEST(FindAmbiguity, AnImageWithoutWordsCouldBeAnywhere) {
+  std::vector<std::vector<WordIdx>> words = kTwins;
+  words[1].clear();
+  Appearance appearance = NodesWithAnImageEach(5, {{0, 1}});  // image 5 is no document
+  ASSERT_TRUE(
+      FindAmbiguity(VocabularyOf(words, 10), PlacesAt({0, 5, 10, 15, 20}), {}, 1, nullptr, &appearance).ok());
+  EXPECT_NEAR(*appearance.nodes[4].entropy, std::log(5.0), 1e-3);
+  EXPECT_NEAR(*appearance.nodes[1].entropy, std::log(4.0), 1e-3);  // of the documents
+}
+
+TEST(FindAmbiguity, FusedImagesAreOnePlace) {
+  Appearance appearance;
+  appearance.nodes = {{.images = {1, 3}}, {.images = {2}}, {.images = {4}}};  // the twins stand at one place
+  appearance.graph = GraphOf(3, {{0, 1}, {1, 2}});
+  ASSERT_TRUE(
+      FindAmbiguity(VocabularyOf(kTwins, 10), PlacesAt({0, 5, 10}), {}, 1, nullptr, &appearance).ok());
+  EXPECT_EQ(appearance.nodes[0].entropy, 0);
+  EXPECT_THAT(appearance.confusable, IsEmpty());
+}
+
+TEST(FindAmbiguity, IsTheSameForAnyNumberOfThreadsAndSurvivesTheFile) {
+  std::vector<std::vector<WordIdx>> words;
+  Random random(3);
+  for (int i = 0; i < 60; ++i) {
+    for (WordIdx word = 0; word < 100; ++word) {
+      if (random.Uniform() < 0.2) words.resize(i + 1), words[i].push_back(word);
+    }
+  }
+  std::vector<double> xs(60);
+  for (int i = 0; i < 60; ++i) xs[i] = 2 * i;
+  const auto find = [&](int num_threads) {
+    Appearance appearance = NodesWithAnImageEach(60, {{0, 1}, {3, 40}});
+    EXPECT_TRUE(FindAmbiguity(VocabularyOf(words, 100), PlacesAt(xs), {.confusable_score_ratio = 0.9},
+                              num_threads, nullptr, &appearance)
+                    .ok());
+    return appearance;
+  };
+  const Appearance one = find(1), four = find(4);
+  EXPECT_FALSE(one.confusable.empty());
+  EXPECT_EQ(one.nodes, four.nodes);
+  EXPECT_EQ(one.confusable, four.confusable);
+  const std::string path = testing::TempDir() + "ambiguity.db";
+  ASSERT_TRUE(WriteAppearance(one, path).ok());
+  const Result<Appearance> read = ReadAppearance(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->nodes, one.nodes);
+  EXPECT_EQ(read->confusable, one.confusable);
+}
+
+TEST(FindAmbiguity, OptionsThatCannotBeMeantAreErrors) {
+  Appearance appearance = NodesWithAnImageEach(4, {});
+  for (const AmbiguityOptions& options :
+       {AmbiguityOptions{.score_exponent = 0}, AmbiguityOptions{.confusable_score_ratio = 1.5},
+        AmbiguityOptions{.confusable_distance_m = std::nan("")},
+        AmbiguityOptions{.max_num_confusable = -1}}) {
+    EXPECT_EQ(FindAmbiguity(VocabularyOf(kTwins, 10), {}, options, 1, nullptr, &appearance).error().code,
+              ErrorCode::kInvalidArgument);
+  }
+}
+
+}  // namespace
+}  // namespace cairn
