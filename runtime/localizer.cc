@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -108,6 +109,10 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
        .help = "landmarks to match first: of the candidates' regions or of the candidate images; auto: "
                "regions, unless the map keeps landmarks that no region has",
        .choices = {"auto", "regions", "images"}});
+  table.push_back(
+      {.name = "exclude_look_alikes",
+       .value = &options->exclude_look_alikes,
+       .help = "withhold a fix as long as a place that looks alike explains the image nearly as well"});
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});
@@ -176,12 +181,51 @@ Result<Localization> Localizer::LocalizeQuery(const Query& query,
     best = Better(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
+  if (options_.exclude_look_alikes && best.has_fix()) {
+    CAIRN_ASSIGN_OR_RETURN(best, ExcludeLookAlikes(query, prior, std::move(best)));
+  }
   best.num_features = static_cast<int>(query.features.keypoints.size());
   best.candidates = std::move(candidate_ids);
   if (best.has_fix()) {
     const Pose given_from_camera = map_->head().camera_from_given.Inverse();
     best.cam_from_world = given_from_camera * best.cam_from_world;
     best.covariance = TransformCovariance(given_from_camera, best.covariance);
+  }
+  return best;
+}
+
+Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+                                                  Localization best) const {
+  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
+  const Pose given_from_camera = map_->head().camera_from_given.Inverse();
+  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
+  CAIRN_ASSIGN_OR_RETURN(
+      const auto near,
+      RetrieveByPrior(*map_, {given_from_camera * best.cam_from_world, 0, 0}, options_.retrieve));
+  const NodeIdx node = near.empty() ? -1 : appearance->node_of_image[near[0].image];
+  if (node < 0) return best;
+  std::vector<int32_t> possible;  // by the prior
+  if (prior) {
+    RetrieveOptions retrieve = options_.retrieve;
+    retrieve.max_num_candidates = std::numeric_limits<int>::max();
+    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, *prior, retrieve));
+    possible = ImagesOf(candidates);
+    std::sort(possible.begin(), possible.end());
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(near[0].image));
+  const Pose cam_from_nearest = best.cam_from_world * nearest->cam_from_world.Inverse();
+  for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
+    const int32_t image = appearance->node_images[look_alike.node].front();
+    if (prior && !std::binary_search(possible.begin(), possible.end(), image)) continue;
+    // Where the camera would be there.
+    CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(image));
+    const PosePrior there{given_from_camera * (cam_from_nearest * other_image->cam_from_world), 0, 0};
+    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, there, options_.retrieve));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(candidates)));
+    if (landmarks.empty()) continue;
+    CAIRN_ASSIGN_OR_RETURN(Localization other, Try(query, {Scope::kImages, std::move(landmarks)}));
+    if (other.has_fix()) best = Better(std::move(best), std::move(other), options_.accept);
+    if (!best.has_fix()) break;
   }
   return best;
 }

@@ -34,6 +34,10 @@ struct LocalizerOptions {
   // A fix with at least so many inliers, found without the pose, is taken at once; with fewer, the other sets
   // of landmarks are tried too, and the fix with most inliers counts: look-alikes give few.  REQUIRES: >= 0
   int sure_num_unguided_inliers = 20;
+  // Where the map knows that the place of a fix looks like others that lie elsewhere [Mariottini11 §V], try
+  // these too, unless a prior excludes them: the fix is withheld as long as one of them explains the image
+  // nearly as well (max_second_pose_ratio).
+  bool exclude_look_alikes = true;
   // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
   bool fall_back_to_all = true;
   int fall_back_max_num_landmarks = 200000;
@@ -93,6 +97,9 @@ class Localizer {
   Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
                               std::vector<Correspondence> matches, const Pose& cam_from_world,
                               Localization localization) const;
+  // `best` if it has a fix that no look-alike of its place questions.
+  Result<Localization> ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+                                         Localization best) const;
   bool IsAmbiguous(const std::vector<PoseMeasurement>& measurements, const PoseEstimate& first) const;
 
   std::shared_ptr<const Map> map_;
