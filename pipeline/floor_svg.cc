@@ -9,42 +9,15 @@
 
 #include "core/decomposition.h"
 #include "core/pose.h"
+#include "pipeline/floor_view.h"
 
 namespace cairn {
 namespace {
 
-constexpr double kWidthPx = 1000;
-constexpr double kMaxHeightPx = 1200;
-constexpr double kTitlePx = 56;
-constexpr double kLegendPx = 64;
-constexpr double kMarginM = 0.5;
 // Okabe and Ito, without black and with a darker yellow.
 constexpr std::array<const char*, 7> kColours = {"#0072B2", "#E69F00", "#009E73", "#D55E00",
                                                  "#CC79A7", "#56B4E9", "#B8A800"};
 constexpr std::array<const char*, 4> kDashes = {"", "9 4", "3 3", "10 3 3 3"};
-
-std::string Escape(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
 
 const char* Colour(RegionIdx region) { return kColours[region % kColours.size()]; }
 
@@ -73,49 +46,8 @@ std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
   return hull;
 }
 
-// The part of the floor that is drawn, and how.
-struct View {
-  Eigen::Vector2d low = Eigen::Vector2d::Zero();
-  Eigen::Vector2d high = Eigen::Vector2d::Zero();
-  double px_per_m = 1;
-  double left_px = 0;
-
-  Eigen::Vector2d Pixel(const Eigen::Vector2d& place) const {
-    return {left_px + (place.x() - low.x()) * px_per_m, kTitlePx + (high.y() - place.y()) * px_per_m};
-  }
-  double HeightPx() const { return (high.y() - low.y()) * px_per_m; }
-};
-
-View MakeView(const MapRows& rows, const std::vector<Eigen::Vector2d>& landmarks) {
-  std::vector<double> xs, ys;
-  for (const Eigen::Vector2d& place : landmarks) {
-    xs.push_back(place.x());
-    ys.push_back(place.y());
-  }
-  View view;
-  if (!xs.empty()) {  // all but the outermost percent: a few far landmarks would shrink the rest
-    std::sort(xs.begin(), xs.end());
-    std::sort(ys.begin(), ys.end());
-    const size_t cut = xs.size() / 100;
-    view.low = {xs[cut], ys[cut]};
-    view.high = {xs[xs.size() - 1 - cut], ys[ys.size() - 1 - cut]};
-  } else if (!rows.stations.empty()) {
-    view.low = view.high = rows.stations[0].position;
-  }
-  for (const MapStation& station : rows.stations) {
-    view.low = view.low.cwiseMin(station.position);
-    view.high = view.high.cwiseMax(station.position);
-  }
-  view.low.array() -= kMarginM;
-  view.high.array() += kMarginM;
-  const Eigen::Vector2d size = view.high - view.low;
-  view.px_per_m = std::min(kWidthPx / size.x(), kMaxHeightPx / size.y());
-  view.left_px = 0.5 * (kWidthPx - size.x() * view.px_per_m);
-  return view;
-}
-
 // Half of the least distance between stations' places, within what can be seen.
-double MarkerSizePx(const MapRows& rows, const View& view) {
+double MarkerSizePx(const MapRows& rows, const FloorView& view) {
   std::vector<Eigen::Vector2d> places;
   for (const MapStation& station : rows.stations) places.push_back(station.position);
   double least = 1;
@@ -128,18 +60,7 @@ double MarkerSizePx(const MapRows& rows, const View& view) {
   return std::clamp(0.45 * least * view.px_per_m, 3.0, 26.0);
 }
 
-// Sectors of one place leave each other room: the arrow points away from the centre.
-std::string ArrowPoints(const Eigen::Vector2d& center, double heading_deg, double size) {
-  const double heading = RadFromDeg(heading_deg);
-  const auto point = [&](double forward, double left) {
-    return fmt::format("{:.1f},{:.1f}",
-                       center.x() + size * (forward * std::cos(heading) - left * std::sin(heading)),
-                       center.y() - size * (forward * std::sin(heading) + left * std::cos(heading)));
-  };
-  return point(1, 0) + " " + point(0.25, 0.34) + " " + point(0.25, -0.34);
-}
-
-std::string DrawStation(const MapStation& station, RegionIdx region, const View& view, double size) {
+std::string DrawStation(const MapStation& station, RegionIdx region, const FloorView& view, double size) {
   const Eigen::Vector2d pixel = view.Pixel(station.position);
   const std::string paint = region >= 0
                                 ? fmt::format("fill=\"{}\"", Colour(region))
@@ -165,7 +86,7 @@ std::string DrawStation(const MapStation& station, RegionIdx region, const View&
   return svg;
 }
 
-std::string DrawRegionOutline(const MapRows& rows, RegionIdx region, const View& view, double size) {
+std::string DrawRegionOutline(const MapRows& rows, RegionIdx region, const FloorView& view, double size) {
   std::vector<Eigen::Vector2d> places;
   for (const StationIdx station : rows.regions[region].stations) {
     const Eigen::Vector2d pixel = view.Pixel(rows.stations[station].position);
@@ -187,18 +108,6 @@ std::string DrawRegionOutline(const MapRows& rows, RegionIdx region, const View&
       "landmarks</title></polygon>\n",
       points, Colour(region), dash, region, rows.regions[region].stations.size(),
       rows.regions[region].landmarks.size());
-}
-
-// 1, 2 or 5 times a power of ten, about a fifth of the picture.
-std::string DrawScaleBar(const View& view, double y) {
-  const double wanted = 0.2 * kWidthPx / view.px_per_m;
-  const double power = std::pow(10, std::floor(std::log10(wanted)));
-  const double length_m = wanted >= 5 * power ? 5 * power : wanted >= 2 * power ? 2 * power : power;
-  const double end = 24 + length_m * view.px_per_m;
-  return fmt::format(
-      "<path d=\"M24 {0:.1f}v8h{1:.1f}v-8\" fill=\"none\" stroke=\"#000000\" stroke-width=\"2\"/>\n"
-      "<text x=\"{2:.1f}\" y=\"{3:.1f}\">{4:g} m</text>\n",
-      y, end - 24, end + 8, y + 9, length_m);
 }
 
 std::string DrawLegend(const MapRows& rows, double y) {
@@ -227,28 +136,23 @@ std::string FloorSvg(const MapRows& rows) {
   for (const MapLandmark& landmark : rows.landmarks) {
     landmarks.push_back((rows.floor_from_world * landmark.position).head<2>());
   }
-  const View view = MakeView(rows, landmarks);
+  const FloorView view = MakeFloorView(rows, landmarks);
   const double size = MarkerSizePx(rows, view);
-  const double height = kTitlePx + view.HeightPx() + kLegendPx;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" "
-      "font-family=\"sans-serif\" font-size=\"15\">\n<rect width=\"100%\" height=\"100%\" "
-      "fill=\"#ffffff\"/>\n",
-      kWidthPx, height);
+  const double height = view.PictureHeightPx();
+  std::string svg = BeginSvg(height);
   std::set<std::pair<double, double>> places;
   for (const MapStation& station : rows.stations) places.emplace(station.position.x(), station.position.y());
   svg += fmt::format(
       "<text x=\"24\" y=\"34\" font-size=\"20\" font-weight=\"bold\">{}</text>\n"
       "<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{}; {} landmarks; {} stations at {} "
       "places</text>\n",
-      Escape(rows.name), kWidthPx - 24, NumRegionsText(rows.regions.size(), rows.lower_bound),
+      EscapeXml(rows.name), FloorView::kWidthPx - 24, NumRegionsText(rows.regions.size(), rows.lower_bound),
       rows.landmarks.size(), rows.stations.size(), places.size());
 
   svg += fmt::format(
       "<clipPath id=\"floor\"><rect x=\"0\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n"
       "<g fill=\"#888888\" fill-opacity=\"0.55\" clip-path=\"url(#floor)\">\n",
-      kTitlePx, kWidthPx, view.HeightPx());
+      FloorView::kTitlePx, FloorView::kWidthPx, view.HeightPx());
   for (const Eigen::Vector2d& landmark : landmarks) {
     const Eigen::Vector2d pixel = view.Pixel(landmark);
     svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\"/>\n", pixel.x(), pixel.y());

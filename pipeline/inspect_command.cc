@@ -17,7 +17,9 @@
 #include "core/map_file.h"
 #include "core/map_rows.h"
 #include "core/sessions.h"
+#include "pipeline/ambiguity_svg.h"
 #include "pipeline/floor_svg.h"
+#include "pipeline/inspect_ambiguity.h"
 #include "pipeline/inspect_drops.h"
 #include "stages/check_map/report.h"
 
@@ -26,11 +28,13 @@ namespace {
 
 constexpr int kMaxRegionLines = 30;
 constexpr int kMaxStationLines = 10;
+constexpr int kMaxPlaceLines = 10;
 
 struct Arguments {
   std::string map_path;
   bool json = false;
   std::string svg_path;
+  std::string ambiguity_svg_path;
 };
 
 // Bytes of the blocks of each kind.
@@ -138,6 +142,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;
   json["dropped"] = DropsJson(rows);
+  json["ambiguity"] = AmbiguityJson(rows);
   json["self_test_regions"] = SelfTestRegionsJson(rows.findings.self_test_regions);
   json["stage_options"] = rows.stage_options;
   json["input_hashes"] = rows.input_hashes;
@@ -176,6 +181,10 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
   for (const auto& [key, value] : json.items()) {
     if (key == "dropped") {
       if (!value.empty()) text += "\n" + DropsText(rows, kMaxStationLines);
+      continue;
+    }
+    if (key == "ambiguity") {
+      if (!value.empty()) text += "\n" + AmbiguityText(rows, kMaxPlaceLines);
       continue;
     }
     if (key == "self_test_regions") {
@@ -222,6 +231,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
   *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json, rows));
+  if (!arguments.ambiguity_svg_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string svg, AmbiguitySvg(rows));
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.ambiguity_svg_path, svg));
+  }
   if (arguments.svg_path.empty()) return Ok();
   return WriteFileAtomically(arguments.svg_path, FloorSvg(rows));
 }
@@ -238,6 +251,9 @@ Command InspectCommand() {
             app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
             app.add_flag("--json", arguments->json, "Print JSON");
             app.add_option("--svg", arguments->svg_path, "Write a picture of the floor")
+                ->type_name("FILE.svg");
+            app.add_option("--ambiguity-svg", arguments->ambiguity_svg_path,
+                           "Write a picture of the places that look like others")
                 ->type_name("FILE.svg");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
