@@ -358,6 +358,57 @@ TEST_F(Compile, SparseMapIsComparedWithAllImagesAndLeadsFromOneToAnother) {
   EXPECT_THAT(left_out.out, HasSubstr("left-out images"));
 }
 
+TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
+  const ProgramRun text =
+      RunShell("cairn inspect " + Path("tiny.cairn") + " --ambiguity-svg " + Path("places.svg"));
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out, ContainsRegex("most ambiguous places .*\n  [0-9.]+  .*deg"));
+  EXPECT_THAT(text.out, ContainsRegex("most ambiguous regions .*\n  [0-9.]+  region [0-9]+"));
+  EXPECT_THAT(*ReadFile(Path("places.svg")), HasSubstr("where the robot can tell where it is"));
+  const auto json = nlohmann::json::parse(RunShell("cairn inspect --json " + Path("tiny.cairn")).out);
+  ASSERT_EQ(json["ambiguity"]["nodes"].size(), json["num_appearance_nodes"].get<size_t>());
+  double most = 0;
+  for (const auto& node : json["ambiguity"]["nodes"])
+    most = std::max(most, node["entropy_nat"].get<double>());
+  EXPECT_GT(most, 0);
+
+  // A map of all features, in which every image is kept: ways over them by each weight.
+  const auto emit = [&](const std::string& arguments) {
+    return RunShell(
+        "cd " + Path("tiny.build") + " && cairn emit-map --classes classes.db --world world.db --regions " +
+        "regions.db --vocabulary vocabulary.db --name tiny -o ../memory.cairn --progress none " + arguments);
+  };
+  const ProgramRun link =
+      RunShell("cd " + Path("tiny.build") +
+               " && cairn link-appearance matches.db vocabulary.db --capture capture --algorithm "
+               "all -o ../all.db --progress none");
+  ASSERT_EQ(link.exit_code, 0) << link.err;
+  ASSERT_EQ(emit("--appearance ../all.db --words survey").exit_code, 0);
+  const auto memory = nlohmann::json::parse(RunShell("cairn inspect --json " + Path("memory.cairn")).out);
+  EXPECT_EQ(memory["num_kept_nodes"], memory["num_appearance_nodes"]);
+  EXPECT_GT(memory["num_words"].get<int>(), 0);
+  const std::string from = memory["ambiguity"]["nodes"].front()["image"],
+                    to = memory["ambiguity"]["nodes"].back()["image"];
+  for (const std::string weight : {"links", "matches", "entropy"}) {
+    const ProgramRun route = RunShell("cairn route " + Path("memory.cairn") + " " + from + " " + to +
+                                      " --json --weight " + weight);
+    ASSERT_EQ(route.exit_code, 0) << route.err;
+    EXPECT_GT(nlohmann::json::parse(route.out)["cost"].get<double>(), 0);
+  }
+  EXPECT_EQ(emit("--appearance ../all.db --words survey --documents kept").exit_code, 2);
+
+  // Without the vocabulary nothing is known, and that is said.
+  ASSERT_EQ(
+      RunShell("cd " + Path("tiny.build") + " && cairn link-appearance matches.db -o ../all.db").exit_code,
+      0);
+  ASSERT_EQ(emit("--appearance ../all.db").exit_code, 0);
+  const ProgramRun none =
+      RunShell("cairn inspect " + Path("memory.cairn") + " --ambiguity-svg " + Path("none.svg"));
+  EXPECT_EQ(none.exit_code, static_cast<int>(ErrorCode::kNotFound));
+  EXPECT_THAT(none.err, HasSubstr("give link-appearance the vocabulary"));
+  EXPECT_FALSE(fs::exists(Path("none.svg")));
+}
+
 TEST_F(Compile, GateOfRegionsKeepsAMapFromBeingWritten) {
   // Nothing is localized to better than a nanometre: every fix is a gross error.
   const std::string check = "cairn check-map " + Path("tiny.build/unsealed.cairn") + " --queries " +
