@@ -77,13 +77,4 @@ Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, int64_t num_
   return vocabulary;
 }
 
-std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors) {
-  std::vector<WordIdx> words(descriptors.rows());
-  for (Eigen::Index row = 0; row < descriptors.rows(); ++row) {
-    words[row] = QuantizeDescriptor(vocabulary, descriptors.row(row).data());
-  }
-  std::sort(words.begin(), words.end());
-  return words;
-}
-
 }  // namespace cairn

@@ -36,7 +36,4 @@ Result<Vocabulary> GrowVocabulary(const DescriptorMatrix& training, int64_t num_
                                   const GrowVocabularyOptions& options, uint64_t seed, int num_threads,
                                   Progress& progress);
 
-// The words that descriptors fall to, ascending, one for each of them.
-std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors);
-
 }  // namespace cairn

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
+#include "core/nearest_centre.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "core/vocabulary_tree.h"
 
 namespace cairn {
 namespace {
@@ -14,6 +15,8 @@ namespace {
 constexpr int64_t kChunk = 4096;  // members a task assigns at a time
 
 using Sums = std::array<int64_t, kDescriptorDim>;
+using ChunkSums = std::array<int32_t, kDescriptorDim>;  // kChunk * 255 fits
+using DescriptorRows = Eigen::Ref<const DescriptorMatrix>;
 
 // The direction of a sum of descriptors, quantised like a descriptor.
 Eigen::Matrix<uint8_t, 1, kDescriptorDim> CentreFromSums(const Sums& sums) {
@@ -28,46 +31,39 @@ Eigen::Matrix<uint8_t, 1, kDescriptorDim> CentreFromSums(const Sums& sums) {
   return centre;
 }
 
-void AddTo(Sums& sums, const uint8_t* descriptor) {
-  for (int i = 0; i < kDescriptorDim; ++i) sums[i] += descriptor[i];
-}
-
-int64_t SquaredDistance(const uint8_t* a, const uint8_t* b) {
-  int32_t sum = 0;
-  for (int i = 0; i < kDescriptorDim; ++i) {
-    const int32_t difference = static_cast<int32_t>(a[i]) - static_cast<int32_t>(b[i]);
-    sum += difference * difference;
-  }
-  return sum;
-}
-
 // k-means++: each next seed is drawn with a probability proportional to the squared distance from the nearest
 // one.
-DescriptorMatrix DrawSeeds(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members,
-                           int num_seeds, uint64_t seed, int num_threads) {
+DescriptorMatrix DrawSeeds(const DescriptorRows& members, int num_seeds, uint64_t seed, int num_threads) {
   Random random(seed);
-  const int64_t num_members = static_cast<int64_t>(members.size());
-  std::vector<int64_t> nearest(members.size(), INT64_MAX);
+  const int64_t num_members = members.rows();
+  std::vector<int32_t> nearest(num_members, INT32_MAX);
   DescriptorMatrix seeds(num_seeds, kDescriptorDim);
   int64_t chosen = random.UniformInt(0, num_members - 1);
   for (int k = 0; k < num_seeds; ++k) {
+    const uint8_t* seed_descriptor = members.row(chosen).data();
     Sums sums = {};
-    const uint8_t* seed_descriptor = descriptors.row(members[chosen]).data();
-    AddTo(sums, seed_descriptor);
+    std::copy_n(seed_descriptor, kDescriptorDim, sums.begin());
     seeds.row(k) = CentreFromSums(sums);
     ParallelFor((num_members + kChunk - 1) / kChunk, num_threads, [&](int64_t chunk) {
-      for (int64_t i = chunk * kChunk; i < std::min(num_members, (chunk + 1) * kChunk); ++i) {
-        nearest[i] =
-            std::min(nearest[i], SquaredDistance(descriptors.row(members[i]).data(), seed_descriptor));
-      }
+      const int64_t first = chunk * kChunk;
+      LowerSquaredDistances(members.row(first).data(), std::min(kChunk, num_members - first), seed_descriptor,
+                            nearest.data() + first);
     });
-    int64_t total = 0;
-    for (const int64_t distance : nearest) total += distance;
+    const int64_t total = std::accumulate(nearest.begin(), nearest.end(), int64_t{0});
     if (total == 0) return seeds.topRows(k + 1);  // every member equals a seed
     int64_t target = random.UniformInt(0, total - 1);
     for (chosen = 0; target >= nearest[chosen]; ++chosen) target -= nearest[chosen];
   }
   return seeds;
+}
+
+// The members side by side in memory, which all rounds run over.
+DescriptorMatrix Gather(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members) {
+  DescriptorMatrix gathered(static_cast<Eigen::Index>(members.size()), kDescriptorDim);
+  for (size_t i = 0; i < members.size(); ++i) {
+    gathered.row(static_cast<Eigen::Index>(i)) = descriptors.row(members[i]);
+  }
+  return gathered;
 }
 
 }  // namespace
@@ -77,22 +73,25 @@ std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std:
   const int64_t num_members = static_cast<int64_t>(members.size());
   if (num_members < 2) return {};
   const int num_seeds = static_cast<int>(std::min<int64_t>(branching, num_members));
-  DescriptorMatrix centres = DrawSeeds(descriptors, members, num_seeds, seed, num_threads);
+  DescriptorMatrix copies;
+  if (num_members != descriptors.rows()) copies = Gather(descriptors, members);
+  const DescriptorRows rows(num_members != descriptors.rows() ? copies : descriptors);
+  DescriptorMatrix centres = DrawSeeds(rows, num_seeds, seed, num_threads);
   const int num_centres = static_cast<int>(centres.rows());
   const int64_t num_chunks = (num_members + kChunk - 1) / kChunk;
   std::vector<int32_t> nearest(members.size(), -1);
   std::vector<int64_t> counts;
   for (int iteration = 0;; ++iteration) {
-    std::vector<std::vector<Sums>> sums(num_chunks);
+    std::vector<std::vector<ChunkSums>> sums(num_chunks);
     std::vector<char> changed(num_chunks, 0);
     ParallelFor(num_chunks, num_threads, [&](int64_t chunk) {
       sums[chunk].resize(num_centres);  // value-initialised: zeros
       for (int64_t i = chunk * kChunk; i < std::min(num_members, (chunk + 1) * kChunk); ++i) {
-        const uint8_t* descriptor = descriptors.row(members[i]).data();
+        const uint8_t* descriptor = rows.row(i).data();
         const int centre = NearestCentre(centres.data(), num_centres, descriptor);
         changed[chunk] |= centre != nearest[i];
         nearest[i] = centre;
-        AddTo(sums[chunk][centre], descriptor);
+        AddDescriptor(descriptor, sums[chunk][centre].data());
       }
     });
     counts.assign(num_centres, 0);
@@ -103,7 +102,7 @@ std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std:
     for (int k = 0; k < num_centres; ++k) {
       if (counts[k] == 0) continue;  // keeps its place; pruned if it stays empty
       Sums sum = {};
-      for (const std::vector<Sums>& chunk : sums) {
+      for (const std::vector<ChunkSums>& chunk : sums) {
         for (int i = 0; i < kDescriptorDim; ++i) sum[i] += chunk[k][i];
       }
       centres.row(k) = CentreFromSums(sum);

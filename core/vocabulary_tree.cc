@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/descriptor_distance.h"
+#include "core/nearest_centre.h"
 
 namespace cairn {
 
@@ -54,19 +54,6 @@ void WeightVocabulary(Vocabulary* vocabulary) {
   }
 }
 
-int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor) {
-  int nearest = 0;
-  int32_t largest = -1;
-  for (int i = 0; i < num_centres; ++i) {
-    const int32_t dot = DescriptorDot(centres + static_cast<size_t>(i) * kDescriptorDim, descriptor);
-    if (dot > largest) {
-      largest = dot;
-      nearest = i;
-    }
-  }
-  return nearest;
-}
-
 WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descriptor) {
   if (vocabulary.nodes.empty()) return -1;
   const VocabularyNode* node = &vocabulary.nodes[0];
@@ -78,15 +65,17 @@ WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descript
   return node->word;
 }
 
-std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors,
-                                            int max_num_documents) {
-  if (vocabulary.nodes.empty()) return {};
+std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors) {
   std::vector<WordIdx> words(descriptors.rows());
-  for (Eigen::Index i = 0; i < descriptors.rows(); ++i) {
-    words[i] = QuantizeDescriptor(vocabulary, descriptors.row(i).data());
+  for (Eigen::Index row = 0; row < descriptors.rows(); ++row) {
+    words[row] = QuantizeDescriptor(vocabulary, descriptors.row(row).data());
   }
   std::sort(words.begin(), words.end());
+  return words;
+}
 
+std::vector<ScoredDocument> RankDocuments(const Vocabulary& vocabulary, const std::vector<WordIdx>& words,
+                                           int max_num_documents) {
   // Sums over the words in ascending order: the same for any order of the descriptors.
   std::vector<double> dots(vocabulary.document_ids.size(), 0.0);
   double squared_norm = 0;
@@ -116,6 +105,12 @@ std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const 
                     });
   scored.resize(num_kept);
   return scored;
+}
+
+std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors,
+                                            int max_num_documents) {
+  if (vocabulary.nodes.empty()) return {};
+  return RankDocuments(vocabulary, QuantizeDescriptors(vocabulary, descriptors), max_num_documents);
 }
 
 }  // namespace cairn

@@ -55,16 +55,18 @@ void WeightVocabulary(Vocabulary* vocabulary);
 // it, ties to the smaller index.  -1 for an empty tree.
 WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descriptor);
 
-// Index of the row of `centres` (128 bytes each) with the largest dot product, ties to the smaller. REQUIRES:
-// >= 1 row
-int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor);
-
 struct ScoredDocument {
   int32_t document = 0;
   float score = 0;  // 1 - |q - d|^2 / 2 = q . d of the L2-normalised vectors, in [0, 1]
 };
-// Documents with a positive score, best first, ties by document, at most `max_num_documents`.  Touches shared
-// words only.
+// The words that descriptors fall to, ascending, one for each of them.
+std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors);
+
+// Documents with a positive score for `words` (ascending, in the tree), best first, ties by document, at most
+// `max_num_documents`.  Touches shared words only.
+std::vector<ScoredDocument> RankDocuments(const Vocabulary& vocabulary, const std::vector<WordIdx>& words,
+                                          int max_num_documents);
+// The same for the words of descriptors.
 std::vector<ScoredDocument> QueryVocabulary(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors,
                                             int max_num_documents);
 

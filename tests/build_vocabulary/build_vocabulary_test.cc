@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/random.h"
+#include "core/split_node.h"
 
 namespace cairn {
 namespace {
@@ -50,6 +51,28 @@ TEST(BuildVocabulary, SameBytesForAnyNumberOfThreads) {
   const std::string one = FileBytes(*Build(images, {}, 1), "vocabulary_1.db");
   EXPECT_EQ(FileBytes(*Build(images, {}, 2), "vocabulary_2.db"), one);
   EXPECT_EQ(FileBytes(*Build(images, {}, 7), "vocabulary_7.db"), one);
+}
+
+TEST(BuildVocabulary, SplitOfSomeRowsIsThatOfThemAlone) {
+  const DescriptorMatrix rows = RandomImages(1, 60, 4)[0].descriptors;
+  std::vector<int32_t> odd, all(30);
+  DescriptorMatrix odd_rows(30, kDescriptorDim);
+  for (int i = 0; i < 30; ++i) {
+    odd.push_back(2 * i + 1);
+    all[i] = i;
+    odd_rows.row(i) = rows.row(2 * i + 1);
+  }
+  const std::vector<NodeChild> of_some = SplitNode(rows, odd, 5, 10, 9, 1);
+  const std::vector<NodeChild> alone = SplitNode(odd_rows, all, 5, 10, 9, 1);
+  ASSERT_EQ(of_some.size(), alone.size());
+  ASSERT_GE(of_some.size(), 2u);
+  for (size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(of_some[i].centre, alone[i].centre);
+    ASSERT_EQ(of_some[i].members.size(), alone[i].members.size());
+    for (size_t k = 0; k < alone[i].members.size(); ++k) {
+      EXPECT_EQ(of_some[i].members[k], 2 * alone[i].members[k] + 1);
+    }
+  }
 }
 
 TEST(BuildVocabulary, SeedChangesTheTree) {
