@@ -3,18 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/grow_vocabulary.h"
-
 namespace cairn {
 
-BagOfWords CountWords(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors) {
+BagOfWords CountWords(const std::vector<WordIdx>& words) {
   BagOfWords bag;
-  if (vocabulary.nodes.empty()) return bag;
-  for (const WordIdx word : QuantizeDescriptors(vocabulary, descriptors)) {
+  for (const WordIdx word : words) {
     if (bag.empty() || bag.back().word != word) bag.push_back({word, 0});
     ++bag.back().count;
   }
   return bag;
+}
+
+BagOfWords CountWords(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors) {
+  if (vocabulary.nodes.empty()) return {};
+  return CountWords(QuantizeDescriptors(vocabulary, descriptors));
 }
 
 std::vector<BagOfWords> DocumentWords(const Vocabulary& vocabulary) {

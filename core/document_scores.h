@@ -17,6 +17,8 @@ struct WordCount {
 // An image as its words, ascending.
 using BagOfWords = std::vector<WordCount>;
 
+// `words`: ascending, one for each feature.
+BagOfWords CountWords(const std::vector<WordIdx>& words);
 BagOfWords CountWords(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors);
 // The same of every document, from the inverted files: stopped words are missing.  O(postings).
 std::vector<BagOfWords> DocumentWords(const Vocabulary& vocabulary);

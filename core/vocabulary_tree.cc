@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/document_scores.h"
 #include "core/nearest_centre.h"
 
 namespace cairn {
@@ -75,28 +76,11 @@ std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const Des
 }
 
 std::vector<ScoredDocument> RankDocuments(const Vocabulary& vocabulary, const std::vector<WordIdx>& words,
-                                           int max_num_documents) {
-  // Sums over the words in ascending order: the same for any order of the descriptors.
-  std::vector<double> dots(vocabulary.document_ids.size(), 0.0);
-  double squared_norm = 0;
-  for (size_t begin = 0; begin < words.size();) {
-    const WordIdx word = words[begin];
-    size_t end = begin;
-    while (end < words.size() && words[end] == word) ++end;
-    const double idf = vocabulary.idf[word];
-    const double query_weight = static_cast<double>(end - begin) * idf;
-    squared_norm += query_weight * query_weight;
-    for (const Posting& posting : vocabulary.inverted_files[word]) {
-      dots[posting.document] += query_weight * idf * posting.count;
-    }
-    begin = end;
-  }
-
+                                          int max_num_documents) {
+  const std::vector<double> scores = ScoreDocuments(vocabulary, CountWords(words));
   std::vector<ScoredDocument> scored;
-  for (size_t i = 0; i < dots.size(); ++i) {
-    if (dots[i] <= 0) continue;
-    const double score = dots[i] / (std::sqrt(squared_norm) * vocabulary.document_norms[i]);
-    scored.push_back({static_cast<int32_t>(i), static_cast<float>(std::min(score, 1.0))});
+  for (size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i] > 0) scored.push_back({static_cast<int32_t>(i), static_cast<float>(scores[i])});
   }
   const size_t num_kept = std::min<size_t>(scored.size(), std::max(0, max_num_documents));
   std::partial_sort(scored.begin(), scored.begin() + num_kept, scored.end(),
