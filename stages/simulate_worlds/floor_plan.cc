@@ -68,7 +68,7 @@ int DrawNumObstacles(const SimulateWorldsOptions& options, Random* random) {
 }
 
 // Obstacles at random places, each a passage away from the perimeter and from those before it.
-void DrawObstacles(const SimulateWorldsOptions& options, Random* random, FloorPlan* plan) {
+void DrawObstacles(const SimulateWorldsOptions& options, Random* random, WorldPlan* plan) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& vertex : plan->perimeter) box.extend(vertex);
   const int num_obstacles = DrawNumObstacles(options, random);
@@ -97,7 +97,7 @@ struct Side {
   Eigen::Vector2d normal;  // into free space
 };
 
-std::vector<Side> Sides(const FloorPlan& plan) {
+std::vector<Side> Sides(const WorldPlan& plan) {
   std::vector<Side> sides;
   const auto add = [&](const Polygon& polygon, double sign) {
     for (size_t i = 0; i < polygon.size(); ++i) {
@@ -111,7 +111,7 @@ std::vector<Side> Sides(const FloorPlan& plan) {
   return sides;
 }
 
-void DrawFeatures(const SimulateWorldsOptions& options, Random* random, FloorPlan* plan) {
+void DrawFeatures(const SimulateWorldsOptions& options, Random* random, WorldPlan* plan) {
   static constexpr int kNumFeatures[] = {5400, 1700, 5000, 1700};
   const int num_features = static_cast<int>(
       std::lround((options.num_features > 0 ? options.num_features : kNumFeatures[options.setting - 1]) *
@@ -137,9 +137,9 @@ void DrawFeatures(const SimulateWorldsOptions& options, Random* random, FloorPla
 
 }  // namespace
 
-FloorPlan DrawFloorPlan(const SimulateWorldsOptions& options, uint64_t seed) {
+WorldPlan DrawFloorPlan(const SimulateWorldsOptions& options, uint64_t seed) {
   Random random(MixSeed(seed, static_cast<uint64_t>(options.setting)));
-  FloorPlan plan;
+  WorldPlan plan;
   plan.perimeter = DrawPerimeter(options, &random);
   DrawObstacles(options, &random, &plan);
   DrawFeatures(options, &random, &plan);

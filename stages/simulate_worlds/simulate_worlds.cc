@@ -224,7 +224,7 @@ OptionTable DescribeOptions(SimulateWorldsOptions* o) {
   };
 }
 
-World SampleFloorPlan(const FloorPlan& plan, double spacing_m) {
+World SampleFloorPlan(const WorldPlan& plan, double spacing_m) {
   WallIndex walls({plan.perimeter}, kWallCellM);
   for (const Polygon& obstacle : plan.obstacles) walls.Add(obstacle);
   Eigen::AlignedBox2d box;

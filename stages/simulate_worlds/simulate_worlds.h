@@ -48,17 +48,17 @@ struct SimulatedFeature {
 };
 
 // What a world is sampled from.
-struct FloorPlan {
+struct WorldPlan {
   Polygon perimeter;
   std::vector<Polygon> obstacles;
   std::vector<SimulatedFeature> features;
 };
 
 // Draws a floor plan.  Same options and seed, same plan.
-FloorPlan DrawFloorPlan(const SimulateWorldsOptions& options, uint64_t seed);
+WorldPlan DrawFloorPlan(const SimulateWorldsOptions& options, uint64_t seed);
 
 // Stations of the lattice through (0, 0) in free space, and what they see.
-World SampleFloorPlan(const FloorPlan& plan, double spacing_m);
+World SampleFloorPlan(const WorldPlan& plan, double spacing_m);
 
 // Both.  Errors: InvalidArgument for a bad option, NoData when there is no free space.
 Result<World> SimulateWorld(const SimulateWorldsOptions& options, uint64_t seed);

@@ -14,7 +14,7 @@ Polygon Box(double min_x, double min_y, double max_x, double max_y) {
 
 // A room of 4 m x 3 m around the lattice points (1, 1), (2, 1), (3, 1) and (1, 2), (2, 2), (3, 2) of a 1 m
 // lattice.
-FloorPlan Room() { return {.perimeter = Box(0.5, 0.5, 3.5, 2.5)}; }
+WorldPlan Room() { return {.perimeter = Box(0.5, 0.5, 3.5, 2.5)}; }
 
 TEST(SampleFloorPlan, StationsAreTheLatticePointsInFreeSpace) {
   const World world = SampleFloorPlan(Room(), 1.0);
@@ -31,7 +31,7 @@ TEST(SampleFloorPlan, StationsAreTheLatticePointsInFreeSpace) {
 TEST(SampleFloorPlan, ObstaclesTakeStationsAndPassages) {
   // The obstacle stands on (2, 1); a thin one between (1, 2) and (2, 2) blocks the way, so that the left part
   // with two stations falls away.
-  FloorPlan plan = Room();
+  WorldPlan plan = Room();
   plan.obstacles = {Box(1.8, 0.8, 2.2, 1.2), Box(1.4, 1.6, 1.6, 2.45)};
   const World world = SampleFloorPlan(plan, 1.0);
   EXPECT_THAT(world.positions,
@@ -42,7 +42,7 @@ TEST(SampleFloorPlan, ObstaclesTakeStationsAndPassages) {
 TEST(SampleFloorPlan, FeatureIsSeenWithinItsAngleAndRange) {
   // On the left wall at y = 1, looking right; stations 0, 1, 2 stand at distances 0.5, 1.5, 2.5 straight
   // ahead, 3, 4, 5 one metre higher at 63, 34 and 22 degrees.
-  FloorPlan plan = Room();
+  WorldPlan plan = Room();
   const auto area = [&](double opening_deg, double near_m, double far_m) {
     plan.features = {{{0.5, 1}, {1, 0}, opening_deg, near_m, far_m}};
     return SampleFloorPlan(plan, 1.0).areas[0];
@@ -54,7 +54,7 @@ TEST(SampleFloorPlan, FeatureIsSeenWithinItsAngleAndRange) {
 }
 
 TEST(SampleFloorPlan, WallsHideFeatures) {
-  FloorPlan plan = Room();
+  WorldPlan plan = Room();
   plan.obstacles = {Box(2.4, 0.9, 2.6, 1.1)};  // between stations 1 and 2: the edge goes as well
   plan.features = {{{0.5, 1}, {1, 0}, 90, 0, 10}};
   EXPECT_THAT(SampleFloorPlan(plan, 1.0).areas[0], ElementsAre(0, 1, 4, 5));
