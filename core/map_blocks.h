@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/map_rows.h"
+#include "core/views.h"
 
 namespace cairn {
 
@@ -30,8 +31,10 @@ enum class BlockKind : uint8_t {
   kLandmarks = 7,
   kAppearance = 8,
   kAmbiguity = 9,
+  kFloorPlan = 10,
+  kViewRegions = 11,
 };
-inline constexpr int kNumBlockKinds = 10;   // 0 is none
+inline constexpr int kNumBlockKinds = 12;   // 0 is none
 const char* BlockKindName(BlockKind kind);  // "stations"
 
 // What the directory says of a block.
@@ -119,6 +122,22 @@ struct AmbiguityBlock {
   std::vector<Node> nodes;
 };
 
+// View-invariant regions first, first + 1, ...
+struct ViewBlock {
+  struct Region {
+    std::vector<int32_t> corners;   // vertices, counter-clockwise
+    int32_t num_more_vertices = 0;  // ends of links that no region up to here has as a corner
+    FaceIdx parent = -1;
+    std::vector<LabelIdx> toggled;  // ascending
+    ViewIndex index;
+    std::vector<ViewLink> links;  // of which this is `a`, ascending
+  };
+  FaceIdx first = 0;
+  int32_t first_vertex = 0;         // so many are named by the blocks before
+  std::vector<GridPoint> vertices;  // named here for the first time, in that order
+  std::vector<Region> regions;
+};
+
 // Blocks as bytes.  Same block, same bytes.
 std::string EncodeBlock(const LandmarkBlock& block);
 std::string EncodeBlock(const ImageBlock& block);
@@ -127,6 +146,8 @@ std::string EncodeBlock(const RegionBlock& block);
 std::string EncodeBlock(const WordBlock& block);
 std::string EncodeBlock(const AppearanceBlock& block);
 std::string EncodeBlock(const AmbiguityBlock& block);
+std::string EncodeBlock(const ViewBlock& block);
+std::string EncodeFloorPlan(const FloorPlan& plan);
 std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
 std::string EncodeDocumentNorms(const std::vector<float>& norms);
 
@@ -146,11 +167,20 @@ Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const Bloc
                                               const MapDirectory& directory, const std::string& what);
 Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockEntry& entry,
                                             const MapDirectory& directory, const std::string& what);
+Result<ViewBlock> DecodeViewBlock(std::string_view bytes, const BlockEntry& entry,
+                                  const MapDirectory& directory, const std::string& what);
+// All that CheckFloorPlan asks.
+Result<FloorPlan> DecodeFloorPlan(std::string_view bytes, const BlockEntry& entry,
+                                  const MapDirectory& directory, const std::string& what);
 // A tree with empty inverted files.
 Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry& entry,
                                         const MapDirectory& directory, const std::string& what);
 Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const BlockEntry& entry,
                                                const std::string& what);
+
+// Puts the regions of a block after those that `views` has.  The whole is for CheckViews to check.
+// Errors: Corrupt where they do not follow one another.
+Status AppendRegions(const ViewBlock& block, const std::string& what, Views* views);
 
 // Memory that a block takes once it is decoded, about.
 int64_t NumBytes(const LandmarkBlock& block);
@@ -160,6 +190,8 @@ int64_t NumBytes(const RegionBlock& block);
 int64_t NumBytes(const WordBlock& block);
 int64_t NumBytes(const AppearanceBlock& block);
 int64_t NumBytes(const AmbiguityBlock& block);
+int64_t NumBytes(const ViewBlock& block);
+int64_t NumBytes(const FloorPlan& plan);
 int64_t NumBytes(const Vocabulary& vocabulary);
 int64_t NumBytes(const std::vector<float>& values);
 

@@ -21,6 +21,10 @@ int64_t FewestBytes(BlockKind kind) {
       return 4;
     case BlockKind::kAmbiguity:
       return 2;
+    case BlockKind::kViewRegions:
+      return 26;
+    case BlockKind::kFloorPlan:
+      return 33;
     case BlockKind::kRegions:
     case BlockKind::kWords:
     case BlockKind::kVocabularyTree:
@@ -29,10 +33,10 @@ int64_t FewestBytes(BlockKind kind) {
   return 1;
 }
 
+constexpr const char* kOtherKind = "other";
+
 // As MapDirectory::Encode writes an entry: kind; first, count, number of bytes; hash; two corners.
 constexpr size_t kEntryBytes = sizeof(uint8_t) + 3 * sizeof(uint32_t) + sizeof(Hash) + 6 * sizeof(float);
-
-bool IsKnown(uint8_t kind) { return kind >= 1 && kind < kNumBlockKinds; }
 
 }  // namespace
 
@@ -56,9 +60,19 @@ const char* BlockKindName(BlockKind kind) {
       return "appearance";
     case BlockKind::kAmbiguity:
       return "ambiguity";
+    case BlockKind::kFloorPlan:
+      return "floor_plan";
+    case BlockKind::kViewRegions:
+      return "view_regions";
   }
-  return "other";
+  return kOtherKind;
 }
+
+namespace {
+
+bool IsKnown(uint8_t kind) { return BlockKindName(static_cast<BlockKind>(kind)) != kOtherKind; }
+
+}  // namespace
 
 void MapDirectory::Add(const BlockEntry& entry) {
   if (IsKnown(entry.kind)) {
@@ -125,7 +139,8 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
       if (entry.count == 0 || int64_t{entry.count} * FewestBytes(kind) > entry.num_bytes) {
         return corrupt("more elements than its bytes can hold, or none");
       }
-      const bool is_single = kind == BlockKind::kVocabularyTree || kind == BlockKind::kDocumentNorms;
+      const bool is_single = kind == BlockKind::kVocabularyTree || kind == BlockKind::kDocumentNorms ||
+                             kind == BlockKind::kFloorPlan;
       if (is_single && directory.NumBlocks(kind) > 0) return corrupt("there may be one of its kind only");
       if (kind == BlockKind::kImages &&
           !(entry.centers.min().allFinite() && entry.centers.max().allFinite())) {
@@ -139,6 +154,9 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
        directory.Count(BlockKind::kWords) > 0)) {
     return MakeError(ErrorCode::kCorrupt,
                      "directory: a vocabulary tree, words and a norm per image belong together");
+  }
+  if ((directory.Count(BlockKind::kFloorPlan) > 0) != (directory.Count(BlockKind::kViewRegions) > 0)) {
+    return MakeError(ErrorCode::kCorrupt, "directory: a floor plan and its regions belong together");
   }
   return directory;
 }

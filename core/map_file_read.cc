@@ -64,6 +64,14 @@ class RowsReader {
       }
       case BlockKind::kAmbiguity:  // stands after the nodes
         return AddAmbiguity(DecodeAmbiguityBlock(bytes, entry, directory, what));
+      case BlockKind::kFloorPlan: {
+        CAIRN_ASSIGN_OR_RETURN(rows_.views.plan, DecodeFloorPlan(bytes, entry, directory, what));
+        return Ok();
+      }
+      case BlockKind::kViewRegions: {
+        CAIRN_ASSIGN_OR_RETURN(const ViewBlock regions, DecodeViewBlock(bytes, entry, directory, what));
+        return AppendRegions(regions, what, &rows_.views);
+      }
     }
     return Ok();  // of a later minor version
   }

@@ -13,6 +13,7 @@ constexpr size_t kRegionsPerBlock = 1024;
 constexpr size_t kWordsPerBlock = 1024;
 constexpr size_t kPostingsPerBlock = 4096;
 constexpr size_t kAppearanceNodesPerBlock = 1024;
+constexpr FaceIdx kViewRegionsPerBlock = 4096;
 
 }  // namespace
 
@@ -51,6 +52,7 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
     }
   }
   CutLandmarks();
+  CutViews();
   LinkRegions();
   LinkImages();
 }
@@ -188,6 +190,50 @@ AmbiguityBlock MapLayout::MakeAmbiguityBlock(const BlockEntry& entry) const {
   return block;
 }
 
+void MapLayout::CutViews() {
+  const Views& views = rows_.views;
+  CutEvenly(BlockKind::kFloorPlan, views.plan.walls.size(), std::numeric_limits<int32_t>::max());
+  CutEvenly(BlockKind::kViewRegions, views.parents.size(), kViewRegionsPerBlock);
+  int32_t next = 0;  // vertices are numbered as regions name them
+  size_t link = 0;
+  for (FaceIdx face = 0; face < views.num_faces(); ++face) {
+    if (face % kViewRegionsPerBlock == 0) first_vertices_.push_back(next);
+    for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i)
+      next = std::max(next, views.face_vertices[i] + 1);
+    for (; link < views.links.size() && views.links[link].a == face; ++link)
+      next = std::max({next, views.links[link].start + 1, views.links[link].end + 1});
+  }
+  first_vertices_.push_back(next);
+}
+
+ViewBlock MapLayout::MakeViewBlock(const BlockEntry& entry) const {
+  const Views& views = rows_.views;
+  const auto first = static_cast<FaceIdx>(entry.first);
+  const FaceIdx ordinal = first / kViewRegionsPerBlock;
+  ViewBlock block{.first = first, .first_vertex = first_vertices_[ordinal]};
+  block.vertices.assign(views.vertices.begin() + block.first_vertex,
+                        views.vertices.begin() + first_vertices_[ordinal + 1]);
+  int32_t next = block.first_vertex;
+  auto link = std::lower_bound(views.links.begin(), views.links.end(), ViewLink{.a = first});
+  for (FaceIdx face = first; face < static_cast<FaceIdx>(entry.first + entry.count); ++face) {
+    ViewBlock::Region& region = block.regions.emplace_back();
+    region.corners.assign(views.face_vertices.begin() + views.face_offsets[face],
+                          views.face_vertices.begin() + views.face_offsets[face + 1]);
+    region.parent = views.parents[face];
+    region.toggled.assign(views.toggled_labels.begin() + views.toggle_offsets[face],
+                          views.toggled_labels.begin() + views.toggle_offsets[face + 1]);
+    region.index = views.index[face];
+    for (const int32_t corner : region.corners) next = std::max(next, corner + 1);
+    const int32_t next_of_corners = next;
+    for (; link != views.links.end() && link->a == face; ++link) {
+      region.links.push_back(*link);
+      next = std::max({next, link->start + 1, link->end + 1});
+    }
+    region.num_more_vertices = next - next_of_corners;
+  }
+  return block;
+}
+
 std::vector<float> MapLayout::MakeDocumentNorms() const {
   std::vector<float> norms(rows_.images.size(), 0);
   for (size_t document = 0; document < image_of_document_.size(); ++document) {
@@ -216,6 +262,10 @@ std::string MapLayout::Encode(const BlockEntry& entry) const {
       return EncodeBlock(MakeAppearanceBlock(entry));
     case BlockKind::kAmbiguity:
       return EncodeBlock(MakeAmbiguityBlock(entry));
+    case BlockKind::kFloorPlan:
+      return EncodeFloorPlan(rows_.views.plan);
+    case BlockKind::kViewRegions:
+      return EncodeBlock(MakeViewBlock(entry));
   }
   return "";
 }

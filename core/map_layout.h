@@ -29,6 +29,7 @@ class MapLayout {
   WordBlock MakeWordBlock(const BlockEntry& entry) const;
   AppearanceBlock MakeAppearanceBlock(const BlockEntry& entry) const;
   AmbiguityBlock MakeAmbiguityBlock(const BlockEntry& entry) const;
+  ViewBlock MakeViewBlock(const BlockEntry& entry) const;
   // Per image; 0 for one that is no document.
   std::vector<float> MakeDocumentNorms() const;
 
@@ -36,6 +37,7 @@ class MapLayout {
   void CutLandmarks();
   void CutEvenly(BlockKind kind, size_t count, size_t size);
   void CutWords();
+  void CutViews();
   void LinkRegions();
   void LinkImages();
   void AddEntry(BlockKind kind, size_t first, size_t count);
@@ -49,6 +51,7 @@ class MapLayout {
   std::vector<std::vector<RegionIdx>> regions_of_station_;
   std::vector<std::vector<int32_t>> image_blocks_of_block_;
   std::vector<int32_t> image_of_document_;
+  std::vector<int32_t> first_vertices_;  // of every block of view regions
 };
 
 }  // namespace cairn

@@ -134,6 +134,15 @@ Status CheckAppearance(const MapRows& rows) {
   return Ok();
 }
 
+Status CheckPlan(const Views& views) {
+  if (views.plan.walls.empty() != views.parents.empty())
+    return Invalid("{} walls, but {} regions of the floor plan", views.plan.walls.size(), views.num_faces());
+  if (const Status status = CheckViews(views, "floor plan"); !status.ok())
+    return Invalid("{}", status.error().message);
+  if (!IsNumberedByUse(views)) return Invalid("floor plan: vertices are not numbered as regions name them");
+  return Ok();
+}
+
 }  // namespace
 
 std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
@@ -184,6 +193,7 @@ Status CheckMapRows(const MapRows& rows) {
   CAIRN_RETURN_IF_ERROR(CheckImages(rows));
   CAIRN_RETURN_IF_ERROR(CheckAppearance(rows));
   CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
+  CAIRN_RETURN_IF_ERROR(CheckPlan(rows.views));
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
     return Invalid("{} landmarks, but {} descriptors", rows.landmarks.size(), rows.descriptors.rows());
   }

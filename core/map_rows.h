@@ -16,6 +16,7 @@
 #include "core/ids.h"
 #include "core/map_findings.h"
 #include "core/pose.h"
+#include "core/views.h"
 #include "core/vocabulary_tree.h"
 
 namespace cairn {
@@ -127,6 +128,9 @@ struct MapRows : MapHead {
   std::vector<MapAppearanceNode> appearance;  // none: not known
   // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
   Vocabulary vocabulary;
+  // The place's floor plan and its view-invariant regions, floor frame; no walls: not known.  Vertices are
+  // numbered by use (NumberVerticesByUse).
+  Views views;
   MapFindings findings;
 };
 

@@ -105,7 +105,60 @@ Status CheckViews(const Views& views, const std::string& what) {
       return Corrupt(what, "a link joins regions {} and {} of {}", link.a, link.b, num_faces);
     }
   }
+  if (!std::is_sorted(views.links.begin(), views.links.end())) return Corrupt(what, "links are out of order");
   return Ok();
+}
+
+namespace {
+
+// New number of every vertex by first use; -1: of no use.  REQUIRES: CheckViews(views)
+std::vector<int32_t> NumbersByUse(const Views& views) {
+  std::vector<int32_t> numbers(views.vertices.size(), -1);
+  int32_t next = 0;
+  const auto name = [&](int32_t vertex) {
+    if (numbers[vertex] < 0) numbers[vertex] = next++;
+  };
+  std::vector<std::pair<GridPoint, int32_t>> more;
+  size_t link = 0;
+  for (FaceIdx face = 0; face < views.num_faces(); ++face) {
+    for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i)
+      name(views.face_vertices[i]);
+    more.clear();
+    for (; link < views.links.size() && views.links[link].a == face; ++link) {
+      for (const int32_t end : {views.links[link].start, views.links[link].end}) {
+        if (numbers[end] < 0) more.emplace_back(views.vertices[end], end);
+      }
+    }
+    std::sort(more.begin(), more.end());
+    for (const auto& [place, vertex] : more) name(vertex);
+  }
+  return numbers;
+}
+
+}  // namespace
+
+void NumberVerticesByUse(Views* views) {
+  const std::vector<int32_t> numbers = NumbersByUse(*views);
+  std::vector<GridPoint> vertices(
+      std::count_if(numbers.begin(), numbers.end(), [](int32_t n) { return n >= 0; }));
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] >= 0) vertices[numbers[i]] = views->vertices[i];
+  }
+  views->vertices = std::move(vertices);
+  for (int32_t& vertex : views->face_vertices) vertex = numbers[vertex];
+  for (ViewLink& link : views->links) {
+    link.start = numbers[link.start];
+    link.end = numbers[link.end];
+  }
+  std::sort(views->links.begin(), views->links.end());
+}
+
+bool IsNumberedByUse(const Views& views) {
+  const std::vector<int32_t> numbers = NumbersByUse(views);
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] != static_cast<int32_t>(i)) return false;
+  }
+  return true;
 }
 
 FaceChildren ChildrenOf(const Views& views) {

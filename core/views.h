@@ -64,6 +64,11 @@ struct Views {
 // order.
 Status CheckViews(const Views& views, const std::string& what);
 
+// Numbers the vertices in the order in which regions name them: each region's corners, then what
+// else its links (those of which it is `a`) end at, by place.  Vertices that nothing names go.
+void NumberVerticesByUse(Views* views);
+bool IsNumberedByUse(const Views& views);
+
 // The database views.db; schemas/views.md.
 // Errors: NotFound, Corrupt, Unsupported (another version).
 Result<Views> ReadViews(const std::string& path);

@@ -123,7 +123,18 @@ std::string QueriesPath(const Recipe& recipe, const std::string& capture, const 
   return recipe.simulated || is_any ? capture + "/queries.txt" : "";
 }
 
+// Of the place; empty = none.
+std::string FloorPlanPath(const Recipe& recipe, const std::string& capture) {
+  if (!recipe.simulated_floor_plan.empty()) return capture + "/" + recipe.simulated_floor_plan;
+  for (const RecipeCapture& given : recipe.captures) {
+    if (!given.floor_plan_path.empty()) return Absolute(given.floor_plan_path);
+  }
+  return "";
+}
+
 }  // namespace
+
+bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empty(); }
 
 bool IsReconstructed(const Recipe& recipe) {
   return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
@@ -150,6 +161,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", capture));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the list of queries", queries));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
+  const std::string floor_plan = FloorPlanPath(recipe, capture);
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the floor plan", floor_plan));
   CAIRN_ASSIGN_OR_RETURN(const SessionWords sessions, JoinedSessions(recipe));
 
   const std::string options = paths.build_dir + "/options";
@@ -165,6 +178,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
       options + "/capture",
       IsJoined(recipe) ? sessions.folders + "\n" + sessions.queries + "\n" : capture + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));
   std::string known_places;
@@ -174,10 +188,10 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string config = fmt::format(
       "{}{}{}\n"
       "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
-      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\n",
+      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\nFLOOR_PLAN := {}\n",
       kConfigHead, paths.recipe, kConfigHeadEnd, paths.map, capture, recipe.simulated ? "yes" : "no",
       IsReconstructed(recipe) ? "yes" : "no", known_places, queries, recipe.name, seed,
-      SizeAndDate(paths.program), sessions.folders, sessions.queries);
+      SizeAndDate(paths.program), sessions.folders, sessions.queries, floor_plan);
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 

@@ -21,6 +21,8 @@ Status CheckMakePath(const std::string& what, const std::string& path);
 
 // Whether the captures have no poses of their own: then `reconstruct` finds them.
 bool IsReconstructed(const Recipe& recipe);
+// Whether the recipe names a floor plan: then `decompose_views` divides it.
+bool HasFloorPlan(const Recipe& recipe);
 
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)

@@ -53,7 +53,7 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     CAIRN_ASSIGN_OR_RETURN(Json report, ReadJson(entry.path().string()));
     const std::string stage = report["stage"];
     if ((stage == "simulate" && !run.simulated) || (stage == "join_captures" && !run.joined) ||
-        (stage == "reconstruct" && !run.reconstructed))
+        (stage == "reconstruct" && !run.reconstructed) || (stage == "decompose_views" && !run.has_floor_plan))
       continue;
     name.resize(name.size() - std::string_view(kReportSuffix).size());
     const size_t place = std::find(std::begin(kLine), std::end(kLine), stage) - std::begin(kLine);

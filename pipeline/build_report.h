@@ -16,9 +16,10 @@ struct BuildRun {
   std::string recipe;  // as given
   std::string map;     // as given
   uint64_t seed = 0;
-  bool simulated = false, joined = false, reconstructed = false;  // whether the line has these stages
-  bool whole_line = true;                                         // false with --until
-  std::set<std::string> ran;  // names in the build folder whose rules ran: "features.db"
+  bool simulated = false, joined = false, reconstructed = false,
+       has_floor_plan = false;  // whether the line has these stages
+  bool whole_line = true;       // false with --until
+  std::set<std::string> ran;    // names in the build folder whose rules ran: "features.db"
   double seconds = 0;
   std::optional<Error> error;  // why there is no map
 };

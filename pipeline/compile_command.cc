@@ -51,7 +51,8 @@ constexpr StageFile kStageFiles[] = {
     {"match_features", "matches.db"},     {"reconstruct", "poses"},
     {"group_classes", "classes.db"},      {"filter_visibility", "world.db"},
     {"decompose_regions", "regions.db"},  {"build_vocabulary", "vocabulary.db"},
-    {"link_appearance", "appearance.db"}, {"emit_map", "unsealed.cairn"}};
+    {"link_appearance", "appearance.db"}, {"decompose_views", "views.db"},
+    {"emit_map", "unsealed.cairn"}};
 
 Result<std::string> ProgramPath() {
   std::error_code error;
@@ -105,6 +106,11 @@ Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, con
   if (stage == "reconstruct" && !IsReconstructed(recipe)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--until {}: the capture has poses of its own (images.txt); nothing is reconstructed",
+                     until);
+  }
+  if (stage == "decompose_views" && !HasFloorPlan(recipe)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--until {}: the recipe names no floor plan; add floor_plan = \"FILE\" to [[capture]]",
                      until);
   }
   std::vector<std::string> stages;
@@ -237,6 +243,7 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
                   .simulated = recipe.simulated,
                   .joined = recipe.captures.size() > 1,
                   .reconstructed = IsReconstructed(recipe),
+                  .has_floor_plan = HasFloorPlan(recipe),
                   .whole_line = goal == paths.map,
                   .ran = RanSince(dates_before, paths.build_dir)};
   if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths);

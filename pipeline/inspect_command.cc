@@ -130,7 +130,10 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"documents", rows.documents},
                                  {"num_words", rows.vocabulary.num_words()},
                                  {"vocabulary_depth", rows.vocabulary.depth},
-                                 {"num_postings", num_postings}};
+                                 {"num_postings", num_postings},
+                                 {"num_plan_walls", rows.views.plan.walls.size()},
+                                 {"num_view_regions", rows.views.parents.size()},
+                                 {"num_view_links", rows.views.links.size()}};
   if (rows.frame.anchor) {
     json["anchor"] = {{"latitude_deg", rows.frame.anchor->latitude_deg},
                       {"longitude_deg", rows.frame.anchor->longitude_deg},

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/views.h"
 #include "runtime/interpretation_tree.h"
+#include "runtime/open_views.h"
 #include "runtime/read_scans.h"
 #include "stages/decompose_views/picture.h"
 
@@ -40,6 +41,7 @@ ordered_json Json(const Interpretation& found, FaceIdx region) {
           {"determined", found.determined},
           {"matched", found.num_matched},
           {"matched_length_m", found.matched_length_m},
+          {"hidden_length_m", found.hidden_length_m},
           {"rms_m", found.rms_m},
           {"region", region},
           {"labels", found.labels},
@@ -68,7 +70,8 @@ ViewsOverlay Overlay(const ScanView& scan, const InterpretationTreeResult& resul
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const Views views, ReadViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ScanView> scans,
                          ReadScans(arguments.scans, arguments.segment_options));
   if (arguments.scan >= static_cast<int>(scans.size())) {
@@ -123,7 +126,7 @@ Command LocateScanCommand() {
   command.name = "locate-scan";
   command.summary = "Find where a laser scan was taken in a floor plan";
   command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db)")
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
         ->required()
         ->type_name("FILE");
     app.add_option("scans", arguments->scans,

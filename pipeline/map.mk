@@ -61,7 +61,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, NAME, SEED and PROGRAM;
+# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, NAME, SEED and PROGRAM;
 # `cairn configure` writes it beside the options.
 include $(BUILD)/config.mk
 
@@ -84,6 +84,9 @@ CAIRN_OUTPUTS := $(addprefix $(BUILD)/,features.db matches.db classes.db world.d
     appearance.db unsealed.cairn)
 ifeq ($(RECONSTRUCTED),yes)
 CAIRN_OUTPUTS += $(BUILD)/poses
+endif
+ifneq ($(FLOOR_PLAN),)
+CAIRN_OUTPUTS += $(BUILD)/views.db
 endif
 # Poses, cameras and frame, read by the stages that know the capture.
 CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt))
@@ -262,19 +265,32 @@ $(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(BUILD
 	$(CAIRN_LAUNCH) $(CAIRN) link-appearance $(@D)/matches.db $(@D)/vocabulary.db --capture $(POSES) \
 	    --options $(@D)/options/link_appearance.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
+# Where the recipe names a floor plan; that of a simulated capture is one of its files.
+ifneq ($(FLOOR_PLAN),)
+$(BUILD)/views.db.stamp: FLOOR_PLAN := $(FLOOR_PLAN)
+$(BUILD)/views.db.stamp: $(if $(filter yes,$(SIMULATED)),$(CAPTURE_STAMP),$(FLOOR_PLAN)) \
+    $(BUILD)/options/floor_plan $(BUILD)/options/decompose_views.toml $(PROGRAM_HASH)
+	$(CAIRN_WHY)
+	$(CAIRN_LAUNCH) $(CAIRN) decompose-views $(FLOOR_PLAN) \
+	    --options $(@D)/options/decompose_views.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+endif
+
 SESSION_LIST := $(filter %/sessions.txt,$(CAPTURE_LISTS))
 $(BUILD)/%: SESSION_LIST := $(SESSION_LIST)
 # The map notes the options of every stage that made it.
 STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCTED)),reconstruct) group_classes \
-    filter_visibility decompose_regions build_vocabulary link_appearance emit_map
+    filter_visibility decompose_regions build_vocabulary link_appearance \
+    $(if $(FLOOR_PLAN),decompose_views) emit_map
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
+VIEWS := $(if $(FLOOR_PLAN),$(BUILD)/views.db)
+$(BUILD)/%: VIEWS := $(VIEWS)
 $(BUILD)/unsealed.cairn.stamp: $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
-    $(BUILD)/vocabulary.db $(BUILD)/appearance.db $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name $(PROGRAM_HASH) \
-    $(POSES_READY) $(SESSION_LIST)
+    $(BUILD)/vocabulary.db $(BUILD)/appearance.db $(VIEWS) $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) \
+    $(BUILD)/options/name $(BUILD)/options/floor_plan $(PROGRAM_HASH) $(POSES_READY) $(SESSION_LIST)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) emit-map --matches $(@D)/matches.db --classes $(@D)/classes.db --world $(@D)/world.db \
 	    --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --appearance $(@D)/appearance.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
-	    $(addprefix --sessions ,$(SESSION_LIST)) \
+	    $(addprefix --sessions ,$(SESSION_LIST)) $(addprefix --views ,$(VIEWS)) \
 	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
 	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 

@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "core/views.h"
 #include "runtime/disambiguate.h"
+#include "runtime/open_views.h"
 #include "runtime/plan_path.h"
 #include "stages/decompose_views/picture.h"
 
@@ -38,7 +39,8 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   if (arguments.kind != "search" && arguments.to.empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "--kind {} needs --to X,Y", arguments.kind);
   }
-  CAIRN_ASSIGN_OR_RETURN(const Views views, ReadViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
   const PlanSpace space(views);
   const Vec2 from(arguments.from[0], arguments.from[1]);
   PlanPath path;
@@ -78,7 +80,8 @@ struct ApartArguments {
 
 Status RunApart(const ApartArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const Views views, ReadViews(arguments.views));
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
   const PlanSpace space(views);
   const PlanarPose a{{arguments.a[0], arguments.a[1]}, arguments.a[2] * kDegree};
   const PlanarPose b{{arguments.b[0], arguments.b[1]}, arguments.b[2] * kDegree};
@@ -117,7 +120,7 @@ Command PlanPathCommand() {
   command.summary =
       "Plan a path in a floor plan: a short one, one with few turns, or one that sees everything";
   command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db)")
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
         ->required()
         ->type_name("FILE");
     app.add_option("--from", arguments->from, "start, metres")
@@ -144,7 +147,7 @@ Command TellApartCommand() {
   command.name = "tell-apart";
   command.summary = "Plan where to go to tell which of two poses in a floor plan is the right one";
   command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db)")
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
         ->required()
         ->type_name("FILE");
     app.add_option("--a", arguments->a, "a pose, metres and degrees")

@@ -31,7 +31,10 @@ constexpr Key kCaptureKeys[] = {
     {"queries", "text",
      "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
      "capture's queries.txt, if there is one."},
-    {"floor_plan", "text", "Floor plan of the place, relative to the recipe. Default: none."},
+    {"floor_plan", "text",
+     "Floor plan of the place (GeoJSON polygons, or lines x0,y0,x1,y1 of walls; metres), relative to the "
+     "recipe: the map then has its view-invariant regions ([floor plans](views.md)). One for all captures. "
+     "Default: none."},
     {"up", "text or list",
      "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]; the "
      "same for all captures that give one. Default \"auto\"."},
@@ -64,9 +67,14 @@ Status CheckName(const std::string& path, const toml::node& node, const std::str
       TomlPlace(path, node), name);
 }
 
-constexpr const char* kGateKeys[] = {"min_localized_ratio", "min_precision_ratio",
+constexpr Key kSimulateFloorPlanKey = {
+    "floor_plan", "text",
+    "Floor plan for the map, a file of the rendered capture: \"floor_plan.geojson\" is the building's. "
+    "Default: none."};
+
+constexpr const char* kGateKeys[] = {"min_localized_ratio",        "min_precision_ratio",
                                      "min_region_localized_ratio", "min_region_precision_ratio",
-                                     "min_region_held_out"};
+                                     "min_region_held_out",        "plan_must_fit"};
 
 // The keys of [gate]: those options of check_map that a map must reach to be written.
 OptionTable GateOptions(const std::vector<StageOptions>& stages) {
@@ -140,8 +148,20 @@ class RecipeReader {
       return UnknownKey(path_, key, node.is_table() ? "table" : "key", valid);
     }
     if (!node.is_table()) return WrongType(path_, node, name, "a table of the stage's options");
-    if (name == "simulate") recipe_.simulated = true;
+    if (name == "simulate") return ReadSimulate(*node.as_table(), stage->table);
     return SetOptionsFromToml(*node.as_table(), path_, stage->table);
+  }
+
+  Status ReadSimulate(toml::table table, const OptionTable& options) {
+    recipe_.simulated = true;
+    if (const toml::node* node = table.get(kSimulateFloorPlanKey.name)) {
+      CAIRN_ASSIGN_OR_RETURN(recipe_.simulated_floor_plan, Text(kSimulateFloorPlanKey.name, *node));
+      const fs::path file(recipe_.simulated_floor_plan);
+      if (file.empty() || file.has_parent_path())
+        return WrongType(path_, *node, "[simulate] floor_plan", "the name of a file of the rendered capture");
+      table.erase(kSimulateFloorPlanKey.name);
+    }
+    return SetOptionsFromToml(table, path_, options);
   }
 
   Status ReadSeed(const toml::node& node) {
@@ -194,6 +214,16 @@ class RecipeReader {
                          TomlPlace(path_, table));
       }
       recipe_.up = up;
+    }
+    for (const RecipeCapture& other : recipe_.captures) {
+      if (capture.floor_plan_path.empty() || other.floor_plan_path.empty() ||
+          other.floor_plan_path == capture.floor_plan_path)
+        continue;
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: floor_plan differs from that of a capture above; a map has one plan, in the frame "
+          "that all captures share: put the plans into one file",
+          TomlPlace(path_, table));
     }
     return AddCapture(table, std::move(capture));
   }
@@ -320,7 +350,10 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
   for (const StageOptions& stage : stages) {
     page += fmt::format("\n## `[{}]`\n", stage.stage);
     if (stage.stage == "simulate")
-      page += "\nThe capture is rendered first; an empty table takes all defaults.\n";
+      page += fmt::format(
+          "\nThe capture is rendered first; an empty table takes all defaults. Beside the options below: "
+          "`{}` ({}). {}\n",
+          kSimulateFloorPlanKey.name, kSimulateFloorPlanKey.type, kSimulateFloorPlanKey.help);
     AppendOptions(&page, stage.table);
   }
   return page;

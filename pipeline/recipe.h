@@ -28,7 +28,9 @@ struct Recipe {
   std::vector<RecipeCapture> captures;
   // "auto", or the up direction in the captures' frame as "x,y,z".
   std::string up = "auto";
-  bool simulated = false;            // [simulate]: the capture is rendered first
+  bool simulated = false;  // [simulate]: the capture is rendered first
+  // [simulate] floor_plan: a file of the rendered capture, relative to it; empty = none.
+  std::string simulated_floor_plan;
   std::vector<StageOptions> stages;  // in the order of the line, defaults overridden by the recipe's tables
 };
 

@@ -3,6 +3,7 @@
 #include "stages/build_vocabulary/build_vocabulary.h"
 #include "stages/check_map/check_map.h"
 #include "stages/decompose_regions/decompose_regions.h"
+#include "stages/decompose_views/decompose_views.h"
 #include "stages/emit_map/emit_map.h"
 #include "stages/extract_features/extract_features.h"
 #include "stages/filter_visibility/filter_visibility.h"
@@ -25,6 +26,7 @@ std::vector<StageOptions> AllStageOptions() {
       MakeStageOptions<DecomposeRegionsOptions>("decompose_regions"),
       MakeStageOptions<BuildVocabularyOptions>("build_vocabulary"),
       MakeStageOptions<LinkAppearanceOptions>("link_appearance"),
+      MakeStageOptions<DecomposeViewsOptions>("decompose_views"),
       MakeStageOptions<EmitMapOptions>("emit_map"),
       MakeStageOptions<CheckMapOptions>("check_map"),
   };

@@ -9,6 +9,7 @@
 #include "core/pose.h"
 #include "core/vector_geometry.h"
 #include "runtime/pairing.h"
+#include "runtime/rank_interpretations.h"
 
 namespace cairn {
 namespace {
@@ -50,12 +51,7 @@ class TreeSearch {
       std::iota(all_labels_.begin(), all_labels_.end(), 0);
       Descend(0, 0, nullptr, all_labels_);
     }
-    std::stable_sort(result_.solutions.begin(), result_.solutions.end(),
-                     [](const Interpretation& a, const Interpretation& b) {
-                       if (std::abs(a.matched_length_m - b.matched_length_m) > 1e-6)
-                         return a.matched_length_m > b.matched_length_m;
-                       return a.rms_m < b.rms_m;
-                     });
+    RankInterpretations(plan_, segments_, options_, &result_.solutions);
     return std::move(result_);
   }
 
@@ -352,27 +348,12 @@ class TreeSearch {
       if (found.labels[i] < 0) continue;
       if (Misfit(found, static_cast<int>(i), found.labels[i]) > 1) return false;
       bool seen = false;
-      for (double share = 0.1; share < 1 && !seen; share += 0.2)
-        seen = Sees(found, segments_[i].start + share * (segments_[i].end - segments_[i].start));
-      if (!seen) return false;
-    }
-    return true;
-  }
-
-  bool Sees(const Interpretation& found, const Vec2& point) const {
-    const Vec2 target = found.pose.FloorFromRobot(point), ray = target - found.pose.position;
-    const double reach = ray.norm();
-    for (const PlanWall& wall : plan_.walls) {
-      const double side_a = Cross(ray, wall.start - found.pose.position);
-      const double side_b = Cross(ray, wall.end - found.pose.position);
-      if ((side_a > 0) == (side_b > 0)) continue;
-      const Vec2 hit =
-          wall.start + (wall.end - wall.start) * (side_a / (side_a - side_b)) - found.pose.position;
-      const double distance = hit.dot(ray) / reach;
-      if (distance > 0 && distance < reach - 2 * options_.position_tolerance_m &&
-          PointToLine(target, wall.start, wall.end) > 2 * options_.position_tolerance_m) {
-        return false;
+      for (double share = 0.1; share < 1 && !seen; share += 0.2) {
+        const Vec2 point = segments_[i].start + share * (segments_[i].end - segments_[i].start);
+        seen =
+            SeesPoint(plan_, found.pose, found.pose.FloorFromRobot(point), 2 * options_.position_tolerance_m);
       }
+      if (!seen) return false;
     }
     return true;
   }

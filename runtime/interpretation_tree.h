@@ -52,6 +52,10 @@ struct InterpretationTreeOptions {
   // one before; 1: all at once.  REQUIRES: >= 1
   int rank_growth = 1;
   bool fix_pose_early = true;
+  // Walls stand about where the plan says, each by itself: standard deviation of their offset and direction,
+  // part of the covariance of solutions.  A laser measures better than plans are drawn.  REQUIRES: >= 0
+  double sigma_wall_m = 0.02;
+  double sigma_wall_deg = 0.5;
   // Search ends after this many pairings; what was found until then is returned, not complete.
   double max_num_nodes = 1e8;
 };
@@ -67,11 +71,12 @@ struct Interpretation {
   bool determined = true;
   int num_matched = 0;
   double matched_length_m = 0;
-  double rms_m = 0;  // of the matched segments' ends from their walls
+  double hidden_length_m = 0;  // of what was seen and lies behind a wall at this pose: speaks against it
+  double rms_m = 0;            // of the matched segments' ends from their walls
 };
 
 struct InterpretationTreeResult {
-  // Different poses only; most matched length first, then least rms.
+  // Different poses only; most matched length less what speaks against it first, then least rms.
   std::vector<Interpretation> solutions;
   int64_t num_nodes = 0;       // pairings tried, null matches included
   int64_t num_expanded = 0;    // pairings that met the constraints

@@ -14,6 +14,7 @@ namespace {
 // In the cache, beside the numbers of blocks.
 constexpr int64_t kAllLandmarks = -1;
 constexpr int64_t kWholeAppearance = -2;
+constexpr int64_t kWholeViews = -3;
 
 int64_t NumBytes(const LandmarkSet& set) {
   return static_cast<int64_t>(set.idx.size() * (sizeof(LandmarkIdx) + sizeof(MapLandmark))) +
@@ -159,6 +160,30 @@ Status Map::AddAmbiguity(AppearanceMap* appearance) const {
   for (auto& others : appearance->look_alikes)
     std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
   return Ok();
+}
+
+Result<std::shared_ptr<const Views>> Map::FloorViews() const {
+  if (auto found = cache_.Find(kWholeViews)) return std::static_pointer_cast<const Views>(found);
+  if (!has_views()) {
+    return MakeError(
+        ErrorCode::kNotFound,
+        "map '{}' has no floor plan; name one in its recipe ([[capture]] floor_plan) and compile "
+        "it again",
+        head_.name);
+  }
+  auto views = std::make_shared<Views>();
+  CAIRN_ASSIGN_OR_RETURN(const auto plan, Load(BlockKind::kFloorPlan, 0, DecodeFloorPlan,
+                                               [&](const auto&, const auto&) { return rows_->views.plan; }));
+  views->plan = *plan;
+  int64_t num_bytes = NumBytes(*plan);
+  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kViewRegions); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(
+        const auto block, Load(BlockKind::kViewRegions, ordinal, DecodeViewBlock, &MapLayout::MakeViewBlock));
+    CAIRN_RETURN_IF_ERROR(AppendRegions(*block, "map '" + head_.name + "'", views.get()));
+    num_bytes += NumBytes(*block);
+  }
+  CAIRN_RETURN_IF_ERROR(CheckViews(*views, "map '" + head_.name + "'"));
+  return std::static_pointer_cast<const Views>(cache_.Insert(kWholeViews, std::move(views), num_bytes));
 }
 
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {

@@ -11,6 +11,7 @@
 #include "core/map_file.h"
 #include "core/map_layout.h"
 #include "core/map_rows.h"
+#include "core/views.h"
 #include "runtime/block_cache.h"
 #include "runtime/landmark_set.h"
 
@@ -73,6 +74,12 @@ class Map {
   // The appearance graph as a whole; nothing in it where the map has none.  Kept like a block.
   // Errors: Corrupt, also where an image is of two nodes.
   Result<std::shared_ptr<const AppearanceMap>> Appearance() const;
+
+  // Whether there is a floor plan.
+  bool has_views() const { return directory_.Count(BlockKind::kViewRegions) > 0; }
+  // The floor plan and its view-invariant regions as a whole, floor frame.  Kept like a block.
+  // Errors: NotFound where the map has none; Corrupt.
+  Result<std::shared_ptr<const Views>> FloorViews() const;
 
   // An image by its index.
   Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;

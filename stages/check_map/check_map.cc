@@ -174,6 +174,18 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
                "stations' spacing is at none",
        .min = 0},
   };
+  table.push_back({.name = "plan_must_fit",
+                   .value = &o->plan_must_fit,
+                   .help = "gate: where the map has a floor plan, its walls must fit the landmarks"});
+  for (Option& option : DescribeOptions(&o->plan)) table.push_back(std::move(option));
+  for (const auto& [name, value, help] :
+       {std::tuple("scan_x_m", &o->scan_x_m,
+                   "where scans are given: the laser stands this far ahead of the camera, m"),
+        std::tuple("scan_y_m", &o->scan_y_m, "where scans are given: and this far to its left, m"),
+        std::tuple("scan_heading_deg", &o->scan_heading_deg,
+                   "where scans are given: and heads so far to the left of the camera's, degrees")}) {
+    table.push_back({.name = name, .value = value, .help = help, .min = -1000, .max = 1000});
+  }
   const OptionTable localizer = DescribeOptions(&o->localizer);
   table.insert(table.end(), localizer.begin(), localizer.end());
   return table;
@@ -223,6 +235,14 @@ void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse) {
 }
 
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
+  const auto fits = report.figures.find("plan_fits");
+  if (options.plan_must_fit && fits != report.figures.end() && fits->second == 0) {
+    return MakeError(ErrorCode::kGate,
+                     "below the gate: the floor plan does not fit the landmarks: it is off by {:.2f} m and "
+                     "{:.1f} deg, {:.0f} % of them lie on its walls; correct it, or the poses",
+                     report.figures.at("plan_shift_m"), report.figures.at("plan_turn_deg"),
+                     100 * report.figures.at("plan_on_walls_ratio"));
+  }
   const double most_asked =
       std::max({options.min_localized_ratio, options.min_precision_ratio, options.min_region_localized_ratio,
                 options.min_region_precision_ratio});

@@ -13,6 +13,7 @@
 #include "core/progress.h"
 #include "runtime/localizer.h"
 #include "runtime/map.h"
+#include "stages/check_map/plan_fit.h"
 
 namespace cairn {
 
@@ -36,6 +37,13 @@ struct CheckMapOptions {
   // this many times the stations' spacing (region_figures.h).  REQUIRES: in [0, 180]; >= 0
   double max_station_heading_deg = 45;
   double max_station_distance_ratio = 1.5;
+  // Gate: the map's floor plan must fit its landmarks (plan_fit.h).
+  bool plan_must_fit = false;
+  PlanFitOptions plan;
+  // A laser in the camera's floor frame: ahead, to the left (m), counter-clockwise (degrees).
+  double scan_x_m = 0;
+  double scan_y_m = 0;
+  double scan_heading_deg = 0;
   LocalizerOptions localizer;
 };
 OptionTable DescribeOptions(CheckMapOptions* options);
@@ -80,7 +88,10 @@ struct CheckMapReport {
   // (AddFullFigures):
   //   num_by_retrieval, all_images_num_by_retrieval: fixes from landmarks that retrieval led to, not from all
   //   landmarks of the map; all_images_num_localized, all_images_localized_ratio, all_images_precision_ratio
+  // and of a map with a floor plan what AddPlanFigures (plan_fit.h) and CompareWithPlan (plan_agreement.h)
+  // say.
   std::map<std::string, double> figures;
+  std::string plan_verdict;  // PlanVerdict; empty where there is no floor plan
   // The same by region, of images with a true pose: for SummarizeRegions (region_figures.h) to fill.
   std::vector<RegionSelfTest> regions;
   // Means over the images tried.

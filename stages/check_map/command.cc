@@ -11,7 +11,9 @@
 
 #include "core/capture.h"
 #include "core/map_documents.h"
+#include "runtime/read_scans.h"
 #include "stages/check_map/check_map.h"
+#include "stages/check_map/plan_agreement.h"
 #include "stages/check_map/region_figures.h"
 #include "stages/check_map/report.h"
 
@@ -25,6 +27,7 @@ struct Arguments {
   std::string queries_path;
   std::string capture_path;
   std::vector<std::string> foreign_paths;
+  std::string scans_path;
   std::string output_path;
   bool json = false;
   CheckMapOptions options;
@@ -103,12 +106,38 @@ Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& c
             const std::string& path) {
   CheckMapOptions options = checked;
   rows.sealed = true;
+  if (!report.images.empty() || !report.plan_verdict.empty()) rows.self_test = report.figures;
   if (!report.images.empty()) {
-    rows.self_test = report.figures;
     rows.findings.self_test_regions = report.regions;
   }
   rows.stage_options["check_map"] = OptionsToml(DescribeOptions(&options));
   return WriteMapRows(rows, path);
+}
+
+// Image fixes and landmarks against the floor plan, where the map has one.
+Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandEnvironment& environment,
+                 CheckMapReport* report) {
+  if (rows.views.plan.walls.empty()) {
+    if (arguments.scans_path.empty()) return Ok();
+    return MakeError(ErrorCode::kInvalidArgument, "--scans {}: map '{}' has no floor plan to locate them in",
+                     arguments.scans_path, rows.name);
+  }
+  const Result<PlanFit> fit = FitPlan(rows, arguments.options.plan);
+  if (!fit.ok() && fit.error().code != ErrorCode::kNoData) return fit.error();
+  if (fit.ok()) {
+    AddPlanFigures(*fit, &report->figures);
+    report->plan_verdict = PlanVerdict(*fit);
+    if (!fit->fits) spdlog::warn("the floor plan {}", report->plan_verdict);
+  } else {
+    spdlog::warn("{}", fit.error().message);
+  }
+  std::vector<std::vector<ScanSegment>> scans;
+  if (!arguments.scans_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(std::vector<ScanView> read, ReadScans(arguments.scans_path, {}));
+    for (ScanView& scan : read) scans.push_back(std::move(scan.segments));
+  }
+  return CompareWithPlan(rows.views, rows.floor_from_world, report->images, scans, arguments.options,
+                         environment.num_threads, *environment.progress, &report->figures);
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -135,6 +164,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     held_out.regions = SummarizeRegions(rows, images, held_out.images, arguments.options);
     WarnOfRejects(held_out);
   }
+  CAIRN_RETURN_IF_ERROR(CheckPlan(rows, arguments, environment, &held_out));
   std::optional<CheckMapReport> foreign;
   if (!arguments.foreign_paths.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images,
@@ -171,6 +201,9 @@ Command CheckMapCommand() {
                            "capture that has the images [the folder of queries.txt]");
             app.add_option("--foreign", arguments->foreign_paths,
                            "capture or folder of images of another place: none may be localized");
+            app.add_option("--scans", arguments->scans_path,
+                           "Carmen log: laser scan i was taken with held-out image i; located in the floor "
+                           "plan, it should say the same");
             app.add_option("-o,--output", arguments->output_path,
                            "sealed map to write, with the figures inside");
             app.add_flag("--json", arguments->json, "print JSON, every image included");

@@ -55,13 +55,35 @@ int NumFixes(const CheckMapReport& report) {
   return static_cast<int>(Figure(report, "num_localized").value_or(0));
 }
 
+std::string Line(const std::string& name, const std::string& value) {
+  return fmt::format("{:<22} {}\n", name, value);
+}
+
+// What the images and the floor plan say of each other.
+std::string PlanText(const CheckMapReport& held_out) {
+  const auto figure = [&](const char* name) { return Figure(held_out, name); };
+  std::string text;
+  if (!held_out.plan_verdict.empty()) text += Line("floor plan", held_out.plan_verdict);
+  if (const auto free = figure("plan_images_free_ratio"))
+    text += Line("survey in its rooms", Text(free, 0.01, 1) + " % of the images");
+  if (const auto free = figure("plan_fixes_free_ratio"))
+    text += Line("fixes in its rooms", Text(free, 0.01, 1) + " %");
+  if (figure("num_scan_fixes")) {
+    text +=
+        Line("scans located", fmt::format("{}, {} of images with a fix", Text(figure("num_scan_fixes"), 1, 0),
+                                          Text(figure("num_image_and_scan_fixes"), 1, 0)));
+    text += Line("scans like images", fmt::format("{} % (any of their poses {} %)",
+                                                  Text(figure("scan_first_agrees_ratio"), 0.01, 1),
+                                                  Text(figure("scan_any_agrees_ratio"), 0.01, 1)));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string ReportText(const PrintedReport& report) {
   std::string text;
-  const auto line = [&](const std::string& name, const std::string& value) {
-    text += fmt::format("{:<22} {}\n", name, value);
-  };
+  const auto line = [&](const std::string& name, const std::string& value) { text += Line(name, value); };
   line("map", fmt::format("{}{}", report.rows->name, report.rows->sealed ? "" : " (unsealed)"));
   line("landmarks", fmt::format("{} ({})", report.rows->landmarks.size(), report.rows->landmark_choice));
   line("regions",
@@ -97,6 +119,7 @@ std::string ReportText(const PrintedReport& report) {
     line("ms per image",
          fmt::format("{:.1f} (SIFT alone {:.1f})", held_out.mean_total_ms, held_out.mean_sift_ms));
   }
+  if (report.held_out != nullptr) text += PlanText(*report.held_out);
   if (report.foreign != nullptr) {
     line("other places",
          fmt::format("{} images, {} false fixes", report.foreign->images.size(), NumFixes(*report.foreign)));
@@ -115,8 +138,12 @@ std::string ReportJson(const PrintedReport& report) {
                          {"k", report.rows->k},
                          {"map_bytes", report.map_bytes}};
   if (report.rows->lower_bound) json["lower_bound"] = *report.rows->lower_bound;
-  if (report.held_out != nullptr && !report.held_out->images.empty()) {
+  if (report.held_out != nullptr && !report.held_out->plan_verdict.empty())
+    json["floor_plan"] = report.held_out->plan_verdict;
+  if (report.held_out != nullptr) {
     for (const auto& [name, value] : report.held_out->figures) json[name] = value;
+  }
+  if (report.held_out != nullptr && !report.held_out->images.empty()) {
     json["mean_total_ms"] = report.held_out->mean_total_ms;
     json["mean_sift_ms"] = report.held_out->mean_sift_ms;
     json["regions"] = SelfTestRegionsJson(report.held_out->regions);

@@ -57,8 +57,19 @@ class GeoJsonReader {
   Status ReadAll(const json& object, const char* member, int depth) {
     const auto list = object.find(member);
     if (list == object.end() || !list->is_array()) return Corrupt(what_, "no list \"{}\"", member);
-    for (const json& part : *list) CAIRN_RETURN_IF_ERROR(Read(part, depth + 1));
+    const bool has_free_space = std::any_of(list->begin(), list->end(), IsFreeSpace);
+    for (const json& part : *list) {
+      if (!has_free_space || IsFreeSpace(part)) CAIRN_RETURN_IF_ERROR(Read(part, depth + 1));
+    }
     return Ok();
+  }
+
+  // A plan may also draw what stands in it, and name its rooms: those polygons are not the plan.
+  static bool IsFreeSpace(const json& object) {
+    const auto properties = object.is_object() ? object.find("properties") : object.end();
+    if (!object.is_object() || properties == object.end() || !properties->is_object()) return false;
+    const auto kind = properties->find("kind");
+    return kind != properties->end() && kind->is_string() && *kind == "free_space";
   }
 
   Status ReadPolygon(const json& rings) {

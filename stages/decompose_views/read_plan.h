@@ -27,7 +27,8 @@ struct InputPlan {
 };
 
 // Reads a floor plan in metres: GeoJSON (RFC 7946's objects, coordinates taken as plane metres: Polygon,
-// MultiPolygon, GeometryCollection, Feature, FeatureCollection) where the text begins with '{', else lines
+// MultiPolygon, GeometryCollection, Feature, FeatureCollection; where features have the property "kind" =
+// "free_space", those alone) where the text begins with '{', else lines
 // `x0,y0,x1,y1`, blank lines and lines that begin with '#' left out.
 // Errors: NotFound, Corrupt (no JSON, not four finite numbers in a line, an open ring, fewer than three
 // points; names the line or ring), Unsupported (other geometries), NoData (no walls).

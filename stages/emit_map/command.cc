@@ -13,6 +13,7 @@
 #include "core/file.h"
 #include "core/sessions.h"
 #include "core/sift.h"
+#include "core/views_database.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
 
@@ -26,6 +27,7 @@ struct Arguments {
   std::string regions_path;
   std::string vocabulary_path;
   std::string appearance_path;
+  std::string views_path;
   std::string frame_path;
   std::string sessions_path;
   std::string name;
@@ -57,6 +59,9 @@ Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
   }
   if (!arguments.appearance_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows->input_hashes["appearance.db"], HashFile(arguments.appearance_path));
+  }
+  if (!arguments.views_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes["views.db"], HashFile(arguments.views_path));
   }
   for (const std::string& text : arguments.stage_options) {
     const size_t equals = text.find('=');
@@ -118,6 +123,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   CAIRN_RETURN_IF_ERROR(AddDrops(arguments, classes, world, &rows));
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
+  if (!arguments.views_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(Views views, ReadViews(arguments.views_path));
+    CAIRN_RETURN_IF_ERROR(AddViews(std::move(views), &rows));
+  }
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
   environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
   environment.report->out = {
@@ -149,6 +158,8 @@ Command EmitMapCommand() {
             app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
             app.add_option("--appearance", arguments->appearance_path,
                            "appearance.db: which images see the same, and which are kept [not in the map]");
+            app.add_option("--views", arguments->views_path,
+                           "views.db: the floor plan and its view-invariant regions [not in the map]");
             app.add_option("--frame", arguments->frame_path,
                            "frame.json of the poses: unit and place on the Earth [metres, anywhere]");
             app.add_option("--sessions", arguments->sessions_path,

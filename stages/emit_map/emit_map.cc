@@ -315,4 +315,16 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   return rows;
 }
 
+Status AddViews(Views views, MapRows* rows) {
+  if (rows->frame.unit != "metre") {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "map '{}' has no scale (unit = {}), and floor plans are in metres; give the scale to "
+                     "[reconstruct] (distances, control_points), or take floor_plan out of the recipe",
+                     rows->name, rows->frame.unit);
+  }
+  NumberVerticesByUse(&views);
+  rows->views = std::move(views);
+  return Ok();
+}
+
 }  // namespace cairn

@@ -9,6 +9,7 @@
 #include "core/feature_class.h"
 #include "core/map_rows.h"
 #include "core/options.h"
+#include "core/views.h"
 #include "core/vocabulary_tree.h"
 #include "core/world.h"
 
@@ -49,5 +50,9 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr);
+
+// Puts a floor plan and its regions, floor frame, into a map.  Errors: InvalidArgument where the map's unit
+// is not the metre, in which plans are.
+Status AddViews(Views views, MapRows* rows);
 
 }  // namespace cairn

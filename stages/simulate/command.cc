@@ -41,7 +41,9 @@ Status ReadRecipe(const std::string& path, SimulateOptions* options, uint64_t* s
     }
     *seed = static_cast<uint64_t>(value->get());
   }
-  return SetOptionsFromToml(*node->as_table(), path, DescribeOptions(options));
+  toml::table table = *node->as_table();
+  table.erase("floor_plan");  // which of the capture's files is the map's plan
+  return SetOptionsFromToml(table, path, DescribeOptions(options));
 }
 
 Status Run(const Arguments& given, const CommandEnvironment& environment, SimulateOptions* options) {

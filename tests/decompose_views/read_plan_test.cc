@@ -51,6 +51,22 @@ TEST(ReadPlan, TurnsRingsSoThatTheInteriorIsToTheirLeft) {
   EXPECT_EQ(input->rings[1][2], Eigen::Vector2d(1, 1));
 }
 
+TEST(ReadPlan, OfAPlanWithFreeSpaceNothingElseCounts) {
+  const std::string square = "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,0]]]}";
+  const auto feature = [&](const std::string& properties) {
+    return "{\"type\": \"Feature\", \"properties\": " + properties + ", \"geometry\": " + square + "}";
+  };
+  const auto num_rings = [&](const std::string& features) {
+    const auto input =
+        ParsePlan("{\"type\": \"FeatureCollection\", \"features\": [" + features + "]}", "plan");
+    return input.ok() ? input->rings.size() : 0;
+  };
+  const std::string room = feature("{\"kind\": \"room\"}"), other = feature("null"),
+                    kind = feature("{\"kind\": 1}");
+  EXPECT_EQ(num_rings(room + "," + feature("{\"kind\": \"free_space\"}") + "," + other + "," + kind), 1u);
+  EXPECT_EQ(num_rings(room + "," + other + "," + kind), 3u);
+}
+
 TEST(ReadPlan, RefusesWhatIsNoPolygon) {
   EXPECT_EQ(ErrorOf("{\"type\": \"Point\", \"coordinates\": [0, 0]}").code, ErrorCode::kUnsupported);
   EXPECT_EQ(ErrorOf("{ not json").code, ErrorCode::kCorrupt);

@@ -3,6 +3,7 @@
 #include "core/appearance.h"
 #include "core/decomposition.h"
 #include "core/feature_class.h"
+#include "core/views.h"
 #include "core/vocabulary_tree.h"
 #include "core/world.h"
 
@@ -87,6 +88,34 @@ inline EmitExample MakeEmitExample() {
   vocabulary.inverted_files = {{{0, 2}, {2, 5}}, {{2, 1}, {3, 1}}};
   WeightVocabulary(&vocabulary);
   return example;
+}
+
+// A room of 2 x 1 m as a plan of four walls, in two regions; the right one does not see the right wall.
+//
+//   3-----2-----5
+//   |  0  |  1  |
+//   0-----1-----4
+inline Views MakeExampleViews() {
+  Views views;
+  FloorPlan& plan = views.plan;
+  plan.grid_m = 0.01;
+  plan.origin = {-1, 0.5};
+  plan.closed = true;
+  plan.high = {200, 100};
+  plan.vertices = {{0, 0}, {200, 0}, {200, 100}, {0, 100}};
+  for (int32_t i = 0; i < 4; ++i) {
+    plan.pieces.push_back({i, (i + 1) % 4, i});
+    plan.walls.push_back({plan.Metres(plan.vertices[i]), plan.Metres(plan.vertices[(i + 1) % 4])});
+  }
+  views.vertices = {{0, 0}, {100, 0}, {100, 100}, {0, 100}, {200, 0}, {200, 100}};
+  views.face_vertices = {0, 1, 2, 3, 1, 4, 5, 2};
+  views.face_offsets = {0, 4, 8};
+  views.parents = {-1, 0};
+  views.toggled_labels = {0, 2, 4, 6, 2};
+  views.toggle_offsets = {0, 4, 5};
+  views.index = {{4, 6, 6, 2, 2}, {3, 5, 5, 1.5F, 2}};
+  views.links = {{0, 1, 1, 2}};
+  return views;
 }
 
 }  // namespace cairn

@@ -1,5 +1,6 @@
 #include "core/map_blocks.h"
 
+#include <cmath>
 #include <functional>
 
 #include <gmock/gmock.h>
@@ -18,8 +19,10 @@ using testing::Pair;
 
 MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
-  return *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                  {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1}, &example.appearance);
+  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                          {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1}, &example.appearance);
+  rows.views = MakeExampleViews();
+  return rows;
 }
 
 // Landmarks in regions of these sizes, one after the other, and some in none.
@@ -120,6 +123,12 @@ struct EncodedBlocks {
       case BlockKind::kAmbiguity:
         CAIRN_RETURN_IF_ERROR(DecodeAmbiguityBlock(changed, entry, directory, "block"));
         return Ok();
+      case BlockKind::kFloorPlan:
+        CAIRN_RETURN_IF_ERROR(DecodeFloorPlan(changed, entry, directory, "block"));
+        return Ok();
+      case BlockKind::kViewRegions:
+        CAIRN_RETURN_IF_ERROR(DecodeViewBlock(changed, entry, directory, "block"));
+        return Ok();
     }
     return Ok();
   }
@@ -127,7 +136,7 @@ struct EncodedBlocks {
 
 TEST(MapBlocks, EveryTruncationIsRefused) {
   const EncodedBlocks blocks;
-  ASSERT_EQ(blocks.bytes.size(), 9u);
+  ASSERT_EQ(blocks.bytes.size(), 11u);
   for (size_t block = 0; block < blocks.bytes.size(); ++block) {
     const std::string& bytes = blocks.bytes[block];
     EXPECT_TRUE(blocks.Decode(block, bytes).ok());
@@ -201,6 +210,28 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
         AmbiguityBlock nodes = layout.MakeAmbiguityBlock(entry);
         change(nodes.nodes[0]);
         EXPECT_FALSE(blocks.Decode(i, EncodeBlock(nodes)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kFloorPlan)) {
+      FloorPlan plan = blocks.rows.views.plan;
+      plan.pieces[2].end = 4;
+      EXPECT_FALSE(blocks.Decode(i, EncodeFloorPlan(plan)).ok());
+      plan = blocks.rows.views.plan;
+      plan.walls[1].start.x() = std::nan("");
+      EXPECT_FALSE(blocks.Decode(i, EncodeFloorPlan(plan)).ok());
+      plan = blocks.rows.views.plan;
+      plan.vertices[2].x = 2 * kMaxGridCoordinate;
+      EXPECT_FALSE(blocks.Decode(i, EncodeFloorPlan(plan)).ok());
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kViewRegions)) {
+      for (const auto& change : std::vector<std::function<void(ViewBlock::Region&)>>{
+               [](ViewBlock::Region& region) { region.toggled = {8}; },
+               [](ViewBlock::Region& region) {
+                 region.corners = {0, 1};
+               },
+               [](ViewBlock::Region& region) { region.index.num_labels = 9; },
+               [](ViewBlock::Region& region) { region.links[0].b = 2; },
+               [](ViewBlock::Region& region) { region.links[0].b = 0; }}) {
+        ViewBlock regions = layout.MakeViewBlock(entry);
+        change(regions.regions[0]);
+        EXPECT_FALSE(blocks.Decode(i, EncodeBlock(regions)).ok());
       }
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
       WordBlock words = layout.MakeWordBlock(entry);

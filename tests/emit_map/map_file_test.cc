@@ -191,6 +191,50 @@ TEST(MapFile, SparseMapsReadBackAsTheyWere) {
   EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "nothing is kept";
 }
 
+TEST(MapFile, FloorPlansReadBackAsTheyWere) {
+  MapRows rows = ExampleRows();
+  rows.views = MakeExampleViews();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("plan.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("plan.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  const Views& found = read->views;
+  EXPECT_EQ(found.plan.vertices, rows.views.plan.vertices);
+  EXPECT_EQ(found.plan.walls[2].end, rows.views.plan.walls[2].end);
+  EXPECT_EQ(found.vertices, rows.views.vertices);
+  EXPECT_EQ(found.face_vertices, rows.views.face_vertices);
+  EXPECT_EQ(found.parents, rows.views.parents);
+  EXPECT_THAT(found.LabelSet(1), ElementsAre(0, 4, 6));
+  EXPECT_EQ(found.index[1].visible_area_m2, 1.5F);
+  EXPECT_EQ(found.links, rows.views.links);
+  std::filesystem::remove(MapPath("plan2.cairn"));
+  ASSERT_TRUE(WriteMapRows(*read, MapPath("plan2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("plan.cairn")), *ReadFile(MapPath("plan2.cairn")));
+
+  rows.views.parents[1] = 1;
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "a region is its own parent";
+  rows.views = MakeExampleViews();
+  std::swap(rows.views.face_vertices[0], rows.views.face_vertices[3]);
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "vertices are not numbered by use";
+}
+
+TEST(MapFile, VerticesOfAPlanAreNumberedByUse) {
+  Views views = MakeExampleViews();
+  std::vector<int32_t> mixed = {7, 3, 1, 6, 0, 4};  // and two that nothing names
+  Views other = views;
+  other.vertices.assign(8, {-5, -5});
+  for (size_t i = 0; i < mixed.size(); ++i) other.vertices[mixed[i]] = views.vertices[i];
+  for (int32_t& vertex : other.face_vertices) vertex = mixed[vertex];
+  other.links[0] = {0, 1, mixed[1], mixed[2]};
+  EXPECT_FALSE(IsNumberedByUse(other));
+  MapRows rows = ExampleRows();
+  ASSERT_TRUE(AddViews(other, &rows).ok());
+  EXPECT_EQ(rows.views.vertices, views.vertices);
+  EXPECT_EQ(rows.views.face_vertices, views.face_vertices);
+  EXPECT_EQ(rows.views.links, views.links);
+  rows.frame.unit = "arbitrary";
+  EXPECT_EQ(AddViews(other, &rows).error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(MapFile, FailedWriteLeavesTheOldFile) {
   ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("kept.cairn")).ok());
   const std::string before = *ReadFile(MapPath("kept.cairn"));

@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 // A flat of two rooms with a door, as a file of wall segments.
 class FloorPlan : public testing::Test {
@@ -90,6 +92,75 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
     EXPECT_THAT(run.err, HasSubstr(message)) << arguments;
     EXPECT_FALSE(fs::exists(Path("out.db"))) << arguments;
   }
+}
+
+// The building's plan, 1 m off.
+std::string ShiftedPlan(const std::string& text) {
+  json plan = json::parse(text);
+  for (json& feature : plan["features"]) {
+    json& geometry = feature["geometry"];
+    const bool is_multi = geometry["type"] == "MultiPolygon";
+    json polygons = is_multi ? geometry["coordinates"] : json::array({geometry["coordinates"]});
+    for (json& polygon : polygons) {
+      for (json& ring : polygon) {
+        for (json& point : ring) point[0] = point[0].get<double>() + 1;
+      }
+    }
+    geometry["coordinates"] = is_multi ? polygons : polygons[0];
+  }
+  return plan.dump();
+}
+
+TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
+  WriteTinyRecipe(Path("tiny.toml"));
+  ReplaceInFile(Path("tiny.toml"), "[simulate]\n", "[simulate]\nfloor_plan = \"floor_plan.geojson\"\n");
+  const ProgramRun views = Run("compile tiny.toml -o tiny.cairn --until decompose-views --progress lines");
+  ASSERT_EQ(views.exit_code, 0) << views.err;
+  EXPECT_THAT(views.err, Not(HasSubstr("features.db")));
+  const ProgramRun compiled = Run("compile tiny.toml -o tiny.cairn --progress lines");
+  ASSERT_EQ(compiled.exit_code, 0) << compiled.err;
+  EXPECT_THAT(compiled.err, Not(HasSubstr("views.db")));
+  EXPECT_THAT(Run("compile tiny.toml -o tiny.cairn").out, HasSubstr("up to date"));
+  const json inspected = json::parse(Run("inspect tiny.cairn --json").out);
+  EXPECT_GT(inspected["num_plan_walls"], 20);
+  EXPECT_GT(inspected["num_view_regions"], 100);
+  EXPECT_EQ(inspected["self_test"]["plan_fits"], 1);
+  EXPECT_EQ(inspected["self_test"]["plan_images_free_ratio"], 1);
+  EXPECT_THAT(inspected["stage_options"]["decompose_views"].get<std::string>(), HasSubstr("snap_m"));
+  EXPECT_THAT(Run("check-map tiny.cairn").out, HasSubstr("floor plan             fits"));
+
+  // A map and views.db say the same of a scan: the walls of a corner.
+  ASSERT_TRUE(WriteFileAtomically(Path("scan.txt"), "2,-1,2,0.5\n1.8,1,-0.5,1\n").ok());
+  const ProgramRun in_map = Run("locate-scan tiny.cairn scan.txt");
+  ASSERT_EQ(in_map.exit_code, 0) << in_map.err;
+  EXPECT_FALSE(json::parse(in_map.out)["solutions"].empty());
+  EXPECT_EQ(in_map.out, Run("locate-scan tiny.build/views.db scan.txt").out);
+
+  // A plan that is off is noticed, and only what depends on it is done again.
+  const std::string plan = *ReadFile(Path("tiny.build/capture/floor_plan.geojson"));
+  ASSERT_TRUE(WriteFileAtomically(Path("tiny.build/capture/moved.geojson"), ShiftedPlan(plan)).ok());
+  ReplaceInFile(Path("tiny.toml"), "floor_plan.geojson", "moved.geojson");
+  const ProgramRun moved = Run("compile tiny.toml -o tiny.cairn --progress lines");
+  EXPECT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_THAT(moved.err, HasSubstr("the floor plan does not fit"));
+  EXPECT_THAT(moved.err, HasSubstr("views.db: options/floor_plan changed"));
+  EXPECT_THAT(moved.err, Not(HasSubstr("regions.db")));
+  const json off = json::parse(Run("inspect tiny.cairn --json").out)["self_test"];
+  EXPECT_EQ(off["plan_fits"], 0);
+  EXPECT_NEAR(off["plan_shift_m"].get<double>(), 1, 0.1);
+  std::ofstream(Path("tiny.toml"), std::ios::app) << "[gate]\nplan_must_fit = true\n";
+  const ProgramRun refused = Run("compile tiny.toml -o tiny.cairn");
+  EXPECT_EQ(refused.exit_code, static_cast<int>(ErrorCode::kGate)) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("does not fit the landmarks"));
+
+  // Without one, the map is as small as before.
+  ReplaceInFile(Path("tiny.toml"), "floor_plan = \"moved.geojson\"\n", "");
+  ASSERT_EQ(Run("compile tiny.toml -o tiny.cairn").exit_code, 0);
+  EXPECT_EQ(json::parse(Run("inspect tiny.cairn --json").out)["num_view_regions"], 0);
+  EXPECT_EQ(Run("locate-scan tiny.cairn scan.txt").exit_code, static_cast<int>(ErrorCode::kNotFound));
+  const ProgramRun until = Run("compile tiny.toml -o tiny.cairn --until decompose_views");
+  EXPECT_EQ(until.exit_code, 2);
+  EXPECT_THAT(until.err, HasSubstr("floor_plan = "));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -116,6 +117,21 @@ TEST_F(RecipeTest, WhatIsMissingIsSaid) {
   EXPECT_THAT(Message("name = \n", ErrorCode::kCorrupt), HasSubstr("recipe.toml:1: not TOML"));
   const auto recipe = ReadRecipe((folder_ / "none.toml").string(), TestStages());
   EXPECT_EQ(recipe.error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(RecipeTest, FloorPlansAreOnePerMap) {
+  fs::create_directories(folder_ / "other");
+  for (const char* plan : {"a.txt", "b.txt"}) std::ofstream(folder_ / plan) << "0,0,1,0\n";
+  const std::string first = "name = \"a\"\n[[capture]]\npath = \"survey\"\nfloor_plan = \"a.txt\"\n";
+  const std::string second = "[[capture]]\npath = \"other\"\n";
+  const auto recipe = Read(first + second + "floor_plan = \"./a.txt\"\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_EQ(recipe->captures[1].floor_plan_path, (folder_ / "a.txt").string());
+  EXPECT_TRUE(Read(first + second).ok());
+  EXPECT_THAT(Message(first + second + "floor_plan = \"b.txt\"\n"), HasSubstr("a map has one plan"));
+  EXPECT_EQ(Read("name = \"a\"\n[simulate]\nfloor_plan = \"p.json\"\n")->simulated_floor_plan, "p.json");
+  EXPECT_THAT(Message("name = \"a\"\n[simulate]\nfloor_plan = \"../p.json\"\n"),
+              HasSubstr("recipe.toml:3: [simulate] floor_plan: expected the name of a file"));
 }
 
 TEST_F(RecipeTest, SeveralCapturesAreSessionsWithNames) {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/views.h"
+#include "runtime/scan_segments.h"
+#include "stages/check_map/check_map.h"
+
+namespace cairn {
+
+// How the fixes of images and the floor plan agree; `scans` is empty, or scans[i] was taken with images[i] by
+// a laser where options.scan_..._ says.  Adds to the figures
+//   plan_fixes_free_ratio: fixes that lie in a region of the plan
+// and with scans
+//   num_scan_fixes: scans that some pose in the plan explains
+//   num_image_and_scan_fixes: of these, such whose image has a fix too
+//   scan_first_agrees_ratio, scan_any_agrees_ratio: of these, such where the scan's first, or any, pose is
+//   that of the image's fix, within gross_error_m and gross_error_deg.
+// A place that looks like another has several poses: the first may be the wrong one.  Same figures for any
+// number of threads.  Errors: InvalidArgument (not as many scans as images), Cancelled.
+Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
+                       const std::vector<HeldOutResult>& images,
+                       const std::vector<std::vector<ScanSegment>>& scans, const CheckMapOptions& options,
+                       int num_threads, Progress& progress, std::map<std::string, double>* figures);
+
+}  // namespace cairn
