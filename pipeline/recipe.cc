@@ -152,16 +152,16 @@ class RecipeReader {
     return SetOptionsFromToml(*node.as_table(), path_, stage->table);
   }
 
-  Status ReadSimulate(toml::table table, const OptionTable& options) {
+  Status ReadSimulate(const toml::table& table, OptionTable options) {
     recipe_.simulated = true;
-    if (const toml::node* node = table.get(kSimulateFloorPlanKey.name)) {
-      CAIRN_ASSIGN_OR_RETURN(recipe_.simulated_floor_plan, Text(kSimulateFloorPlanKey.name, *node));
-      const fs::path file(recipe_.simulated_floor_plan);
-      if (file.empty() || file.has_parent_path())
-        return WrongType(path_, *node, "[simulate] floor_plan", "the name of a file of the rendered capture");
-      table.erase(kSimulateFloorPlanKey.name);
-    }
-    return SetOptionsFromToml(table, path_, options);
+    options.push_back({.name = kSimulateFloorPlanKey.name,
+                       .value = &recipe_.simulated_floor_plan,
+                       .help = kSimulateFloorPlanKey.help});
+    CAIRN_RETURN_IF_ERROR(SetOptionsFromToml(table, path_, options));
+    const toml::node* node = table.get(kSimulateFloorPlanKey.name);
+    const fs::path file(recipe_.simulated_floor_plan);
+    if (node == nullptr || (!file.empty() && !file.has_parent_path())) return Ok();
+    return WrongType(path_, *node, "[simulate] floor_plan", "the name of a file of the rendered capture");
   }
 
   Status ReadSeed(const toml::node& node) {

@@ -41,9 +41,10 @@ Status ReadRecipe(const std::string& path, SimulateOptions* options, uint64_t* s
     }
     *seed = static_cast<uint64_t>(value->get());
   }
-  toml::table table = *node->as_table();
-  table.erase("floor_plan");  // which of the capture's files is the map's plan
-  return SetOptionsFromToml(table, path, DescribeOptions(options));
+  OptionTable table = DescribeOptions(options);
+  std::string floor_plan;  // which of the capture's files is the map's plan
+  table.push_back({.name = "floor_plan", .value = &floor_plan, .help = "floor plan of the map"});
+  return SetOptionsFromToml(*node->as_table(), path, table);
 }
 
 Status Run(const Arguments& given, const CommandEnvironment& environment, SimulateOptions* options) {

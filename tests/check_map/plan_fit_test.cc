@@ -36,6 +36,8 @@ Views RoomViews(const std::vector<Vec2>& corners) {
   views.parents = {-1};
   views.toggle_offsets = {0, count};
   views.index.resize(1);
+  views.index[0].num_labels = count;
+  for (const PlanWall& wall : plan.walls) views.index[0].wall_length_m += static_cast<float>(wall.Length());
   return views;
 }
 
@@ -46,7 +48,8 @@ Views RoomViews(const std::vector<Vec2>& corners) {
 //    0        6    10
 const std::vector<Vec2> kCorners = {{0, 0}, {10, 0}, {10, 4}, {6, 4}, {6, 8}, {0, 8}};
 
-// Landmarks on the walls with 2 cm noise, some of furniture, some of the ceiling; images in the room.
+// Landmarks on the walls with 2 cm noise, some of furniture, some of the ceiling; images where all walls are
+// seen.
 MapRows SurveyOfRoom() {
   Random random(5);
   MapRows rows;
@@ -68,7 +71,7 @@ MapRows SurveyOfRoom() {
     // Upright, looking along +y of the floor.
     image.cam_from_world.rotation =
         Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()));
-    const Eigen::Vector3d center(random.Uniform(1, 5), random.Uniform(1, 7), 1.4);
+    const Eigen::Vector3d center(random.Uniform(1, 5), random.Uniform(2.5, 3.5), 1.4);
     image.cam_from_world.translation = -(image.cam_from_world.rotation * center);
   }
   rows.views = RoomViews(kCorners);

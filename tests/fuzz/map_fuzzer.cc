@@ -82,6 +82,7 @@ MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_by
 void TryBlock(BlockKind kind, std::string_view bytes) {
   if (bytes.size() < kCountBytes) return;
   const MapDirectory directory = DirectoryFor(kind, bytes.substr(0, kCountBytes), bytes.size() - kCountBytes);
+  if (directory.NumBlocks(kind) == 0) return;  // a kind of a later version
   const BlockEntry& entry = directory.Entry(kind, 0);
   bytes.remove_prefix(kCountBytes);
   switch (kind) {
