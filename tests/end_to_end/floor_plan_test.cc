@@ -130,7 +130,7 @@ TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
   EXPECT_THAT(Run("check-map tiny.cairn").out, HasSubstr("floor plan             fits"));
 
   // A map and views.db say the same of a scan: the walls of a corner.
-  ASSERT_TRUE(WriteFileAtomically(Path("scan.txt"), "2,-1,2,0.5\n1.8,1,-0.5,1\n").ok());
+  ASSERT_TRUE(WriteFileAtomically(Path("scan.txt"), "1,-0.2,1,0.4\n0.6,1,-0.2,1\n").ok());
   const ProgramRun in_map = Run("locate-scan tiny.cairn scan.txt");
   ASSERT_EQ(in_map.exit_code, 0) << in_map.err;
   EXPECT_FALSE(json::parse(in_map.out)["solutions"].empty());
