@@ -54,8 +54,8 @@ struct InterpretationTreeOptions {
   bool fix_pose_early = true;
   // Walls stand about where the plan says, each by itself: standard deviation of their offset and direction,
   // part of the covariance of solutions.  A laser measures better than plans are drawn.  REQUIRES: >= 0
-  double sigma_wall_m = 0.02;
-  double sigma_wall_deg = 0.5;
+  double sigma_wall_m = 0.03;
+  double sigma_wall_deg = 0.8;
   // Search ends after this many pairings; what was found until then is returned, not complete.
   double max_num_nodes = 1e8;
 };
