@@ -210,6 +210,7 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
         AmbiguityBlock nodes = layout.MakeAmbiguityBlock(entry);
         change(nodes.nodes[0]);
         EXPECT_FALSE(blocks.Decode(i, EncodeBlock(nodes)).ok());
+      }
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kFloorPlan)) {
       FloorPlan plan = blocks.rows.views.plan;
       plan.pieces[2].end = 4;
