@@ -17,7 +17,7 @@
 #include "core/capture.h"
 #include "core/image_file.h"
 #include "core/parallel.h"
-#include "runtime/localizer.h"
+#include "runtime/region_tracker.h"
 
 namespace cairn {
 namespace {
@@ -29,7 +29,9 @@ struct Arguments {
   std::string output_path;
   std::string camera;
   std::string cameras_path;
+  bool is_sequence = false;
   LocalizerOptions options;
+  RegionTrackerOptions tracker_options;
   OptionArguments option_arguments;
 };
 
@@ -86,6 +88,18 @@ Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>&
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     return Localizer(map, options).Localize(grey, camera);
+  }();
+  return answer;
+}
+
+// The same for the next frame of a sequence.
+Answer TrackImage(const std::string& image, const CameraChoice& cameras, RegionTracker* tracker) {
+  Answer answer{.image = image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    return tracker->Track(grey, camera);
   }();
   return answer;
 }
@@ -174,11 +188,15 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   std::vector<CaptureImage> poses;
   std::optional<Error> first_error;
   int num_images = 0, num_failed = 0;
-  const size_t batch_size = 4 * static_cast<size_t>(NumThreads(environment.num_threads));
+  RegionTracker tracker(map, arguments.options, arguments.tracker_options);
+  const size_t batch_size =
+      arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
     std::vector<Answer> answers(batch.size());
-    ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads,
-                [&](int64_t i) { answers[i] = LocalizeImage(batch[i], map, cameras, arguments.options); });
+    ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
+      answers[i] = arguments.is_sequence ? TrackImage(batch[i], cameras, &tracker)
+                                         : LocalizeImage(batch[i], map, cameras, arguments.options);
+    });
     for (const Answer& answer : answers) {
       *environment.out << AnswerJson(answer).dump() << "\n" << std::flush;
       ++num_images;
@@ -221,7 +239,12 @@ Command LocalizeCommand() {
                 ->type_name("MODEL,W,H,P...");
             app.add_option("--cameras", arguments->cameras_path, "cameras.txt; chosen by image size")
                 ->type_name("FILE");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+            app.add_flag("--sequence", arguments->is_sequence,
+                         "The images are frames in order: follow the camera from one to the next");
+            OptionTable options = DescribeOptions(&arguments->options);
+            const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
+            options.insert(options.end(), of_tracker.begin(), of_tracker.end());
+            arguments->option_arguments.Add(app, options);
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
   };

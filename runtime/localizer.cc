@@ -91,6 +91,8 @@ const char* ScopeName(Scope scope) {
       return "images";
     case Scope::kAll:
       return "all";
+    case Scope::kTrack:
+      return "track";
   }
   return "all";
 }
@@ -140,39 +142,49 @@ Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& opt
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
                                          const std::optional<PosePrior>& prior) {
   return WithoutExceptions("localize", [&]() -> Result<Localization> {
-    CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-    if (grey.cols != camera.width || grey.rows != camera.height) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
-                       camera.width, camera.height);
-    }
-    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
-    return LocalizeFeatures(std::move(features), camera, prior);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromImage(grey, camera));
+    return LocalizeQuery(query, prior);
   });
 }
 
 Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
                                                  const std::optional<PosePrior>& prior) {
   return WithoutExceptions("localize", [&]() -> Result<Localization> {
-    CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
-    if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
-      return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
-                       features.keypoints.size(), features.descriptors.rows());
-    }
-    const int num_features = static_cast<int>(features.keypoints.size());
-    if (num_features < options_.accept.min_num_features) {
-      Localization none = Failure(
-          NoFix::kTooFewFeatures,
-          fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
-      none.num_features = num_features;
-      return none;
-    }
-    return LocalizeQuery(MakeQuery(std::move(features), camera, options_.measurement), prior);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromFeatures(std::move(features), camera));
+    return LocalizeQuery(query, prior);
   });
+}
+
+Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+  if (grey.cols != camera.width || grey.rows != camera.height) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
+                     camera.width, camera.height);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
+  return QueryFromFeatures(std::move(features), camera);
+}
+
+Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+  if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
+    return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
+                     features.keypoints.size(), features.descriptors.rows());
+  }
+  return MakeQuery(std::move(features), camera, options_.measurement);
 }
 
 Result<Localization> Localizer::LocalizeQuery(const Query& query,
                                               const std::optional<PosePrior>& prior) const {
+  const int num_features = static_cast<int>(query.features.keypoints.size());
+  if (num_features < options_.accept.min_num_features) {
+    Localization none = Failure(
+        NoFix::kTooFewFeatures,
+        fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
+    none.num_features = num_features;
+    return none;
+  }
   std::vector<ImageId> candidate_ids;
   Localization best = Failure(NoFix::kNoCandidates, "no survey image looks like it");
   CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
@@ -184,14 +196,24 @@ Result<Localization> Localizer::LocalizeQuery(const Query& query,
   if (options_.exclude_look_alikes && best.has_fix()) {
     CAIRN_ASSIGN_OR_RETURN(best, ExcludeLookAlikes(query, prior, std::move(best)));
   }
-  best.num_features = static_cast<int>(query.features.keypoints.size());
   best.candidates = std::move(candidate_ids);
-  if (best.has_fix()) {
+  return InGivenFrame(query, std::move(best));
+}
+
+Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
+                                              std::vector<LandmarkIdx> landmarks) const {
+  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {scope, std::move(landmarks)}));
+  return InGivenFrame(query, std::move(localization));
+}
+
+Localization Localizer::InGivenFrame(const Query& query, Localization localization) const {
+  localization.num_features = static_cast<int>(query.features.keypoints.size());
+  if (localization.has_fix()) {
     const Pose given_from_camera = map_->head().camera_from_given.Inverse();
-    best.cam_from_world = given_from_camera * best.cam_from_world;
-    best.covariance = TransformCovariance(given_from_camera, best.covariance);
+    localization.cam_from_world = given_from_camera * localization.cam_from_world;
+    localization.covariance = TransformCovariance(given_from_camera, localization.covariance);
   }
-  return best;
+  return localization;
 }
 
 Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,

@@ -45,8 +45,8 @@ struct LocalizerOptions {
 OptionTable DescribeOptions(LocalizerOptions* options);
 
 // Where landmarks to match came from.
-enum class Scope { kPrior, kRegions, kImages, kAll };
-const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all"
+enum class Scope { kPrior, kRegions, kImages, kAll, kTrack };
+const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all", "track"
 
 // A fix, or the reason for none.
 struct Localization {
@@ -86,11 +86,20 @@ class Localizer {
   Result<Localization> LocalizeFeatures(Features features, const Camera& camera,
                                         const std::optional<PosePrior>& prior = std::nullopt);
 
+  // The pieces of it, for who knows more than an image (RegionTracker).
+  // Features of an image and what is known of them.  Errors: as Localize.
+  Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
+  Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
+  Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
+  // Among these landmarks (ascending) alone.
+  Result<Localization> LocalizeAmong(const Query& query, Scope scope,
+                                     std::vector<LandmarkIdx> landmarks) const;
+
   const LocalizerOptions& options() const { return options_; }
 
  private:
   struct Attempt;
-  Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
+  Localization InGivenFrame(const Query& query, Localization localization) const;
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
                                             std::vector<ImageId>* candidate_ids) const;
   Result<Localization> Try(const Query& query, const Attempt& attempt) const;

@@ -133,7 +133,7 @@ Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::ve
   return landmarks;
 }
 
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
   std::vector<LandmarkIdx> ascending = landmarks;
   std::sort(ascending.begin(), ascending.end());
   std::map<RegionIdx, int> counts;
@@ -145,15 +145,18 @@ Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>&
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
     for (const auto& [region, of_region] : block->regions) counts[region] += NumShared(of_region, ascending);
   }
-  RegionIdx best_region = -1;
-  int most = 0;
+  std::vector<RegionVotes> votes;
   for (const auto& [region, count] : counts) {
-    if (count > most) {
-      most = count;
-      best_region = region;
-    }
+    if (count > 0) votes.push_back({region, count});
   }
-  return best_region;
+  std::stable_sort(votes.begin(), votes.end(),
+                   [](const RegionVotes& a, const RegionVotes& b) { return a.num_votes > b.num_votes; });
+  return votes;
+}
+
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks) {
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(map, landmarks));
+  return votes.empty() ? -1 : votes.front().region;
 }
 
 Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center) {

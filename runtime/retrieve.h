@@ -60,6 +60,14 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
 Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);
 
+// How many of these landmarks (each once) every region has [Sala06 §III: the visible features vote], most
+// first, ties to the smaller index; regions without any are left out.
+struct RegionVotes {
+  RegionIdx region = -1;
+  int num_votes = 0;
+};
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+
 // The region that has most of these landmarks, the smaller index on a tie; -1 for none.
 Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
 
