@@ -93,14 +93,23 @@ class BuildingMaker {
     double low = begin;
     for (size_t d = 0; d <= wall.doors.size(); ++d) {
       const double high = d < wall.doors.size() ? wall.doors[d].first : end;
-      const int num_pieces =
-          std::max(1, static_cast<int>(std::ceil((high - low) / options_.panel_width_m - 1e-9)));
-      for (int i = 0; i < num_pieces && high > low; ++i) {
-        const double x0 = low + (high - low) * i / num_pieces;
-        const double x1 = i + 1 == num_pieces ? high : low + (high - low) * (i + 1) / num_pieces;
-        const int box = AddBox(part(x0, x1), 0, options_.height_m);
-        for (const int face : faces) panels_.push_back({6 * box + face, x1 - x0, materials[face]});
+      const auto add_pieces = [&](double from, double to) {
+        const int num_pieces =
+            std::max(1, static_cast<int>(std::ceil((to - from) / options_.panel_width_m - 1e-9)));
+        for (int i = 0; i < num_pieces && to > from; ++i) {
+          const double x0 = from + (to - from) * i / num_pieces;
+          const double x1 = i + 1 == num_pieces ? to : from + (to - from) * (i + 1) / num_pieces;
+          const int box = AddBox(part(x0, x1), 0, options_.height_m);
+          for (const int face : faces) panels_.push_back({6 * box + face, x1 - x0, materials[face]});
+        }
+      };
+      double from = low;
+      for (const double joint : wall.joints) {
+        if (joint <= from || joint >= high) continue;
+        add_pieces(from, joint);
+        from = joint;
       }
+      add_pieces(from, high);
       if (d == wall.doors.size()) break;
       low = wall.doors[d].second;
       const int box = AddBox(part(high, low), options_.door_height_m, options_.height_m);
@@ -149,8 +158,55 @@ class BuildingMaker {
       Box& box = building_.boxes[panel.face / 6];
       box.faces[panel.face % 6] = FaceSurface(box, panel.face % 6, job);
     }
+    if (building_.layout.twins) PairTwins();
     building_.num_wall_panels = num_panels;
     building_.num_repeated_panels = num_repeated;
+  }
+
+  // Panels of the second twin take the textures of the first, but for the ones that are to differ.
+  void PairTwins() {
+    const Twins& twins = *building_.layout.twins;
+    const Rect& rect = twins.rect;
+    const Eigen::Vector2d middle(0.5 * (rect.x0 + rect.x1) + twins.offset_m, 0.5 * (twins.wing_y + rect.y1));
+    struct Pair {
+      double distance = 0;  // from the middle of the second wing
+      int first = 0, second = 0;
+    };
+    std::vector<Pair> pairs;
+    for (const Panel& second : panels_) {
+      const Box& box = building_.boxes[second.face / 6];
+      for (const Panel& first : panels_) {
+        const Box& twin = building_.boxes[first.face / 6];
+        const Eigen::Vector3d offset(twins.offset_m, 0, 0);
+        if (first.face % 6 != second.face % 6 || !(twin.min + offset).isApprox(box.min, 1e-9) ||
+            !(twin.max + offset).isApprox(box.max, 1e-9) || twin.min.x() < rect.x0 - 1e-9) {
+          continue;
+        }
+        Eigen::Vector2d place = 0.5 * (box.min + box.max).head<2>();  // of the face
+        const int face = second.face % 6;
+        place[face / 2] = (face % 2 == 0 ? box.min : box.max)[face / 2];
+        pairs.push_back({(place - middle).norm(), first.face, second.face});
+      }
+    }
+    std::stable_sort(pairs.begin(), pairs.end(),
+                     [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+    int num_left = options_.num_different_panels;
+    for (const Pair& pair : pairs) {
+      if (num_left-- > 0) continue;
+      Box& box = building_.boxes[pair.second / 6];
+      box.faces[pair.second % 6] =
+          FaceSurface(box, pair.second % 6, building_.boxes[pair.first / 6].faces[pair.first % 6].texture);
+    }
+  }
+
+  // The floor or the ceiling of the second twin: that of the first.
+  void CopyTwin(cv::Mat picture, double texel_m) const {
+    const Twins& twins = *building_.layout.twins;
+    const auto column = [&](double x) { return std::clamp(static_cast<int>(x / texel_m), 0, picture.cols); };
+    const int begin = column(twins.rect.x0), offset = static_cast<int>(std::lround(twins.offset_m / texel_m));
+    const int end = std::min(column(twins.rect.x1), picture.cols - offset);
+    if (end <= begin) return;
+    picture.colRange(begin, end).clone().copyTo(picture.colRange(begin + offset, end + offset));
   }
 
   void Paint(int num_threads) {
@@ -187,6 +243,7 @@ class BuildingMaker {
             break;
         }
       }
+      if (texture >= floor && building_.layout.twins) CopyTwin(picture, coarse_texel_m);
       building_.textures[texture] = Texture(picture);
     });
     // Both are maps of the building with y upwards.

@@ -5,6 +5,7 @@
 
 #include "core/random.h"
 #include "stages/simulate/furniture.h"
+#include "stages/simulate/twin_wings.h"
 
 namespace cairn {
 namespace {
@@ -186,7 +187,8 @@ double DistanceToRect(const Rect& rect, double x, double y) {
 
 Result<Layout> MakeLayout(const SimulateOptions& options, uint64_t seed) {
   CAIRN_RETURN_IF_ERROR(CheckSimulateOptions(options));
-  CAIRN_ASSIGN_OR_RETURN(Layout layout, LayoutMaker(options, seed).Make());
+  CAIRN_ASSIGN_OR_RETURN(Layout layout,
+                         options.twin_wings ? MakeTwinLayout(options) : LayoutMaker(options, seed).Make());
   PlaceFurniture(options, seed, &layout);
   return layout;
 }

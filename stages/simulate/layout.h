@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct Wall {
   Rect rect;
   bool along_x = true;
   std::vector<std::pair<double, double>> doors;  // ascending
+  std::vector<double> joints;                    // ascending: places along it where a panel ends
 };
 
 // Something that stands on the floor.
@@ -41,6 +43,13 @@ struct Furniture {
   Rect rect;
   double height_m = 0;
   bool is_pillar = false;
+};
+
+// A part of a building that looks like another: `rect` and the same moved along x.
+struct Twins {
+  Rect rect;
+  double offset_m = 0;
+  double wing_y = 0;  // where the wings begin
 };
 
 // The plan of a building.  Rooms stand in strips on both sides of corridors along x; where there are several
@@ -57,6 +66,7 @@ struct Layout {
   std::vector<Room> rooms;
   std::vector<Wall> walls;  // the four outer ones first
   std::vector<Furniture> furniture;
+  std::optional<Twins> twins;  // with twin_wings only (twin_wings.h)
 };
 
 // Lays out the building; the same options and seed give the same layout.

@@ -32,6 +32,10 @@ struct SimulateOptions {
   // Pillars per room, standing free where there is place.  REQUIRES: in [0, 10]
   double pillars_per_room = 0.5;
 
+  // Two wings that look alike, a spine and a goal room instead of rooms along corridors: perceptual aliasing
+  // of whole places (twin_wings.h).
+  bool twin_wings = false;
+
   // --- Its surfaces
   // Walls are covered with panels of at most this width, each with a texture.  REQUIRES: in [0.5, 10]
   double panel_width_m = 1.6;
@@ -40,6 +44,9 @@ struct SimulateOptions {
   double repetition_ratio = 0.15;
   // Size of that set.  REQUIRES: in [1, 100]
   int num_shared_textures = 3;
+  // Wall panels of the second of twin wings that differ from the first's, those near its middle first.
+  // REQUIRES: >= 0
+  int num_different_panels = 1;
   // Edge of a wall texel; floor and ceiling have twice that.  REQUIRES: in [0.001, 0.05]
   double texel_m = 0.003;
 

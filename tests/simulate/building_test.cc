@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 
 #include "core/random.h"
+#include "stages/simulate/renderer.h"
+#include "stages/simulate/survey.h"
 
 namespace cairn {
 namespace {
@@ -157,6 +159,61 @@ TEST(CastRay, GivesNothingFromInsideAWallOrOutside) {
   EXPECT_FALSE(CastRay(building, {(wall.x0 + wall.x1) / 2, (wall.y0 + wall.y1) / 2, 2.3}, {1, 0.2, 0.1}));
   EXPECT_FALSE(CastRay(building, {-3, 1, 1}, {1, 0, 0}));
   EXPECT_FALSE(CastRay(building, {4, 3.5, 2.7}, {0, 0, -1}));
+}
+
+// The picture from a place and from the same place of the other twin.
+double TwinDifference(const Building& building, double x, double y, double heading_rad) {
+  Camera camera = {.model = CameraModel::kSimplePinhole, .width = 160, .height = 120, .params = {80, 80, 60}};
+  const Renderer renderer(building, camera);
+  const double offset = building.layout.twins->offset_m;
+  return cv::norm(renderer.Render(MakePose({x, y, 1.0}, heading_rad)),
+                  renderer.Render(MakePose({x + offset, y, 1.0}, heading_rad)), cv::NORM_INF);
+}
+
+SimulateOptions TwinOptions() {
+  SimulateOptions options = QuickOptions();
+  options.width_m = 12;
+  options.depth_m = 8;
+  options.twin_wings = true;
+  return options;
+}
+
+TEST(TwinWings, LookAlikeEverywhereInsideThem) {
+  SimulateOptions options = TwinOptions();
+  options.num_different_panels = 0;
+  const Building building = Make(options);
+  ASSERT_TRUE(building.layout.twins.has_value());
+  const Rect& wing = building.layout.rooms[0].rect;
+  const double x = 0.5 * (wing.x0 + wing.x1);
+  for (const double y : {wing.y0 + 2.2, 0.5 * (wing.y0 + wing.y1), wing.y1 - 0.5}) {
+    for (const double heading : {-1.57, -1.3, -1.8, 0.3, 1.57}) {
+      EXPECT_LE(TwinDifference(building, x, y, heading), 2) << y << " " << heading;
+    }
+  }
+}
+
+TEST(TwinWings, DifferInOnePanel) {
+  const Building building = Make(TwinOptions());
+  const Rect& wing = building.layout.rooms[0].rect;
+  const double x = 0.5 * (wing.x0 + wing.x1), y = 0.5 * (wing.y0 + wing.y1);
+  const double west = TwinDifference(building, x, y, 3.14), east = TwinDifference(building, x, y, 0);
+  EXPECT_GT(std::max(west, east), 50);
+  EXPECT_LE(std::min(west, east), 2);
+  EXPECT_LE(TwinDifference(building, x, wing.y1 - 0.5, 1.57), 2);
+}
+
+TEST(TwinWings, DoNotLookAlikeOutsideOfThem) {
+  const Building building = Make(TwinOptions());
+  const Rect& wing = building.layout.rooms[0].rect;
+  EXPECT_GT(TwinDifference(building, 0.5 * (wing.x0 + wing.x1), 0.8, 0), 50);  // along the spine
+}
+
+TEST(TwinWings, NeedRoom) {
+  SimulateOptions options = TwinOptions();
+  options.width_m = 6;
+  const Result<Building> building = MakeBuilding(options, 0);
+  ASSERT_FALSE(building.ok());
+  EXPECT_EQ(building.error().code, ErrorCode::kInvalidArgument);
 }
 
 }  // namespace
