@@ -2,6 +2,7 @@
 
 #include "pipeline/clean_command.h"
 #include "pipeline/compile_command.h"
+#include "pipeline/drive_command.h"
 #include "pipeline/export_command.h"
 #include "pipeline/import_command.h"
 #include "pipeline/inspect_command.h"
@@ -37,6 +38,7 @@ std::vector<Command> AllCommands() {
       JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
       MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),  RouteCommand(),
       DecomposeViewsCommand(),  LocateScanCommand(),       PlanPathCommand(),         TellApartCommand(),
+      DriveCommand(),
   };
 }
 

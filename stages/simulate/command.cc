@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "core/toml_options.h"
+#include "stages/simulate/read_recipe.h"
 #include "stages/simulate/simulate.h"
 
 namespace cairn {
@@ -49,7 +49,8 @@ Status ReadRecipe(const std::string& path, SimulateOptions* options, uint64_t* s
 
 Status Run(const Arguments& given, const CommandEnvironment& environment, SimulateOptions* options) {
   uint64_t seed = environment.seed;
-  if (!given.recipe_path.empty()) CAIRN_RETURN_IF_ERROR(ReadRecipe(given.recipe_path, options, &seed));
+  if (!given.recipe_path.empty())
+    CAIRN_RETURN_IF_ERROR(ReadSimulateRecipe(given.recipe_path, options, &seed));
   if (environment.seed_given) seed = environment.seed;
   CAIRN_RETURN_IF_ERROR(given.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(

@@ -1,0 +1,225 @@
+#include "stages/simulate/robot_drive.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/pose.h"
+
+namespace cairn {
+namespace {
+
+const char* VerdictName(HypothesisVerdict verdict) {
+  switch (verdict) {
+    case HypothesisVerdict::kFollow:
+      return "follow";
+    case HypothesisVerdict::kSwitch:
+      return "switch";
+    case HypothesisVerdict::kLost:
+      break;
+  }
+  return "lost";
+}
+
+ServoTarget TargetOfFeatures(const Features& features, const PlanarPose& pose) {
+  ServoTarget target{{}, features.descriptors, pose};
+  for (const Keypoint& keypoint : features.keypoints) target.pixels.emplace_back(keypoint.x, keypoint.y);
+  return target;
+}
+
+class Driver {
+ public:
+  Driver(const Map& map, const PlaceModel& model, Robot robot, int32_t goal_image,
+         const std::optional<Kidnapping>& kidnapping, const RobotDriveOptions& options)
+      : map_(map), model_(model), robot_(std::move(robot)), kidnapping_(kidnapping), options_(options) {
+    drive_.goal_image = goal_image;
+    drive_.start = robot_.pose();
+    goal_node_ = model.appearance().node_of_image[goal_image];
+  }
+
+  // Errors are those of the map's file; what happens to the robot is part of the drive.
+  Result<RobotDrive> Run() {
+    CAIRN_ASSIGN_OR_RETURN(const ServoTarget goal, TargetOfImage(map_, drive_.goal_image));
+    drive_.goal = goal.pose;
+    if (Status status = LookAnew("start"); !status.ok()) {
+      drive_.error = status.error();
+    } else if (status = FollowWays(goal); !status.ok()) {
+      if (status.error().code == ErrorCode::kCorrupt || status.error().code == ErrorCode::kIo)
+        return status.error();
+      drive_.error = status.error();
+    }
+    drive_.goal_error_m = (robot_.pose().position - goal.pose.position).norm();
+    drive_.goal_error_deg =
+        std::abs(DegFromRad(WrapAngle(robot_.pose().heading_rad - goal.pose.heading_rad)));
+    return std::move(drive_);
+  }
+
+ private:
+  Status FollowWays(const ServoTarget& goal) {
+    while (num_legs_ < options_.max_num_legs) {
+      const bool is_goal = next_ >= way_.size();
+      if (is_goal) {
+        DriveLeg& leg = Go("go", goal, goal_node_, true);
+        if (leg.arrived) return Ok();
+        CAIRN_RETURN_IF_ERROR(Relocalize(leg.why));
+        continue;
+      }
+      const NodeIdx node = way_[next_];
+      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target,
+                             TargetOfImage(map_, model_.appearance().node_images[node].front()));
+      DriveLeg& leg = Go("go", target, node, false);
+      if (!leg.arrived) {
+        CAIRN_RETURN_IF_ERROR(Relocalize(leg.why));
+        continue;
+      }
+      ++next_;
+      const Features seen = robot_.Look();
+      trail_.push_back(TargetOfFeatures(seen, robot_.pose()));
+      const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(seen.descriptors));
+      leg.verdict = VerdictName(verdict);
+      Note(&leg);
+      if (verdict == HypothesisVerdict::kLost) CAIRN_RETURN_IF_ERROR(Relocalize("an image of elsewhere"));
+      if (verdict == HypothesisVerdict::kSwitch) CAIRN_RETURN_IF_ERROR(Switch());
+    }
+    return MakeError(ErrorCode::kFailed, "drive: not at the goal after {} images", num_legs_);
+  }
+
+  // Where it stands is its start from now on.
+  Status LookAnew(const char* kind) {
+    const Features seen = robot_.Look();
+    DriveLeg leg;
+    leg.kind = kind;
+    leg.pose = leg.target = robot_.pose();
+    drive_.legs.push_back(leg);
+    if (seen.keypoints.empty()) {
+      return MakeError(ErrorCode::kNoData,
+                       "drive: an image without features at {:.2f}, {:.2f}; turn the "
+                       "camera to where there is something to see",
+                       robot_.pose().position.x(), robot_.pose().position.y());
+    }
+    CAIRN_ASSIGN_OR_RETURN(hypotheses_, StartHypotheses::Make(model_, model_.Look(seen.descriptors),
+                                                              goal_node_, options_.hypotheses));
+    trail_ = {TargetOfFeatures(seen, robot_.pose())};
+    Note(&drive_.legs.back());
+    TakeWay(hypotheses_->hypotheses()[hypotheses_->followed()].path);
+    return Ok();
+  }
+
+  Status Relocalize(const std::string& why) {
+    if (drive_.num_relocalizations == options_.max_num_relocalizations) {
+      return MakeError(ErrorCode::kFailed, "drive: lost for the {}th time at {:.2f}, {:.2f}: {}",
+                       drive_.num_relocalizations + 1, robot_.pose().position.x(), robot_.pose().position.y(),
+                       why);
+    }
+    ++drive_.num_relocalizations;
+    return LookAnew("relocalize");
+  }
+
+  // Back to the start over its own images, or on from where it would be by now.
+  Status Switch() {
+    ++drive_.num_switches;
+    const int followed = hypotheses_->followed();
+    if (options_.hypotheses.on_switch == "replan") {
+      const std::optional<NodePath> path = hypotheses_->Replan(followed);
+      if (!path) return Relocalize("no way from where the robot would be");
+      TakeWay(*path);
+      return Ok();
+    }
+    for (size_t i = trail_.size() - 1; i-- > 0;) {
+      const DriveLeg& leg = Go("retrace", trail_[i], -1, false);
+      if (!leg.arrived) return Relocalize(leg.why);
+    }
+    trail_.resize(1);
+    hypotheses_->Restart();
+    TakeWay(hypotheses_->hypotheses()[followed].path);
+    return Ok();
+  }
+
+  void TakeWay(const NodePath& path) {
+    way_ = path.nodes;
+    next_ = std::min<size_t>(1, way_.size());
+    if (way_.size() > 1) way_.pop_back();  // the goal's image itself comes last
+  }
+
+  DriveLeg& Go(const char* kind, const ServoTarget& target, NodeIdx node, bool is_goal) {
+    if (kidnapping_ && kidnapping_->before_leg == num_legs_) robot_.PutAt(kidnapping_->pose);
+    ++num_legs_;
+    const PlanarPose before = robot_.pose();
+    RobotLeg went = robot_.GoTo(target, is_goal);
+    DriveLeg leg{.kind = kind, .node = node, .target = target.pose, .pose = robot_.pose()};
+    leg.arrived = went.arrived;
+    leg.why = went.why;
+    leg.steps = std::move(went.steps);
+    Eigen::Vector2d last = before.position;
+    for (const RobotStep& step : leg.steps) {
+      drive_.way_m += (step.pose.position - last).norm();
+      last = step.pose.position;
+    }
+    drive_.way_m += (robot_.pose().position - last).norm();
+    drive_.legs.push_back(std::move(leg));
+    return drive_.legs.back();
+  }
+
+  void Note(DriveLeg* leg) const {
+    leg->followed = hypotheses_->followed();
+    for (const StartHypothesis& hypothesis : hypotheses_->hypotheses()) {
+      const auto image = map_.Image(model_.appearance().node_images[hypothesis.start].front());
+      leg->hypotheses.push_back({hypothesis.start,
+                                 image.ok() ? PlanarPoseOf((*image)->cam_from_world) : PlanarPose(),
+                                 hypothesis.posterior, hypothesis.path.nodes});
+    }
+  }
+
+  const Map& map_;
+  const PlaceModel& model_;
+  Robot robot_;
+  const std::optional<Kidnapping> kidnapping_;
+  const RobotDriveOptions& options_;
+  NodeIdx goal_node_ = -1;
+  RobotDrive drive_;
+  std::optional<StartHypotheses> hypotheses_;
+  std::vector<ServoTarget> trail_;  // its own images since the start, that first
+  std::vector<NodeIdx> way_;        // without the goal, unless it is the start
+  size_t next_ = 0;                 // of the way; past it: the goal
+  int num_legs_ = 0;
+};
+
+}  // namespace
+
+OptionTable DescribeOptions(RobotDriveOptions* o) {
+  OptionTable table = {
+      {"max_num_legs", &o->max_num_legs, "most images that the robot goes to", 1},
+      {"max_num_relocalizations", &o->max_num_relocalizations,
+       "how often it may look anew where it is, after it got lost", 0},
+  };
+  for (const OptionTable& part :
+       {DescribeOptions(&o->robot), DescribeOptions(&o->servo), DescribeOptions(&o->hypotheses)}) {
+    table.insert(table.end(), part.begin(), part.end());
+  }
+  return table;
+}
+
+Result<RobotDrive> DriveToImage(const Map& map, const PlaceModel& model, const Building& building,
+                                const Camera& camera, double camera_height_m, const PlanarPose& start,
+                                int32_t goal_image, const std::optional<Kidnapping>& kidnapping,
+                                const RobotDriveOptions& options, uint64_t seed) {
+  RobotDriveOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  for (const PlanarPose& pose : {start, kidnapping ? kidnapping->pose : start}) {
+    if (!(ClearanceM(building, pose.position.x(), pose.position.y()) > 0)) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "drive: no place to stand at {:g}, {:g}: in a wall, in "
+                       "furniture or outside of the building",
+                       pose.position.x(), pose.position.y());
+    }
+  }
+  if (goal_image < 0 || goal_image >= static_cast<int32_t>(model.appearance().node_of_image.size()) ||
+      model.appearance().node_of_image[goal_image] < 0) {
+    return MakeError(ErrorCode::kNotFound, "drive: the goal image is not in the map's appearance graph");
+  }
+  CAIRN_ASSIGN_OR_RETURN(
+      Robot robot, Robot::Create(building, camera, camera_height_m, options.robot, options.servo, seed));
+  robot.PutAt(start);
+  return Driver(map, model, std::move(robot), goal_image, kidnapping, options).Run();
+}
+
+}  // namespace cairn
