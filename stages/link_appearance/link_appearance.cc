@@ -1,6 +1,10 @@
 #include "stages/link_appearance/link_appearance.h"
+#include "core/panorama.h"
+#include "core/pose.h"
 
 #include <algorithm>
+#include <map>
+#include <optional>
 
 #include "stages/link_appearance/domination.h"
 #include "stages/link_appearance/greedy_dominating_set.h"
@@ -140,12 +144,30 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
   }
 }
 
+// Those of images that stand no farther apart, and of images without pose.
+std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& capture, double max_m) {
+  std::map<std::string, Pose> poses;
+  for (const CaptureImage& image : capture.images) {
+    if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
+  }
+  std::vector<std::optional<Pose>> pose_of;
+  for (const DatabaseImage& image : images.images) pose_of.push_back(FindPose(poses, image.name));
+  std::vector<AppearanceLink> near;
+  for (const AppearanceLink& link : images.links) {
+    const std::optional<Pose>&a = pose_of[link.node1], &b = pose_of[link.node2];
+    if (!a || !b || CenterErrorM(*a, *b) <= max_m) near.push_back(link);
+  }
+  return near;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(LinkAppearanceOptions* options) {
   ConnectedBoundOptions& bound = options->bound;
   OptionTable table = {
       {"min_num_inliers", &options->min_num_inliers, "fewest verified inliers of a link", 1},
+      {"max_link_distance_m", &options->max_link_distance_m,
+       "images that stand farther apart are not linked, by the capture's poses, m; 0: any", 0},
       {.name = "fuse",
        .value = &options->fuse,
        .help =
@@ -221,7 +243,9 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
                          FuseImages(images.images, options.fuse, options.same_place_m, capture));
   LinkAppearanceResult result;
   Appearance& appearance = result.appearance;
-  appearance.graph = FusedGraph(images.links, node_of_image);
+  appearance.graph = options.max_link_distance_m > 0 && capture
+                         ? FusedGraph(NearLinks(images, *capture, options.max_link_distance_m), node_of_image)
+                         : FusedGraph(images.links, node_of_image);
   appearance.num_dominators = options.num_dominators;
   appearance.strong_num_inliers = options.strong_num_inliers;
   appearance.max_detour_links = options.num_kept == 0 ? options.max_detour_links : 0;

@@ -27,7 +27,7 @@ struct RobotOptions {
   double ideal_noise_m = 0.05;
   double ideal_noise_deg = 2;
   // The ideal servo gets to places that are no farther than this, metres.  REQUIRES: > 0
-  double ideal_reach_m = 2.5;
+  double ideal_reach_m = 4;
   // The assumed focal length over the camera's.  REQUIRES: in [0.5, 2]
   double focal_ratio = 1;
   // Radius of the robot: it stops at walls and furniture.  REQUIRES: in [0, 2]
