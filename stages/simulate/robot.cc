@@ -171,7 +171,10 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
     leg.arrived = command.state == ServoState::kArrived;
     if (leg.arrived) return leg;
     if (command.state == ServoState::kLost) {
-      if (num_searched == static_cast<int>(std::size(kSearchDeg))) return leg;
+      if (num_searched == static_cast<int>(std::size(kSearchDeg))) {
+        pose_.heading_rad = lost_heading_rad;
+        return leg;
+      }
       if (num_searched == 0) lost_heading_rad = pose_.heading_rad;
       pose_.heading_rad = WrapAngle(lost_heading_rad + RadFromDeg(kSearchDeg[num_searched++]));
       continue;

@@ -68,7 +68,7 @@ class Driver {
                              TargetOfImage(map_, model_.appearance().node_images[node].front()));
       DriveLeg& leg = Go("go", target, node, false);
       if (!leg.arrived) {
-        CAIRN_RETURN_IF_ERROR(Relocalize(leg.why));
+        CAIRN_RETURN_IF_ERROR(GiveUp(&leg));
         continue;
       }
       ++next_;
@@ -112,6 +112,16 @@ class Driver {
     }
     ++drive_.num_relocalizations;
     return LookAnew("relocalize");
+  }
+
+  // Where no image of the way is found, what is seen instead may speak for another start.
+  Status GiveUp(DriveLeg* leg) {
+    const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(robot_.Look().descriptors));
+    leg->verdict = VerdictName(verdict);
+    Note(leg);
+    if (verdict != HypothesisVerdict::kSwitch) return Relocalize(leg->why);
+    trail_.push_back({});  // of here, from where it goes back
+    return Switch();
   }
 
   // Back to the start over its own images, or on from where it would be by now.
