@@ -44,6 +44,8 @@ const char* ErrorCodeName(ErrorCode code) {
       return "read_only";
     case ErrorCode::kDiskFull:
       return "disk_full";
+    case ErrorCode::kLost:
+      return "lost";
   }
   return "failed";
 }

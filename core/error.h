@@ -33,6 +33,7 @@ enum class ErrorCode : int {
   kWrongKey = 18,     // signed with another key, or the signature is false
   kReadOnly = 19,     // the folder or file may not be written
   kDiskFull = 20,     // no space is left
+  kLost = 21,         // a robot that does not know any more where it is
 };
 
 // Stable lower-case name of a code, as it stands in error.json ("corrupt", "no_data", ...).

@@ -80,7 +80,7 @@ class Driver {
       if (verdict == HypothesisVerdict::kLost) CAIRN_RETURN_IF_ERROR(Relocalize("an image of elsewhere"));
       if (verdict == HypothesisVerdict::kSwitch) CAIRN_RETURN_IF_ERROR(Switch());
     }
-    return MakeError(ErrorCode::kFailed, "drive: not at the goal after {} images", num_legs_);
+    return MakeError(ErrorCode::kLost, "drive: not at the goal after {} images", num_legs_);
   }
 
   // Where it stands is its start from now on.
@@ -106,7 +106,7 @@ class Driver {
 
   Status Relocalize(const std::string& why) {
     if (drive_.num_relocalizations == options_.max_num_relocalizations) {
-      return MakeError(ErrorCode::kFailed, "drive: lost for the {}th time at {:.2f}, {:.2f}: {}",
+      return MakeError(ErrorCode::kLost, "drive: lost for the {}th time at {:.2f}, {:.2f}: {}",
                        drive_.num_relocalizations + 1, robot_.pose().position.x(), robot_.pose().position.y(),
                        why);
     }
