@@ -16,37 +16,6 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// Takes options and seed from a recipe's [simulate] table, or the options from a file that holds only such a
-// table's keys.  Other tables are other stages'.
-Status ReadRecipe(const std::string& path, SimulateOptions* options, uint64_t* seed) {
-  CAIRN_ASSIGN_OR_RETURN(const toml::table document, ReadTomlFile(path));
-  const toml::node* node = document.get("simulate");
-  if (node == nullptr && (document.contains("name") || document.contains("capture"))) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: a recipe without [simulate]: there is nothing to render; add the table, or compile the "
-        "recipe's own capture",
-        path);
-  }
-  if (node == nullptr) return SetOptionsFromToml(document, path, DescribeOptions(options));
-  if (!node->is_table()) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: 'simulate' is not a table; write [simulate]",
-                     TomlPlace(path, *node));
-  }
-  if (const toml::node* seed_node = document.get("seed")) {
-    const auto* value = seed_node->as_integer();
-    if (value == nullptr || value->get() < 0) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: seed: expected an integer of at least 0",
-                       TomlPlace(path, *seed_node));
-    }
-    *seed = static_cast<uint64_t>(value->get());
-  }
-  OptionTable table = DescribeOptions(options);
-  std::string floor_plan;  // which of the capture's files is the map's plan
-  table.push_back({.name = "floor_plan", .value = &floor_plan, .help = "floor plan of the map"});
-  return SetOptionsFromToml(*node->as_table(), path, table);
-}
-
 Status Run(const Arguments& given, const CommandEnvironment& environment, SimulateOptions* options) {
   uint64_t seed = environment.seed;
   if (!given.recipe_path.empty())

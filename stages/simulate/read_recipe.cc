@@ -27,7 +27,10 @@ Status ReadSimulateRecipe(const std::string& path, SimulateOptions* options, uin
     }
     *seed = static_cast<uint64_t>(value->get());
   }
-  return SetOptionsFromToml(*node->as_table(), path, DescribeOptions(options));
+  OptionTable table = DescribeOptions(options);
+  std::string floor_plan;  // which of the capture's files is the map's plan
+  table.push_back({.name = "floor_plan", .value = &floor_plan, .help = "floor plan of the map"});
+  return SetOptionsFromToml(*node->as_table(), path, table);
 }
 
 }  // namespace cairn
