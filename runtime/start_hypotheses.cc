@@ -215,6 +215,19 @@ HypothesisVerdict StartHypotheses::Observe(const PlaceScores& image) {
   return HypothesisVerdict::kSwitch;
 }
 
+bool StartHypotheses::Refute() {
+  int best = -1;
+  for (int i = 0; i < static_cast<int>(hypotheses_.size()); ++i) {
+    if (i == followed_ || hypotheses_[i].posterior <= 0) continue;
+    if (best < 0 || hypotheses_[i].posterior > hypotheses_[best].posterior) best = i;
+  }
+  if (best < 0) return false;
+  for (auto& [node, probability] : beliefs_[followed_]) probability = 0;
+  followed_ = best;
+  Normalise();
+  return true;
+}
+
 void StartHypotheses::Normalise() {
   double sum = 0;
   std::vector<double> sums;

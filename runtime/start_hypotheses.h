@@ -23,9 +23,9 @@ struct StartHypothesesOptions {
   int reach_links = 2;
   // Over which bins images are compared (eq. 7; the source leaves it open): "all" nodes, or those "reachable"
   // within reach_links by some hypothesis.
-  std::string compared_nodes = "all";
+  std::string compared_nodes = "reachable";
   // Of JeffreyDivergence, so that an empty bin is no proof.  REQUIRES: in (0, 1]
-  double uniform_ratio = 0.2;
+  double uniform_ratio = 0.02;
   // Posterior by which another start must lead before the robot turns back for it.  REQUIRES: in [0, 1]
   double switch_margin = 0.1;
   // Whether it turns back at all; without, the first choice is followed to its end.
@@ -78,6 +78,9 @@ class StartHypotheses {
 
   // An image at the next node of the way.
   HypothesisVerdict Observe(const PlaceScores& image);
+  // What the next image of the followed way shows is not there: the robot did not start so.  Follows the
+  // likeliest other start; false where there is none.
+  bool Refute();
   // The robot is back where it started: what it has found out about starts is kept.
   void Restart();
 

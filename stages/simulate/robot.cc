@@ -109,10 +109,14 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
       alike.push_back({target.pose.position + Eigen::Vector2d(offset, 0), target.pose.heading_rad});
     }
   }
+  // It moves as the images' places do: by as much as from the last one's to this one's.
+  Eigen::Vector2d expected = pose_.position;
+  if (last_target_) expected += target.pose.position - last_target_->position;
   const auto distance = [&](const PlanarPose& pose) { return (pose.position - pose_.position).norm(); };
   const PlanarPose& nearest =
-      *std::min_element(alike.begin(), alike.end(),
-                        [&](const PlanarPose& a, const PlanarPose& b) { return distance(a) < distance(b); });
+      *std::min_element(alike.begin(), alike.end(), [&](const PlanarPose& a, const PlanarPose& b) {
+        return (a.position - expected).norm() < (b.position - expected).norm();
+      });
   RobotLeg leg;
   leg.steps.push_back({.pose = pose_});
   if (distance(nearest) > options_.ideal_reach_m) {
@@ -125,6 +129,7 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
   const PlanarPose noisy = {nearest.position + Eigen::Vector2d(x, y), WrapAngle(nearest.heading_rad + turn)};
   pose_ = ClearanceM(*building_, noisy.position.x(), noisy.position.y()) > 0 ? noisy : nearest;
   leg.arrived = true;
+  last_target_ = target.pose;
   leg.why = "put there";
   leg.steps.back().command.state = ServoState::kArrived;
   return leg;

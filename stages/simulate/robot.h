@@ -76,7 +76,11 @@ class Robot {
                               const RobotOptions& options, const ServoOptions& servo_options, uint64_t seed);
 
   const PlanarPose& pose() const { return pose_; }
-  void PutAt(const PlanarPose& pose) { pose_ = pose; }
+  // Somewhere; it does not remember which image it came by.
+  void PutAt(const PlanarPose& pose) {
+    pose_ = pose;
+    last_target_.reset();
+  }
 
   // The features of what it sees.
   Features Look();
@@ -98,6 +102,7 @@ class Robot {
   uint64_t seed_;
   uint64_t num_draws_ = 0;  // images and noise so far
   PlanarPose pose_;
+  std::optional<PlanarPose> last_target_;  // where the image was taken that it was put at last
 };
 
 }  // namespace cairn

@@ -85,6 +85,7 @@ class Driver {
 
   // Where it stands is its start from now on.
   Status LookAnew(const char* kind) {
+    robot_.PutAt(robot_.pose());
     const Features seen = robot_.Look();
     DriveLeg leg;
     leg.kind = kind;
@@ -114,12 +115,14 @@ class Driver {
     return LookAnew("relocalize");
   }
 
-  // Where no image of the way is found, what is seen instead may speak for another start.
+  // An image of the way is not where the followed start has it: another one is tried, as long as there is
+  // any.
   Status GiveUp(DriveLeg* leg) {
-    const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(robot_.Look().descriptors));
-    leg->verdict = VerdictName(verdict);
+    const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
+    leg->verdict = VerdictName(has_other ? HypothesisVerdict::kSwitch : HypothesisVerdict::kLost);
+    const std::string why = leg->why;
     Note(leg);
-    if (verdict != HypothesisVerdict::kSwitch) return Relocalize(leg->why);
+    if (!has_other) return Relocalize(why);
     trail_.push_back({});  // of here, from where it goes back
     return Switch();
   }

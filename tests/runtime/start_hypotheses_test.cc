@@ -103,6 +103,19 @@ TEST(StartHypotheses, TwinsAreToldApartWhereTheyDiffer) {
   EXPECT_EQ(starts.Observe(LookAt(model, 7)), HypothesisVerdict::kFollow);
 }
 
+TEST(StartHypotheses, ARefutedStartIsNotFollowedAgain) {
+  const PlaceModel model = ModelOf(Wings());
+  StartHypotheses starts = *StartHypotheses::Make(model, LookAt(model, 6), 11);
+  ASSERT_EQ(starts.hypotheses()[starts.followed()].start, 1);
+  EXPECT_TRUE(starts.Refute());
+  EXPECT_EQ(starts.hypotheses()[starts.followed()].start, 6);
+  EXPECT_EQ(starts.hypotheses()[0].posterior, 0);
+  EXPECT_EQ(starts.hypotheses()[1].posterior, 1);
+  starts.Restart();
+  EXPECT_EQ(starts.Observe(LookAt(model, 2)), HypothesisVerdict::kFollow) << "whatever it sees";
+  EXPECT_FALSE(starts.Refute()) << "no other is left";
+}
+
 TEST(StartHypotheses, WithoutSwitchingTheFirstChoiceIsFollowed) {
   const PlaceModel model = ModelOf(Wings());
   StartHypotheses starts = *StartHypotheses::Make(model, LookAt(model, 6), 11, {.switching = false});
@@ -147,7 +160,8 @@ TEST(StartHypotheses, PosteriorIsTheSumOverAllWays) {
   std::vector<std::pair<int, int>> links;
   for (int i = 0; i + 1 < 10; ++i) links.emplace_back(i, i + 1);
   const PlaceModel model = ModelOf(VisualMemory(words, links, std::vector<double>(10, 0.5)));
-  const StartHypothesesOptions options{.min_score_ratio = 0.01, .uniform_ratio = 0.5, .switching = false};
+  const StartHypothesesOptions options{
+      .min_score_ratio = 0.01, .compared_nodes = "all", .uniform_ratio = 0.5, .switching = false};
   const auto look = [&](int i) { return model.Look(DescriptorsOf(words[i])); };
   StartHypotheses starts = *StartHypotheses::Make(model, look(3), 9, options);
   ASSERT_GE(starts.hypotheses().size(), 2);
