@@ -12,9 +12,9 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev libsodium-dev \
     coinor-libcbc-dev libgeos++-dev libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap slurmctld slurmd slurm-client munge procps jq \
     python3 time clang libclang-rt-14-dev clang-format clang-tidy
-# Nothing fails without these.  The demo's picture as PNG; a peer of the vocabulary's benchmark; tests of the matching kernels of other processors: Intel's
+# Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
 # instructions emulated, an ARM compiler and emulator.
-OPTIONAL_PACKAGES := librsvg2-bin libfaiss-dev libsimde-dev g++-aarch64-linux-gnu qemu-user-static
+OPTIONAL_PACKAGES := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
 
 # A clone elsewhere compiles the same files: let ccache see that.
 export CCACHE_BASEDIR := $(CURDIR)
