@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +11,12 @@
 #include "core/ids.h"
 
 namespace cairn {
+
+// Entropies and scores are stored as integers.
+inline int64_t Thousandths(double value) { return std::llround(value * 1000); }
+inline double OfThousandths(int64_t thousandths) { return static_cast<double>(thousandths) / 1000; }
+// Of a distribution over more places than there are, nats.
+inline constexpr double kMaxEntropy = 64;
 
 // Why a node is kept, or not.
 enum class NodeRole : int {

@@ -1,7 +1,6 @@
 #include "core/appearance.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/database.h"
 #include "schemas/appearance_sql.h"
@@ -11,8 +10,6 @@ namespace {
 
 constexpr int kApplicationId = 0x63726167;
 constexpr int kVersion = 2;
-// Entropies and scores are stored as integers.
-constexpr double kThousandths = 1000;
 
 template <typename T>
 void BindVector(SQLite::Statement& statement, int index, const std::vector<T>& values) {
@@ -58,7 +55,7 @@ void WriteNodes(SQLite::Database& database, const Appearance& appearance) {
     BindVector(row, 4, node.images);
     BindVector(row, 5, neighbours);
     BindVector(row, 6, num_inliers);
-    if (node.entropy) row.bind(7, int64_t{std::lround(*node.entropy * kThousandths)});
+    if (node.entropy) row.bind(7, Thousandths(*node.entropy));
     row.exec();
     row.reset();
     row.clearBindings();
@@ -70,7 +67,7 @@ void WriteConfusable(SQLite::Database& database, const Appearance& appearance) {
   for (const ConfusablePair& pair : appearance.confusable) {
     row.bind(1, pair.node1);
     row.bind(2, pair.node2);
-    row.bind(3, int64_t{std::lround(pair.score * kThousandths)});
+    row.bind(3, Thousandths(pair.score));
     row.exec();
     row.reset();
   }
@@ -82,13 +79,13 @@ Status ReadConfusable(SQLite::Database& database, const std::string& path, Appea
   while (rows.executeStep()) {
     const int64_t node1 = rows.getColumn(0).getInt64(), node2 = rows.getColumn(1).getInt64(),
                   score = rows.getColumn(2).getInt64();
-    if (node1 < 0 || node2 <= node1 || node2 >= num_nodes || score <= 0 || score > kThousandths) {
+    if (node1 < 0 || node2 <= node1 || node2 >= num_nodes || score <= 0 || score > Thousandths(1)) {
       return MakeError(ErrorCode::kCorrupt,
                        "{}: table confusable: nodes {} and {} of {} with a score of {} thousandths", path,
                        node1, node2, num_nodes, score);
     }
-    appearance->confusable.push_back({static_cast<NodeIdx>(node1), static_cast<NodeIdx>(node2),
-                                      static_cast<double>(score) / kThousandths});
+    appearance->confusable.push_back(
+        {static_cast<NodeIdx>(node1), static_cast<NodeIdx>(node2), OfThousandths(score)});
   }
   return Ok();
 }
@@ -134,9 +131,9 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
     }
     if (!rows.getColumn(6).isNull()) {
       const int64_t entropy = rows.getColumn(6).getInt64();
-      if (entropy < 0 || entropy > 100 * kThousandths)
+      if (entropy < 0 || entropy > Thousandths(kMaxEntropy))
         return MakeError(ErrorCode::kCorrupt, "{}: an entropy of {} thousandths", what, entropy);
-      node.entropy = static_cast<double>(entropy) / kThousandths;
+      node.entropy = OfThousandths(entropy);
     }
     appearance->nodes.push_back(std::move(node));
   }

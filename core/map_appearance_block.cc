@@ -1,19 +1,12 @@
 // Blocks of the appearance graph as bytes: drawn in schemas/FORMAT.md.
-#include <cmath>
 #include <limits>
 
+#include "core/appearance.h"
 #include "core/blob.h"
 #include "core/map_blocks.h"
 #include "core/map_codes.h"
 
 namespace cairn {
-namespace {
-
-constexpr int64_t kMaxListElements = 1 << 22;
-// Entropies and scores are stored as integers.
-constexpr double kThousandths = 1000;
-
-}  // namespace
 
 std::string EncodeBlock(const AppearanceBlock& block) {
   BlobWriter writer;
@@ -64,12 +57,12 @@ Result<AppearanceBlock> DecodeAppearanceBlock(std::string_view bytes, const Bloc
 std::string EncodeBlock(const AmbiguityBlock& block) {
   BlobWriter writer;
   for (const AmbiguityBlock::Node& node : block.nodes) {
-    writer.Varint(static_cast<uint64_t>(std::lround(node.entropy * kThousandths)));
+    writer.Varint(static_cast<uint64_t>(Thousandths(node.entropy)));
     std::vector<int32_t> others;
     for (const MapAppearanceNode::LookAlike& other : node.look_alikes) others.push_back(other.node);
     WriteRuns(others, &writer);
     for (const MapAppearanceNode::LookAlike& other : node.look_alikes)
-      writer.Varint(static_cast<uint64_t>(std::lround(other.score * kThousandths)));
+      writer.Varint(static_cast<uint64_t>(Thousandths(other.score)));
   }
   return writer.Take();
 }
@@ -86,16 +79,17 @@ Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockE
     std::vector<int32_t> others;
     if (!ReadRuns(&reader, directory.Count(BlockKind::kAppearance), &max_num_values, &others) ||
         node_idx >= directory.Count(BlockKind::kAppearance) ||
-        (!others.empty() && others.front() <= node_idx) || entropy > kMaxEntropy * kThousandths) {
+        (!others.empty() && others.front() <= node_idx) ||
+        entropy > static_cast<uint64_t>(Thousandths(kMaxEntropy))) {
       return Corrupt(what, "the entropy or look-alikes of node {} make no sense", node_idx);
     }
     AmbiguityBlock::Node& node = block.nodes.emplace_back();
-    node.entropy = static_cast<double>(entropy) / kThousandths;
+    node.entropy = OfThousandths(static_cast<int64_t>(entropy));
     for (const int32_t other : others) {
       const uint64_t score = reader.Varint();
-      if (score == 0 || score > kThousandths)
+      if (score == 0 || score > static_cast<uint64_t>(Thousandths(1)))
         return Corrupt(what, "a look-alike of node {} scores {} thousandths", node_idx, score);
-      node.look_alikes.push_back({other, static_cast<double>(score) / kThousandths});
+      node.look_alikes.push_back({other, OfThousandths(static_cast<int64_t>(score))});
     }
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} nodes", entry.count);

@@ -11,7 +11,6 @@
 namespace cairn {
 namespace {
 
-constexpr int64_t kMaxListElements = 1 << 22;
 constexpr double kMaxCoordinate = 2e9;  // 200 km in units of 0.1 mm
 constexpr double kHeadingUnitDeg = 1e-3;
 constexpr int64_t kMaxHeading = 1'000'000'000;  // a million degrees

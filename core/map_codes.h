@@ -33,6 +33,9 @@ Eigen::Matrix3d DecodeCovariance(uint64_t code);
 void WriteRotation(const Eigen::Quaterniond& rotation, BlobWriter* writer);
 Eigen::Quaterniond ReadRotation(BlobReader* reader);  // ok() is false too when the three are too long
 
+// Most list elements that a block decodes to: bounds what a few bytes of runs allocate.
+inline constexpr int64_t kMaxListElements = 1 << 22;
+
 // Strictly ascending numbers >= 0 as runs of consecutive ones: a varint of the number of runs, then per run a
 // varint of 2 * gap + (1 if it is longer than one), and then its length less 2.
 void WriteRuns(const std::vector<int32_t>& values, BlobWriter* writer);

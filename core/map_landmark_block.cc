@@ -11,8 +11,6 @@
 namespace cairn {
 namespace {
 
-// Most list elements that a block decodes to: bounds what a few bytes of runs allocate.
-constexpr int64_t kMaxListElements = 1 << 22;
 constexpr double kMaxCoordinate = 2e9;  // 200 km in units of 0.1 mm
 
 // The values that occur in the descriptors, ascending: with up to 2^bits of them, a value takes `bits` bits.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/appearance.h"
 #include "core/map_documents.h"
 #include "core/sessions.h"
 

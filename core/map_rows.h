@@ -139,8 +139,6 @@ inline constexpr int kMapVersionMinor = 3;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;
-// Of a distribution over more places than there are, nats.
-inline constexpr double kMaxEntropy = 64;
 
 // Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
 // strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.

@@ -8,8 +8,6 @@
 namespace cairn {
 namespace {
 
-constexpr int64_t kMaxListElements = 1 << 22;
-
 void WriteStep(const GridPoint& point, GridPoint* before, BlobWriter* writer) {
   writer->Varint(ZigZag(point.x - before->x));
   writer->Varint(ZigZag(point.y - before->y));

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/floor_pose.h"
+#include "core/svg.h"
 #include "pipeline/floor_view.h"
 
 namespace cairn {
@@ -52,7 +53,7 @@ class Picture {
     const double height = view_.PictureHeightPx();
     size_t num_pairs = 0;
     for (const MapAppearanceNode& node : rows_.appearance) num_pairs += node.look_alikes.size();
-    std::string svg = BeginSvg(height);
+    std::string svg = BeginSvg(FloorView::kWidthPx, height, FloorView::kFontPx);
     svg += fmt::format(
         "<text x=\"24\" y=\"34\" font-size=\"20\" font-weight=\"bold\">{}: where the robot can tell where it "
         "is</text>\n<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{} places, {} pairs look alike</text>\n",

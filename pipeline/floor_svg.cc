@@ -9,17 +9,15 @@
 
 #include "core/decomposition.h"
 #include "core/pose.h"
+#include "core/svg.h"
 #include "pipeline/floor_view.h"
 
 namespace cairn {
 namespace {
 
-// Okabe and Ito, without black and with a darker yellow.
-constexpr std::array<const char*, 7> kColours = {"#0072B2", "#E69F00", "#009E73", "#D55E00",
-                                                 "#CC79A7", "#56B4E9", "#B8A800"};
 constexpr std::array<const char*, 4> kDashes = {"", "9 4", "3 3", "10 3 3 3"};
 
-const char* Colour(RegionIdx region) { return kColours[region % kColours.size()]; }
+const char* Colour(RegionIdx region) { return kSvgColours[region % kSvgColours.size()]; }
 
 // The convex hull, counter-clockwise (Andrew's monotone chain).
 std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
@@ -101,7 +99,7 @@ std::string DrawRegionOutline(const MapRows& rows, RegionIdx region, const Floor
   for (const Eigen::Vector2d& corner : ConvexHull(std::move(places))) {
     points += fmt::format("{}{:.1f},{:.1f}", points.empty() ? "" : " ", corner.x(), corner.y());
   }
-  const char* dash = kDashes[(static_cast<size_t>(region) / kColours.size()) % kDashes.size()];
+  const char* dash = kDashes[(static_cast<size_t>(region) / kSvgColours.size()) % kDashes.size()];
   return fmt::format(
       "<polygon points=\"{0}\" fill=\"{1}\" fill-opacity=\"0.05\" stroke=\"{1}\" stroke-width=\"2\" "
       "stroke-dasharray=\"{2}\" stroke-linejoin=\"round\"><title>region {3}: {4} stations, {5} "
@@ -139,7 +137,7 @@ std::string FloorSvg(const MapRows& rows) {
   const FloorView view = MakeFloorView(rows, landmarks);
   const double size = MarkerSizePx(rows, view);
   const double height = view.PictureHeightPx();
-  std::string svg = BeginSvg(height);
+  std::string svg = BeginSvg(FloorView::kWidthPx, height, FloorView::kFontPx);
   std::set<std::pair<double, double>> places;
   for (const MapStation& station : rows.stations) places.emplace(station.position.x(), station.position.y());
   svg += fmt::format(

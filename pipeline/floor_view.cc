@@ -43,38 +43,6 @@ FloorView MakeFloorView(const MapRows& rows, const std::vector<Eigen::Vector2d>&
   return view;
 }
 
-std::string EscapeXml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
-std::string BeginSvg(double height_px) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" "
-      "font-family=\"sans-serif\" font-size=\"15\">\n<rect width=\"100%\" height=\"100%\" "
-      "fill=\"#ffffff\"/>\n",
-      FloorView::kWidthPx, height_px);
-}
-
 std::string ArrowPoints(const Eigen::Vector2d& center, double heading_deg, double size_px) {
   const double heading = RadFromDeg(heading_deg);
   const auto point = [&](double forward, double left) {

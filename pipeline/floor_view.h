@@ -14,6 +14,7 @@ struct FloorView {
   static constexpr double kWidthPx = 1000;
   static constexpr double kTitlePx = 56;
   static constexpr double kLegendPx = 64;
+  static constexpr int kFontPx = 15;
 
   Eigen::Vector2d low = Eigen::Vector2d::Zero();  // the part of the floor that is drawn, floor frame, metres
   Eigen::Vector2d high = Eigen::Vector2d::Zero();
@@ -29,11 +30,6 @@ struct FloorView {
 
 // Shows all stations, and all but the outermost of some other places (floor frame, metres).
 FloorView MakeFloorView(const MapRows& rows, const std::vector<Eigen::Vector2d>& others);
-
-std::string EscapeXml(const std::string& text);
-
-// The first lines of a picture: size, font, white ground.
-std::string BeginSvg(double height_px);
 
 // Corners of an arrow that points away from `center` (pixels): several at one place leave each other room.
 std::string ArrowPoints(const Eigen::Vector2d& center, double heading_deg, double size_px);

@@ -165,14 +165,12 @@ const std::vector<NodeIdx>& StartHypotheses::Reach(NodeIdx node) {
   return reach_[node] = WithinReach(model_->appearance().graph, node, options_.reach_links);
 }
 
-double StartHypotheses::Likelihood(const std::vector<double>& image, NodeIdx node,
+double StartHypotheses::Likelihood(const std::vector<double>& seen, NodeIdx node,
                                    const std::vector<NodeIdx>& bins) {
   auto found = expected_.find(node);
   if (found == expected_.end()) found = expected_.emplace(node, model_->Expected(node)).first;
-  const double divergence =
-      options_.compared_nodes == "all"
-          ? JeffreyDivergence(image, found->second, options_.uniform_ratio)
-          : JeffreyDivergence(Restrict(image, bins), Restrict(found->second, bins), options_.uniform_ratio);
+  const double divergence = JeffreyDivergence(
+      seen, bins.empty() ? found->second : Restrict(found->second, bins), options_.uniform_ratio);
   return std::exp(-divergence * divergence / 2) / std::sqrt(2 * std::numbers::pi);
 }
 
@@ -191,11 +189,13 @@ HypothesisVerdict StartHypotheses::Observe(const PlaceScores& image) {
     belief = Predict(belief);
     for (const auto& [node, probability] : belief) reachable.insert(node);
   }
-  const std::vector<NodeIdx> bins(reachable.begin(), reachable.end());
+  std::vector<NodeIdx> bins;  // none: all
+  if (options_.compared_nodes == "reachable") bins.assign(reachable.begin(), reachable.end());
+  const std::vector<double> seen = bins.empty() ? image.probabilities : Restrict(image.probabilities, bins);
   std::map<NodeIdx, double> likelihood;
   double reachable_ratio = 0;
-  for (const NodeIdx node : bins) {
-    likelihood[node] = Likelihood(image.probabilities, node, bins);
+  for (const NodeIdx node : reachable) {
+    likelihood[node] = Likelihood(seen, node, bins);
     reachable_ratio += image.probabilities[node];
   }
   for (Belief& belief : beliefs_) {

@@ -97,7 +97,8 @@ class StartHypotheses {
       : model_(&model), goal_(goal), options_(options) {}
   using Belief = std::map<NodeIdx, double>;  // sums to the hypothesis's posterior
   const std::vector<NodeIdx>& Reach(NodeIdx node);
-  double Likelihood(const std::vector<double>& image, NodeIdx node, const std::vector<NodeIdx>& bins);
+  // `seen`: what an image says of `bins`; no bins: of all nodes.
+  double Likelihood(const std::vector<double>& seen, NodeIdx node, const std::vector<NodeIdx>& bins);
   Belief Predict(const Belief& belief);
   void Normalise();
 

@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/pose.h"
+#include "core/svg.h"
 #include "tests/runtime/servo_scene.h"
 
 namespace {
@@ -79,12 +80,10 @@ std::string Draw(const std::vector<Run>& runs) {
   constexpr double kPxPerM = 52, kLowX = -4.4, kHighX = 2.1, kHighY = 2.0;
   constexpr double kWidth = (kHighX - kLowX) * kPxPerM, kHeight = 2 * kHighY * kPxPerM;
   const std::vector<int> headings = {-40, -20, 0, 20, 40, 60};
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"100%\" height=\"100%\" "
-      "fill=\"#ffffff\"/>\n<text x=\"16\" y=\"28\" font-size=\"18\" font-weight=\"bold\">Ways of the servo "
-      "to a target image, by the heading at the start</text>\n",
-      3 * kWidth, 44 + 2 * kHeight + 30);
+  std::string svg = BeginSvg(3 * kWidth, 44 + 2 * kHeight + 30, 14);
+  svg +=
+      "<text x=\"16\" y=\"28\" font-size=\"18\" font-weight=\"bold\">Ways of the servo "
+      "to a target image, by the heading at the start</text>\n";
   for (size_t panel = 0; panel < headings.size(); ++panel) {
     const double left = (panel % 3) * kWidth, top = 44 + (panel / 3) * kHeight;
     const auto pixel = [&](const Eigen::Vector2d& place) {

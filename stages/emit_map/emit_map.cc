@@ -251,6 +251,11 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
                         const Appearance* appearance) {
   EmitMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  if (options.words == "survey" && options.documents == "kept") {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: words = \"survey\" with documents = \"kept\"; one of them must be the default");
+  }
   CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
   const std::vector<size_t> order = OrderLandmarks(classes, classes_of_regions, options.landmarks == "all");
   if (order.empty()) {
@@ -299,11 +304,6 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
   AddRegionEntropies(&rows);
   const auto num_landmarks = static_cast<double>(rows.landmarks.size());
-  if (options.words == "survey" && options.documents == "kept") {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "emit_map: words = \"survey\" with documents = \"kept\"; one of them must be the default");
-  }
   if (options.words == "survey") {
     rows.vocabulary = SurveyVocabulary(vocabulary, rows.images, is_document);
   } else if (num_landmarks >= options.min_num_landmarks_for_words && !vocabulary.nodes.empty()) {

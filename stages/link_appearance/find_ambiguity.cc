@@ -10,7 +10,7 @@ namespace cairn {
 namespace {
 
 // As stored: the last bits of sums may differ between machines.
-double ToThousandths(double value) { return std::round(value * 1000) / 1000; }
+double AsStored(double value) { return OfThousandths(Thousandths(value)); }
 
 // A node that looks like another one.
 struct LookAlike {
@@ -21,7 +21,6 @@ struct LookAlike {
 // What a node's images, as queries, get.
 struct NodeScores {
   double entropy = 0;
-  double best_other = 0;  // score of the best look-alike, itself apart
   std::vector<LookAlike> apart;
 };
 
@@ -70,8 +69,8 @@ class AmbiguitySearch {
     for (double& p : probabilities) p = sum > 0 ? p / sum : 1.0 / static_cast<double>(num_nodes);
     NodeScores result{.entropy = Entropy(probabilities)};
     best[node] = 0;
-    result.best_other = best.empty() ? 0 : *std::max_element(best.begin(), best.end());
-    result.apart = LookAlikesApart(node, best, options_.confusable_score_ratio * result.best_other);
+    const double best_other = *std::max_element(best.begin(), best.end());
+    result.apart = LookAlikesApart(node, best, options_.confusable_score_ratio * best_other);
     return result;
   }
 
@@ -150,9 +149,9 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
     return MakeError(ErrorCode::kCancelled, "telling places apart was stopped");
   appearance->confusable.clear();
   for (NodeIdx node = 0; node < num_nodes; ++node) {
-    appearance->nodes[node].entropy = ToThousandths(scores[node].entropy);
+    appearance->nodes[node].entropy = AsStored(scores[node].entropy);
     for (const LookAlike& other : scores[node].apart) {
-      const double score = ToThousandths(other.score);
+      const double score = AsStored(other.score);
       const std::vector<LookAlike>& back = scores[other.node].apart;
       const bool is_mutual = std::any_of(
           back.begin(), back.end(), [&](const LookAlike& look_alike) { return look_alike.node == node; });

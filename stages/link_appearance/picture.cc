@@ -12,6 +12,7 @@
 
 #include "core/panorama.h"
 #include "core/pose.h"
+#include "core/svg.h"
 
 namespace cairn {
 namespace {
@@ -65,11 +66,7 @@ class Picture {
   }
 
   void Begin(double width, double height) {
-    Write(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-        "height=\"{1:.0f}\" font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"100%\" "
-        "height=\"100%\" fill=\"#ffffff\"/>\n",
-        width, height);
+    Write("{}", BeginSvg(width, height, 14));
     const size_t num_kept = appearance_.Kept().size();
     const int bound = appearance_.LowerBound();
     Write(

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/descriptor_matcher.h"
+#include "core/floor_pose.h"
 #include "core/pose.h"
 #include "core/random.h"
 #include "stages/simulate/survey.h"
@@ -46,8 +47,8 @@ OptionTable DescribeOptions(RobotOptions* o) {
 }
 
 PlanarPose PlanarPoseOf(const Pose& cam_from_world) {
-  const Eigen::Vector3d centre = cam_from_world.Center(), ahead = cam_from_world.ViewingDirection();
-  return {centre.head<2>(), std::atan2(ahead.y(), ahead.x())};
+  const FloorPose pose = FloorPoseOf(cam_from_world, Pose());
+  return {pose.position, WrapAngle(RadFromDeg(pose.heading_deg))};
 }
 
 Result<ServoTarget> TargetOfImage(const Map& map, int32_t image_idx) {
@@ -112,14 +113,13 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
   // It moves as the images' places do: by as much as from the last one's to this one's.
   Eigen::Vector2d expected = pose_.position;
   if (last_target_) expected += target.pose.position - last_target_->position;
-  const auto distance = [&](const PlanarPose& pose) { return (pose.position - pose_.position).norm(); };
   const PlanarPose& nearest =
       *std::min_element(alike.begin(), alike.end(), [&](const PlanarPose& a, const PlanarPose& b) {
         return (a.position - expected).norm() < (b.position - expected).norm();
       });
   RobotLeg leg;
   leg.steps.push_back({.pose = pose_});
-  if (distance(nearest) > options_.ideal_reach_m) {
+  if ((nearest.position - pose_.position).norm() > options_.ideal_reach_m) {
     leg.why = fmt::format("nothing that looks like the image within {:g} m", options_.ideal_reach_m);
     return leg;
   }

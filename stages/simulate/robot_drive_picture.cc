@@ -4,15 +4,13 @@
 #include <fmt/format.h>
 
 #include "core/pose.h"
+#include "core/svg.h"
 #include "stages/simulate/robot_drive.h"
 
 namespace cairn {
 namespace {
 
-constexpr double kWidthPx = 1000, kTopPx = 56, kMarginPx = 24, kChartPx = 150, kLegendPx = 40;
-// Okabe and Ito, without black and with a darker yellow.
-constexpr std::array<const char*, 7> kColours = {"#0072B2", "#E69F00", "#009E73", "#D55E00",
-                                                 "#CC79A7", "#56B4E9", "#B8A800"};
+constexpr double kWidthPx = 1000, kTopPx = 56, kMarginPx = 24, kChartPx = 150, kLegendPx = 56;
 
 class Picture {
  public:
@@ -31,11 +29,7 @@ class Picture {
 
   std::string Draw() {
     const double height = kTopPx + floor_px_ + kChartPx + kLegendPx + 40;
-    Write(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-        "height=\"{1:.0f}\" font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"100%\" "
-        "height=\"100%\" fill=\"#ffffff\"/>\n",
-        kWidthPx, height);
+    text_ = BeginSvg(kWidthPx, height, 14);
     Write(
         "<text x=\"{:.0f}\" y=\"34\" font-size=\"18\" font-weight=\"bold\">{}; {:.1f} m, turned back {} "
         "times, looked anew {} times</text>\n",
@@ -60,7 +54,7 @@ class Picture {
 
   const char* Colour(NodeIdx start) const {
     const auto found = std::find(starts_.begin(), starts_.end(), start);
-    return kColours[static_cast<size_t>(found - starts_.begin()) % kColours.size()];
+    return kSvgColours[static_cast<size_t>(found - starts_.begin()) % kSvgColours.size()];
   }
 
   void DrawArrow(const PlanarPose& pose, double size, const std::string& paint) {
@@ -111,12 +105,13 @@ class Picture {
     DrawArrow(drive_.start, 12, "fill=\"#000000\"");
     DrawArrow(drive_.goal, 12, "fill=\"#D55E00\"");
     const double y = kTopPx + floor_px_ + 26;
-    Write(
-        "<text x=\"{:.0f}\" y=\"{:.0f}\">black arrow: start, red: goal; rings: starts held possible, with "
-        "the "
-        "images of their ways; line: the robot's way, dashed where it turns back; below: posteriors after "
-        "each image</text>\n",
-        kMarginPx, y);
+    for (const auto& [line, text] :
+         {std::pair(0, "black arrow: start, red: goal; line: the robot's way, dashed where it turns back"),
+          std::pair(1,
+                    "rings: starts held possible, with the images of their ways; below: posteriors after "
+                    "each image")}) {
+      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", kMarginPx, y + 18 * line, text);
+    }
   }
 
   void DrawChart() {

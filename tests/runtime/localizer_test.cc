@@ -188,58 +188,6 @@ TEST(Localizer, TwoPosesOfEqualSupportAreAmbiguous) {
   EXPECT_EQ(found.reason, NoFix::kAmbiguous) << found.message;
 }
 
-// The room, and a twin of it 30 m away that words and regions do not lead to, as the survey knows.
-MapRows TwinRooms() {
-  MapRows rows = Room().rows;
-  const auto num_images = static_cast<int32_t>(rows.images.size());
-  const auto num_landmarks = static_cast<LandmarkIdx>(rows.landmarks.size());
-  const Pose from_twin{Eigen::Quaterniond::Identity(), {-30, 0, 0}};
-  for (LandmarkIdx i = 0; i < num_landmarks; ++i) {
-    rows.landmarks.push_back(rows.landmarks[i]);
-    rows.landmarks.back().position.x() += 30;
-  }
-  const DescriptorMatrix descriptors = rows.descriptors;
-  rows.descriptors.resize(2 * num_landmarks, kDescriptorDim);
-  rows.descriptors << descriptors, descriptors;
-  for (int32_t i = 0; i < num_images; ++i) {
-    MapImage twin = rows.images[i];
-    twin.image_id += num_images;
-    twin.cam_from_world = twin.cam_from_world * from_twin;
-    twin.station = -1;
-    for (LandmarkIdx& landmark : twin.landmarks) landmark += num_landmarks;
-    rows.images.push_back(std::move(twin));
-  }
-  for (int32_t i = 0; i < 2 * num_images; ++i)
-    rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.7});
-  for (int32_t i = 0; i < num_images; ++i) rows.appearance[i].look_alikes = {{num_images + i, 1}};
-  return rows;
-}
-
-TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
-  MapRows rows = TwinRooms();
-  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
-  const Features features = RenderFeatures(Room(), truth, {}, 3);
-  LocalizerOptions options;
-  options.fall_back_to_all = false;
-  const auto localize = [&](const std::optional<PosePrior>& prior) {
-    return *Localizer(*Map::FromRows(rows), options).LocalizeFeatures(features, Room().camera, prior);
-  };
-  EXPECT_EQ(localize(std::nullopt).reason, NoFix::kAmbiguous);
-  const Localization with_prior = localize(PosePrior{truth, 1, 10});
-  ASSERT_TRUE(with_prior.has_fix()) << with_prior.message;
-  EXPECT_LT(CenterErrorM(with_prior.cam_from_world, truth), 0.1);
-  EXPECT_EQ(localize(PosePrior{truth, 12, 10}).reason, NoFix::kAmbiguous) << "30 m are within the prior";
-  options.exclude_look_alikes = false;
-  EXPECT_TRUE(localize(std::nullopt).has_fix());
-  options.exclude_look_alikes = true;
-  // A twin that differs in two thirds of its landmarks explains the image less well.
-  Random random(9);
-  for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
-    if (i % 3 > 0) rows.descriptors.row(i) = RandomDescriptor(random);
-  }
-  EXPECT_TRUE(localize(std::nullopt).has_fix());
-}
-
 TEST(Localizer, FewFeaturesAreNamedAsTheReason) {
   Localizer localizer(RoomMap());
   const auto found = *localizer.LocalizeFeatures(Features(), Room().camera);
