@@ -118,7 +118,7 @@ void Servo::LearnScale(const PlanarPose& pose) {
 void Servo::ChooseLeg(const PlanarPose& pose) {
   const double behind = -pose.position.x(), beside = std::abs(pose.position.y());
   const double max_heading = RadFromDeg(options_.max_heading_deg);
-  const double direction = std::atan2(beside, behind);  // |delta|
+  const double direction = std::atan2(beside, std::abs(behind));  // |delta|, or of the mirrored way backwards
   const bool in_cone = direction <= max_heading / options_.approach_gain;
   const bool on_axis = beside <= options_.arrive_distance_ratio;
   const Leg before = leg_;
@@ -153,10 +153,11 @@ double Servo::WantedHeading(const PlanarPose& pose, int num_inliers) const {
   if (leg_ == Leg::kRetreat) return leg_side_ * limit;
   if (leg_ == Leg::kToHeightOfTarget) return -leg_side_ * limit;
   const double tolerance = options_.arrive_distance_ratio;
-  if (behind <= tolerance) return 0;
+  if (std::abs(behind) <= tolerance) return 0;
   // The direction to the target, less what its uncertainty is near the target.
   const double offset = Sign(left) * std::max(0.0, std::abs(left) - 0.5 * tolerance);
-  return Limited(options_.approach_gain * std::atan2(-offset, std::max(behind, 3 * tolerance)), limit);
+  const double delta = std::atan2(-offset, std::max(std::abs(behind), 3 * tolerance));
+  return Limited(Sign(behind) * options_.approach_gain * delta, limit);
 }
 
 ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {

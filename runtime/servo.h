@@ -29,10 +29,11 @@ namespace cairn {
 //
 // Approach: delta = phi + pi is the way to the target in its frame.  With the heading turned by
 // gain * delta, delta' is -(gain - 1) (v / rho) delta to first order: both epipoles vanish, at any scale.
-// That needs |gain * delta| within the turn allowed: a robot beside the target or in front of it first
-// retreats, reversing with its heading turned by max_heading_deg towards the axis, until it stands in that
-// cone; where the scene gets too small, it goes forwards to the height of the target with the opposite turn
-// and retreats again.
+// In front of the target it reverses likewise, with -phi for delta.
+// That needs |gain * delta| within the turn allowed: a robot beside the target first retreats, reversing with
+// its heading turned by max_heading_deg towards the axis, until it stands in one of those cones; where the
+// scene gets too small, it goes forwards to the height of the target with the opposite turn and retreats
+// again.
 // The focal length that matches show is remembered from image to image.  Only the speed depends on a scale:
 // the scene's distance is learnt from the way that own commands should have made, from scene_distance_m on.
 struct ServoOptions {

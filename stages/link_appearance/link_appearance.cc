@@ -144,8 +144,9 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
   }
 }
 
-// Those of images that stand no farther apart, and of images without pose.
-std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& capture, double max_m) {
+// Those of images that stand no farther apart and are turned by no more, and of images without pose.
+std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& capture,
+                                      const LinkAppearanceOptions& options) {
   std::map<std::string, Pose> poses;
   for (const CaptureImage& image : capture.images) {
     if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
@@ -155,7 +156,11 @@ std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& c
   std::vector<AppearanceLink> near;
   for (const AppearanceLink& link : images.links) {
     const std::optional<Pose>&a = pose_of[link.node1], &b = pose_of[link.node2];
-    if (!a || !b || CenterErrorM(*a, *b) <= max_m) near.push_back(link);
+    if (a && b) {
+      if (options.max_link_distance_m > 0 && CenterErrorM(*a, *b) > options.max_link_distance_m) continue;
+      if (RotationErrorDeg(*a, *b) > options.max_link_turn_deg) continue;
+    }
+    near.push_back(link);
   }
   return near;
 }
@@ -168,6 +173,9 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
       {"min_num_inliers", &options->min_num_inliers, "fewest verified inliers of a link", 1},
       {"max_link_distance_m", &options->max_link_distance_m,
        "images that stand farther apart are not linked, by the capture's poses, m; 0: any", 0},
+      {"max_link_turn_deg", &options->max_link_turn_deg,
+       "images that are turned by more against each other are not linked, by the capture's poses, degrees", 0,
+       180},
       {.name = "fuse",
        .value = &options->fuse,
        .help =
@@ -243,9 +251,7 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
                          FuseImages(images.images, options.fuse, options.same_place_m, capture));
   LinkAppearanceResult result;
   Appearance& appearance = result.appearance;
-  appearance.graph = options.max_link_distance_m > 0 && capture
-                         ? FusedGraph(NearLinks(images, *capture, options.max_link_distance_m), node_of_image)
-                         : FusedGraph(images.links, node_of_image);
+  appearance.graph = FusedGraph(capture ? NearLinks(images, *capture, options) : images.links, node_of_image);
   appearance.num_dominators = options.num_dominators;
   appearance.strong_num_inliers = options.strong_num_inliers;
   appearance.max_detour_links = options.num_kept == 0 ? options.max_detour_links : 0;

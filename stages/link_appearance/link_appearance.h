@@ -36,6 +36,9 @@ struct LinkAppearanceOptions {
   // Images that stand farther apart are not linked, by the capture's poses; 0: any.  Look-alikes that are
   // moved without being turned verify as if all that they show were far away.  REQUIRES: >= 0
   double max_link_distance_m = 0;
+  // Images that are turned by more against each other are not linked, by the capture's poses: a robot cannot
+  // be steered from one to the other.  REQUIRES: in [0, 180]
+  double max_link_turn_deg = 180;
   // Which images are one node of the graph (fuse_images.h): "none", "name", "place".
   std::string fuse = "none";
   // Images within this distance were taken at one place.  REQUIRES: > 0
@@ -73,8 +76,8 @@ struct LinkAppearanceResult {
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
                                  uint64_t seed, int* num_greedy, Progress* progress = nullptr);
 
-// Pure: no files, no clock; same result for the same seed.  `capture` is for fuse = "place" and
-// max_link_distance_m, and may be null.
+// Pure: no files, no clock; same result for the same seed.  `capture` is for fuse = "place",
+// max_link_distance_m and max_link_turn_deg, and may be null.
 // `progress` may be null.  Errors: InvalidArgument (an option), NoData (no image), Cancelled.
 Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
                                             const LinkAppearanceOptions& options, uint64_t seed,

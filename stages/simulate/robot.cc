@@ -18,6 +18,15 @@ constexpr double kSearchDeg[] = {20, -20, 40, -40, 60, -60};
 constexpr int kMaxNumBlocked = 8;
 constexpr DescriptorMatcherOptions kMatcher{.max_ratio = 0.85, .max_angle_rad = 0.8};
 
+std::vector<PixelPair> MatchPixels(const Features& seen, const ServoTarget& target) {
+  std::vector<PixelPair> pairs;
+  for (const Match& match : MatchDescriptors(seen.descriptors, target.descriptors, kMatcher)) {
+    const Keypoint& keypoint = seen.keypoints[match.idx1];
+    pairs.push_back({{keypoint.x, keypoint.y}, target.pixels[match.idx2]});
+  }
+  return pairs;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(RobotOptions* o) {
@@ -96,6 +105,19 @@ Features Robot::Look() {
   return *ExtractSift(grey, options_.sift);  // fails for bad options only, which Create has checked
 }
 
+Camera Robot::AssumedCamera() const {
+  Camera assumed = renderer_.camera();
+  const int num_focals = assumed.model == CameraModel::kPinhole ? 2 : 1;
+  for (int i = 0; i < num_focals; ++i) assumed.params[i] *= options_.focal_ratio;
+  return assumed;
+}
+
+int Robot::NumAgreeing(const Features& seen, const ServoTarget& target) const {
+  const ServoCommand command =
+      Servo::Create(AssumedCamera(), servo_options_)->Step(MatchPixels(seen, target));
+  return command.epipoles ? command.epipoles->num_inliers : 0;
+}
+
 RobotLeg Robot::GoTo(const ServoTarget& target, bool is_goal) {
   return options_.servo == "ideal" ? GoIdeally(target) : Steer(target, is_goal);
 }
@@ -150,25 +172,17 @@ bool Robot::Move(const ServoCommand& command) {
 }
 
 RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
-  Camera assumed = renderer_.camera();
-  const int num_focals = assumed.model == CameraModel::kPinhole ? 2 : 1;
-  for (int i = 0; i < num_focals; ++i) assumed.params[i] *= options_.focal_ratio;
   ServoOptions servo_options = servo_options_;
   if (!is_goal) {
     servo_options.arrive_distance_ratio = options_.pass_distance_ratio;
     servo_options.arrive_heading_deg = options_.pass_heading_deg;
   }
-  Servo servo = *Servo::Create(assumed, servo_options);
+  Servo servo = *Servo::Create(AssumedCamera(), servo_options);
   RobotLeg leg;
   int num_blocked = 0, num_searched = 0;
   double lost_heading_rad = 0;
   while (static_cast<int>(leg.steps.size()) < options_.max_num_commands) {
-    const Features seen = Look();
-    std::vector<PixelPair> pairs;
-    for (const Match& match : MatchDescriptors(seen.descriptors, target.descriptors, kMatcher)) {
-      const Keypoint& keypoint = seen.keypoints[match.idx1];
-      pairs.push_back({{keypoint.x, keypoint.y}, target.pixels[match.idx2]});
-    }
+    const std::vector<PixelPair> pairs = MatchPixels(Look(), target);
     ServoCommand command = servo.Step(pairs);
     command.epipoles.reset();
     leg.steps.push_back({pose_, command, static_cast<int>(pairs.size())});
@@ -184,6 +198,7 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
       pose_.heading_rad = WrapAngle(lost_heading_rad + RadFromDeg(kSearchDeg[num_searched++]));
       continue;
     }
+    leg.seen = true;
     num_searched = 0;
     num_blocked = Move(command) ? 0 : num_blocked + 1;
     if (num_blocked == kMaxNumBlocked) {

@@ -64,7 +64,8 @@ struct RobotStep {
 
 struct RobotLeg {
   bool arrived = false;
-  std::string why;  // of the last command
+  bool seen = false;  // the target's matches agreed on a motion, if only once
+  std::string why;    // of the last command
   std::vector<RobotStep> steps;
 };
 
@@ -84,6 +85,8 @@ class Robot {
 
   // The features of what it sees.
   Features Look();
+  // Matches of such features with a target that agree on one motion over the floor; 0 where none do.
+  int NumAgreeing(const Features& seen, const ServoTarget& target) const;
   // Goes to where an image was taken.  A target without matches is looked for by turning on the spot.
   RobotLeg GoTo(const ServoTarget& target, bool is_goal);
 
@@ -92,6 +95,7 @@ class Robot {
         const ServoOptions& servo_options, uint64_t seed);
   RobotLeg GoIdeally(const ServoTarget& target);
   RobotLeg Steer(const ServoTarget& target, bool is_goal);
+  Camera AssumedCamera() const;
   bool Move(const ServoCommand& command);
 
   const Building* building_;

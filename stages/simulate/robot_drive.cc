@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/pose.h"
 
@@ -64,8 +65,7 @@ class Driver {
         continue;
       }
       const NodeIdx node = way_[next_];
-      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target,
-                             TargetOfImage(map_, model_.appearance().node_images[node].front()));
+      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, TargetOfNode(node));
       DriveLeg& leg = Go("go", target, node, false);
       if (!leg.arrived) {
         CAIRN_RETURN_IF_ERROR(GiveUp(&leg));
@@ -97,12 +97,42 @@ class Driver {
                        "camera to where there is something to see",
                        robot_.pose().position.x(), robot_.pose().position.y());
     }
-    CAIRN_ASSIGN_OR_RETURN(hypotheses_, StartHypotheses::Make(model_, model_.Look(seen.descriptors),
-                                                              goal_node_, options_.hypotheses));
+    PlaceScores scores = model_.Look(seen.descriptors);
+    CAIRN_RETURN_IF_ERROR(KeepSeen(seen, &scores));
+    CAIRN_ASSIGN_OR_RETURN(hypotheses_,
+                           StartHypotheses::Make(model_, scores, goal_node_, options_.hypotheses));
     trail_ = {TargetOfFeatures(seen, robot_.pose())};
     Note(&drive_.legs.back());
-    TakeWay(hypotheses_->hypotheses()[hypotheses_->followed()].path);
+    return TakeWay(hypotheses_->hypotheses()[hypotheses_->followed()].path, seen);
+  }
+
+  // Scores become shares of the most matches, 0 for places whose images do not show what it sees, unless none
+  // does.
+  Status KeepSeen(const Features& seen, PlaceScores* scores) {
+    if (options_.min_start_inliers == 0) return Ok();
+    std::vector<NodeIdx> order(scores->scores.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](NodeIdx a, NodeIdx b) { return scores->scores[a] > scores->scores[b]; });
+    if (static_cast<int>(order.size()) > options_.max_num_start_checks)
+      order.resize(options_.max_num_start_checks);
+    std::vector<double> kept(scores->scores.size(), 0);
+    double most = 0;
+    for (const NodeIdx node : order) {
+      CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, TargetOfNode(node));
+      const int num_agreeing = robot_.NumAgreeing(seen, target);
+      if (num_agreeing < options_.min_start_inliers) continue;
+      kept[node] = num_agreeing;
+      most = std::max(most, kept[node]);
+    }
+    if (most == 0) return Ok();
+    for (double& score : kept) score /= most;
+    scores->scores = std::move(kept);
     return Ok();
+  }
+
+  Result<ServoTarget> TargetOfNode(NodeIdx node) const {
+    return TargetOfImage(map_, model_.appearance().node_images[node].front());
   }
 
   Status Relocalize(const std::string& why) {
@@ -116,8 +146,12 @@ class Driver {
   }
 
   // An image of the way is not where the followed start has it: another one is tried, as long as there is
-  // any.
+  // any. An image that was seen and not reached is where it should be, and says nothing against the start.
   Status GiveUp(DriveLeg* leg) {
+    if (leg->seen) {
+      Note(leg);
+      return Relocalize(leg->why);
+    }
     const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
     leg->verdict = VerdictName(has_other ? HypothesisVerdict::kSwitch : HypothesisVerdict::kLost);
     const std::string why = leg->why;
@@ -134,8 +168,7 @@ class Driver {
     if (options_.hypotheses.on_switch == "replan") {
       const std::optional<NodePath> path = hypotheses_->Replan(followed);
       if (!path) return Relocalize("no way from where the robot would be");
-      TakeWay(*path);
-      return Ok();
+      return TakeWay(*path, robot_.Look());
     }
     for (size_t i = trail_.size() - 1; i-- > 0;) {
       const DriveLeg& leg = Go("retrace", trail_[i], -1, false);
@@ -143,14 +176,18 @@ class Driver {
     }
     trail_.resize(1);
     hypotheses_->Restart();
-    TakeWay(hypotheses_->hypotheses()[followed].path);
-    return Ok();
+    return TakeWay(hypotheses_->hypotheses()[followed].path, robot_.Look());
   }
 
-  void TakeWay(const NodePath& path) {
+  // From its first image on, where what the second one shows is not to be seen from here.
+  Status TakeWay(const NodePath& path, const Features& seen) {
     way_ = path.nodes;
     next_ = std::min<size_t>(1, way_.size());
     if (way_.size() > 1) way_.pop_back();  // the goal's image itself comes last
+    if (path.nodes.size() < 2 || options_.min_start_inliers == 0) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(const ServoTarget second, TargetOfNode(path.nodes[1]));
+    if (robot_.NumAgreeing(seen, second) < options_.min_start_inliers) next_ = 0;
+    return Ok();
   }
 
   DriveLeg& Go(const char* kind, const ServoTarget& target, NodeIdx node, bool is_goal) {
@@ -160,6 +197,7 @@ class Driver {
     RobotLeg went = robot_.GoTo(target, is_goal);
     DriveLeg leg{.kind = kind, .node = node, .target = target.pose, .pose = robot_.pose()};
     leg.arrived = went.arrived;
+    leg.seen = went.seen;
     leg.why = went.why;
     leg.steps = std::move(went.steps);
     Eigen::Vector2d last = before.position;
@@ -203,6 +241,12 @@ OptionTable DescribeOptions(RobotDriveOptions* o) {
       {"max_num_legs", &o->max_num_legs, "most images that the robot goes to", 1},
       {"max_num_relocalizations", &o->max_num_relocalizations,
        "how often it may look anew where it is, after it got lost", 0},
+      {"min_start_inliers", &o->min_start_inliers,
+       "matches with a place's image that must agree on one motion for it to be held possible; 0: words "
+       "decide",
+       0},
+      {"max_num_start_checks", &o->max_num_start_checks, "places that are checked so, those that score best",
+       1},
   };
   for (const OptionTable& part :
        {DescribeOptions(&o->robot), DescribeOptions(&o->servo), DescribeOptions(&o->hypotheses)}) {

@@ -18,6 +18,11 @@ struct RobotDriveOptions {
   int max_num_legs = 200;
   // How often it may look anew where it is, after it got lost.  REQUIRES: >= 0
   int max_num_relocalizations = 5;
+  // A place is held possible if so many matches with its image agree on one motion, as many as make a link
+  // [Mariottini11 §V: 20]; the source, 0, takes what the words say.  REQUIRES: >= 0
+  int min_start_inliers = 20;
+  // Places that are checked so, those that score best.  REQUIRES: >= 1
+  int max_num_start_checks = 40;
   RobotOptions robot;
   ServoOptions servo;
   StartHypothesesOptions hypotheses;
@@ -38,6 +43,7 @@ struct DriveLeg {
   NodeIdx node = -1;        // gone to; -1: an image of its own
   PlanarPose target, pose;  // of its image; of the robot afterwards
   bool arrived = false;
+  bool seen = false;  // as RobotLeg
   std::string why;
   std::vector<RobotStep> steps;
   // After the image taken at its end; empty where none was looked at.

@@ -28,9 +28,9 @@ class Drive : public testing::Test {
     folder_ = nullptr;
   }
   static std::string Path(const std::string& name) { return *folder_ / name; }
-  static ProgramRun Run(const std::string& arguments) {
-    return RunShell(fmt::format("cairn drive {} --building {} --servo ideal {}", Path("rooms.cairn"), kRecipe,
-                                arguments));
+  static ProgramRun Run(const std::string& arguments, const char* servo = "ideal") {
+    return RunShell(fmt::format("cairn drive {} --building {} --servo {} {}", Path("rooms.cairn"), kRecipe,
+                                servo, arguments));
   }
 
   static constexpr char kRecipe[] = CAIRN_SOURCE_DIR "/maps/drive_unique/recipe.toml";
@@ -56,6 +56,14 @@ TEST_F(Drive, ALostRobotReachesItsGoalAndRecordsTheWay) {
   EXPECT_THAT(*ReadFile(Path("run.svg")), HasSubstr("</svg>"));
   ASSERT_EQ(Run(arguments + Path("again.json")).exit_code, 0);
   EXPECT_EQ(*ReadFile(Path("again.json")), *ReadFile(Path("run.json"))) << "same seed, same drive";
+}
+
+TEST_F(Drive, ALostRobotIsSteeredToItsGoalByItsCamera) {
+  const ProgramRun run = Run("--start 2,2,0 --goal d0060.jpg -o " + Path("steered.json"), "epipolar");
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const auto record = nlohmann::json::parse(*ReadFile(Path("steered.json")));
+  EXPECT_LT(record["goal_error_m"].get<double>(), 0.1);
+  EXPECT_LT(record["goal_error_deg"].get<double>(), 2);
 }
 
 TEST_F(Drive, ACarriedRobotIsRecordedWhereItWasPut) {

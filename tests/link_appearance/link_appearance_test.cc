@@ -7,6 +7,7 @@
 
 #include "core/appearance.h"
 #include "core/file.h"
+#include "core/pose.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/picture.h"
 #include "tests/link_appearance/graphs.h"
@@ -320,6 +321,25 @@ TEST(FuseImages, ViewsOfAPanoramaAreOneNode) {
   images.images[1].name = "p.jpg#1of2";
   images.images[2].name = "q.jpg";
   EXPECT_THAT(*FuseImages(images.images, "none", 0.1, nullptr), ElementsAre(0, 0, 1));
+}
+
+TEST(LinkAppearance, ImagesTurnedTooFarAgainstEachOtherAreNotLinked) {
+  ImageLinks images;
+  Capture capture;
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = fmt::format("{}.jpg", i);
+    images.images.push_back({.image_id = i + 1, .name = name});
+    const Eigen::AngleAxisd turn(RadFromDeg(30 * i), Eigen::Vector3d::UnitY());
+    capture.images.push_back({name, 1, Pose{Eigen::Quaterniond(turn), Eigen::Vector3d::Zero()}});
+  }
+  images.links = {{0, 1, 50}, {0, 2, 50}, {1, 2, 50}};
+  LinkAppearanceOptions options;
+  options.max_link_turn_deg = 31;
+  EXPECT_EQ(LinkAppearance(images, &capture, options, 0)->appearance.graph.num_links(), 2);
+  options.max_link_turn_deg = 29;
+  EXPECT_EQ(LinkAppearance(images, &capture, options, 0)->appearance.graph.num_links(), 0);
+  EXPECT_EQ(LinkAppearance(images, nullptr, options, 0)->appearance.graph.num_links(), 3)
+      << "without poses nothing is known of turns";
 }
 
 TEST(SurveyImagesOf, LeavesOutImagesThatTheCaptureDoesNotList) {

@@ -19,6 +19,7 @@ struct Drive {
   int num_steps = 0;
   double greatest_speed_m_s = 0, greatest_turn_rad_s = 0;
   bool went_backwards = false;
+  double least_x_m = 0;  // of the floor frame
 };
 
 Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose& target,
@@ -35,6 +36,7 @@ Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose
     drive.greatest_turn_rad_s = std::max(drive.greatest_turn_rad_s, std::abs(drive.last.turn_rad_s));
     drive.went_backwards |= drive.last.speed_m_s < 0;
     drive.end = Moved(drive.end, drive.last.speed_m_s, drive.last.turn_rad_s, options.step_s);
+    drive.least_x_m = std::min(drive.least_x_m, drive.end.position.x());
   }
   return drive;
 }
@@ -106,6 +108,17 @@ TEST(Servo, ReversesToATargetBehindIt) {
   const Drive drive = DriveTo(Room(), start, target);
   ExpectThere(drive, target, "behind");
   EXPECT_TRUE(drive.went_backwards);
+}
+
+TEST(Servo, ReversesAlongItsWayWithoutAFartherRetreat) {
+  const PlanarPose target;
+  for (const PlanarPose& start : {PlanarPose{{0.8, 0.02}, 0}, PlanarPose{{0.9, 0.3}, 0.5}}) {
+    ServoScene scene = Room();
+    scene.noise_px = 0.3;
+    const Drive drive = DriveTo(scene, start, target);
+    ExpectThere(drive, target, fmt::format("from {:g}, {:g}", start.position.x(), start.position.y()));
+    EXPECT_GT(drive.least_x_m, -0.1) << "it must not need the room behind the target";
+  }
 }
 
 TEST(Servo, TurnsOnTheSpotWhereOnlyTheHeadingDiffers) {

@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+"""Robots that are carried along their way: kidnapped.py CAIRN MAP CAPTURE RECIPE NUM [drive options]
+
+From random survey images to random others by the way of least entropy and by the shortest one (`--weight links`), put
+near each image of it (`--servo ideal`).  Half-way a robot is carried to a place farther along its own way, 3 m or more
+away, and must notice and find out where it is.  Prints for each way: how often robots looked anew, how often they then
+took the wrong place (more than 1 m or 45 degrees from where they stood) for the right one, goals reached by truth
+(within 0.3 m and 10 degrees), images and metres driven.
+"""
+import json
+import math
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+
+LEAST_WAY_IMAGES = 10  # shorter ways are not driven
+LEAST_CARRIED_M = 3
+
+
+def survey_poses(path):
+    """(x m, y m, heading degrees) by image name, from COLMAP's images.txt."""
+    poses = {}
+    for line in open(path):
+        fields = line.split()
+        if line.startswith("#") or len(fields) < 10:
+            continue
+        w, x, y, z, *t = map(float, fields[1:8])
+        rotation = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+        centre = [-sum(rotation[r][c] * t[r] for r in range(3)) for c in range(2)]
+        poses[fields[9]] = (*centre, math.degrees(math.atan2(rotation[2][1], rotation[2][0])))
+    return poses
+
+
+def apart(a, b):
+    return math.hypot(a[0] - b[0], a[1] - b[1])
+
+
+def pose_of(json_pose):
+    return json_pose["x_m"], json_pose["y_m"], json_pose["heading_deg"]
+
+
+class Tally:
+    def __init__(self):
+        self.looked, self.wrong, self.wrong_runs, self.goals, self.images, self.metres = 0, 0, 0, 0, [], []
+
+    def add(self, run, reached):
+        legs = run["legs"]
+        wrong = 0
+        for leg in legs:
+            if leg["kind"] != "relocalize" or not leg["hypotheses"]:
+                continue
+            self.looked += 1
+            stands, taken = pose_of(leg["pose"]), pose_of(leg["hypotheses"][leg["followed"]]["start_pose"])
+            turn = abs((stands[2] - taken[2] + 180) % 360 - 180)
+            wrong += apart(stands, taken) > 1 or turn > 45
+        self.wrong += wrong
+        self.wrong_runs += wrong > 0
+        self.goals += reached
+        self.images.append(sum(leg["kind"] in ("go", "retrace") for leg in legs))
+        self.metres.append(run["way_m"])
+
+
+def main():
+    cairn, map_path, capture, recipe, num = *sys.argv[1:5], int(sys.argv[5])
+    options = sys.argv[6:]
+    poses = survey_poses(os.path.join(capture, "images.txt"))
+    names = sorted(poses)
+    draw = random.Random(1)
+    tallies = {"entropy": Tally(), "links": Tally()}
+    num_done = 0
+    with tempfile.TemporaryDirectory() as folder:
+        out = os.path.join(folder, "run.json")
+        while num_done < num:
+            start, goal = draw.choice(names), draw.choice(names)
+            ways = {}
+            for weight in tallies:
+                listing = subprocess.run([cairn, "route", map_path, start, goal, "--weight", weight],
+                                         capture_output=True, text=True).stdout
+                ways[weight] = [word for word in listing.split() if word in poses]
+            carried = {}
+            for weight, way in ways.items():
+                half = len(way) // 2
+                farther = [name for name in way[half:] if apart(poses[name], poses[way[half - 1]]) > LEAST_CARRIED_M]
+                if len(way) >= LEAST_WAY_IMAGES and farther:
+                    carried[weight] = f"{half - 1}:" + ",".join(f"{v:.3f}" for v in poses[farther[0]])
+            if len(carried) < len(tallies):
+                continue
+            num_done += 1
+            for weight, tally in tallies.items():
+                subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", str(num_done),
+                                "--start", ",".join(f"{v:.3f}" for v in poses[start]), "--kidnap", carried[weight],
+                                "--weight", weight, "--servo", "ideal", "--ideal-reach-m", "2", "-o", out, *options],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                run = json.load(open(out))
+                tally.add(run, not run["error"] and run["goal_error_m"] < 0.3 and run["goal_error_deg"] < 10)
+    for weight, tally in tallies.items():
+        print(f"{weight}: {num_done} runs; looked anew {tally.looked} times, {tally.wrong} of them wrong, in "
+              f"{tally.wrong_runs} runs; goal reached {tally.goals}; {statistics.mean(tally.images):.1f} images, "
+              f"{statistics.mean(tally.metres):.1f} m")
+
+
+if __name__ == "__main__":
+    main()
