@@ -21,9 +21,9 @@ struct GrowVocabularyOptions {
   int depth = 0;
   // Descriptors that a word should hold on average when the depth is chosen (on a logarithmic scale).
   // REQUIRES: >= 1
-  double descriptors_per_word = 40;
+  double descriptors_per_word = 3;
   // A node below the root with fewer training descriptors than this is not split.  REQUIRES: >= 2
-  int min_num_descriptors_to_split = 20;
+  int min_num_descriptors_to_split = 5;
   // Most rounds of k-means per node.  REQUIRES: >= 1
   int max_num_iterations = 10;
 };

@@ -1,4 +1,5 @@
 // Blocks of the appearance graph as bytes: drawn in schemas/FORMAT.md.
+#include <algorithm>
 #include <limits>
 
 #include "core/appearance.h"
@@ -94,6 +95,16 @@ Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockE
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} nodes", entry.count);
   return block;
+}
+
+void CompleteLookAlikes(std::vector<std::vector<MapAppearanceNode::LookAlike>>* look_alikes) {
+  const std::vector<std::vector<MapAppearanceNode::LookAlike>> stored = *look_alikes;
+  for (size_t node = 0; node < stored.size(); ++node) {
+    for (const MapAppearanceNode::LookAlike& other : stored[node])
+      (*look_alikes)[other.node].push_back({static_cast<int32_t>(node), other.score});
+  }
+  for (auto& others : *look_alikes)
+    std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
 }
 
 int64_t NumBytes(const AmbiguityBlock& block) {

@@ -122,6 +122,10 @@ struct AmbiguityBlock {
   std::vector<Node> nodes;
 };
 
+// Maps store every pair of look-alikes once, at the smaller node: adds it at the other one too.  Per node,
+// ascending.  REQUIRES: nodes in range
+void CompleteLookAlikes(std::vector<std::vector<MapAppearanceNode::LookAlike>>* look_alikes);
+
 // View-invariant regions first, first + 1, ...
 struct ViewBlock {
   struct Region {

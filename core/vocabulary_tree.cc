@@ -39,6 +39,7 @@ void WeightVocabulary(Vocabulary* vocabulary) {
   const double num_documents = static_cast<double>(vocabulary->document_ids.size());
   vocabulary->idf.assign(vocabulary->num_words(), 0.f);
   std::vector<double> squared_norms(vocabulary->document_ids.size(), 0.0);
+  vocabulary->document_num_words.assign(vocabulary->document_ids.size(), 0);
   for (int word = 0; word < vocabulary->num_words(); ++word) {
     const std::vector<Posting>& postings = vocabulary->inverted_files[word];
     if (postings.empty()) continue;
@@ -47,6 +48,7 @@ void WeightVocabulary(Vocabulary* vocabulary) {
     for (const Posting& posting : postings) {
       const double weight = static_cast<double>(posting.count) * vocabulary->idf[word];
       squared_norms[posting.document] += weight * weight;
+      ++vocabulary->document_num_words[posting.document];
     }
   }
   vocabulary->document_norms.resize(squared_norms.size());

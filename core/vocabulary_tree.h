@@ -39,7 +39,8 @@ struct Vocabulary {
 
   // Made from the inverted files by WeightVocabulary.
   std::vector<float> idf;  // per word: ln(documents / documents with the word); 0 for an empty file
-  std::vector<float> document_norms;  // per document: L2 norm of its vector (count * idf)
+  std::vector<float> document_norms;        // per document: L2 norm of its vector (count * idf)
+  std::vector<int32_t> document_num_words;  // per document: different words of it
 
   int num_words() const { return static_cast<int>(inverted_files.size()); }
 };
@@ -48,7 +49,7 @@ struct Vocabulary {
 // `num_children` alone, breadth first.
 // Errors: Corrupt when the counts do not add up to the number of nodes.
 Status NumberVocabularyNodes(Vocabulary* vocabulary);
-// Sets `idf` and `document_norms` from the inverted files.
+// Sets `idf`, `document_norms` and `document_num_words` from the inverted files.
 void WeightVocabulary(Vocabulary* vocabulary);
 
 // The leaf that a descriptor falls to: at each node the child whose centre has the largest dot product with

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/floor_pose.h"
+#include "core/map_blocks.h"
 
 namespace cairn {
 namespace {
@@ -22,12 +23,8 @@ const MapImage& FirstImage(const MapRows& rows, size_t node) {
 // Look-alikes of every node, both ways.
 std::vector<std::vector<MapAppearanceNode::LookAlike>> LookAlikes(const MapRows& rows) {
   std::vector<std::vector<MapAppearanceNode::LookAlike>> all(rows.appearance.size());
-  for (size_t node = 0; node < all.size(); ++node) {
-    for (const MapAppearanceNode::LookAlike& other : rows.appearance[node].look_alikes) {
-      all[node].push_back(other);
-      all[other.node].push_back({static_cast<int32_t>(node), other.score});
-    }
-  }
+  for (size_t node = 0; node < all.size(); ++node) all[node] = rows.appearance[node].look_alikes;
+  CompleteLookAlikes(&all);
   return all;
 }
 

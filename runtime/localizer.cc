@@ -193,20 +193,23 @@ Result<Localization> Localizer::LocalizeQuery(const Query& query,
     best = Better(std::move(best), std::move(localization), options_.accept);
     if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
   }
-  if (options_.exclude_look_alikes && best.has_fix()) {
-    CAIRN_ASSIGN_OR_RETURN(best, ExcludeLookAlikes(query, prior, std::move(best)));
-  }
+  CAIRN_ASSIGN_OR_RETURN(best, Answer(query, prior, std::move(best)));
   best.candidates = std::move(candidate_ids);
-  return InGivenFrame(query, std::move(best));
+  return best;
 }
 
 Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
-                                              std::vector<LandmarkIdx> landmarks) const {
+                                              std::vector<LandmarkIdx> landmarks,
+                                              const std::optional<PosePrior>& prior) const {
   CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {scope, std::move(landmarks)}));
-  return InGivenFrame(query, std::move(localization));
+  return Answer(query, prior, std::move(localization));
 }
 
-Localization Localizer::InGivenFrame(const Query& query, Localization localization) const {
+Result<Localization> Localizer::Answer(const Query& query, const std::optional<PosePrior>& prior,
+                                       Localization localization) const {
+  if (options_.exclude_look_alikes && localization.has_fix()) {
+    CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(query, prior, std::move(localization)));
+  }
   localization.num_features = static_cast<int>(query.features.keypoints.size());
   if (localization.has_fix()) {
     const Pose given_from_camera = map_->head().camera_from_given.Inverse();

@@ -91,15 +91,17 @@ class Localizer {
   Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
   Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
   Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
-  // Among these landmarks (ascending) alone.
-  Result<Localization> LocalizeAmong(const Query& query, Scope scope,
-                                     std::vector<LandmarkIdx> landmarks) const;
+  // Among these landmarks (ascending) alone, and those of look-alikes that the prior does not exclude.
+  Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::vector<LandmarkIdx> landmarks,
+                                     const std::optional<PosePrior>& prior) const;
 
   const LocalizerOptions& options() const { return options_; }
 
  private:
   struct Attempt;
-  Localization InGivenFrame(const Query& query, Localization localization) const;
+  // What every fix passes on its way out: no look-alike questions it, and it is in the given frame.
+  Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
+                              Localization localization) const;
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
                                             std::vector<ImageId>* candidate_ids) const;
   Result<Localization> Try(const Query& query, const Attempt& attempt) const;

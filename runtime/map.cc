@@ -140,25 +140,19 @@ Result<std::shared_ptr<const AppearanceMap>> Map::Appearance() const {
 
 Status Map::AddAmbiguity(AppearanceMap* appearance) const {
   const int64_t num_blocks = directory_.NumBlocks(BlockKind::kAmbiguity);
-  if (num_blocks > 0) appearance->look_alikes.resize(appearance->is_kept.size());
   for (int64_t ordinal = 0; ordinal < num_blocks; ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kAmbiguity, ordinal, DecodeAmbiguityBlock,
                                                   &MapLayout::MakeAmbiguityBlock));
     for (const AmbiguityBlock::Node& node : block->nodes) {
-      const auto node_idx = static_cast<int32_t>(appearance->entropy.size());
       appearance->entropy.push_back(node.entropy);
-      for (const MapAppearanceNode::LookAlike& other : node.look_alikes) {
-        appearance->look_alikes[node_idx].push_back(other);
-        appearance->look_alikes[other.node].push_back({node_idx, other.score});
-      }
+      appearance->look_alikes.push_back(node.look_alikes);
     }
   }
   if (num_blocks > 0 && appearance->entropy.size() != appearance->is_kept.size()) {
     return MakeError(ErrorCode::kCorrupt, "map '{}': entropies of {} appearance nodes of {}", head_.name,
                      appearance->entropy.size(), appearance->is_kept.size());
   }
-  for (auto& others : appearance->look_alikes)
-    std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
+  CompleteLookAlikes(&appearance->look_alikes);
   return Ok();
 }
 

@@ -1,6 +1,7 @@
 #include "runtime/place_model.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "runtime/no_throw.h"
 
@@ -44,11 +45,25 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
   });
 }
 
-PlaceScores PlaceModel::Score(const BagOfWords& bag) const {
+Result<PlaceView> ViewOfImage(const Map& map, int32_t image) {
+  CAIRN_ASSIGN_OR_RETURN(const auto of_map, map.Image(image));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(of_map->landmarks, true));
+  PlaceView view;
+  for (const MapLandmark& landmark : landmarks->landmarks)
+    view.bearings.push_back((of_map->cam_from_world * landmark.position).normalized());
+  view.packed = landmarks->packed;
+  return view;
+}
+
+std::vector<double> PlaceModel::ImageScores(const BagOfWords& bag) const {
   std::vector<double> scores = ScoreDocuments(vocabulary_, bag);
   for (size_t image = 0; image < scores.size(); ++image) {
     if (appearance_->node_of_image[image] < 0) scores[image] = 0;
   }
+  return scores;
+}
+
+PlaceScores PlaceModel::OfNodes(const std::vector<double>& scores) const {
   const std::vector<double> probabilities = ProbabilitiesOfScores(scores, options_.score_exponent);
   PlaceScores places{std::vector<double>(num_nodes(), 0.0), std::vector<double>(num_nodes(), 0.0)};
   double sum = 0;
@@ -64,14 +79,39 @@ PlaceScores PlaceModel::Score(const BagOfWords& bag) const {
 }
 
 PlaceScores PlaceModel::Look(const DescriptorMatrix& descriptors) const {
-  return Score(CountWords(vocabulary_, descriptors));
+  return OfNodes(ImageScores(CountWords(vocabulary_, descriptors)));
+}
+
+Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
+                                           const RerankOptions& options) const {
+  return WithoutExceptions("place model", [&]() -> Result<PlaceScores> {
+    const std::vector<double> by_words = ImageScores(CountWords(vocabulary_, query.features.descriptors));
+    std::vector<int32_t> order(by_words.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int32_t a, int32_t b) { return by_words[a] > by_words[b]; });
+    std::vector<PlaceView> views;
+    for (const int32_t image : order) {
+      if (by_words[image] <= 0 || static_cast<int>(views.size()) >= options.num_candidates) break;
+      CAIRN_ASSIGN_OR_RETURN(PlaceView view, ViewOfImage(map, image));
+      views.push_back(std::move(view));
+    }
+    std::vector<const PlaceView*> candidates;
+    for (const PlaceView& view : views) candidates.push_back(&view);
+    CAIRN_ASSIGN_OR_RETURN(const auto places,
+                           RerankPlaces(MakePlaceView(query.features, query.camera), candidates, options, 1));
+    if (places.empty() || !places.front().is_verified()) return OfNodes(by_words);
+    std::vector<double> verified(by_words.size(), 0.0);
+    for (const RerankedPlace& place : places) verified[order[place.candidate]] = place.score;
+    return OfNodes(verified);
+  });
 }
 
 std::vector<double> PlaceModel::Expected(NodeIdx node) const {
   const std::vector<int32_t>& images = appearance_->node_images[node];
   std::vector<double> mean(num_nodes(), 0.0);
   for (const int32_t image : images) {
-    const std::vector<double> probabilities = Score(bags_[image]).probabilities;
+    const std::vector<double> probabilities = OfNodes(ImageScores(bags_[image])).probabilities;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += probabilities[i] / static_cast<double>(images.size());
   }
   return mean;

@@ -6,7 +6,9 @@
 #include "core/document_scores.h"
 #include "core/error.h"
 #include "core/options.h"
+#include "core/rerank_places.h"
 #include "runtime/map.h"
+#include "runtime/measurement.h"
 
 namespace cairn {
 
@@ -24,6 +26,10 @@ struct PlaceScores {
       probabilities;  // p(X = node | image) [Mariottini11 §IV]: sums to 1, all alike for zeros
 };
 
+// A survey image of a map as geometry sees it: the landmarks that it shows, where they are and as they look.
+// Errors: as Map::Landmarks.
+Result<PlaceView> ViewOfImage(const Map& map, int32_t image);
+
 // Scores images against the places of a map by its visual words [Mariottini11 §IV].  Holds the whole
 // vocabulary and its inverted files: unlike a Localizer it looks at all of the map for every image.
 // Immutable, shareable between threads.
@@ -38,13 +44,20 @@ class PlaceModel {
 
   // Of an image's descriptors (n x 128); none: nothing is known.  Touches shared words only.
   PlaceScores Look(const DescriptorMatrix& descriptors) const;
+  // A closer look, for a robot that stands still because it is lost: the images that score best by their
+  // words are verified (core/rerank_places.h), and those that are get the score of that instead, the others
+  // none.  Where none is, the same as Look.  Costs one matching of descriptors for each of them.  `map`: the
+  // one that the model is of, best with all landmarks.
+  // Errors: InvalidArgument (an option), and as Map::Landmarks.  No exception leaves it.
+  Result<PlaceScores> LookCloser(const Map& map, const Query& query, const RerankOptions& options = {}) const;
   // h' = p(X | Z of a node) [Mariottini11 eq. 7]: what a robot at the node expects to get, the mean over its
   // images.
   std::vector<double> Expected(NodeIdx node) const;
 
  private:
   PlaceModel() = default;
-  PlaceScores Score(const BagOfWords& bag) const;
+  std::vector<double> ImageScores(const BagOfWords& bag) const;  // images of no node: 0
+  PlaceScores OfNodes(const std::vector<double>& image_scores) const;
 
   std::shared_ptr<const AppearanceMap> appearance_;
   Vocabulary vocabulary_;  // documents: the map's images, by index

@@ -79,7 +79,7 @@ Result<Localization> RegionTracker::TrackQuery(const Query& query) {
   if (has_features && prior) {
     CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
     CAIRN_ASSIGN_OR_RETURN(Localization found,
-                           localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected)));
+                           localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior));
     if (found.has_fix() && Agrees(found, *prior)) {
       Update(found);
       return found;
@@ -88,8 +88,8 @@ Result<Localization> RegionTracker::TrackQuery(const Query& query) {
   if (has_features) {
     CAIRN_ASSIGN_OR_RETURN(auto voted, VotedLandmarks(query));
     if (!voted.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(Localization found,
-                             localizer_.LocalizeAmong(query, Scope::kRegions, std::move(voted)));
+      CAIRN_ASSIGN_OR_RETURN(Localization found, localizer_.LocalizeAmong(query, Scope::kRegions,
+                                                                          std::move(voted), std::nullopt));
       if (found.has_fix() && found.num_unguided_inliers >= localizer_.options().sure_num_unguided_inliers) {
         Update(found);
         return found;

@@ -9,8 +9,8 @@
 
 #include "core/descriptor_distance.h"
 #include "core/pose.h"
+#include "core/two_view_error.h"
 #include "core/vector_geometry.h"
-#include "stages/match_features/two_view_error.h"
 
 namespace cairn {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "core/parallel.h"
 #include "core/pose.h"
+#include "core/two_view_error.h"
 #include "core/vector_geometry.h"
-#include "stages/match_features/two_view_error.h"
 
 namespace cairn {
 

@@ -5,9 +5,9 @@
 
 #include <Eigen/Dense>
 
-#include "stages/match_features/estimate_models.h"
-#include "stages/match_features/relative_pose.h"
-#include "stages/match_features/two_view_error.h"
+#include "core/estimate_two_view.h"
+#include "core/relative_pose.h"
+#include "core/two_view_error.h"
 
 namespace cairn {
 namespace {

@@ -78,9 +78,8 @@ struct ViewForVerification {
 //   (src/estimators/two_view_geometry.cc there): kCalibrated, kUncalibrated (E explains too little of what F
 //   does), kPlanarOrPanoramic. Differs from it: inliers are those of E also where F has more, so that they
 //   obey the known intrinsics.
-// - two_view = "eight_point", in place of all that: eight points (estimate_models.h), poses not read;
-// kCalibrated or,
-//   where a focal length is guessed, kUncalibrated.
+// - two_view = "eight_point", in place of all that: eight points (core/estimate_two_view.h), poses not read;
+//   kCalibrated or, where a focal length is guessed, kUncalibrated.
 // - focal length guessed: fundamental matrix by USAC; kUncalibrated or kPlanarOrPanoramic.
 // Then guided matching adds what the geometry allows (guided_match.h).
 //

@@ -81,9 +81,13 @@ TEST(BuildVocabulary, SeedChangesTheTree) {
 }
 
 TEST(BuildVocabulary, DepthFollowsTheNumberOfDescriptors) {
+  BuildVocabularyOptions options;
+  options.tree.descriptors_per_word = 40;
   // Words wanted: 100 / 40 = 2.5 (nearest power of ten: 10^0, at least one level), 4000 / 40 = 100 = 10^2.
-  EXPECT_EQ(Build(RandomImages(2, 50, 1), {})->depth, 1);
-  EXPECT_EQ(Build(RandomImages(4, 1000, 1), {})->depth, 2);
+  EXPECT_EQ(Build(RandomImages(2, 50, 1), options)->depth, 1);
+  EXPECT_EQ(Build(RandomImages(4, 1000, 1), options)->depth, 2);
+  // By default 4000 / 3 = 1333, nearest to 10^3.
+  EXPECT_EQ(Build(RandomImages(4, 1000, 1), {})->depth, 3);
 }
 
 TEST(BuildVocabulary, EveryDescriptorIsInTheFileOfItsWord) {

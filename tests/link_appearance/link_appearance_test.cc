@@ -351,6 +351,39 @@ TEST(SurveyImagesOf, LeavesOutImagesThatTheCaptureDoesNotList) {
   EXPECT_THAT(survey.links, ElementsAre(AppearanceLink{0, 1, 30}));
 }
 
+// Twins 10 m apart whose images 0 and 2, 1 and 3 verify as if all that they show were far away; image 4 has
+// no pose.
+TEST(LinkAppearance, DoesNotLinkTwinsThatStandFarApart) {
+  ImageLinks images = ImagesOf(GraphOf(5, {{0, 1}, {2, 3}, {0, 2}, {1, 3}, {3, 4}}));
+  Capture capture;
+  for (int i = 0; i < 5; ++i) {
+    CaptureImage image{.name = images.images[i].name};
+    if (i < 4) {
+      image.cam_from_world.emplace();
+      image.cam_from_world->translation = {-(10.0 * (i / 2) + 0.5 * (i % 2)), 0, 0};
+    }
+    capture.images.push_back(image);
+  }
+  const auto links = [&](double max_link_distance_m, const Capture* given) {
+    LinkAppearanceOptions options;
+    options.max_link_distance_m = max_link_distance_m;
+    std::vector<std::pair<int, int>> pairs;
+    const auto result = LinkAppearance(images, given, options, 0);
+    for (const AppearanceLink& link : result->appearance.graph.links())
+      pairs.emplace_back(link.node1, link.node2);
+    return pairs;
+  };
+  const auto near = ElementsAre(std::pair(0, 1), std::pair(2, 3), std::pair(3, 4));
+  const auto all =
+      ElementsAre(std::pair(0, 1), std::pair(0, 2), std::pair(1, 3), std::pair(2, 3), std::pair(3, 4));
+  EXPECT_THAT(links(9.9, &capture), near);
+  EXPECT_THAT(links(0.5, &capture), near);  // not farther than the limit
+  EXPECT_THAT(links(0.49, &capture), ElementsAre(std::pair(3, 4)));
+  EXPECT_THAT(links(10, &capture), all);
+  EXPECT_THAT(links(0, &capture), all);
+  EXPECT_THAT(links(1, nullptr), all);  // nothing is known of where they stand
+}
+
 TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
   const Result<LinkAppearanceResult> result =
       LinkAppearance(ImagesOf(GraphOf(3, {{0, 1}, {1, 2}})), nullptr, {}, 0);

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "stages/match_features/relative_pose.h"
-#include "stages/match_features/two_view_error.h"
+#include "core/relative_pose.h"
+#include "core/two_view_error.h"
 #include "tests/match_features/two_view_scene.h"
 
 namespace cairn {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "stages/match_features/two_view_error.h"
+#include "core/two_view_error.h"
 #include "tests/match_features/two_view_scene.h"
 
 namespace cairn {

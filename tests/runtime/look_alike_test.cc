@@ -1,7 +1,11 @@
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/map_blocks.h"
 #include "runtime/localizer.h"
+#include "runtime/region_tracker.h"
 #include "tests/runtime/synthetic_room.h"
 
 namespace cairn {
@@ -62,6 +66,40 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
     if (i % 3 > 0) rows.descriptors.row(i) = RandomDescriptor(random);
   }
   EXPECT_TRUE(localize(std::nullopt).has_fix());
+}
+
+// The twin's landmarks look a little different, so that the visible ones vote for the room; alone they match.
+TEST(RegionTracker, WithholdsAVotedFixUntilTheLookAlikeIsExcluded) {
+  MapRows rows = TwinRooms();
+  Random random(11);
+  for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
+    for (int d = 0; d < kDescriptorDim; ++d) {
+      const double value = random.Normal(rows.descriptors(i, d), 16);
+      rows.descriptors(i, d) = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
+    }
+  }
+  const auto map = *Map::FromRows(rows);
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const auto track = [&](RegionTracker* tracker, const Pose& pose) {
+    return *tracker->TrackFeatures(RenderFeatures(Room(), pose, {}, 3), Room().camera);
+  };
+  LocalizerOptions options;
+  options.fall_back_to_all = false;
+  RegionTracker careful(map, options);
+  EXPECT_EQ(track(&careful, truth).reason, NoFix::kAmbiguous);
+  options.exclude_look_alikes = false;
+  RegionTracker careless(map, options);
+  const Localization fix = track(&careless, truth);
+  EXPECT_TRUE(fix.has_fix()) << fix.message;
+  EXPECT_EQ(fix.scope, Scope::kRegions);
+}
+
+TEST(Map, ListsLookAlikesAtBothPlaces) {
+  std::vector<std::vector<MapAppearanceNode::LookAlike>> all = {{{1, 0.5}, {3, 0.25}}, {{2, 0.75}}, {}, {}};
+  CompleteLookAlikes(&all);
+  using List = std::vector<MapAppearanceNode::LookAlike>;
+  EXPECT_THAT(all, testing::ElementsAre(List{{1, 0.5}, {3, 0.25}}, List{{0, 0.5}, {2, 0.75}}, List{{1, 0.75}},
+                                        List{{0, 0.25}}));
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "stages/match_features/two_view_error.h"
+#include "core/two_view_error.h"
 
 namespace cairn {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "core/pose.h"
-#include "stages/match_features/two_view_error.h"
+#include "core/two_view_error.h"
 
 namespace cairn {
 

@@ -1,4 +1,4 @@
-#include "stages/match_features/estimate_models.h"
+#include "core/estimate_two_view.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stages/match_features/relative_pose.h"
+#include "core/relative_pose.h"
 
 #include <cmath>
 
