@@ -3,34 +3,12 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/random.h"
-#include "stages/decompose_views/node_segments.h"
-
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
-// Tags of segments: boundaries from 0, pieces of walls from -1 down, then the sides of the box.
-std::vector<TaggedSegment> AllSegments(const FloorPlan& plan, const std::vector<ViewBoundary>& boundaries) {
-  std::vector<TaggedSegment> segments;
-  for (size_t i = 0; i < boundaries.size(); ++i)
-    segments.push_back({boundaries[i].start, boundaries[i].end, static_cast<int32_t>(i)});
-  for (size_t i = 0; i < plan.pieces.size(); ++i) {
-    segments.push_back({Real(plan.vertices[plan.pieces[i].start]), Real(plan.vertices[plan.pieces[i].end]),
-                        -1 - static_cast<int32_t>(i)});
-  }
-  if (plan.closed) return segments;
-  const Vec2 low = Real(plan.low), high = Real(plan.high);
-  const auto box = -1 - static_cast<int32_t>(plan.pieces.size());
-  segments.push_back({low, {high.x(), low.y()}, box});
-  segments.push_back({{high.x(), low.y()}, high, box});
-  segments.push_back({high, {low.x(), high.y()}, box});
-  segments.push_back({{low.x(), high.y()}, low, box});
-  return segments;
-}
 
 // Half-edge 2e runs along edge e, 2e + 1 against it.
 class FaceWalker {
@@ -122,21 +100,32 @@ class FaceWalker {
 
 }  // namespace
 
-Result<Arrangement> Arrange(const FloorPlan& plan, const std::vector<ViewBoundary>& boundaries,
-                            const Progress& progress) {
-  Arrangement arrangement;
-  std::vector<NodedEdge> noded;
-  {
-    CAIRN_ASSIGN_OR_RETURN(NodedSegments result, NodeSegments(AllSegments(plan, boundaries), progress));
-    arrangement.vertices = std::move(result.vertices);
-    noded = std::move(result.edges);
+std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
+                                            const std::vector<ViewBoundary>& boundaries) {
+  std::vector<TaggedSegment> segments;
+  for (size_t i = 0; i < boundaries.size(); ++i)
+    segments.push_back({boundaries[i].start, boundaries[i].end, static_cast<int32_t>(i)});
+  for (size_t i = 0; i < plan.pieces.size(); ++i) {
+    segments.push_back({Real(plan.vertices[plan.pieces[i].start]), Real(plan.vertices[plan.pieces[i].end]),
+                        -1 - static_cast<int32_t>(i)});
   }
+  if (plan.closed) return segments;
+  const Vec2 low = Real(plan.low), high = Real(plan.high);
+  const auto box = -1 - static_cast<int32_t>(plan.pieces.size());
+  segments.push_back({low, {high.x(), low.y()}, box});
+  segments.push_back({{high.x(), low.y()}, high, box});
+  segments.push_back({high, {low.x(), high.y()}, box});
+  segments.push_back({{low.x(), high.y()}, low, box});
+  return segments;
+}
+
+Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
+                            Progress& progress) {
+  Arrangement arrangement;
+  CAIRN_ASSIGN_OR_RETURN(NodedSegments result, noder.Node(num_threads, progress));
+  arrangement.vertices = std::move(result.vertices);
+  std::vector<NodedEdge> noded = std::move(result.edges);
   const auto lower_first = [](const NodedEdge& edge) { return std::minmax(edge.start, edge.end); };
-  std::sort(noded.begin(), noded.end(), [&](const NodedEdge& a, const NodedEdge& b) {
-    const auto ends_a = lower_first(a), ends_b = lower_first(b);
-    return std::tie(ends_a.first, ends_a.second, a.tag, a.start) <
-           std::tie(ends_b.first, ends_b.second, b.tag, b.start);
-  });
   std::vector<int8_t> solid_sides;
   for (size_t i = 0; i < noded.size(); ++i) {
     const auto [start, end] = lower_first(noded[i]);
@@ -158,25 +147,6 @@ Result<Arrangement> Arrange(const FloorPlan& plan, const std::vector<ViewBoundar
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
   FaceWalker(plan, &arrangement, solid_sides).Run();
   return arrangement;
-}
-
-double EstimateNumEdges(const std::vector<ViewBoundary>& boundaries, int num_samples) {
-  const auto num = static_cast<int64_t>(boundaries.size());
-  if (num < 2) return static_cast<double>(num);
-  const auto left = [](const Vec2& a, const Vec2& b, const Vec2& c) {
-    const Vec2 along = b - a, to = c - a;
-    return along.x() * to.y() - along.y() * to.x();
-  };
-  Random random(0);
-  int64_t crossings = 0;
-  for (int i = 0; i < num_samples; ++i) {
-    const ViewBoundary& a = boundaries[random.UniformInt(0, num - 1)];
-    const ViewBoundary& b = boundaries[random.UniformInt(0, num - 1)];
-    crossings += left(a.start, a.end, b.start) * left(a.start, a.end, b.end) < 0 &&
-                 left(b.start, b.end, a.start) * left(b.start, b.end, a.end) < 0;
-  }
-  const double pairs = 0.5 * static_cast<double>(num) * static_cast<double>(num - 1);
-  return static_cast<double>(num) + 2 * pairs * static_cast<double>(crossings) / num_samples;
 }
 
 }  // namespace cairn

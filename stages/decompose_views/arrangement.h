@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/floor_plan.h"
 #include "core/progress.h"
+#include "stages/decompose_views/node_segments.h"
 #include "stages/decompose_views/view_boundaries.h"
 
 namespace cairn {
@@ -39,13 +40,15 @@ struct Arrangement {
   }
 };
 
-// Nodes the lines on the plan's grid and walks around the faces, turning as sharply left as possible.
-// O((B + I) log(B + I)) for B boundaries with I intersections.  Errors: Cancelled, Failed.
-Result<Arrangement> Arrange(const FloorPlan& plan, const std::vector<ViewBoundary>& boundaries,
-                            const Progress& progress);
+// The lines of the planar graph.  Tags: boundaries from 0, pieces of walls from -1 down, then the box's
+// sides.
+std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
+                                            const std::vector<ViewBoundary>& boundaries);
 
-// About how many edges the arrangement will have: crossings of `num_samples` pairs of boundaries drawn at
-// random, scaled up.
-double EstimateNumEdges(const std::vector<ViewBoundary>& boundaries, int num_samples);
+// Nodes the lines on the plan's grid and walks around the faces, turning as sharply left as possible.
+// `noder`: of ArrangedSegments.  O((B + I) log(B + I)) for B boundaries with I intersections.
+// Errors: Cancelled, Unsupported.
+Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
+                            Progress& progress);
 
 }  // namespace cairn

@@ -13,6 +13,9 @@
 namespace cairn {
 namespace {
 
+// Noding a plan alone is quick.
+constexpr int kNumThreads = 1;
+
 using Vec2 = Eigen::Vector2d;
 
 // A wall in grid coordinates.
@@ -27,7 +30,7 @@ Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static
 // Cleaning keeps the plan's frame and the list of changes.
 class Cleaner {
  public:
-  Cleaner(const InputPlan& input, const CleanPlanOptions& options, const Progress& progress)
+  Cleaner(const InputPlan& input, const CleanPlanOptions& options, Progress& progress)
       : input_(input), options_(options), progress_(progress) {}
 
   Result<CleanPlanResult> Run() {
@@ -216,7 +219,7 @@ class Cleaner {
   Status Divide() {
     std::vector<TaggedSegment> segments;
     for (size_t i = 0; i < walls_.size(); ++i) AddSegments(static_cast<int32_t>(i), &segments);
-    CAIRN_ASSIGN_OR_RETURN(NodedSegments noded, NodeSegments(segments, progress_));
+    CAIRN_ASSIGN_OR_RETURN(NodedSegments noded, SegmentNoder(segments).Node(kNumThreads, progress_));
     NoteCrossings(noded);
     std::vector<PlanPiece> pieces = WithoutOverlaps(noded, /*note=*/true);
     const double tolerance = options_.simplify_m / options_.grid_m;
@@ -229,7 +232,7 @@ class Cleaner {
       segments.clear();
       for (const PlanPiece& piece : joined.pieces)
         segments.push_back({Real(noded.vertices[piece.start]), Real(noded.vertices[piece.end]), piece.wall});
-      CAIRN_ASSIGN_OR_RETURN(noded, NodeSegments(segments, progress_));
+      CAIRN_ASSIGN_OR_RETURN(noded, SegmentNoder(segments).Node(kNumThreads, progress_));
       pieces = WithoutOverlaps(noded, /*note=*/false);
     }
     MakePlan(noded.vertices, std::move(pieces));
@@ -318,7 +321,7 @@ class Cleaner {
 
   const InputPlan& input_;
   const CleanPlanOptions& options_;
-  const Progress& progress_;
+  Progress& progress_;
   std::vector<Wall> walls_;
   CleanPlanResult result_;
 };
@@ -346,7 +349,7 @@ const char* PlanChangeName(PlanChangeKind kind) {
 }
 
 Result<CleanPlanResult> CleanPlan(const InputPlan& input, const CleanPlanOptions& options,
-                                  const Progress& progress) {
+                                  Progress& progress) {
   if (input.closed()) CAIRN_RETURN_IF_ERROR(CheckRings(input.rings));
   if (!input.closed() && input.segments.empty()) return MakeError(ErrorCode::kNoData, "a plan without walls");
   return Cleaner(input, options, progress).Run();

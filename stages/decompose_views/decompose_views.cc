@@ -16,8 +16,22 @@ namespace {
 
 // Bytes of memory for an edge of the arrangement while it is noded, measured (bench/README.md).
 constexpr double kBytesPerEdge = 1000;
-constexpr int kNumCrossingSamples = 200000;
 constexpr int64_t kFacesPerBlock = 1024;
+
+// Refuses what would not fit.
+Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossings, int64_t memory_mib) {
+  const double num_edges = plan.num_walls() + num_boundaries + 2 * num_crossings;
+  const std::string work =
+      fmt::format("dividing {} walls by about {:.0f} view boundaries into about {:.0f} regions",
+                  plan.num_walls(), num_boundaries, 0.5 * num_edges);
+  const char* remedy =
+      "; or simplify the plan (--simplify-m, --snap-m, no furniture), or divide it by buildings and floors";
+  if (num_edges > std::numeric_limits<int32_t>::max()) {
+    return MakeError(ErrorCode::kUnsupported, "{}: 32 bits do not number them{}", work, remedy);
+  }
+  const Status fits = CheckMemory(work, static_cast<int64_t>(num_edges * kBytesPerEdge), memory_mib);
+  return fits.ok() ? fits : MakeError(fits.error().code, "{}{}", fits.error().message, remedy);
+}
 
 // Index values from the centroids.  Blocks begin with a label set of their own.
 Status AddIndex(Views* views, int num_threads, Progress& progress) {
@@ -103,19 +117,11 @@ Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const Decomp
   const WallRays rays(plan);
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ViewBoundary> boundaries,
                          FindViewBoundaries(plan, rays, num_threads, progress));
-  const double num_edges = EstimateNumEdges(boundaries, kNumCrossingSamples);
-  CAIRN_RETURN_IF_ERROR(
-      CheckMemory(fmt::format("dividing {} walls by {} view boundaries into about {:.0f} regions",
-                              plan.num_walls(), boundaries.size(), 0.5 * num_edges),
-                  static_cast<int64_t>(num_edges * kBytesPerEdge), memory_mib));
-  if (num_edges > 0.8 * std::numeric_limits<int32_t>::max()) {
-    return MakeError(ErrorCode::kUnsupported, "about {:.0f} regions are more than 32 bits can number",
-                     num_edges);
-  }
-  progress.Begin("regions", 1, "arrangements");
-  auto arrangement = Arrange(plan, boundaries, progress);
-  progress.Advance();
-  progress.End();
+  const SegmentNoder noder(ArrangedSegments(plan, boundaries));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t num_crossings, noder.CountCrossings(num_threads, progress));
+  CAIRN_RETURN_IF_ERROR(CheckSize(plan, static_cast<double>(boundaries.size()),
+                                  static_cast<double>(num_crossings), memory_mib));
+  auto arrangement = Arrange(plan, noder, num_threads, progress);
   if (!arrangement.ok()) return arrangement.error();
   CAIRN_ASSIGN_OR_RETURN(LabelFacesResult labelled,
                          LabelFaces(plan, rays, boundaries, std::move(arrangement).value(), progress));
