@@ -10,6 +10,7 @@ namespace {
 constexpr int kApplicationId = 0x63727677;
 constexpr int kVersion = 1;
 constexpr size_t kLinksPerRow = 65536;
+constexpr FaceIdx kRegionsPerReport = 4096;
 
 void BindNumbers(SQLite::Statement& statement, int index, const std::vector<int32_t>& values) {
   static constexpr int32_t kNone = 0;  // a blob of no bytes still needs an address, or it is NULL
@@ -68,9 +69,14 @@ void WritePlan(SQLite::Database& database, const Views& views) {
   }
 }
 
-void WriteRegions(SQLite::Database& database, const Views& views) {
+Status WriteRegions(SQLite::Database& database, const Views& views, Progress& progress) {
   SQLite::Statement row(database, "INSERT INTO regions VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  progress.Begin("regions written", views.num_faces(), "regions");
   for (FaceIdx face = 0; face < views.num_faces(); ++face) {
+    if (face % kRegionsPerReport == kRegionsPerReport - 1) {
+      progress.Advance(kRegionsPerReport);
+      if (progress.Cancelled()) break;
+    }
     const std::vector<int32_t> corners(views.face_vertices.begin() + views.face_offsets[face],
                                        views.face_vertices.begin() + views.face_offsets[face + 1]);
     const std::string toggled =
@@ -93,6 +99,8 @@ void WriteRegions(SQLite::Database& database, const Views& views) {
     row.exec();
     row.reset();
   }
+  progress.End();
+  return progress.Cancelled() ? Status(MakeError(ErrorCode::kCancelled, "cancelled")) : Ok();
 }
 
 void WriteLinks(SQLite::Database& database, const Views& views) {
@@ -183,11 +191,11 @@ Status ReadLinks(SQLite::Database& database, const std::string& path, Views* vie
 
 }  // namespace
 
-Status WriteViews(const Views& views, const std::string& path,
+Status WriteViews(const Views& views, const std::string& path, Progress& progress,
                   const std::function<Status(SQLite::Database&)>& fill_changes) {
   return WriteDatabase(path, kViewsSql, [&](SQLite::Database& database) -> Status {
     WritePlan(database, views);
-    WriteRegions(database, views);
+    CAIRN_RETURN_IF_ERROR(WriteRegions(database, views, progress));
     WriteLinks(database, views);
     return fill_changes(database);
   });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <tuple>
 
 #include "core/vector_geometry.h"
 
@@ -20,6 +21,18 @@ struct Side {
   LabelIdx label = 0;
 };
 
+// A direction in which a side begins or ends, counter-clockwise.
+struct Event {
+  double angle;  // (-pi, pi]
+  int side;
+  bool begins;
+};
+
+Vec2 Towards(const std::vector<Side>& sides, const Event& event) {
+  const Side& side = sides[event.side];
+  return event.begins ? side.start : side.start + side.along;
+}
+
 // Where a ray meets the line of a side.
 Vec2 Meet(const Side& side, const Vec2& direction) {
   return direction * (Cross(side.start, side.along) / Cross(direction, side.along));
@@ -30,7 +43,7 @@ Vec2 Meet(const Side& side, const Vec2& direction) {
 std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::vector<LabelIdx>& labels,
                                              const Vec2& place) {
   std::vector<Side> sides;
-  std::vector<double> angles;
+  std::vector<Event> events;
   for (const LabelIdx label : labels) {
     const auto first =
         std::lower_bound(plan.pieces.begin(), plan.pieces.end(), WallOf(label),
@@ -40,24 +53,38 @@ std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::v
       Vec2 end = plan.Metres(plan.vertices[piece->end]) - place;
       if (IsRightSide(label)) std::swap(start, end);
       if (Cross(start, end) <= 0) continue;
+      const auto side = static_cast<int>(sides.size());
       sides.push_back({start, end - start, label});
-      angles.push_back(std::atan2(start.y(), start.x()));
-      angles.push_back(std::atan2(end.y(), end.x()));
+      events.push_back({std::atan2(start.y(), start.x()), side, true});
+      events.push_back({std::atan2(end.y(), end.x()), side, false});
     }
   }
-  std::sort(angles.begin(), angles.end());
   std::vector<VisibleStretch> stretches;
-  if (angles.empty()) return stretches;
+  if (events.empty()) return stretches;
+  // Sides in the direction that the sweep has come to; it begins at the direction of -x.
+  std::vector<int> ahead;
+  for (size_t i = 0; i < sides.size(); ++i) {
+    if (events[2 * i + 1].angle < events[2 * i].angle) ahead.push_back(static_cast<int>(i));
+  }
+  std::sort(events.begin(), events.end(), [](const Event& a, const Event& b) {
+    return std::tie(a.angle, a.side) < std::tie(b.angle, b.side);
+  });
   bool open = false;  // the last stretch goes on to the direction before
-  for (size_t i = 0; i < angles.size(); ++i) {
-    const double from = angles[i], to = i + 1 < angles.size() ? angles[i + 1] : angles[0] + 2 * kPi;
-    if (to - from < kSameDirection) continue;
-    const double middle = 0.5 * (from + to);
+  for (size_t i = 0; i < events.size(); ++i) {
+    const Event &event = events[i], &next = events[i + 1 < events.size() ? i + 1 : 0];
+    if (event.begins) {
+      ahead.push_back(event.side);
+    } else {
+      std::erase(ahead, event.side);
+    }
+    const double to = i + 1 < events.size() ? next.angle : next.angle + 2 * kPi;
+    if (to - event.angle < kSameDirection) continue;
+    const double middle = 0.5 * (event.angle + to);
     const Vec2 direction(std::cos(middle), std::sin(middle));
     const Side* nearest = nullptr;
     double nearest_distance = std::numeric_limits<double>::infinity();
-    for (const Side& side : sides) {
-      if (Cross(side.start, direction) < 0 || Cross(direction, side.start + side.along) < 0) continue;
+    for (const int index : ahead) {
+      const Side& side = sides[index];
       const double distance = Cross(side.start, side.along) / Cross(direction, side.along);
       if (distance <= 0 || distance >= nearest_distance) continue;
       nearest = &side;
@@ -67,8 +94,8 @@ std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::v
       open = false;
       continue;
     }
-    const Vec2 start = Meet(*nearest, {std::cos(from), std::sin(from)}) + place;
-    const Vec2 end = Meet(*nearest, {std::cos(to), std::sin(to)}) + place;
+    const Vec2 start = Meet(*nearest, Towards(sides, event)) + place;
+    const Vec2 end = Meet(*nearest, Towards(sides, next)) + place;
     if (open && stretches.back().label == nearest->label) {
       stretches.back().end = end;
     } else {

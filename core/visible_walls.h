@@ -19,7 +19,7 @@ struct VisibleStretch {
 
 // Stretches of the walls of `labels` that are visible from a point, counter-clockwise, if nothing but these
 // walls hid one another: with the label set of the point's region, what is visible.  A label seen through
-// several windows has as many stretches.  O(n^2) for n pieces of their walls.
+// several windows has as many stretches.  O(n log n + n k) for n pieces of their walls, k in one direction.
 std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::vector<LabelIdx>& labels,
                                              const Eigen::Vector2d& place);
 

@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
   std::printf("%zu scans, %zu walls, %d regions in %.1f s\n", scans->size(), input.segments.size(),
               result->views.num_faces(), Seconds() - start);
   if (const char* path = std::getenv("VIEWS_DB"))
-    (void)WriteViews(result->views, path, [](SQLite::Database&) { return Ok(); });
+    (void)WriteViews(result->views, path, progress, [](SQLite::Database&) { return Ok(); });
   const ViewSearchIndex index(result->views);
   std::vector<size_t> queries;
   const size_t max_scans = argc > 2 ? std::atoi(argv[2]) : scans->size();

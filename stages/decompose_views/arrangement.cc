@@ -3,25 +3,35 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/parallel.h"
+
 namespace cairn {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
+
+constexpr int64_t kItemsPerBlock = 4096;
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
 
 // Half-edge 2e runs along edge e, 2e + 1 against it.
 class FaceWalker {
  public:
-  FaceWalker(const FloorPlan& plan, Arrangement* arrangement, const std::vector<int8_t>& solid_sides)
-      : plan_(plan), arrangement_(*arrangement), solid_sides_(solid_sides) {}
+  FaceWalker(Arrangement* arrangement, const std::vector<int8_t>& solid_sides)
+      : arrangement_(*arrangement), solid_sides_(solid_sides) {}
 
-  void Run() {
-    SortAroundVertices();
+  // False: cancelled.
+  bool Run(int num_threads, Progress& progress) {
+    if (!SortAroundVertices(num_threads, progress)) return false;
     const auto num_halves = static_cast<int64_t>(2 * arrangement_.edges.size());
     std::vector<bool> seen(num_halves, false);
     std::vector<int64_t> walk;
+    progress.Begin("faces", num_halves, "sides of edges");
     for (int64_t first = 0; first < num_halves; ++first) {
+      if (first % kItemsPerBlock == kItemsPerBlock - 1) {
+        progress.Advance(kItemsPerBlock);
+        if (progress.Cancelled()) break;
+      }
       if (seen[first]) continue;
       walk.clear();
       bool inside = true;
@@ -32,6 +42,8 @@ class FaceWalker {
       }
       if (inside && TwiceArea(walk) > 0) AddFace(walk);
     }
+    progress.End();
+    return !progress.Cancelled();
   }
 
  private:
@@ -41,7 +53,7 @@ class FaceWalker {
   }
   int32_t Target(int64_t half) const { return Origin(half ^ 1); }
 
-  void SortAroundVertices() {
+  bool SortAroundVertices(int num_threads, Progress& progress) {
     const size_t num_vertices = arrangement_.vertices.size();
     const auto num_halves = static_cast<int64_t>(2 * arrangement_.edges.size());
     offsets_.assign(num_vertices + 1, 0);
@@ -51,20 +63,28 @@ class FaceWalker {
     std::vector<int64_t> next(offsets_.begin(), offsets_.end() - 1);
     for (int64_t half = 0; half < num_halves; ++half) around_[next[Origin(half)]++] = half;
     place_.resize(num_halves);
-    for (size_t vertex = 0; vertex < num_vertices; ++vertex) {
-      const GridPoint& centre = arrangement_.vertices[vertex];
-      const auto is_lower = [&](const GridPoint& point) {
-        return point.y < centre.y || (point.y == centre.y && point.x < centre.x);
-      };
-      std::sort(around_.begin() + offsets_[vertex], around_.begin() + offsets_[vertex + 1],
-                [&](int64_t a, int64_t b) {
-                  const GridPoint &to_a = arrangement_.vertices[Target(a)],
-                                  &to_b = arrangement_.vertices[Target(b)];
-                  if (is_lower(to_a) != is_lower(to_b)) return is_lower(to_b);
-                  return Orientation(centre, to_a, to_b) > 0;
-                });
-      for (int64_t i = offsets_[vertex]; i < offsets_[vertex + 1]; ++i) place_[around_[i]] = i;
-    }
+    const int64_t num_blocks = (static_cast<int64_t>(num_vertices) + kItemsPerBlock - 1) / kItemsPerBlock;
+    ParallelFor(num_blocks, num_threads, [&](int64_t block) {
+      if (progress.Cancelled()) return;
+      const size_t end = std::min<size_t>(num_vertices, (block + 1) * kItemsPerBlock);
+      for (size_t vertex = block * kItemsPerBlock; vertex < end; ++vertex) SortAround(vertex);
+    });
+    return !progress.Cancelled();
+  }
+
+  void SortAround(size_t vertex) {
+    const GridPoint& centre = arrangement_.vertices[vertex];
+    const auto is_lower = [&](const GridPoint& point) {
+      return point.y < centre.y || (point.y == centre.y && point.x < centre.x);
+    };
+    std::sort(around_.begin() + offsets_[vertex], around_.begin() + offsets_[vertex + 1],
+              [&](int64_t a, int64_t b) {
+                const GridPoint &to_a = arrangement_.vertices[Target(a)],
+                                &to_b = arrangement_.vertices[Target(b)];
+                if (is_lower(to_a) != is_lower(to_b)) return is_lower(to_b);
+                return Orientation(centre, to_a, to_b) > 0;
+              });
+    for (int64_t i = offsets_[vertex]; i < offsets_[vertex + 1]; ++i) place_[around_[i]] = i;
   }
 
   // The half-edge that follows with the same face to its left: at the target, the next one clockwise.
@@ -92,7 +112,6 @@ class FaceWalker {
     arrangement_.face_offsets.push_back(static_cast<int64_t>(arrangement_.face_vertices.size()));
   }
 
-  const FloorPlan& plan_;
   Arrangement& arrangement_;
   const std::vector<int8_t>& solid_sides_;  // per edge: 1: nothing of the domain on its left, 2: on its right
   std::vector<int64_t> offsets_, around_, place_;
@@ -144,8 +163,9 @@ Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, in
       if (plan.closed || is_box) solid_sides.back() |= reversed ? 1 : 2;
     }
   }
-  if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
-  FaceWalker(plan, &arrangement, solid_sides).Run();
+  std::vector<NodedEdge>().swap(noded);
+  if (progress.Cancelled() || !FaceWalker(&arrangement, solid_sides).Run(num_threads, progress))
+    return MakeError(ErrorCode::kCancelled, "cancelled");
   return arrangement;
 }
 

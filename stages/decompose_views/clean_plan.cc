@@ -13,10 +13,22 @@
 namespace cairn {
 namespace {
 
-// Noding a plan alone is quick.
 constexpr int kNumThreads = 1;
 
 using Vec2 = Eigen::Vector2d;
+
+// Says nothing: a plan's walls alone are few.
+class QuietProgress final : public Progress {
+ public:
+  explicit QuietProgress(const Progress& asked) : asked_(asked) {}
+  void Begin(std::string_view, int64_t, std::string_view) override {}
+  void Advance(int64_t) override {}
+  void End() override {}
+  bool Cancelled() const override { return asked_.Cancelled(); }
+
+ private:
+  const Progress& asked_;
+};
 
 // A wall in grid coordinates.
 struct Wall {
@@ -30,7 +42,7 @@ Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static
 // Cleaning keeps the plan's frame and the list of changes.
 class Cleaner {
  public:
-  Cleaner(const InputPlan& input, const CleanPlanOptions& options, Progress& progress)
+  Cleaner(const InputPlan& input, const CleanPlanOptions& options, const Progress& progress)
       : input_(input), options_(options), progress_(progress) {}
 
   Result<CleanPlanResult> Run() {
@@ -215,11 +227,16 @@ class Cleaner {
     });
   }
 
+  Result<NodedSegments> Noded(const std::vector<TaggedSegment>& segments) {
+    QuietProgress progress(progress_);
+    return SegmentNoder(segments).Node(kNumThreads, progress);
+  }
+
   // Pieces between the places where walls meet; walls that continue each other become one.
   Status Divide() {
     std::vector<TaggedSegment> segments;
     for (size_t i = 0; i < walls_.size(); ++i) AddSegments(static_cast<int32_t>(i), &segments);
-    CAIRN_ASSIGN_OR_RETURN(NodedSegments noded, SegmentNoder(segments).Node(kNumThreads, progress_));
+    CAIRN_ASSIGN_OR_RETURN(NodedSegments noded, Noded(segments));
     NoteCrossings(noded);
     std::vector<PlanPiece> pieces = WithoutOverlaps(noded, /*note=*/true);
     const double tolerance = options_.simplify_m / options_.grid_m;
@@ -232,7 +249,7 @@ class Cleaner {
       segments.clear();
       for (const PlanPiece& piece : joined.pieces)
         segments.push_back({Real(noded.vertices[piece.start]), Real(noded.vertices[piece.end]), piece.wall});
-      CAIRN_ASSIGN_OR_RETURN(noded, SegmentNoder(segments).Node(kNumThreads, progress_));
+      CAIRN_ASSIGN_OR_RETURN(noded, Noded(segments));
       pieces = WithoutOverlaps(noded, /*note=*/false);
     }
     MakePlan(noded.vertices, std::move(pieces));
@@ -321,7 +338,7 @@ class Cleaner {
 
   const InputPlan& input_;
   const CleanPlanOptions& options_;
-  Progress& progress_;
+  const Progress& progress_;
   std::vector<Wall> walls_;
   CleanPlanResult result_;
 };
@@ -349,7 +366,7 @@ const char* PlanChangeName(PlanChangeKind kind) {
 }
 
 Result<CleanPlanResult> CleanPlan(const InputPlan& input, const CleanPlanOptions& options,
-                                  Progress& progress) {
+                                  const Progress& progress) {
   if (input.closed()) CAIRN_RETURN_IF_ERROR(CheckRings(input.rings));
   if (!input.closed() && input.segments.empty()) return MakeError(ErrorCode::kNoData, "a plan without walls");
   return Cleaner(input, options, progress).Run();

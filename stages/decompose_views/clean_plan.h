@@ -54,6 +54,6 @@ struct CleanPlanResult {
 // Errors: InvalidArgument (options), Corrupt (an invalid polygon: what and where), NoData (no wall is left),
 // Unsupported (extents beyond the grid), Cancelled.
 Result<CleanPlanResult> CleanPlan(const InputPlan& input, const CleanPlanOptions& options,
-                                  Progress& progress);
+                                  const Progress& progress);
 
 }  // namespace cairn

@@ -84,10 +84,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                  views.links.size());
   }
   if (!arguments.svg.empty()) CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, DrawViews(views)));
-  return WriteViews(views, arguments.output, [&](SQLite::Database& database) -> Status {
-    WriteChanges(database, result->changes);
-    return Ok();
-  });
+  return WriteViews(views, arguments.output, *environment.progress,
+                    [&](SQLite::Database& database) -> Status {
+                      WriteChanges(database, result->changes);
+                      return Ok();
+                    });
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace cairn {
 namespace {
 
 // Bytes of memory for an edge of the arrangement while it is noded, measured (bench/README.md).
-constexpr double kBytesPerEdge = 1000;
+constexpr double kBytesPerEdge = 250;
 constexpr int64_t kFacesPerBlock = 1024;
 
 // Refuses what would not fit.

@@ -35,21 +35,15 @@ class FaceLabeller {
     ListBorders();
     new_index_.assign(num_faces_, -1);
     hashes_.assign(num_faces_, 0);
-    std::vector<int32_t> roots(num_faces_);
-    std::iota(roots.begin(), roots.end(), 0);
-    std::vector<double> areas(num_faces_);
-    for (int32_t face = 0; face < num_faces_; ++face) areas[face] = Area(face);
-    std::stable_sort(roots.begin(), roots.end(), [&](int32_t a, int32_t b) { return areas[a] > areas[b]; });
     progress.Begin("label sets", num_faces_, "regions");
-    for (const int32_t root : roots) {
-      if (new_index_[root] >= 0) continue;
+    for (const int32_t root : Roots()) {
       if (!Walk(root, progress)) {
         progress.End();
         return MakeError(ErrorCode::kCancelled, "cancelled");
       }
     }
     progress.End();
-    TakeLinks();
+    if (!TakeLinks(progress)) return MakeError(ErrorCode::kCancelled, "cancelled");
     return Ok();
   }
 
@@ -79,6 +73,34 @@ class FaceLabeller {
       borders_[next[edge.left]++] = {static_cast<int64_t>(i), edge.right};
       borders_[next[edge.right]++] = {static_cast<int64_t>(i), edge.left};
     }
+  }
+
+  // The largest face of each connected part, large ones first.
+  std::vector<int32_t> Roots() const {
+    std::vector<bool> seen(num_faces_, false);
+    std::vector<std::pair<double, int32_t>> roots;  // area, -face: of equal ones the first
+    std::vector<int32_t> open;
+    for (int32_t face = 0; face < num_faces_; ++face) {
+      if (seen[face]) continue;
+      std::pair<double, int32_t> largest{0, -face};
+      seen[face] = true;
+      open.push_back(face);
+      while (!open.empty()) {
+        const int32_t at = open.back();
+        open.pop_back();
+        largest = std::max(largest, {Area(at), -at});
+        for (int64_t i = border_offsets_[at]; i < border_offsets_[at + 1]; ++i) {
+          if (seen[borders_[i].other]) continue;
+          seen[borders_[i].other] = true;
+          open.push_back(borders_[i].other);
+        }
+      }
+      roots.push_back(largest);
+    }
+    std::sort(roots.rbegin(), roots.rend());
+    std::vector<int32_t> faces;
+    for (const auto& [area, minus_face] : roots) faces.push_back(-minus_face);
+    return faces;
   }
 
   double Area(int32_t face) const {
@@ -200,15 +222,28 @@ class FaceLabeller {
     return labels;
   }
 
-  void TakeLinks() {
+  // Ascending: gathered by their lower region, then sorted among its others.
+  bool TakeLinks(Progress& progress) {
     Views& views = result_->views;
-    for (const Arrangement::Edge& edge : arrangement_.edges) {
-      if (edge.is_wall || edge.left < 0 || edge.right < 0 || edge.left == edge.right) continue;
-      const FaceIdx left = new_index_[edge.left], right = new_index_[edge.right];
-      views.links.push_back(left < right ? ViewLink{left, right, edge.start, edge.end}
-                                         : ViewLink{right, left, edge.end, edge.start});
+    std::vector<int64_t> ends(num_faces_ + 1, 0);
+    const auto visit_links = [&](auto&& visit) {
+      for (const Arrangement::Edge& edge : arrangement_.edges) {
+        if (edge.is_wall || edge.left < 0 || edge.right < 0 || edge.left == edge.right) continue;
+        const FaceIdx left = new_index_[edge.left], right = new_index_[edge.right];
+        visit(left < right ? ViewLink{left, right, edge.start, edge.end}
+                           : ViewLink{right, left, edge.end, edge.start});
+      }
+    };
+    visit_links([&](const ViewLink& link) { ++ends[link.a + 1]; });
+    std::partial_sum(ends.begin(), ends.end(), ends.begin());
+    views.links.resize(ends.back());
+    const std::vector<int64_t> starts = ends;
+    visit_links([&](const ViewLink& link) { views.links[ends[link.a]++] = link; });
+    for (int32_t face = 0; face < num_faces_; ++face) {
+      if (face % 65536 == 0 && progress.Cancelled()) return false;
+      std::sort(views.links.begin() + starts[face], views.links.begin() + starts[face + 1]);
     }
-    std::sort(views.links.begin(), views.links.end());
+    return true;
   }
 
   const FloorPlan& plan_;

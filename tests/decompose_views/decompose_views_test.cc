@@ -221,11 +221,12 @@ TEST(DecomposeViews, NichesMakeRegionsGrowAboutWithTheSquare) {
 TEST(DecomposeViews, ThreadsDoNotMatter) {
   const std::string text = PolygonText({{{0, 0}, {10, 0}, {10, 6}, {6, 6}, {6, 4}, {5, 4}, {5, 6}, {0, 6}}});
   const std::string folder = testing::TempDir();
+  NoProgress progress;
   std::string bytes[2];
   for (const int threads : {1, 3}) {
     const auto result = Decomposed(text, {}, threads);
     const std::string path = folder + "threads.db";
-    ASSERT_TRUE(WriteViews(result.views, path, [](SQLite::Database&) { return Ok(); }).ok());
+    ASSERT_TRUE(WriteViews(result.views, path, progress, [](SQLite::Database&) { return Ok(); }).ok());
     bytes[threads == 3] = *ReadFile(path);
   }
   EXPECT_EQ(bytes[0], bytes[1]);
@@ -234,7 +235,8 @@ TEST(DecomposeViews, ThreadsDoNotMatter) {
 TEST(DecomposeViews, ADatabaseGivesBackWhatWasWritten) {
   const auto result = Decomposed("0,0,2,0\n1,1,3,2\n0.5,-1,0.5,0.5");
   const std::string path = testing::TempDir() + "views.db";
-  ASSERT_TRUE(WriteViews(result.views, path, [](SQLite::Database&) { return Ok(); }).ok());
+  NoProgress progress;
+  ASSERT_TRUE(WriteViews(result.views, path, progress, [](SQLite::Database&) { return Ok(); }).ok());
   const auto read = ReadViews(path);
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->face_vertices, result.views.face_vertices);
@@ -253,8 +255,9 @@ TEST(DecomposeViews, ADatabaseGivesBackWhatWasWritten) {
 TEST(DecomposeViews, RefusesDamagedDatabases) {
   const auto result = Decomposed("0,0,2,0\n1,1,3,2");
   const std::string path = testing::TempDir() + "damaged.db";
+  NoProgress progress;
   const auto damaged = [&](const char* statement) {
-    EXPECT_TRUE(WriteViews(result.views, path, [](SQLite::Database&) { return Ok(); }).ok());
+    EXPECT_TRUE(WriteViews(result.views, path, progress, [](SQLite::Database&) { return Ok(); }).ok());
     {
       SQLite::Database database(path, SQLite::OPEN_READWRITE);
       database.exec(statement);
