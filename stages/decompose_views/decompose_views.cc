@@ -14,11 +14,15 @@
 namespace cairn {
 namespace {
 
-// Bytes of memory for an edge of the arrangement while it is noded, measured (bench/README.md).
+// Bytes of memory for a boundary and for an edge of the arrangement, measured (bench/README.md).
+constexpr int64_t kBytesPerBoundary = 250;
 constexpr double kBytesPerEdge = 250;
+constexpr size_t kNumSampledVertices = 256, kNumSampledBoundaries = 4000;
+// By how much what follows from a sample may be too large.
+constexpr double kSampleError = 1.5;
 constexpr int64_t kFacesPerBlock = 1024;
 
-// Refuses what would not fit.
+// Refuses what would not fit: boundaries, and the regions that they make.
 Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossings, int64_t memory_mib) {
   const double num_edges = plan.num_walls() + num_boundaries + 2 * num_crossings;
   const std::string work =
@@ -26,11 +30,35 @@ Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossi
                   plan.num_walls(), num_boundaries, 0.5 * num_edges);
   const char* remedy =
       "; or simplify the plan (--simplify-m, --snap-m, no furniture), or divide it by buildings and floors";
-  if (num_edges > std::numeric_limits<int32_t>::max()) {
+  const double num_bytes = num_boundaries * kBytesPerBoundary + num_edges * kBytesPerEdge;
+  const Status fits = CheckMemory(work, static_cast<int64_t>(num_bytes), memory_mib);
+  if (!fits.ok()) return MakeError(fits.error().code, "{}{}", fits.error().message, remedy);
+  if (num_edges > std::numeric_limits<int32_t>::max())
     return MakeError(ErrorCode::kUnsupported, "{}: 32 bits do not number them{}", work, remedy);
-  }
-  const Status fits = CheckMemory(work, static_cast<int64_t>(num_edges * kBytesPerEdge), memory_mib);
-  return fits.ok() ? fits : MakeError(fits.error().code, "{}{}", fits.error().message, remedy);
+  return Ok();
+}
+
+// Refuses a large plan that by a sample of its boundaries takes much more memory than there is, before the
+// rest of them is found.  Of n boundaries in N, (n / N)^2 of the crossings are found.
+Status CheckSample(const FloorPlan& plan, const WallRays& rays, int num_threads, int64_t memory_mib,
+                   Progress& progress) {
+  const auto stride = static_cast<int>(plan.vertices.size() / kNumSampledVertices);
+  if (stride < 2) return Ok();
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::vector<ViewBoundary> boundaries,
+      FindViewBoundaries(plan, rays, stride, std::numeric_limits<int64_t>::max(), num_threads, progress));
+  const size_t step = boundaries.size() / kNumSampledBoundaries + 1;
+  std::vector<TaggedSegment> segments;
+  for (size_t i = 0; i < boundaries.size(); i += step)
+    segments.push_back({boundaries[i].start, boundaries[i].end, 0});
+  CAIRN_ASSIGN_OR_RETURN(const int64_t num_crossings,
+                         SegmentNoder(segments).CountCrossings(num_threads, progress));
+  const double num_boundaries = static_cast<double>(stride) * static_cast<double>(boundaries.size());
+  const double inverse_share = static_cast<double>(stride) * static_cast<double>(step);
+  const double all_crossings = inverse_share * inverse_share * static_cast<double>(num_crossings);
+  const Status fits = CheckSize(plan, num_boundaries, all_crossings,
+                                static_cast<int64_t>(kSampleError * static_cast<double>(memory_mib)));
+  return fits.ok() ? fits : CheckSize(plan, num_boundaries, all_crossings, memory_mib);
 }
 
 // Index values from the centroids.  Blocks begin with a label set of their own.
@@ -115,8 +143,12 @@ Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const Decomp
   CAIRN_ASSIGN_OR_RETURN(CleanPlanResult cleaned, CleanPlan(input, options.clean, progress));
   const FloorPlan& plan = cleaned.plan;
   const WallRays rays(plan);
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<ViewBoundary> boundaries,
-                         FindViewBoundaries(plan, rays, num_threads, progress));
+  CAIRN_RETURN_IF_ERROR(CheckSample(plan, rays, num_threads, memory_mib, progress));
+  const int64_t max_num_boundaries = (memory_mib << 20) / kBytesPerBoundary;
+  auto found = FindViewBoundaries(plan, rays, /*stride=*/1, max_num_boundaries, num_threads, progress);
+  if (!found.ok() && found.error().code == ErrorCode::kFailed)
+    return CheckSize(plan, static_cast<double>(max_num_boundaries), 0, 0).error();
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ViewBoundary> boundaries, std::move(found));
   const SegmentNoder noder(ArrangedSegments(plan, boundaries));
   CAIRN_ASSIGN_OR_RETURN(const int64_t num_crossings, noder.CountCrossings(num_threads, progress));
   CAIRN_RETURN_IF_ERROR(CheckSize(plan, static_cast<double>(boundaries.size()),

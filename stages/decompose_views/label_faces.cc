@@ -181,15 +181,15 @@ class FaceLabeller {
       int depth;  // below a region without a parent
     };
     std::vector<Step> path{{root, border_offsets_[root], -1, 0}};
-    int64_t steps = 0;
+    int64_t steps = 0, left = 0;
     while (!path.empty()) {
-      if ((++steps & 0xffff) == 0 && progress.Cancelled()) return false;
+      if ((++steps & 0xfff) == 0 && progress.Cancelled()) return false;
       Step& step = path.back();
       if (step.next_border == border_offsets_[step.face + 1]) {
         if (step.entered_by >= 0)
           Cross(step.entered_by, arrangement_.edges[step.entered_by].right == step.face);
         path.pop_back();
-        progress.Advance();
+        if ((++left & 0xfff) == 0) progress.Advance(0x1000);
         continue;
       }
       const Border border = borders_[step.next_border++];

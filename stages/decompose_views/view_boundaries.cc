@@ -1,6 +1,7 @@
 #include "stages/decompose_views/view_boundaries.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -257,22 +258,28 @@ class BoundaryFinder {
 
 }  // namespace
 
-Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays,
-                                                     int num_threads, Progress& progress) {
-  const auto num_vertices = static_cast<int64_t>(plan.vertices.size());
-  std::vector<std::vector<ViewBoundary>> found(num_vertices);
+Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays, int stride,
+                                                     int64_t max_num, int num_threads, Progress& progress) {
+  const int64_t num_items = (static_cast<int64_t>(plan.vertices.size()) + stride - 1) / stride;
+  std::vector<std::vector<ViewBoundary>> found(num_items);
   const BoundaryFinder finder(plan, rays);
-  progress.Begin("view boundaries", num_vertices, "vertices");
-  ParallelFor(num_vertices, num_threads, [&](int64_t vertex) {
-    if (progress.Cancelled()) return;
-    finder.FindFrom(static_cast<int32_t>(vertex), &found[vertex]);
+  std::atomic<int64_t> total{0};
+  progress.Begin(stride > 1 ? "view boundaries, a sample" : "view boundaries", num_items, "vertices");
+  ParallelFor(num_items, num_threads, [&](int64_t i) {
+    if (progress.Cancelled() || total > max_num) return;
+    finder.FindFrom(static_cast<int32_t>(i * stride), &found[i]);
+    total += static_cast<int64_t>(found[i].size());
     progress.Advance();
   });
   progress.End();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
+  if (total > max_num) return MakeError(ErrorCode::kFailed, "more than {} view boundaries", max_num);
   std::vector<ViewBoundary> boundaries;
-  for (std::vector<ViewBoundary>& part : found)
+  boundaries.reserve(total);
+  for (std::vector<ViewBoundary>& part : found) {
     std::move(part.begin(), part.end(), std::back_inserter(boundaries));
+    std::vector<ViewBoundary>().swap(part);
+  }
   return boundaries;
 }
 

@@ -37,8 +37,10 @@ struct ViewBoundary {
 // vertices in one line, walls along the line (seen edge-on), and walls that are seen from both sides.
 //
 // Walls lie on no boundary's inside.  Both ends of a boundary lie on walls, or on the domain's border.
-// Deterministic for any number of threads.  O(n^2) rays.  Errors: Cancelled.
-Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays,
-                                                     int num_threads, Progress& progress);
+// Deterministic for any number of threads.  O(n^2) rays.
+// `stride`: only those that begin at every stride-th vertex, a sample of them all.  Errors: Cancelled, Failed
+// (more than `max_num`; nothing beyond is kept).
+Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays, int stride,
+                                                     int64_t max_num, int num_threads, Progress& progress);
 
 }  // namespace cairn

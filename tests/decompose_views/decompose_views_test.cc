@@ -309,6 +309,79 @@ TEST(DecomposeViews, StopsWhenItIsCancelled) {
   EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
 }
 
+// Rooms of 4 m side by side, with doors of 1 m in random places between them: what is visible is near.
+std::string RoomsText(int per_side) {
+  Random random(1);
+  std::string text;
+  const auto wall = [&](bool upright, double across, double from, double to) {
+    text += upright ? fmt::format("{},{},{},{}\n", across, from, across, to)
+                    : fmt::format("{},{},{},{}\n", from, across, to, across);
+  };
+  for (int i = 0; i <= per_side; ++i) {
+    for (int j = 0; j < per_side; ++j) {
+      for (const bool upright : {false, true}) {
+        const double door = random.Uniform(0.5, 2.5);
+        if (i == 0 || i == per_side) {
+          wall(upright, 4 * i, 4 * j, 4 * j + 4);
+        } else {
+          wall(upright, 4 * i, 4 * j, 4 * j + door);
+          wall(upright, 4 * i, 4 * j + door + 1, 4 * j + 4);
+        }
+      }
+    }
+  }
+  return text;
+}
+
+// Remembers its tasks, and cancels after a number of steps.
+class StepsProgress final : public Progress {
+ public:
+  explicit StepsProgress(int64_t max_steps) : max_steps_(max_steps) {}
+  void Begin(std::string_view task, int64_t total, std::string_view) override {
+    tasks.emplace_back(std::string(task), total);
+  }
+  void Advance(int64_t) override { ++steps; }
+  void End() override {}
+  bool Cancelled() const override { return steps >= max_steps_; }
+  std::vector<std::pair<std::string, int64_t>> tasks;
+  int64_t steps = 0;
+
+ private:
+  int64_t max_steps_;
+};
+
+TEST(DecomposeViews, AnswersInEveryPartOfItsWorkOnALargerPlan) {
+  const InputPlan input = Parsed(RoomsText(5));
+  StepsProgress all(1 << 30);
+  const auto whole = DecomposeViews(input, {}, 1, 4096, all);
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  EXPECT_GT(whole->views.num_faces(), 10000);
+  ExpectLabelsAsSeen(*whole, 200);
+  EXPECT_GT(all.steps, 300);
+  for (int64_t steps = 1; steps < all.steps; steps += 1 + all.steps / 8) {
+    StepsProgress some(steps);
+    const auto stopped = DecomposeViews(input, {}, 1, 4096, some);
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+    EXPECT_EQ(some.steps, steps);  // nothing is done after it
+  }
+}
+
+TEST(DecomposeViews, RefusesADensePlanBeforeAllOfItsBoundariesAreFound) {
+  std::string text;
+  Random random(3);
+  for (int i = 0; i < 600; ++i) {
+    const double x = random.Uniform(0, 100), y = random.Uniform(0, 100);
+    text += fmt::format("{},{},{},{}\n", x, y, x + random.Uniform(0.1, 0.5), y + random.Uniform(0.1, 0.5));
+  }
+  StepsProgress progress(1 << 30);
+  const auto result = DecomposeViews(Parsed(text), {}, 1, 1024, progress);
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(result.error().message, HasSubstr("regions takes about"));
+  EXPECT_THAT(result.error().message, HasSubstr("--simplify-m"));
+  for (const auto& [task, total] : progress.tasks) EXPECT_NE(task, "view boundaries") << total;
+}
+
 TEST(DecomposeViews, RealPlansHaveTheLabelsThatAreSeen) {
   const std::string folder = CAIRN_SOURCE_DIR "/../shared/data/floorplans/";
   for (const char* name : {"Obstacle_Hallway", "ICRA2022_F1Tenth_Track"}) {
