@@ -4,12 +4,15 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <set>
 
 #include "core/pose.h"
 #include "core/vector_geometry.h"
 #include "runtime/pairing.h"
 #include "runtime/rank_interpretations.h"
+#include "runtime/view_order.h"
 
 namespace cairn {
 namespace {
@@ -194,12 +197,65 @@ class TreeSearch {
     }
   }
 
-  void SearchGroup(const FaceSet& candidates) {
+  void SearchGroup(const FaceSet& all) {
+    const bool all_walls =
+        options_.one_segment_per_wall && max_nulls_ == 0 && options_.max_missing_ratio == 0;
+    FaceSet candidates = all;
+    if (all_walls) candidates = SearchInOrder(all);
+    if (candidates.empty() || done_) return;
     std::vector<LabelIdx> labels;
     for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
       if (Intersects(candidates, index_.FacesOf(label))) labels.push_back(label);
     }
     Descend(0, 0, &candidates, labels);
+  }
+
+  // Where every visible wall has a segment, only labels in the order in which a candidate sees them; returns
+  // the candidates whose order cannot tell.
+  FaceSet SearchInOrder(const FaceSet& candidates) {
+    const std::vector<int> order = SegmentsInOrder(segments_);
+    const double tolerance =
+        RadFromDeg(options_.angle_tolerance_deg) +
+        std::sqrt(2.0) * *std::max_element(angle_tolerance_.begin(), angle_tolerance_.end());
+    FaceSet others;
+    std::set<OrderedLabels> ways;
+    for (const FaceSet::Word& word : candidates.words) {
+      for (uint64_t bits = word.bits; bits != 0; bits &= bits - 1) {
+        const FaceIdx face = word.block * 64 + std::countr_zero(bits);
+        const auto labels =
+            LabelsInOrder(index_.views(), face, segments_, order, tolerance,
+                          [&](int segment, LabelIdx label) { return PairingOf(segment, label).possible; });
+        if (labels) {
+          ways.insert(labels->begin(), labels->end());
+        } else {
+          others.Add(face);
+        }
+      }
+    }
+    std::vector<const OrderedLabels*> all;
+    for (const OrderedLabels& way : ways) all.push_back(&way);
+    DescendInOrder(0, all);
+    return others;
+  }
+
+  // `ways`: those in which the segments so far have their labels.
+  void DescendInOrder(int depth, const std::vector<const OrderedLabels*>& ways) {
+    if (depth == static_cast<int>(order_.size())) {
+      Finish();
+      return;
+    }
+    const int segment = order_[depth];
+    std::map<LabelIdx, std::vector<const OrderedLabels*>> by_label;
+    for (const OrderedLabels* way : ways) by_label[(*way)[segment]].push_back(way);
+    for (const auto& [label, left] : by_label) {
+      if (!CountNode()) return;
+      if (!AgreesWithAll(depth, segment, label)) continue;
+      ++result_.num_expanded;
+      labels_[segment] = label;
+      DescendInOrder(depth + 1, left);
+      labels_[segment] = kOpen;
+      if (done_) return;
+    }
   }
 
   bool CountNode() {

@@ -24,7 +24,9 @@ namespace cairn {
 // The standard search branches over all labels.  The VIR search starts with the candidates among the regions
 // (index functions), branches over the union of their label sets, and after each pairing provisionally drops
 // the candidates that do not see its label, in which none of its places lies, or whose labels with its
-// heading are not spread as the segments are; ranked, better candidates come first.
+// heading are not spread as the segments are; ranked, better candidates come first.  Where every visible wall
+// has one segment, its branches are only the labels that keep the order in which a candidate sees its walls
+// (view_order.h).
 //
 // Once two pairings that are not parallel fix the pose, and `fix_pose_early`, the others are paired at that
 // pose without branching.

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "core/pose.h"
+#include "runtime/pairing.h"
+#include "runtime/view_order.h"
 #include "tests/decompose_views/plan_fixture.h"
 #include "tests/runtime/simulated_scan.h"
 
@@ -205,6 +207,52 @@ TEST(InterpretationTree, WhatLiesBehindAWallSpeaksAgainstAPose) {
   EXPECT_NEAR(in_room(12)->hidden_length_m, 0, 1e-9);
   EXPECT_GT(in_room(2)->hidden_length_m, 0.5);
   EXPECT_LT(in_room(12), in_room(2));
+}
+
+// An elbow of different walls: in a region that sees all six, only one way keeps their order.
+TEST(LabelsInOrder, KeepsTheOrderInWhichWallsAreSeen) {
+  const Views views = Decomposed(PolygonText({{{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 5}, {0, 5}}})).views;
+  const FaceLocator locator(views);
+  const PlanarPose pose{{1, 1}, 0.4};
+  const FaceIdx face = locator.Find(pose.position);
+  Random random(5);
+  std::vector<ScanSegment> segments = SimulateScan(views, face, pose, {}, &random);
+  ASSERT_EQ(segments.size(), 6u);
+  const auto ways = [&] {
+    return LabelsInOrder(views, face, segments, SegmentsInOrder(segments), 0.01,
+                         [](int, LabelIdx) { return true; });
+  };
+  // Directions alone: turned by a right angle no sequence of left and right corners is the same.
+  ASSERT_TRUE(ways().has_value());
+  ASSERT_EQ(ways()->size(), 1u);
+  for (size_t i = 0; i < segments.size(); ++i) {
+    const Vec2 start = pose.FloorFromRobot(segments[i].start);
+    const LabelIdx label = ways()->front()[i];
+    const Vec2 from = LabelStart(views.plan, label), to = LabelEnd(views.plan, label);
+    EXPECT_NEAR(PointToLine(start, from, to), 0, 1e-9);
+  }
+  std::swap(segments[0].start, segments[1].start);
+  std::swap(segments[0].end, segments[1].end);
+  EXPECT_EQ(ways()->size(), 1u);  // the order is by direction, not by index
+  const auto none = LabelsInOrder(views, face, segments, SegmentsInOrder(segments), 0.01,
+                                  [](int segment, LabelIdx) { return segment != 3; });
+  EXPECT_TRUE(none->empty());
+}
+
+TEST(InterpretationTree, InTheOrderOfAViewAPairingEachIsNearlyAll) {
+  const Flat flat;
+  double nodes = 0, segments_seen = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    Random random(seed);
+    const auto pose = RandomPose(flat.views, flat.locator, 0.1, &random);
+    const auto segments = SimulateScan(flat.views, flat.locator.Find(pose->position), *pose, {}, &random);
+    if (segments.size() < 3) continue;
+    InterpretationTreeOptions options = Exact();
+    options.fix_pose_early = false;
+    nodes += static_cast<double>(SearchInterpretations(flat.index, segments, options)->num_nodes);
+    segments_seen += static_cast<double>(segments.size());
+  }
+  EXPECT_LT(nodes, 2 * segments_seen);
 }
 
 TEST(ViewSearchIndex, SetsOfRegionsAreThoseOfTheLabels) {
