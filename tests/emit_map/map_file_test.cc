@@ -291,5 +291,35 @@ TEST(GoldenMap, Version2_2IsRead) {
   EXPECT_THAT(rows->images[1].landmarks, ElementsAre(0, 1, 2));
 }
 
+// An example with everything that came with 2.3: ambiguity, a floor plan and its regions.
+MapRows Rows2_3() {
+  const EmitExample example = MakeEmitExample();
+  MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                          {.words = "survey"}, &example.appearance);
+  rows.name = "example";
+  rows.writer = "cairn test";
+  EXPECT_TRUE(AddViews(MakeExampleViews(), &rows).ok());
+  return rows;
+}
+
+TEST(GoldenMap, TEMPWRITE) { ASSERT_TRUE(WriteMapRows(Rows2_3(), GOLDEN_DIR "/map_2.3.cairn").ok()); }
+// Version 2.3 as the program of that version wrote it.
+TEST(GoldenMap, Version2_3IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.3.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  ASSERT_EQ(rows->appearance.size(), 3u);  // image 3 is none of the map's
+  EXPECT_EQ(rows->appearance[1], (MapAppearanceNode{{1}, true, {{2, 30}}, 0.5, {}}));
+  EXPECT_EQ(rows->appearance[0].look_alikes, (std::vector<MapAppearanceNode::LookAlike>{{2, 0.5}}));
+  EXPECT_EQ(rows->findings.region_entropies, Rows2_3().findings.region_entropies);
+  const Views views = MakeExampleViews();
+  EXPECT_EQ(rows->views.plan.vertices, views.plan.vertices);
+  EXPECT_EQ(rows->views.vertices, views.vertices);
+  EXPECT_EQ(rows->views.face_vertices, views.face_vertices);
+  EXPECT_EQ(rows->views.parents, views.parents);
+  EXPECT_EQ(rows->views.toggled_labels, views.toggled_labels);
+  EXPECT_EQ(rows->views.links, views.links);
+  EXPECT_EQ(rows->vocabulary.inverted_files, Rows2_3().vocabulary.inverted_files);
+}
+
 }  // namespace
 }  // namespace cairn
