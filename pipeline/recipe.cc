@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/toml_options.h"
+#include "stages/simulate/read_recipe.h"
 
 namespace cairn {
 namespace {
@@ -67,10 +68,7 @@ Status CheckName(const std::string& path, const toml::node& node, const std::str
       TomlPlace(path, node), name);
 }
 
-constexpr Key kSimulateFloorPlanKey = {
-    "floor_plan", "text",
-    "Floor plan for the map, a file of the rendered capture: \"floor_plan.geojson\" is the building's. "
-    "Default: none."};
+constexpr Key kSimulateFloorPlanKey = {SimulatedFloorPlanKey::kName, "text", SimulatedFloorPlanKey::kHelp};
 
 constexpr const char* kGateKeys[] = {"min_localized_ratio",        "min_precision_ratio",
                                      "min_region_localized_ratio", "min_region_precision_ratio",

@@ -1,6 +1,7 @@
 // views_growth: time and regions of the decomposition over polygons of growing size, with and without holes;
 // and the source's experiment, nodes of both searches, on seven plans of growing size.
-//   views_growth time | plans FOLDER
+// Plans of up to 10,000 segments, to be decomposed by the program.
+//   views_growth time | plans FOLDER | large FOLDER
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -104,10 +105,58 @@ int Time() {
   return 0;
 }
 
+// Rooms of 4 m side by side, with doors of 1 m in random places between them: `n` in a row, 4 n^2 segments.
+std::string Rooms(int n) {
+  Random random(1);
+  std::string text;
+  for (int i = 0; i <= n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      for (const bool upright : {false, true}) {
+        const double door = random.Uniform(0.5, 2.5);
+        const auto wall = [&](double from, double to) {
+          text += upright ? fmt::format("{},{:.4f},{},{:.4f}\n", 4 * i, from, 4 * i, to)
+                          : fmt::format("{:.4f},{},{:.4f},{}\n", from, 4 * i, to, 4 * i);
+        };
+        if (i == 0 || i == n) {
+          wall(4 * j, 4 * j + 4);
+        } else {
+          wall(4 * j, 4 * j + door);
+          wall(4 * j + door + 1, 4 * j + 4);
+        }
+      }
+    }
+  }
+  return text;
+}
+
+// `n` walls of 0.5 to 3 m anywhere and any way, one on 3.6 m2.
+std::string Loose(int n) {
+  Random random(2);
+  const double side = std::sqrt(3.6 * n);
+  std::string text;
+  for (int i = 0; i < n; ++i) {
+    const Vec2 start(random.Uniform(0, side), random.Uniform(0, side));
+    const double turn = random.Uniform(0, 3.14159), length = random.Uniform(0.5, 3);
+    const Vec2 end = start + length * Vec2(std::cos(turn), std::sin(turn));
+    text += fmt::format("{:.4f},{:.4f},{:.4f},{:.4f}\n", start.x(), start.y(), end.x(), end.y());
+  }
+  return text;
+}
+
 int Plans(const std::string& folder) {
   for (const int rooms : {2, 4, 6, 10, 16, 24, 36}) {
     const std::string path = fmt::format("{}/office_{:02}.geojson", folder, rooms);
     if (!WriteFileAtomically(path, GeoJson({Office(rooms, rooms)})).ok()) return 1;
+  }
+  return 0;
+}
+
+int LargePlans(const std::string& folder) {
+  for (const int n : {16, 25, 35, 50}) {
+    if (!WriteFileAtomically(fmt::format("{}/rooms_{}.txt", folder, n), Rooms(n)).ok()) return 1;
+  }
+  for (const int n : {300, 1000, 2500, 10000}) {
+    if (!WriteFileAtomically(fmt::format("{}/loose_{}.txt", folder, n), Loose(n)).ok()) return 1;
   }
   return 0;
 }
@@ -117,6 +166,7 @@ int Plans(const std::string& folder) {
 int main(int argc, char** argv) {
   if (argc == 2 && std::strcmp(argv[1], "time") == 0) return Time();
   if (argc == 3 && std::strcmp(argv[1], "plans") == 0) return Plans(argv[2]);
-  std::fprintf(stderr, "usage: views_growth time | plans FOLDER\n");
+  if (argc == 3 && std::strcmp(argv[1], "large") == 0) return LargePlans(argv[2]);
+  std::fprintf(stderr, "usage: views_growth time | plans FOLDER | large FOLDER\n");
   return 2;
 }

@@ -142,12 +142,21 @@ int main(int argc, char** argv) {
         error << pose.position - scan.pose.position, WrapAngle(pose.heading_rad - scan.pose.heading_rad);
         outcome.nees = error.dot(found->solutions[0].covariance.inverse() * error);
       }
-      if (std::getenv("SHOW_FAILURES") != nullptr && !outcome.first && search[0] == 'v') {
-        std::printf(
-            "scan %zu: %zu segments, %zu solutions; first: matched %d, off %.2f m\n", queries[i],
-            segments.size(), found->solutions.size(),
-            found->solutions.empty() ? 0 : found->solutions[0].num_matched,
-            found->solutions.empty() ? 0 : (found->solutions[0].pose.position - scan.pose.position).norm());
+      if (std::getenv("SHOW_FAILURES") != nullptr && !outcome.first && search[0] == 's') {
+        std::string text = fmt::format("scan {}: {} segments, {} solutions\n", queries[i], segments.size(),
+                                       found->solutions.size());
+        for (size_t k = 0; k < found->solutions.size(); ++k) {
+          const Interpretation& solution = found->solutions[k];
+          const double off_m = (solution.pose.position - scan.pose.position).norm();
+          const double off_deg =
+              std::abs(WrapAngle(solution.pose.heading_rad - scan.pose.heading_rad)) / kDegree;
+          if (k > 0 && (off_m > 0.5 || off_deg > 10)) continue;
+          text += fmt::format(
+              "  {}: off {:.2f} m {:.1f} deg, matched {} of {:.2f} m, hidden {:.2f} m, rms {:.3f} m\n", k,
+              off_m, off_deg, solution.num_matched, solution.matched_length_m, solution.hidden_length_m,
+              solution.rms_m);
+        }
+        std::fputs(text.c_str(), stdout);
       }
     });
     int tried = 0, first = 0, any = 0, none = 0;

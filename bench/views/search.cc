@@ -1,10 +1,13 @@
 // views_search NUM_POSITIONS noise-free|noisy|all PLAN...: nodes of the standard interpretation tree and of
 // the VIR search, and right poses.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+
+#include <Eigen/Eigenvalues>
 
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -22,7 +25,7 @@ struct Sample {
   bool valid = false;
   double num_segments = 0, candidates = 0;
   double standard_first = 0, standard_all = 0, vir_first = 0, vir_ranked = 0, vir_all = 0;
-  bool listed = false, first_right = false, ambiguous = false, complete = true;
+  bool listed = false, first_right = false, ambiguous = false, uncertain = false, complete = true;
   double seconds = 0;
 };
 
@@ -49,6 +52,16 @@ double Seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// What fits of the simulated points would have.
+void SetSigmas(std::vector<ScanSegment>* segments) {
+  constexpr double kSigma = 0.02;
+  for (ScanSegment& segment : *segments) {
+    const double num_points = std::clamp(segment.Length() / 0.05, 6.0, 200.0);
+    segment.sigma_offset_m = kSigma / std::sqrt(num_points);
+    segment.sigma_angle_rad = kSigma / (segment.Length() * std::sqrt(num_points / 12));
+  }
+}
+
 Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool noisy, bool with_standard,
                 uint64_t seed) {
   Random random(seed);
@@ -69,6 +82,7 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
     options.max_null_ratio = 0.25;
     options.one_segment_per_wall = false;
     options.max_num_nodes = 2e7;
+    options.sigma_wall_m = options.sigma_wall_deg = 0;  // the plan is exact
   } else {
     options.angle_tolerance_deg = 0.01;
     options.position_tolerance_m = 1e-3;
@@ -86,8 +100,10 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
     sample.standard_first = static_cast<double>(run("standard", true, 1).num_nodes);
     sample.standard_all = static_cast<double>(run("standard", false, 1).num_nodes);
   }
-  sample.vir_first = static_cast<double>(run("vir", true, 1).num_nodes);
-  sample.vir_ranked = static_cast<double>(run("vir", true, 4).num_nodes);
+  if (!noisy) {
+    sample.vir_first = static_cast<double>(run("vir", true, 1).num_nodes);
+    sample.vir_ranked = static_cast<double>(run("vir", true, 4).num_nodes);
+  }
   const double start = Seconds();
   const InterpretationTreeResult all = run("vir", false, 1);
   sample.seconds = Seconds() - start;
@@ -103,20 +119,35 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
     sample.listed = sample.listed || right;
     sample.first_right = sample.first_right || (i == 0 && right);
   }
-  // Ambiguous: without noise the same portions fit elsewhere too, or nowhere in particular.
+  // Ambiguous: without noise the same portions fit elsewhere too, or nowhere in particular.  Uncertain: they
+  // do so within what the noise allows, or from the right pairings a pose follows that has twice its standard
+  // deviation beyond what counts as right.
   Random again(seed);
   const auto same = RandomPose(views, locator, 0.2, &again);
   scan_options.sigma_m = scan_options.spurious_ratio = 0;
-  const auto exact = SimulateScan(views, face, *same, scan_options, &again);
+  std::vector<ScanSegment> exact = SimulateScan(views, face, *same, scan_options, &again);
   InterpretationTreeOptions exact_options;
   exact_options.angle_tolerance_deg = noisy ? 2 : 0.01;
   exact_options.position_tolerance_m = noisy ? 0.1 : 1e-3;
   exact_options.length_tolerance_m = noisy ? 0.1 : 1e-3;
   exact_options.max_num_nodes = 2e7;
   exact_options.one_segment_per_wall = !noisy;
+  exact_options.sigma_wall_m = exact_options.sigma_wall_deg = 0;
   const auto twins = SearchInterpretations(index, exact, exact_options);
   sample.ambiguous = !twins.ok() || twins->solutions.size() != 1 || !twins->solutions[0].determined;
-  if (noisy && !sample.ambiguous && !sample.first_right && std::getenv("SHOW_FAILURES") != nullptr) {
+  if (noisy && !sample.ambiguous) {
+    SetSigmas(&exact);
+    const auto found = SearchInterpretations(index, exact, exact_options);
+    sample.uncertain = !found.ok() || found->solutions.size() != 1;
+    if (!sample.uncertain) {
+      const Eigen::Matrix3d& covariance = found->solutions[0].covariance;
+      sample.uncertain =
+          2 * std::sqrt(covariance.topLeftCorner<2, 2>().eigenvalues().real().maxCoeff()) > metres ||
+          2 * std::sqrt(covariance(2, 2)) > degrees * kDegree;
+    }
+  }
+  if (noisy && !sample.ambiguous && !sample.uncertain && !sample.first_right &&
+      std::getenv("SHOW_FAILURES") != nullptr) {
     std::printf("seed %llu: %zu segments, %zu solutions, listed %d\n", static_cast<unsigned long long>(seed),
                 segments.size(), all.solutions.size(), sample.listed);
     for (size_t i = 0; i < std::min<size_t>(4, all.solutions.size()); ++i)
@@ -143,8 +174,8 @@ int main(int argc, char** argv) {
   std::printf(
       "| plan | walls N | regions | positions | segments | candidates | standard, first | standard, all | "
       "VIR, first | VIR ranked, first | VIR, all | all: ratio | ms | truth listed | first right | "
-      "unambiguous: first right |\n");
-  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "unambiguous: first right | certain: first right |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   std::vector<std::array<double, 4>> curve;
   for (int i = 3; i < argc; ++i) {
     const std::string path = argv[i];
@@ -163,7 +194,8 @@ int main(int argc, char** argv) {
       samples[k] = TryPlace(index, locator, noisy, with_standard, MixSeed(11, k));
     });
     Mean segments, candidates, standard_first, standard_all, vir_first, vir_ranked, vir_all, ms;
-    int num = 0, listed = 0, first = 0, unambiguous = 0, unambiguous_right = 0, incomplete = 0;
+    int num = 0, listed = 0, first = 0, unambiguous = 0, unambiguous_right = 0, certain = 0,
+        certain_right = 0, incomplete = 0;
     for (const Sample& sample : samples) {
       if (!sample.valid) continue;
       ++num;
@@ -179,16 +211,20 @@ int main(int argc, char** argv) {
       first += sample.first_right;
       unambiguous += !sample.ambiguous;
       unambiguous_right += !sample.ambiguous && sample.first_right;
+      const bool is_certain = !sample.ambiguous && !sample.uncertain;
+      certain += is_certain;
+      certain_right += is_certain && sample.first_right;
       incomplete += !sample.complete;
     }
     std::printf(
         "| %s | %d | %d | %d | %.1f ± %.1f | %.0f | %.0f ± %.0f | %.0f ± %.0f | %.0f ± %.0f | %.0f ± %.0f | "
-        "%.0f ± %.0f | %.1f | %.1f | %d | %d | %d of %d |%s\n",
+        "%.0f ± %.0f | %.1f | %.1f | %d | %d | %d of %d | %d of %d |%s\n",
         path.substr(path.rfind('/') + 1).c_str(), result->views.plan.num_walls(), result->views.num_faces(),
         num, segments.mean(), segments.sd(), candidates.mean(), standard_first.mean(), standard_first.sd(),
         standard_all.mean(), standard_all.sd(), vir_first.mean(), vir_first.sd(), vir_ranked.mean(),
         vir_ranked.sd(), vir_all.mean(), vir_all.sd(), standard_all.mean() / vir_all.mean(), ms.mean(),
-        listed, first, unambiguous_right, unambiguous, incomplete > 0 ? " (not all complete)" : "");
+        listed, first, unambiguous_right, unambiguous, certain_right, certain,
+        incomplete > 0 ? " (not all complete)" : "");
     std::fflush(stdout);
     curve.push_back({std::log(result->views.plan.num_walls()), std::log(std::max(1.0, standard_all.mean())),
                      std::log(std::max(1.0, vir_all.mean())), std::log(std::max(1.0, vir_ranked.mean()))});

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include <opencv2/imgproc.hpp>
+
 #include "core/floor_pose.h"
 
 namespace cairn {
@@ -18,10 +20,10 @@ constexpr double kCoarseScaleM = 0.5, kFineScaleM = 0.15;
 // A motion has to gain this much to count: landmarks are no perfect sample of the walls.
 constexpr double kMinGainRatio = 1.05;
 
-// Distances from the nearest wall, up to kMaxWallDistanceM, at the middles of cells.
+// Distances from the nearest wall, up to kMaxWallDistanceM, at the middles of cells, to a cell or so.
 class WallDistances {
  public:
-  WallDistances(const FloorPlan& plan) {
+  explicit WallDistances(const FloorPlan& plan) {
     Vec2 low = plan.walls[0].start, high = low;
     for (const PlanWall& wall : plan.walls) {
       low = low.cwiseMin(wall.start.cwiseMin(wall.end));
@@ -32,49 +34,30 @@ class WallDistances {
     cell_ = std::max({0.02, std::sqrt(size.x() * size.y() / kMaxNumCells), size.maxCoeff() / kMaxNumCells});
     num_columns_ = static_cast<int>(size.x() / cell_) + 1;
     num_rows_ = static_cast<int>(size.y() / cell_) + 1;
-    distances_.assign(static_cast<size_t>(num_columns_) * num_rows_, kMaxWallDistanceM);
-    for (const PlanWall& wall : plan.walls) Draw(wall);
+    cv::Mat free(num_rows_, num_columns_, CV_8U, cv::Scalar(1));
+    constexpr int kShift = 4;  // ends to sixteenths of a cell; a cell's middle is its whole number
+    const auto at = [&](const Vec2& place) {
+      const Vec2 cell = ((place - low_) / cell_).array() - 0.5;
+      return cv::Point(cvRound(std::ldexp(cell.x(), kShift)), cvRound(std::ldexp(cell.y(), kShift)));
+    };
+    for (const PlanWall& wall : plan.walls)
+      cv::line(free, at(wall.start), at(wall.end), cv::Scalar(0), 1, cv::LINE_8, kShift);
+    cv::distanceTransform(free, distances_, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   }
 
   double At(const Vec2& place) const {
     const Vec2 at = (place - low_) / cell_;
     if (!(at.x() >= 0 && at.y() >= 0 && at.x() < num_columns_ && at.y() < num_rows_))
       return kMaxWallDistanceM;
-    return distances_[static_cast<size_t>(at.y()) * num_columns_ + static_cast<size_t>(at.x())];
+    const float cells = distances_.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
+    return std::min(kMaxWallDistanceM, cells * cell_);
   }
 
  private:
-  // Row by row, the cells near the wall.
-  void Draw(const PlanWall& wall) {
-    const Vec2 along = wall.end - wall.start;
-    const auto first_row =
-        static_cast<int>((std::min(wall.start.y(), wall.end.y()) - kMaxWallDistanceM - low_.y()) / cell_);
-    const auto last_row =
-        static_cast<int>((std::max(wall.start.y(), wall.end.y()) + kMaxWallDistanceM - low_.y()) / cell_);
-    for (int row = std::max(0, first_row); row <= std::min(last_row, num_rows_ - 1); ++row) {
-      const double y = low_.y() + (row + 0.5) * cell_;
-      double from = std::min(wall.start.x(), wall.end.x()), to = std::max(wall.start.x(), wall.end.x());
-      if (std::abs(along.y()) > 1e-9) {  // where the wall is near this row
-        const double a = wall.start.x() + along.x() * (y - kMaxWallDistanceM - wall.start.y()) / along.y();
-        const double b = wall.start.x() + along.x() * (y + kMaxWallDistanceM - wall.start.y()) / along.y();
-        from = std::max(from, std::min(a, b));
-        to = std::min(to, std::max(a, b));
-      }
-      const auto first = static_cast<int>((from - kMaxWallDistanceM - low_.x()) / cell_);
-      const auto last = static_cast<int>((to + kMaxWallDistanceM - low_.x()) / cell_);
-      for (int column = std::max(0, first); column <= std::min(last, num_columns_ - 1); ++column) {
-        const Vec2 middle(low_.x() + (column + 0.5) * cell_, y);
-        const double share = std::clamp((middle - wall.start).dot(along) / along.squaredNorm(), 0.0, 1.0);
-        float& distance = distances_[static_cast<size_t>(row) * num_columns_ + column];
-        distance = std::min(distance, static_cast<float>((middle - wall.start - share * along).norm()));
-      }
-    }
-  }
-
   Vec2 low_;
   double cell_ = 0;
   int num_columns_ = 0, num_rows_ = 0;
-  std::vector<float> distances_;
+  cv::Mat distances_;  // in cells
 };
 
 // Of the landmarks, about their middle.

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include <Eigen/Geometry>
+
 #include "core/memory.h"
 #include "core/parallel.h"
+#include "core/pose.h"
 #include "core/visible_walls.h"
 #include "stages/decompose_views/arrangement.h"
 #include "stages/decompose_views/label_faces.h"
@@ -21,6 +24,21 @@ constexpr size_t kNumSampledVertices = 256, kNumSampledBoundaries = 4000;
 // By how much what follows from a sample may be too large.
 constexpr double kSampleError = 1.5;
 constexpr int64_t kFacesPerBlock = 1024;
+
+// The plan where the options say that it lies.
+InputPlan Placed(InputPlan plan, const DecomposeViewsOptions& options) {
+  const Eigen::Vector2d origin(options.plan_x_m, options.plan_y_m);
+  if (origin.isZero(0) && options.plan_heading_deg == 0) return plan;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(RadFromDeg(options.plan_heading_deg)).toRotationMatrix();
+  for (std::vector<Eigen::Vector2d>& ring : plan.rings) {
+    for (Eigen::Vector2d& point : ring) point = turn * point + origin;
+  }
+  for (InputSegment& segment : plan.segments) {
+    segment.start = turn * segment.start + origin;
+    segment.end = turn * segment.end + origin;
+  }
+  return plan;
+}
 
 // Refuses what would not fit: boundaries, and the regions that they make.
 Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossings, int64_t memory_mib) {
@@ -107,6 +125,17 @@ Status AddIndex(Views* views, int num_threads, Progress& progress) {
 
 OptionTable DescribeOptions(DecomposeViewsOptions* o) {
   return {
+      {.name = "plan_x_m",
+       .value = &o->plan_x_m,
+       .help = "where the origin of the plan's file lies in the survey's floor frame, x in metres",
+       .min = -1e7,
+       .max = 1e7},
+      {.name = "plan_y_m", .value = &o->plan_y_m, .help = "the same, y in metres", .min = -1e7, .max = 1e7},
+      {.name = "plan_heading_deg",
+       .value = &o->plan_heading_deg,
+       .help = "direction of the plan's x axis in the survey's floor frame, counter-clockwise, degrees",
+       .min = -360,
+       .max = 360},
       {.name = "grid_m",
        .value = &o->clean.grid_m,
        .help = "unit that all coordinates are rounded to, metres",
@@ -140,7 +169,7 @@ Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const Decomp
                                             int num_threads, int64_t memory_mib, Progress& progress) {
   DecomposeViewsOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_ASSIGN_OR_RETURN(CleanPlanResult cleaned, CleanPlan(input, options.clean, progress));
+  CAIRN_ASSIGN_OR_RETURN(CleanPlanResult cleaned, CleanPlan(Placed(input, options), options.clean, progress));
   const FloorPlan& plan = cleaned.plan;
   const WallRays rays(plan);
   CAIRN_RETURN_IF_ERROR(CheckSample(plan, rays, num_threads, memory_mib, progress));

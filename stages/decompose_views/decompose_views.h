@@ -22,11 +22,14 @@ namespace cairn {
 //
 // | paper                          | here                                                 |
 // | point visibility scan (I)      | FindViewBoundaries: rays from every vertex           |
-// | intersections (II)             | Arrange: snap rounding by GEOS                       |
+// | intersections (II)             | Arrange: snap rounding, tile by tile                 |
 // | traversal of boundaries (III)  | LabelFaces: a walk over the regions' borders         |
 // | faces (IV)                     | Arrange                                              |
 struct DecomposeViewsOptions {
   CleanPlanOptions clean;
+  // Where the plan lies: its origin, and the direction of its x axis counter-clockwise, in the frame that the
+  // views are wanted in (a survey's floor).  Regions, walls and lists of changes are in that frame.
+  double plan_x_m = 0, plan_y_m = 0, plan_heading_deg = 0;
   // Regions smaller than this are joined to a neighbour, whose labels they get; 0: none.  What that loses is
   // reported.  REQUIRES: >= 0
   double min_region_area_m2 = 0;
@@ -44,8 +47,9 @@ struct DecomposeViewsResult {
 };
 
 // Pure: same plan and options, same result for any number of threads.  O(n^2 log n + I log I) for n walls
-// whose boundaries cross I times; memory is proportional to I, estimated first, and refused beyond
-// `memory_mib`.
+// whose boundaries cross I times; memory is proportional to I.  Plans that take more than `memory_mib` are
+// refused: those far beyond it by a sample of their boundaries, others when all crossings are counted, before
+// they are kept.  Work goes by small parts, each reported; cancelling ends within one.
 // Errors: those of CleanPlan, InvalidArgument (options), Failed (memory), Cancelled.
 Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
                                             int num_threads, int64_t memory_mib, Progress& progress);

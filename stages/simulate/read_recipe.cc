@@ -28,8 +28,9 @@ Status ReadSimulateRecipe(const std::string& path, SimulateOptions* options, uin
     *seed = static_cast<uint64_t>(value->get());
   }
   OptionTable table = DescribeOptions(options);
-  std::string floor_plan;  // which of the capture's files is the map's plan
-  table.push_back({.name = "floor_plan", .value = &floor_plan, .help = "floor plan of the map"});
+  std::string floor_plan;
+  table.push_back(
+      {.name = SimulatedFloorPlanKey::kName, .value = &floor_plan, .help = SimulatedFloorPlanKey::kHelp});
   return SetOptionsFromToml(*node->as_table(), path, table);
 }
 

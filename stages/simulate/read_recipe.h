@@ -8,6 +8,15 @@
 
 namespace cairn {
 
+// The one key of [simulate] that is no option of the stage: which file of the rendered capture is the floor
+// plan of the map made from it.
+struct SimulatedFloorPlanKey {
+  static constexpr const char* kName = "floor_plan";
+  static constexpr const char* kHelp =
+      "Floor plan for the map, a file of the rendered capture: \"floor_plan.geojson\" is the building's. "
+      "Default: none.";
+};
+
 // Takes options and seed from a recipe's [simulate] table, or the options from a file that holds only such a
 // table's keys.  Other tables are other stages'.  Errors: NotFound, Corrupt, InvalidArgument (a recipe
 // without the table; keys and values).

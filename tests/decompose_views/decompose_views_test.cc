@@ -391,6 +391,20 @@ TEST(DecomposeViews, RealPlansHaveTheLabelsThatAreSeen) {
   }
 }
 
+TEST(DecomposeViews, APlanWithAnOriginOfItsOwnIsPutWhereTheOptionsSay) {
+  const std::string text = PolygonText({{{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 5}, {0, 5}}});
+  const auto here = Decomposed(text);
+  const auto there = Decomposed(text, {.plan_x_m = 100, .plan_y_m = -20, .plan_heading_deg = 90});
+  ASSERT_EQ(there.views.num_faces(), here.views.num_faces());
+  EXPECT_NEAR(TotalArea(there.views), TotalArea(here.views), 1e-3);
+  // (x, y) comes to (100 - y, -20 + x).
+  for (const Vec2& place : {Vec2(1, 1), Vec2(5, 1), Vec2(1, 4)}) {
+    EXPECT_EQ(LabelsAt(there.views, {100 - place.y(), -20 + place.x()}).size(),
+              LabelsAt(here.views, place).size());
+  }
+  EXPECT_EQ(FaceLocator(there.views).Find({100 - 4, -20 + 5}), -1);
+}
+
 TEST(DecomposeViews, SmallRegionsAreJoinedOnRequestAndTheLossIsSaid) {
   const std::string text = PolygonText(
       {{{0, 0}, {10, 0}, {10, 6}, {6, 6}, {6, 4}, {5, 4}, {5, 6}, {0, 6}}, {{2, 2}, {2, 3}, {3, 3}, {3, 2}}});
