@@ -33,8 +33,9 @@ enum class BlockKind : uint8_t {
   kAmbiguity = 9,
   kFloorPlan = 10,
   kViewRegions = 11,
+  kLandmarkModels = 12,
 };
-inline constexpr int kNumBlockKinds = 12;   // 0 is none
+inline constexpr int kNumBlockKinds = 13;   // 0 is none
 const char* BlockKindName(BlockKind kind);  // "stations"
 
 // What the directory says of a block.
@@ -142,6 +143,12 @@ struct ViewBlock {
   std::vector<Region> regions;
 };
 
+// Models of the landmarks first, first + 1, ..., with what all blocks of the visual map repeat.
+struct VisualBlock {
+  LandmarkIdx first = 0;
+  VisualMapData part;
+};
+
 // Blocks as bytes.  Same block, same bytes.
 std::string EncodeBlock(const LandmarkBlock& block);
 std::string EncodeBlock(const ImageBlock& block);
@@ -151,6 +158,7 @@ std::string EncodeBlock(const WordBlock& block);
 std::string EncodeBlock(const AppearanceBlock& block);
 std::string EncodeBlock(const AmbiguityBlock& block);
 std::string EncodeBlock(const ViewBlock& block);
+std::string EncodeBlock(const VisualBlock& block);
 std::string EncodeFloorPlan(const FloorPlan& plan);
 std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
 std::string EncodeDocumentNorms(const std::vector<float>& norms);
@@ -173,6 +181,8 @@ Result<AmbiguityBlock> DecodeAmbiguityBlock(std::string_view bytes, const BlockE
                                             const MapDirectory& directory, const std::string& what);
 Result<ViewBlock> DecodeViewBlock(std::string_view bytes, const BlockEntry& entry,
                                   const MapDirectory& directory, const std::string& what);
+Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& entry,
+                                      const MapDirectory& directory, const std::string& what);
 // All that CheckFloorPlan asks.
 Result<FloorPlan> DecodeFloorPlan(std::string_view bytes, const BlockEntry& entry,
                                   const MapDirectory& directory, const std::string& what);
@@ -186,6 +196,10 @@ Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const Blo
 // Errors: Corrupt where they do not follow one another.
 Status AppendRegions(const ViewBlock& block, const std::string& what, Views* views);
 
+// Puts the models of a block after those that `visual_map` has.  Errors: Corrupt where their camera or
+// headings differ.
+Status AppendModels(const VisualBlock& block, const std::string& what, VisualMapData* visual_map);
+
 // Memory that a block takes once it is decoded, about.
 int64_t NumBytes(const LandmarkBlock& block);
 int64_t NumBytes(const ImageBlock& block);
@@ -195,6 +209,7 @@ int64_t NumBytes(const WordBlock& block);
 int64_t NumBytes(const AppearanceBlock& block);
 int64_t NumBytes(const AmbiguityBlock& block);
 int64_t NumBytes(const ViewBlock& block);
+int64_t NumBytes(const VisualBlock& block);
 int64_t NumBytes(const FloorPlan& plan);
 int64_t NumBytes(const Vocabulary& vocabulary);
 int64_t NumBytes(const std::vector<float>& values);

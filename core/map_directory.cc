@@ -28,6 +28,7 @@ int64_t FewestBytes(BlockKind kind) {
     case BlockKind::kRegions:
     case BlockKind::kWords:
     case BlockKind::kVocabularyTree:
+    case BlockKind::kLandmarkModels:
       return 1;
   }
   return 1;
@@ -64,6 +65,8 @@ const char* BlockKindName(BlockKind kind) {
       return "floor_plan";
     case BlockKind::kViewRegions:
       return "view_regions";
+    case BlockKind::kLandmarkModels:
+      return "landmark_models";
   }
   return kOtherKind;
 }
@@ -157,6 +160,11 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
   }
   if ((directory.Count(BlockKind::kFloorPlan) > 0) != (directory.Count(BlockKind::kViewRegions) > 0)) {
     return MakeError(ErrorCode::kCorrupt, "directory: a floor plan and its regions belong together");
+  }
+  if (directory.Count(BlockKind::kLandmarkModels) > 0 &&
+      directory.Count(BlockKind::kLandmarkModels) != directory.Count(BlockKind::kLandmarks)) {
+    return MakeError(ErrorCode::kCorrupt, "directory: models of {} landmarks of {}",
+                     directory.Count(BlockKind::kLandmarkModels), directory.Count(BlockKind::kLandmarks));
   }
   return directory;
 }

@@ -72,6 +72,10 @@ class RowsReader {
         CAIRN_ASSIGN_OR_RETURN(const ViewBlock regions, DecodeViewBlock(bytes, entry, directory, what));
         return AppendRegions(regions, what, &rows_.views);
       }
+      case BlockKind::kLandmarkModels: {
+        CAIRN_ASSIGN_OR_RETURN(const VisualBlock models, DecodeVisualBlock(bytes, entry, directory, what));
+        return AppendModels(models, what, &rows_.visual_map);
+      }
     }
     return Ok();  // of a later minor version
   }

@@ -14,6 +14,7 @@ constexpr size_t kWordsPerBlock = 1024;
 constexpr size_t kPostingsPerBlock = 4096;
 constexpr size_t kAppearanceNodesPerBlock = 1024;
 constexpr FaceIdx kViewRegionsPerBlock = 4096;
+constexpr size_t kLandmarkModelsPerBlock = 256;
 
 }  // namespace
 
@@ -53,6 +54,7 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
   }
   CutLandmarks();
   CutViews();
+  CutEvenly(BlockKind::kLandmarkModels, rows.visual_map.landmarks.size(), kLandmarkModelsPerBlock);
   LinkRegions();
   LinkImages();
 }
@@ -234,6 +236,13 @@ ViewBlock MapLayout::MakeViewBlock(const BlockEntry& entry) const {
   return block;
 }
 
+VisualBlock MapLayout::MakeVisualBlock(const BlockEntry& entry) const {
+  const VisualMapData& all = rows_.visual_map;
+  const auto begin = all.landmarks.begin() + entry.first;
+  return {static_cast<LandmarkIdx>(entry.first),
+          {all.camera_id, all.focal_px, all.headings_deg, {begin, begin + entry.count}}};
+}
+
 std::vector<float> MapLayout::MakeDocumentNorms() const {
   std::vector<float> norms(rows_.images.size(), 0);
   for (size_t document = 0; document < image_of_document_.size(); ++document) {
@@ -266,6 +275,8 @@ std::string MapLayout::Encode(const BlockEntry& entry) const {
       return EncodeFloorPlan(rows_.views.plan);
     case BlockKind::kViewRegions:
       return EncodeBlock(MakeViewBlock(entry));
+    case BlockKind::kLandmarkModels:
+      return EncodeBlock(MakeVisualBlock(entry));
   }
   return "";
 }

@@ -30,6 +30,7 @@ class MapLayout {
   AppearanceBlock MakeAppearanceBlock(const BlockEntry& entry) const;
   AmbiguityBlock MakeAmbiguityBlock(const BlockEntry& entry) const;
   ViewBlock MakeViewBlock(const BlockEntry& entry) const;
+  VisualBlock MakeVisualBlock(const BlockEntry& entry) const;
   // Per image; 0 for one that is no document.
   std::vector<float> MakeDocumentNorms() const;
 

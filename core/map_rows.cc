@@ -195,6 +195,8 @@ Status CheckMapRows(const MapRows& rows) {
   CAIRN_RETURN_IF_ERROR(CheckAppearance(rows));
   CAIRN_RETURN_IF_ERROR(CheckRegions(rows));
   CAIRN_RETURN_IF_ERROR(CheckPlan(rows.views));
+  CAIRN_RETURN_IF_ERROR(CheckVisualMap(rows.visual_map, static_cast<int64_t>(rows.landmarks.size()),
+                                       static_cast<int64_t>(rows.images.size())));
   if (rows.descriptors.rows() != static_cast<Eigen::Index>(rows.landmarks.size())) {
     return Invalid("{} landmarks, but {} descriptors", rows.landmarks.size(), rows.descriptors.rows());
   }

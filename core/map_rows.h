@@ -17,6 +17,7 @@
 #include "core/map_findings.h"
 #include "core/pose.h"
 #include "core/views.h"
+#include "core/visual_map.h"
 #include "core/vocabulary_tree.h"
 
 namespace cairn {
@@ -131,11 +132,13 @@ struct MapRows : MapHead {
   // The place's floor plan and its view-invariant regions, floor frame; no walls: not known.  Vertices are
   // numbered by use (NumberVerticesByUse).
   Views views;
+  // How landmarks look from where; its images are indices in `images`.  No landmarks: not in the map.
+  VisualMapData visual_map;
   MapFindings findings;
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 3;
+inline constexpr int kMapVersionMinor = 4;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

@@ -93,6 +93,25 @@ nlohmann::ordered_json SessionsJson(const MapRows& rows) {
   return sessions;
 }
 
+// Models of landmarks, of how many sights, and how long they are.
+void AddVisualMap(const MapDirectory& directory, const VisualMapData& visual_map,
+                  nlohmann::ordered_json* json) {
+  int64_t num_models = 0, num_bad = 0, num_sights = 0, num_bytes = 0;
+  for (const std::vector<HeadingModel>& models : visual_map.landmarks) {
+    num_models += static_cast<int64_t>(models.size());
+    for (const HeadingModel& model : models) {
+      num_bad += model.predicts_badly ? 1 : 0;
+      num_sights += static_cast<int64_t>(model.sights.size());
+    }
+  }
+  for (int64_t i = 0; i < directory.NumBlocks(BlockKind::kLandmarkModels); ++i)
+    num_bytes += directory.Entry(BlockKind::kLandmarkModels, i).num_bytes;
+  (*json)["num_landmark_models"] = num_models;
+  (*json)["num_bad_landmark_models"] = num_bad;
+  (*json)["num_landmark_sights"] = num_sights;
+  (*json)["num_landmark_model_bytes"] = num_bytes;
+}
+
 nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t num_bytes,
                                const std::vector<std::pair<std::string, int64_t>>& tables) {
   size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
@@ -134,6 +153,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"num_plan_walls", rows.views.plan.walls.size()},
                                  {"num_view_regions", rows.views.parents.size()},
                                  {"num_view_links", rows.views.links.size()}};
+  AddVisualMap(file.directory(), rows.visual_map, &json);
   if (rows.frame.anchor) {
     json["anchor"] = {{"latitude_deg", rows.frame.anchor->latitude_deg},
                       {"longitude_deg", rows.frame.anchor->longitude_deg},

@@ -17,6 +17,7 @@
 #include "core/capture.h"
 #include "core/image_file.h"
 #include "core/parallel.h"
+#include "pipeline/visual_answer.h"
 #include "runtime/region_tracker.h"
 
 namespace cairn {
@@ -30,7 +31,10 @@ struct Arguments {
   std::string camera;
   std::string cameras_path;
   bool is_sequence = false;
+  std::string estimator = "pnp";
   LocalizerOptions options;
+  VisualMapOptions visual_options;
+  VisualEstimateOptions estimate_options;
   RegionTrackerOptions tracker_options;
   OptionArguments option_arguments;
 };
@@ -40,6 +44,8 @@ struct Answer {
   std::string image;
   CameraId camera_id = 0;
   Result<Localization> localization = Error{};
+  std::optional<Result<VisualPose>> visual;
+  std::optional<Disagreement> disagreement;  // where both have a fix
 };
 
 // The camera to use for an image size: given on the command line, else the map's.
@@ -80,6 +86,47 @@ class CameraChoice {
   std::map<CameraId, Camera> cameras_;
 };
 
+Status CheckEstimator(const Arguments& arguments) {
+  if (arguments.estimator != "pnp" && arguments.is_sequence) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--sequence follows a camera by --estimator pnp; leave one of them out");
+  }
+  if (arguments.estimator == "visual-map" && !arguments.output_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
+                     "--estimator both");
+  }
+  return Ok();
+}
+
+// By the visual map, and where asked for by PnP too.
+Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>& map, const VisualMap& visual,
+                     const CameraChoice& cameras, const Arguments& arguments) {
+  Answer answer{.image = image};
+  const auto locate = [&]() -> Result<VisualPose> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    const Localizer localizer(map, arguments.options);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
+    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(query));
+    if (arguments.estimator == "both") {
+      CAIRN_ASSIGN_OR_RETURN(answer.localization, localizer.LocalizeQuery(query, std::nullopt));
+    }
+    return EstimateVisualPose(visual, seen, arguments.estimate_options);
+  };
+  answer.visual = locate();
+  if (!answer.visual->ok()) {
+    answer.localization = answer.visual->error();
+  } else if (arguments.estimator == "visual-map") {
+    answer.localization = Localization();  // none in space
+  } else if (answer.localization->has_fix() && (*answer.visual)->flag == VisualFlag::kNone) {
+    answer.disagreement =
+        Compare(FloorFixOf(*answer.localization, map->head().floor_from_world), **answer.visual);
+  }
+  return answer;
+}
+
 Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>& map,
                      const CameraChoice& cameras, const LocalizerOptions& options) {
   Answer answer{.image = image};
@@ -104,14 +151,15 @@ Answer TrackImage(const std::string& image, const CameraChoice& cameras, RegionT
   return answer;
 }
 
-nlohmann::ordered_json AnswerJson(const Answer& answer) {
+// That an image could not be tried.
+nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
+  return {
+      {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
+}
+
+nlohmann::ordered_json PnpJson(const Answer& answer) {
   nlohmann::ordered_json json = {{"image", answer.image}};
-  if (!answer.localization.ok()) {
-    json["fix"] = false;
-    json["reason"] = ErrorCodeName(answer.localization.error().code);
-    json["message"] = answer.localization.error().message;
-    return json;
-  }
+  if (!answer.localization.ok()) return ErrorJson(answer.image, answer.localization.error());
   const Localization& found = *answer.localization;
   json["fix"] = found.has_fix();
   if (found.has_fix()) {
@@ -132,6 +180,20 @@ nlohmann::ordered_json AnswerJson(const Answer& answer) {
   json["num_matches"] = found.num_matches;
   json["num_inliers"] = found.num_inliers;
   json["candidates"] = found.candidates;
+  return json;
+}
+
+nlohmann::ordered_json AnswerJson(const Answer& answer, const std::string& estimator) {
+  if (!answer.visual) return PnpJson(answer);
+  if (!answer.visual->ok()) return ErrorJson(answer.image, answer.visual->error());
+  if (estimator == "visual-map") {
+    nlohmann::ordered_json json = {{"image", answer.image}};
+    json.update(VisualJson(**answer.visual));
+    return json;
+  }
+  nlohmann::ordered_json json = PnpJson(answer);
+  json["visual_map"] = VisualJson(**answer.visual);
+  if (answer.disagreement) json["disagreement"] = DisagreementJson(*answer.disagreement);
   return json;
 }
 
@@ -180,26 +242,33 @@ class ImageNames {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
   cv::setNumThreads(1);  // images in parallel, each on one thread
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  std::shared_ptr<const VisualMap> visual;
+  if (arguments.estimator != "pnp") {
+    CAIRN_ASSIGN_OR_RETURN(visual, VisualMap::Load(*map, arguments.visual_options));
+  }
   CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras, CameraChoice::Make(arguments, map));
   CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments));
 
   std::vector<CaptureImage> poses;
   std::optional<Error> first_error;
-  int num_images = 0, num_failed = 0;
+  int num_images = 0, num_failed = 0, num_places = 0;
   RegionTracker tracker(map, arguments.options, arguments.tracker_options);
   const size_t batch_size =
       arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
-      answers[i] = arguments.is_sequence ? TrackImage(batch[i], cameras, &tracker)
-                                         : LocalizeImage(batch[i], map, cameras, arguments.options);
+      answers[i] = visual                  ? LocateByViews(batch[i], map, *visual, cameras, arguments)
+                   : arguments.is_sequence ? TrackImage(batch[i], cameras, &tracker)
+                                           : LocalizeImage(batch[i], map, cameras, arguments.options);
     });
     for (const Answer& answer : answers) {
-      *environment.out << AnswerJson(answer).dump() << "\n" << std::flush;
+      *environment.out << AnswerJson(answer, arguments.estimator).dump() << "\n" << std::flush;
       ++num_images;
+      if (answer.visual && answer.visual->ok() && (*answer.visual)->flag == VisualFlag::kNone) ++num_places;
       if (!answer.localization.ok()) {
         ++num_failed;
         if (!first_error) first_error = answer.localization.error();
@@ -212,7 +281,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "localizing was stopped");
   }
   if (!arguments.output_path.empty()) CAIRN_RETURN_IF_ERROR(WriteImagesText(arguments.output_path, poses));
-  spdlog::info("{} of {} images localized", poses.size(), num_images);
+  if (arguments.estimator != "visual-map")
+    spdlog::info("{} of {} images localized", poses.size(), num_images);
+  if (visual) spdlog::info("{} of {} images localized by the visual map", num_places, num_images);
   if (!first_error) return Ok();
   return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
                    num_images, first_error->message);
@@ -241,9 +312,19 @@ Command LocalizeCommand() {
                 ->type_name("FILE");
             app.add_flag("--sequence", arguments->is_sequence,
                          "The images are frames in order: follow the camera from one to the next");
+            app.add_option(
+                   "--estimator", arguments->estimator,
+                   "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
+                   "how landmarks look from where (the map needs a visual map); both: and how far "
+                   "they disagree [pnp]")
+                ->check(CLI::IsMember({"pnp", "visual-map", "both"}));
             OptionTable options = DescribeOptions(&arguments->options);
             const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
             options.insert(options.end(), of_tracker.begin(), of_tracker.end());
+            for (const OptionTable& of_visual : {DescribeOptions(&arguments->visual_options),
+                                                 DescribeOptions(&arguments->estimate_options)}) {
+              options.insert(options.end(), of_visual.begin(), of_visual.end());
+            }
             arguments->option_arguments.Add(app, options);
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },

@@ -180,6 +180,22 @@ Result<std::shared_ptr<const Views>> Map::FloorViews() const {
   return std::static_pointer_cast<const Views>(cache_.Insert(kWholeViews, std::move(views), num_bytes));
 }
 
+Result<VisualMapData> Map::LandmarkModels() const {
+  if (!has_visual_map()) {
+    return MakeError(ErrorCode::kNotFound,
+                     "map '{}' has no visual map; set [emit_map] visual_map = true in its recipe and compile "
+                     "it again",
+                     head_.name);
+  }
+  VisualMapData models;
+  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kLandmarkModels); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kLandmarkModels, ordinal, DecodeVisualBlock,
+                                                  &MapLayout::MakeVisualBlock));
+    CAIRN_RETURN_IF_ERROR(AppendModels(*block, "map '" + head_.name + "'", &models));
+  }
+  return models;
+}
+
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {
   CAIRN_ASSIGN_OR_RETURN(const auto block, Images(directory_.OrdinalOf(BlockKind::kImages, image)));
   return std::shared_ptr<const MapImage>(block, &block->images[image - block->first]);

@@ -81,6 +81,12 @@ class Map {
   // Errors: NotFound where the map has none; Corrupt.
   Result<std::shared_ptr<const Views>> FloorViews() const;
 
+  // Whether there is a visual map (runtime/visual_map.h).
+  bool has_visual_map() const { return directory_.NumBlocks(BlockKind::kLandmarkModels) > 0; }
+  // The models of all landmarks; their images are in range.  Not kept: who loads them makes more of them.
+  // Errors: NotFound where the map has none; Corrupt.
+  Result<VisualMapData> LandmarkModels() const;
+
   // An image by its index.
   Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;
   // These landmarks (ascending), packed for matching if asked.

@@ -16,6 +16,7 @@
 #include "core/views_database.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/model_landmarks.h"
 
 namespace cairn {
 namespace {
@@ -120,6 +121,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   if (!arguments.sessions_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.sessions, ReadSessionsText(arguments.sessions_path));
+  }
+  if (arguments.options.visual_map) {
+    CAIRN_ASSIGN_OR_RETURN(rows.visual_map,
+                           ModelLandmarks(classes, rows, arguments.options, environment.num_threads));
   }
   CAIRN_RETURN_IF_ERROR(AddDrops(arguments, classes, world, &rows));
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));

@@ -243,7 +243,20 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
       {.name = "documents",
        .value = &options->documents,
        .help = "survey images that retrieval finds: all, or those that link_appearance keeps",
-       .choices = {"all", "kept"}}};
+       .choices = {"all", "kept"}},
+      {.name = "visual_map",
+       .value = &options->visual_map,
+       .help =
+           "store how every landmark looks from where: the visual map, for localization without 3-D points"},
+      {.name = "max_num_sights",
+       .value = &options->max_num_sights,
+       .help = "most sights of a landmark that its models store",
+       .min = 16,
+       .max = 512},
+      {.name = "bad_model_px",
+       .value = &options->bad_model_px,
+       .help = "models that predict left-out sights worse than this count less, px",
+       .min = 0}};
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,

@@ -37,6 +37,14 @@ struct EmitMapOptions {
   std::string words = "landmarks";
   // Survey images that retrieval finds: "all", or "kept": those of the connected dominating set alone.
   std::string documents = "all";
+  // Whether the map gets a model of how every landmark looks from where, for localization without 3-D points
+  // and calibration (runtime/visual_map.h).
+  bool visual_map = false;
+  // Most sights of a landmark that its models store: 5 bytes each.  REQUIRES: in [16, 512]
+  int max_num_sights = 96;
+  // Models that predict left-out sights worse than this (root mean square) are marked and count less, px.
+  // REQUIRES: >= 0
+  double bad_model_px = 20;
 };
 OptionTable DescribeOptions(EmitMapOptions* options);
 

@@ -43,6 +43,9 @@ OptionTable DescribeOptions(SimulateOptions* o) {
        .choices = {"lattice", "driven"}},
       {"spacing_m", &o->spacing_m, "Edge of the lattice, metres", 0.05, 10},
       {"num_headings", &o->num_headings, "Headings of a lattice station (Sala06: 4)", 1, 360},
+      {"survey_area_m", &o->survey_area_m,
+       "Part of the floor that a lattice survey and its queries keep to: x from, y from, x to, y to, metres; "
+       "empty: all"},
       {"step_m", &o->step_m, "Path length between images of a driven survey, metres", 0.01, 5},
       {"clearance_m", &o->clearance_m, "Least distance of the camera from walls and furniture, metres", 0.05,
        2},
@@ -56,6 +59,10 @@ OptionTable DescribeOptions(SimulateOptions* o) {
       {"image_noise", &o->image_noise, "Standard deviation of grey noise in survey images, of 255", 0, 50},
       {"jpeg_quality", &o->jpeg_quality, "Quality of the JPEG files", 1, 100},
       {"num_queries", &o->num_queries, "Held-out images at free poses", 0, 1000000},
+      {.name = "query_headings",
+       .value = &o->query_headings,
+       .help = "Whereto queries of a lattice survey look: any way, or along one of its headings",
+       .choices = {"any", "surveyed"}},
       {"query_tilt_deg", &o->query_tilt_deg, "Standard deviation of the queries' pitch and roll, degrees", 0,
        30},
       {"query_height_m", &o->query_height_m, "Standard deviation of the queries' camera height, metres", 0,
@@ -75,6 +82,13 @@ Status CheckSimulateOptions(const SimulateOptions& options) {
                      "option horizontal_fov_deg = {:g}: a pinhole camera sees at most 140; use "
                      "camera_model = OPENCV_FISHEYE",
                      options.horizontal_fov_deg);
+  }
+  const std::vector<double>& area = options.survey_area_m;
+  if (!area.empty() && !(area.size() == 4 && area[0] < area[2] && area[1] < area[3])) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option survey_area_m has {} numbers: expected x from, y from, x to, y to, each 'from' "
+                     "below its 'to'",
+                     area.size());
   }
   if (options.panorama_width_px % 2 != 0) {
     return MakeError(ErrorCode::kInvalidArgument, "option panorama_width_px = {}: must be even",

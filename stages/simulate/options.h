@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/options.h"
 
@@ -71,6 +72,9 @@ struct SimulateOptions {
   double spacing_m = 0.5;
   // Headings of a lattice station, evenly spread from +x [Sala06: 4].  REQUIRES: in [1, 360]
   int num_headings = 4;
+  // The part of the floor that a lattice survey covers and its queries lie in: x from, y from, x to, y to, m;
+  // empty: all of it.
+  std::vector<double> survey_area_m;
   // Path length between two images of a driven survey.  REQUIRES: in [0.01, 5]
   double step_m = 0.15;
   // Another run through the same building: other places in another order, other noise; a second survey of it,
@@ -93,6 +97,8 @@ struct SimulateOptions {
   // --- The queries: free poses off the lattice, held out
   // REQUIRES: in [0, 1000000]
   int num_queries = 93;
+  // Whereto queries of a lattice survey look: "any" way, or "surveyed": along one of its headings.
+  std::string query_headings = "any";
   // Standard deviations of pitch and roll, and of the height around camera_height_m.
   // REQUIRES: in [0, 30] and [0, 0.3]
   double query_tilt_deg = 2;

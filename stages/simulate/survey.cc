@@ -47,12 +47,22 @@ int NumDigits(size_t count, int least) {
   return std::max(digits, least);
 }
 
+// The part of the floor that is surveyed.
+Rect SurveyArea(const Building& building, const SimulateOptions& options) {
+  const std::vector<double>& area = options.survey_area_m;
+  return area.empty() ? building.layout.bounds : Rect{area[0], area[1], area[2], area[3]};
+}
+
+bool IsInside(const Rect& rect, double x, double y) { return DistanceToRect(rect, x, y) == 0; }
+
 std::vector<Eigen::Vector2d> LatticeStations(const Building& building, const SimulateOptions& options) {
   std::vector<Eigen::Vector2d> stations;
   const Rect& bounds = building.layout.bounds;
+  const Rect area = SurveyArea(building, options);
   for (double y = bounds.y0 + options.spacing_m / 2; y < bounds.y1; y += options.spacing_m) {
     for (double x = bounds.x0 + options.spacing_m / 2; x < bounds.x1; x += options.spacing_m) {
-      if (ClearanceM(building, x, y) >= options.clearance_m) stations.emplace_back(x, y);
+      if (IsInside(area, x, y) && ClearanceM(building, x, y) >= options.clearance_m)
+        stations.emplace_back(x, y);
     }
   }
   return stations;
@@ -78,7 +88,8 @@ Status AddSurveyImages(const Building& building, const SimulateOptions& options,
       return MakeError(
           ErrorCode::kNoData,
           "no place for a station: no point of the lattice with spacing_m = {:g} keeps clearance_m = {:g} "
-          "from walls and furniture; use a smaller spacing or clearance, or a larger building",
+          "from walls and furniture; use a smaller spacing or clearance, or a larger building or "
+          "survey_area_m",
           options.spacing_m, options.clearance_m);
     }
   } else {
@@ -115,7 +126,7 @@ Status AddQueries(const Building& building, const SimulateOptions& options, uint
   const bool lattice = options.survey == "lattice";
   const double unit_m = lattice ? options.spacing_m : 1.0;
   const double greatest_m = lattice ? kGreatestOffset * options.spacing_m : kGreatestDriveOffsetM;
-  const Rect& bounds = building.layout.bounds;
+  const Rect bounds = lattice ? SurveyArea(building, options) : building.layout.bounds;
   const int digits = NumDigits(options.num_queries, 3);
   const double focal_px = survey->query_camera.MeanFocal();
   for (int q = 0; q < options.num_queries; ++q) {
@@ -138,9 +149,12 @@ Status AddQueries(const Building& building, const SimulateOptions& options, uint
              ClearanceM(building, place.x(), place.y()) < options.clearance_m);
     PlannedImage image;
     image.name = fmt::format("q{:0{}}.jpg", q, digits);
+    const double turns = random.Uniform();
+    const bool surveyed = options.query_headings == "surveyed";
     const double heading =
-        lattice ? random.Uniform(0, 2 * std::numbers::pi)
-                : headings[nearest.first] + RadFromDeg(random.Uniform(-kDriveHeadingDeg, kDriveHeadingDeg));
+        lattice ? 2 * std::numbers::pi *
+                      (surveyed ? std::floor(turns * options.num_headings) / options.num_headings : turns)
+                : headings[nearest.first] + RadFromDeg(2 * kDriveHeadingDeg * turns - kDriveHeadingDeg);
     const double pitch = RadFromDeg(random.Normal(0, options.query_tilt_deg));
     const double roll = RadFromDeg(random.Normal(0, options.query_tilt_deg));
     const double height = std::clamp(options.camera_height_m + random.Normal(0, options.query_height_m), 0.05,

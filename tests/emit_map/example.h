@@ -4,6 +4,7 @@
 #include "core/decomposition.h"
 #include "core/feature_class.h"
 #include "core/views.h"
+#include "core/visual_map.h"
 #include "core/vocabulary_tree.h"
 #include "core/world.h"
 
@@ -116,6 +117,24 @@ inline Views MakeExampleViews() {
   views.index = {{4, 6, 6, 2, 2}, {3, 5, 5, 1.5F, 2}};
   views.links = {{0, 1, 1, 2}};
   return views;
+}
+
+// Models of the first and the last of three landmarks, of sights in three images.
+inline VisualMapData MakeExampleVisualMap() {
+  VisualMapData visual_map;
+  visual_map.camera_id = 3;
+  visual_map.focal_px = 321.5F;
+  visual_map.headings_deg = {0, 90, 180.25};
+  visual_map.landmarks.resize(3);
+  HeadingModel model{.heading = 0, .shape = {2, 3}, .sigma = {0.5, 0.25, 0.125}};
+  for (int32_t image = 0; image < 3; ++image)
+    model.sights.push_back({image, {100.125F + image, 50, 1.5F - 0.25F * image}});
+  visual_map.landmarks[0] = {model};
+  model.heading = 2;
+  model.predicts_badly = true;
+  visual_map.landmarks[2] = {visual_map.landmarks[0][0], model};
+  const Status status = RoundAsStored(&visual_map);
+  return status.ok() ? visual_map : VisualMapData();
 }
 
 }  // namespace cairn

@@ -22,6 +22,7 @@ MapRows ExampleRows() {
   MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
                           {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1}, &example.appearance);
   rows.views = MakeExampleViews();
+  rows.visual_map = MakeExampleVisualMap();
   return rows;
 }
 
@@ -129,6 +130,9 @@ struct EncodedBlocks {
       case BlockKind::kViewRegions:
         CAIRN_RETURN_IF_ERROR(DecodeViewBlock(changed, entry, directory, "block"));
         return Ok();
+      case BlockKind::kLandmarkModels:
+        CAIRN_RETURN_IF_ERROR(DecodeVisualBlock(changed, entry, directory, "block"));
+        return Ok();
     }
     return Ok();
   }
@@ -136,7 +140,7 @@ struct EncodedBlocks {
 
 TEST(MapBlocks, EveryTruncationIsRefused) {
   const EncodedBlocks blocks;
-  ASSERT_EQ(blocks.bytes.size(), 11u);
+  ASSERT_EQ(blocks.bytes.size(), 12u);
   for (size_t block = 0; block < blocks.bytes.size(); ++block) {
     const std::string& bytes = blocks.bytes[block];
     EXPECT_TRUE(blocks.Decode(block, bytes).ok());
@@ -233,6 +237,21 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
         ViewBlock regions = layout.MakeViewBlock(entry);
         change(regions.regions[0]);
         EXPECT_FALSE(blocks.Decode(i, EncodeBlock(regions)).ok());
+      }
+    } else if (entry.kind == static_cast<uint8_t>(BlockKind::kLandmarkModels)) {
+      for (const auto& change : std::vector<std::function<void(VisualMapData&)>>{
+               [](VisualMapData& part) { part.landmarks[0][0].heading = 3; },
+               [](VisualMapData& part) { part.landmarks[0][0].shape.length = kNumKernelLengths; },
+               [](VisualMapData& part) { part.landmarks[0][0].sights[2].image = 3; },
+               [](VisualMapData& part) { part.landmarks[0][0].sights.pop_back(); },
+               [](VisualMapData& part) { part.headings_deg[2] = 360; },
+               [](VisualMapData& part) { part.headings_deg[2] = 90; },
+               [](VisualMapData& part) { part.headings_deg.clear(); },
+               [](VisualMapData& part) { part.focal_px = -1; },
+               [](VisualMapData& part) { part.focal_px = std::nanf(""); }}) {
+        VisualBlock models = layout.MakeVisualBlock(entry);
+        change(models.part);
+        EXPECT_FALSE(blocks.Decode(i, EncodeBlock(models)).ok());
       }
     } else if (entry.kind == static_cast<uint8_t>(BlockKind::kWords)) {
       WordBlock words = layout.MakeWordBlock(entry);

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <filesystem>
+#include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -215,6 +216,61 @@ TEST(MapFile, FloorPlansReadBackAsTheyWere) {
   rows.views = MakeExampleViews();
   std::swap(rows.views.face_vertices[0], rows.views.face_vertices[3]);
   EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "vertices are not numbered by use";
+}
+
+TEST(MapFile, VisualMapsReadBackAsTheyWere) {
+  MapRows rows = ExampleRows();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("without.cairn")).ok());
+  rows.visual_map = MakeExampleVisualMap();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("visual.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("visual.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  const VisualMapData& found = read->visual_map;
+  EXPECT_EQ(found.camera_id, 3u);
+  EXPECT_EQ(found.focal_px, 321.5F);
+  EXPECT_EQ(found.headings_deg, rows.visual_map.headings_deg);
+  ASSERT_EQ(found.landmarks.size(), 3u);
+  EXPECT_TRUE(found.landmarks[1].empty());
+  ASSERT_EQ(found.landmarks[2].size(), 2u);
+  const HeadingModel& model = found.landmarks[2][1];
+  EXPECT_EQ(model.heading, 2);
+  EXPECT_EQ(model.shape, (KernelShape{2, 3}));
+  EXPECT_TRUE(model.predicts_badly);
+  EXPECT_EQ(model.sights, rows.visual_map.landmarks[2][1].sights);
+  EXPECT_EQ(model.sigma, rows.visual_map.landmarks[2][1].sigma);
+  ASSERT_TRUE(WriteMapRows(*read, MapPath("visual2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("visual.cairn")), *ReadFile(MapPath("visual2.cairn")));
+  // Who does not ask for it has the same map as before.
+  rows.visual_map = {};
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("without2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("without.cairn")), *ReadFile(MapPath("without2.cairn")));
+}
+
+TEST(MapFile, VisualMapsThatMakeNoSenseAreNotWritten) {
+  for (const auto& change : std::vector<std::function<void(VisualMapData&)>>{
+           [](VisualMapData& data) { data.landmarks.pop_back(); },
+           [](VisualMapData& data) { data.landmarks[0][0].sights[0].image = 1; },
+           [](VisualMapData& data) { data.landmarks[0][0].sights[1].seen.x() = std::nanf(""); },
+           [](VisualMapData& data) { data.landmarks[0][0].sigma.y() = -1; },
+           [](VisualMapData& data) { data.landmarks[2][0].heading = 2; },
+           [](VisualMapData& data) {
+             data.headings_deg = {90, 0, 180};
+           }}) {
+    MapRows rows = ExampleRows();
+    rows.visual_map = MakeExampleVisualMap();
+    change(rows.visual_map);
+    const Status status = WriteMapRows(rows, MapPath("bad.cairn"));
+    ASSERT_FALSE(status.ok());
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST(RoundAsStored, RefusesWhatLiesOutsideOfTheLargestImage) {
+  for (const float x : {-2049.0F, 6200.0F, std::nanf("")}) {
+    VisualMapData data = MakeExampleVisualMap();
+    data.landmarks[0][0].sights[0].seen.x() = x;
+    EXPECT_EQ(RoundAsStored(&data).error().code, ErrorCode::kUnsupported);
+  }
 }
 
 TEST(MapFile, VerticesOfAPlanAreNumberedByUse) {

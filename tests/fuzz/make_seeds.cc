@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
                          .documents = "kept"},
                         &example.appearance);
     if (!rows.ok() || !AddViews(MakeExampleViews(), &*rows).ok()) return 1;
+    rows->visual_map = MakeExampleVisualMap();
     rows->findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                         {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
     rows->findings.drops = {
@@ -37,9 +38,9 @@ int main(int argc, char** argv) {
       const std::string seed = std::string(1, static_cast<char>(entry.kind)) + counts + *file->ReadBlock(i);
       if (!WriteFileAtomically(fmt::format("{}/block_{}", folder, entry.kind), seed).ok()) return 1;
     }
-    if (!WriteFileAtomically(folder + "/directory", "\x0c" + file->directory().Encode()).ok()) return 1;
+    if (!WriteFileAtomically(folder + "/directory", "\x0d" + file->directory().Encode()).ok()) return 1;
     if (!WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok()) return 1;
   }
   const auto old = ReadFile(argv[2]);
-  return old.ok() && WriteFileAtomically(folder + "/map_version1", "\x0d" + *old).ok() ? 0 : 1;
+  return old.ok() && WriteFileAtomically(folder + "/map_version1", "\x0e" + *old).ok() ? 0 : 1;
 }

@@ -1,6 +1,6 @@
 // What a robot reads, fed with any bytes: libFuzzer's entry.  The first byte chooses: 0 a whole map file,
-// opened, read and asked for a place and a way; 1 to 11 a block of that kind, the next 12 bytes being
-// the counts that its directory states; 12 a directory; 13 a map of format 1.  Built with the preset `fuzz`,
+// opened, read and asked for a place and a way; 1 to 12 a block of that kind, the next 13 bytes being
+// the counts that its directory states; 13 a directory; 14 a map of format 1.  Built with the preset `fuzz`,
 // hashes are not compared, so that what lies behind them is reached.
 #include <unistd.h>
 
@@ -60,6 +60,8 @@ void TryFile(std::string_view bytes) {
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera).ok();
   (void)localizer.LocalizeFeatures(SomeFeatures(), camera, PosePrior{}).ok();
   if (const auto views = (*map)->FloorViews(); views.ok()) (void)FaceLocator(**views).Find({0.5, 0.5});
+  if (const auto visual = VisualMap::Load(**map); visual.ok())
+    (void)EstimateVisualPose(**visual, {{0, {10, 20, 1}}, {2, {90, 40, 2}}}).ok();
   (void)PlanRoute(**map, 0, static_cast<int32_t>((*map)->num_images()) - 1).ok();
 }
 
@@ -133,6 +135,12 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
       if (plan.ok() && !DecodeFloorPlan(EncodeFloorPlan(*plan), entry, directory, "block").ok()) std::abort();
       break;
     }
+    case BlockKind::kLandmarkModels: {
+      const auto models = DecodeVisualBlock(bytes, entry, directory, "block");
+      if (models.ok() && !DecodeVisualBlock(EncodeBlock(*models), entry, directory, "block").ok())
+        std::abort();
+      break;
+    }
     case BlockKind::kViewRegions: {
       const auto regions = DecodeViewBlock(bytes, entry, directory, "block");
       if (regions.ok() && !DecodeViewBlock(EncodeBlock(*regions), entry, directory, "block").ok())
@@ -148,12 +156,12 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   if (size == 0) return 0;
   const std::string_view rest(reinterpret_cast<const char*>(bytes) + 1, size - 1);
-  const int choice = bytes[0] % 14;
+  const int choice = bytes[0] % 15;
   if (choice == 0) {
     cairn::TryFile(rest);
   } else if (choice < cairn::kNumBlockKinds) {
     cairn::TryBlock(static_cast<cairn::BlockKind>(choice), rest);
-  } else if (choice == 12) {
+  } else if (choice == 13) {
     (void)cairn::MapDirectory::Decode(rest, 1 << 20).ok();
   } else {
     (void)cairn::ReadMapRowsVersion1(cairn::WriteTemporary(rest)).ok();

@@ -1,6 +1,7 @@
 #include "stages/simulate/survey.h"
 
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -92,6 +93,29 @@ TEST(PlanSurvey, AsksFromFreePlacesOffTheLattice) {
       nearest = std::min(nearest, (station - centre.head<2>()).norm());
     EXPECT_GT(nearest, 0.05);
     EXPECT_LT(nearest, 0.5);
+  }
+}
+
+TEST(PlanSurvey, KeepsToThePartOfTheFloorAskedFor) {
+  SimulateOptions options = QuickOptions();
+  options.width_m = 8, options.depth_m = 9.3, options.num_rooms = 2, options.corridor_width_m = 5;
+  options.spacing_m = 0.25;
+  options.survey_area_m = {0.8, 3.3, 7.0, 6.2};
+  options.query_headings = "surveyed";
+  const Survey survey = *PlanSurvey(*MakeBuilding(options, 0), options, 0);
+  EXPECT_EQ(survey.stations.size(), 25u * 12u);
+  for (const PlannedImage& query : survey.queries) {
+    const Eigen::Vector3d centre = query.cam_from_world.Center();
+    EXPECT_TRUE(centre.x() >= 0.8 && centre.x() <= 7 && centre.y() >= 3.3 && centre.y() <= 6.2);
+    const Eigen::Vector3d forward = query.cam_from_world.ViewingDirection();
+    const double quarters = std::atan2(forward.y(), forward.x()) / (std::numbers::pi / 2);
+    EXPECT_NEAR(quarters, std::round(quarters), 0.01);  // as level as rolled and pitched cameras are
+  }
+  for (const std::vector<double>& bad : {std::vector<double>{1, 2, 3}, {3, 1, 1, 2}, {20, 20, 21, 21}}) {
+    options.survey_area_m = bad;
+    const Result<Survey> none = PlanSurvey(*MakeBuilding(QuickOptions(), 0), options, 0);
+    ASSERT_FALSE(none.ok());
+    EXPECT_NE(none.error().message.find("survey_area_m"), std::string::npos);
   }
 }
 

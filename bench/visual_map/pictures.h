@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "runtime/visual_estimate.h"
+
+namespace cairn {
+
+// p(x | z) over the survey's places for one image [Sala06 Fig. 15]: the darker, the likelier (tenfold less is
+// one step lighter); a cross where the image was taken, a circle at the maximum.
+std::string PosteriorSvg(const std::string& title, const VisualMap& map, const VisualPose& pose,
+                         const Eigen::Vector2d& truth);
+
+// Arrows from where images were taken to where they were placed [Sala06 Fig. 16], dotted where flagged.
+struct ErrorArrow {
+  Eigen::Vector2d truth, found;
+  bool is_flagged = false;
+};
+std::string ErrorSvg(const std::string& title, const VisualMap& map, const std::vector<ErrorArrow>& arrows);
+
+}  // namespace cairn

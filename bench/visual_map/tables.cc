@@ -1,0 +1,261 @@
+// The source's experiment on maps of one survey [Sala06 §VI-C, Tables V and VI]: held-out images localized by
+// the visual map, and by PnP with the same landmarks and features.  The first map is the one of all features:
+// divergences are from its posteriors.
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "bench/visual_map/pictures.h"
+#include "core/capture.h"
+#include "core/file.h"
+#include "core/floor_pose.h"
+#include "core/image_file.h"
+#include "runtime/localizer.h"
+#include "runtime/visual_estimate.h"
+
+namespace cairn {
+namespace {
+
+struct Arguments {
+  std::string capture;
+  std::vector<std::string> maps;
+  std::string queries;
+  std::string pictures;
+  int max_num_features = 450;
+  double uniform_weight = 0.1;
+  bool print_all = false;
+};
+
+// Processor time: others may use the machine.
+double CpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+double Mean(const std::vector<double>& values) {
+  return values.empty()
+             ? std::numeric_limits<double>::quiet_NaN()
+             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double Deviation(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += (value - Mean(values)) * (value - Mean(values));
+  return std::sqrt(sum / static_cast<double>(std::max<size_t>(values.size(), 1)));
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+struct TestImage {
+  std::string name;
+  Query query;
+  FloorPose truth;
+  Pose cam_from_world;
+  bool is_inside = false;  // of the survey's hull
+  double feature_seconds = 0;
+};
+
+// Whether a point lies in the convex hull of others: no direction has it beyond them all.
+bool IsInHull(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& at) {
+  for (int i = 0; i < 720; ++i) {
+    const Eigen::Vector2d direction(std::cos(i * 3.14159265358979 / 360),
+                                    std::sin(i * 3.14159265358979 / 360));
+    double farthest = -std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector2d& point : points) farthest = std::max(farthest, direction.dot(point));
+    if (direction.dot(at) > farthest) return false;
+  }
+  return true;
+}
+
+Result<std::vector<TestImage>> ReadTestImages(const Arguments& arguments, const Map& map,
+                                              const VisualMap& visual) {
+  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
+  std::vector<CaptureImage> queries = capture.queries;
+  if (!arguments.queries.empty()) {
+    std::vector<Reject> rejects;
+    CAIRN_ASSIGN_OR_RETURN(queries, ReadImagesText(arguments.queries, &rejects));
+  }
+  std::vector<TestImage> images;
+  for (const CaptureImage& image : queries) {
+    if (!image.cam_from_world) continue;
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(capture.ImagePath(image)));
+    TestImage& test = images.emplace_back();
+    test.name = image.name;
+    const double start = CpuSeconds();
+    CAIRN_ASSIGN_OR_RETURN(Features features,
+                           ExtractSift(grey, {.max_num_features = arguments.max_num_features}));
+    test.query = MakeQuery(std::move(features), capture.cameras.at(image.camera_id), {});
+    test.feature_seconds = CpuSeconds() - start;
+    test.truth = FloorPoseOf(*image.cam_from_world, map.head().floor_from_world);
+    test.cam_from_world = *image.cam_from_world;
+    test.is_inside = IsInHull(visual.places(), test.truth.position);
+  }
+  return images;
+}
+
+struct Row {
+  std::string name;
+  int64_t num_landmarks = 0;
+  double megabytes = 0, model_bytes = 0;
+  int num_fixes = 0, num_wrong = 0, num_flagged_outside = 0, num_outside = 0, num_inside = 0;
+  std::vector<double> lattice_cm;  // of the likeliest place of the survey, as the source's estimate
+  std::vector<double> errors_cm, all_errors_cm, errors_deg, seconds, search_seconds, divergences, nees,
+      matches;
+  int num_pnp = 0, num_pnp_wrong = 0;
+  std::vector<double> pnp_cm, pnp_seconds;
+};
+
+void AddVisual(const TestImage& test, const VisualMap& map, const VisualPose& pose, Row* row) {
+  const double error_cm = 100 * (pose.position - test.truth.position).norm();
+  if (!test.is_inside) {
+    ++row->num_outside;
+    row->num_flagged_outside += pose.flag != VisualFlag::kNone ? 1 : 0;
+    if (pose.flag == VisualFlag::kNone) row->num_wrong += error_cm > 100 ? 1 : 0;
+    return;
+  }
+  ++row->num_inside;
+  row->all_errors_cm.push_back(error_cm);
+  row->matches.push_back(pose.num_agreeing);
+  const auto likeliest = std::max_element(pose.at_place.begin(), pose.at_place.end()) - pose.at_place.begin();
+  row->lattice_cm.push_back(100 * (map.places()[likeliest] - test.truth.position).norm());
+  if (pose.flag != VisualFlag::kNone) return;
+  ++row->num_fixes;
+  row->num_wrong += error_cm > 100 ? 1 : 0;
+  row->errors_cm.push_back(error_cm);
+  row->errors_deg.push_back(AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg));
+  Eigen::Vector3d error;
+  error << pose.position - test.truth.position,
+      RadFromDeg(std::remainder(pose.heading_deg - test.truth.heading_deg, 360));
+  row->nees.push_back(error.dot(pose.covariance.ldlt().solve(error)) / 3);
+}
+
+Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
+  const double start = CpuSeconds();
+  CAIRN_ASSIGN_OR_RETURN(const Localization found,
+                         localizer->LocalizeFeatures(test.query.features, test.query.camera));
+  row->pnp_seconds.push_back(test.feature_seconds + CpuSeconds() - start);
+  if (!found.has_fix() || !test.is_inside) return Ok();
+  ++row->num_pnp;
+  row->pnp_cm.push_back(100 * CenterErrorM(found.cam_from_world, test.cam_from_world));
+  row->num_pnp_wrong += row->pnp_cm.back() > 100 ? 1 : 0;
+  return Ok();
+}
+
+void PrintRow(const Row& row) {
+  fmt::print(
+      "| {} | {} | {:.2f} | {:.0f} | {} of {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | "
+      "{:.4f} | {:.3f} ± {:.3f} | "
+      "{:.2f} | {:.0f} | {} of {} | {} | {:.1f} | {:.1f} | {:.3f} |\n",
+      row.name, row.num_landmarks, row.megabytes, row.model_bytes, row.num_fixes, row.num_inside,
+      row.num_wrong, Mean(row.errors_cm), Median(row.errors_cm), Mean(row.all_errors_cm),
+      Mean(row.lattice_cm), Median(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds),
+      Mean(row.divergences), Deviation(row.divergences), Mean(row.nees), Mean(row.matches),
+      row.num_flagged_outside, row.num_outside, row.num_pnp, Mean(row.pnp_cm), Median(row.pnp_cm),
+      Mean(row.pnp_seconds));
+}
+
+Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,
+                    const std::vector<TestImage>& images, const std::vector<VisualPose>& poses) {
+  std::vector<ErrorArrow> arrows;
+  for (size_t i = 0; i < images.size(); ++i)
+    arrows.push_back({images[i].truth.position, poses[i].position, poses[i].flag != VisualFlag::kNone});
+  CAIRN_RETURN_IF_ERROR(
+      WriteFileAtomically(arguments.pictures + "/errors_" + map_name + ".svg",
+                          ErrorSvg(map_name + ": from the true place to the one found", map, arrows)));
+  return WriteFileAtomically(
+      arguments.pictures + "/posterior_" + map_name + ".svg",
+      PosteriorSvg(map_name + ", " + images[0].name, map, poses[0], images[0].truth.position));
+}
+
+Status Run(const Arguments& arguments) {
+  cv::setNumThreads(1);
+  fmt::print(
+      "| map | landmarks | MB | bytes a model | fixes | > 1 m | mean error (cm) | median | mean, flagged too "
+      "| likeliest place, mean "
+      "| median (deg) | s a pose | without features | KL mean ± sd | NEES | agreeing | outside: flagged | "
+      "PnP fixes | mean (cm) | "
+      "median | s a pose |\n|---|{}\n",
+      "--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+  std::vector<TestImage> images;
+  std::vector<VisualPose> reference;
+  for (const std::string& path : arguments.maps) {
+    CAIRN_ASSIGN_OR_RETURN(const auto map, Map::Open(path));
+    CAIRN_ASSIGN_OR_RETURN(const auto visual, VisualMap::Load(*map));
+    if (images.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(images, ReadTestImages(arguments, *map, *visual));
+    }
+    Row row{.name = std::filesystem::path(path).stem().string(), .num_landmarks = map->num_landmarks()};
+    row.megabytes = static_cast<double>(std::filesystem::file_size(path)) / 1e6;
+    for (int64_t i = 0; i < map->directory().NumBlocks(BlockKind::kLandmarkModels); ++i)
+      row.model_bytes += map->directory().Entry(BlockKind::kLandmarkModels, i).num_bytes /
+                         static_cast<double>(map->num_landmarks());
+    Localizer localizer(map);
+    std::vector<VisualPose> poses;
+    for (const TestImage& test : images) {
+      const double start = CpuSeconds();
+      CAIRN_ASSIGN_OR_RETURN(const auto seen, visual->Match(test.query));
+      CAIRN_ASSIGN_OR_RETURN(const VisualPose pose, EstimateVisualPose(*visual, seen));
+      row.search_seconds.push_back(CpuSeconds() - start);
+      row.seconds.push_back(test.feature_seconds + row.search_seconds.back());
+      if (arguments.print_all) {
+        fmt::print(stderr, "{} {} {} of {} {:.1f} cm {:.2f} deg sd {:.1f} cm elsewhere {:.2g} {}\n", row.name,
+                   test.name, pose.num_agreeing, pose.num_matches,
+                   100 * (pose.position - test.truth.position).norm(),
+                   AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg),
+                   100 * std::sqrt(pose.covariance.topLeftCorner<2, 2>().trace()), pose.elsewhere,
+                   VisualFlagName(pose.flag));
+      }
+      if (!reference.empty() && test.is_inside)
+        row.divergences.push_back(
+            PosteriorDivergence(pose, reference[poses.size()], arguments.uniform_weight));
+      AddVisual(test, *visual, pose, &row);
+      poses.push_back(pose);
+      CAIRN_RETURN_IF_ERROR(AddPnp(test, &localizer, &row));
+    }
+    if (!arguments.pictures.empty()) {
+      CAIRN_RETURN_IF_ERROR(DrawPictures(arguments, row.name, *visual, images, poses));
+    }
+    if (reference.empty()) {
+      reference = std::move(poses);
+      fmt::print(stderr, "{} places, spacing {:.2f} m, focal length {:.1f} px ({})\n",
+                 visual->places().size(), visual->spacing_m(), visual->focal_px(),
+                 visual->has_learnt_focal() ? "learnt" : "guessed");
+    }
+    PrintRow(row);
+  }
+  return Ok();
+}
+
+}  // namespace
+}  // namespace cairn
+
+int main(int argc, char** argv) {
+  CLI::App app{"Localizes held-out images by the visual map and by PnP"};
+  cairn::Arguments arguments;
+  app.add_option("capture", arguments.capture, "Capture with queries.txt")->required();
+  app.add_option("maps", arguments.maps, "Maps with a visual map; the first: of all features")->required();
+  app.add_option("--queries", arguments.queries, "Held-out images [the capture's queries.txt]");
+  app.add_option("--pictures", arguments.pictures, "Folder for pictures of posteriors and errors");
+  app.add_option("--max-num-features", arguments.max_num_features, "Features a query")->capture_default_str();
+  app.add_option("--uniform-weight", arguments.uniform_weight, "Mixed into posteriors before KL")
+      ->capture_default_str();
+  app.add_flag("--print-all", arguments.print_all, "A line per image and map on stderr");
+  CLI11_PARSE(app, argc, argv);
+  const cairn::Status status = cairn::Run(arguments);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
+  return status.ok() ? 0 : 1;
+}

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/error.h"
+#include "core/landmark_model.h"
+#include "core/options.h"
+#include "runtime/map.h"
+#include "runtime/measurement.h"
+
+namespace cairn {
+
+// Localization without 3-D points and without a calibration [Sala06 §VI-C, after Sim & Dudek]: the visual map
+// has, for every landmark and heading, a model of where in the image and how large it shows from where.  It
+// is opt-in ([emit_map] visual_map = true); runtime/visual_estimate.h finds the pose.
+
+struct VisualMapOptions {
+  // A model counts at the survey's places that see the landmark, and at those within this distance of one, in
+  // units of the survey's spacing [Sala06: the poses from which it was seen].  REQUIRES: >= 0
+  double extent_spacings = 1;
+  // Largest ratio of best to second-best descriptor angle, both ways.  REQUIRES: in (0, 1]
+  double visual_max_ratio = 0.85;
+  // Largest angle between the descriptors of a match, radians.  REQUIRES: > 0
+  double visual_max_angle_rad = 0.7;
+};
+OptionTable DescribeOptions(VisualMapOptions* options);
+
+// A keypoint that shows a landmark, as the estimator takes it: no camera.
+struct SeenLandmark {
+  LandmarkIdx landmark = 0;
+  Eigen::Vector3d seen = Eigen::Vector3d::Zero();  // x px, y px, log2 of the scale in px
+};
+
+// The visual map of a map, ready to use: immutable, shareable.
+class VisualMap {
+ public:
+  // What a model says at a place of the survey.
+  struct AtPlace {
+    int32_t place = 0;
+    Eigen::Vector3d seen;                  // from the image's middle
+    Eigen::Matrix<double, 3, 2> gradient;  // d seen / d place, per metre
+  };
+  struct Model {
+    LandmarkIdx landmark = 0;
+    int32_t heading = 0;
+    LandmarkModel interpolation;
+    Eigen::Vector3d sigma;  // as HeadingModel::sigma
+    bool predicts_badly = false;
+    std::vector<AtPlace> extent;  // ascending place
+  };
+
+  // Loads all models.  Errors: NotFound where the map has none; Corrupt (sights of an image that the map
+  // lacks, or that make no model; a camera that it lacks); Io.
+  static Result<std::shared_ptr<const VisualMap>> Load(const Map& map, const VisualMapOptions& options = {});
+
+  // Where the survey was taken, floor frame, metres: the pose lattice, each place once.
+  const std::vector<Eigen::Vector2d>& places() const { return places_; }
+  // Median distance from a place to the next.
+  double spacing_m() const { return spacing_m_; }
+  const std::vector<double>& headings_deg() const { return headings_deg_; }
+  // px; where the survey does not tell how far a turn moves the image, a guess: 1.2 max(width, height).
+  double focal_px() const { return focal_px_; }
+  bool has_learnt_focal() const { return has_learnt_focal_; }
+  // How far off the survey's own images are placed by models that leave them out, per axis and of the
+  // heading, less what chance in so many landmarks explains: what landmarks' errors share (cameras' heights,
+  // places between which models interpolate).
+  double shared_sigma_m() const { return shared_sigma_m_; }
+  double shared_sigma_rad() const { return shared_sigma_rad_; }
+  // Size of the images that it is for.
+  int image_width_px() const { return width_px_; }
+  int image_height_px() const { return height_px_; }
+  Eigen::Vector2d middle_px() const { return {0.5 * width_px_, 0.5 * height_px_}; }
+  const std::vector<Model>& models() const { return models_; }
+  // Of a landmark: indices in models().
+  const std::vector<int32_t>& ModelsOf(LandmarkIdx landmark) const { return models_of_landmark_[landmark]; }
+  int64_t num_landmarks() const { return static_cast<int64_t>(models_of_landmark_.size()); }
+
+  // Matches by mutual nearest descriptors and ratio test with all landmarks of the map, ascending keypoint.
+  // Errors: Unsupported for an image of another size than the survey's.
+  Result<std::vector<SeenLandmark>> Match(const Query& query) const;
+
+ private:
+  VisualMap() = default;
+  Status AddModels(const Map& map, const VisualMapData& data);
+  Status AddPlaces(const Map& map);
+  void FillExtents();
+  void LearnSharedError(const VisualMapData& data);
+  // The error (x m, y m, heading rad) at which the models in which an image is a sight place it when they
+  // leave it out, to first order, and the covariance that their own errors give it.  `in_models`: model,
+  // sight.
+  std::optional<std::pair<Eigen::Vector3d, Eigen::Matrix3d>> PlaceLeftOut(
+      const std::vector<std::pair<size_t, size_t>>& in_models, const VisualMapData& data) const;
+
+  VisualMapOptions options_;
+  std::vector<Eigen::Vector2d> places_;
+  double spacing_m_ = 0;
+  std::vector<double> headings_deg_;
+  double focal_px_ = 0;
+  bool has_learnt_focal_ = false;
+  double shared_sigma_m_ = 0, shared_sigma_rad_ = 0;
+  int width_px_ = 0, height_px_ = 0;
+  std::vector<Model> models_;
+  std::vector<std::vector<int32_t>> models_of_landmark_;
+  std::vector<std::vector<Sight>> sights_;  // of every model, while it is loaded
+  std::shared_ptr<const LandmarkSet> landmarks_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace cairn {
+
+// A keypoint as a bearing on the floor: from where, with which heading, how far right of the image's middle.
+struct FloorSight {
+  Eigen::Vector2d place = Eigen::Vector2d::Zero();  // floor frame, metres
+  double heading_rad = 0;
+  double right_px = 0;
+};
+
+// What a survey with known places and headings says about how far a turn of the camera moves its image: the
+// focal length, px, at which the sights of each landmark (an element) meet best in a point of the floor; the
+// sum over sights of ln(1 + (error / 2 px)^2) decides.  Landmarks that are wrong or move do little harm.
+// 0 where fewer than 20 landmarks have four sights, or the best is at the edge of 0.2 to 5 image widths.
+double LearnFocal(const std::vector<std::vector<FloorSight>>& landmarks, int image_width_px);
+
+}  // namespace cairn
