@@ -358,7 +358,6 @@ MapRows Rows2_3() {
   return rows;
 }
 
-TEST(GoldenMap, TEMPWRITE) { ASSERT_TRUE(WriteMapRows(Rows2_3(), GOLDEN_DIR "/map_2.3.cairn").ok()); }
 // Version 2.3 as the program of that version wrote it.
 TEST(GoldenMap, Version2_3IsRead) {
   const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.3.cairn");

@@ -369,7 +369,7 @@ TEST(LinkAppearance, DoesNotLinkTwinsThatStandFarApart) {
     options.max_link_distance_m = max_link_distance_m;
     std::vector<std::pair<int, int>> pairs;
     const auto result = LinkAppearance(images, given, options, 0);
-    for (const AppearanceLink& link : result->appearance.graph.links())
+    for (const AppearanceLink& link : result->appearance.graph.Links())
       pairs.emplace_back(link.node1, link.node2);
     return pairs;
   };
