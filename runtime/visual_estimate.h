@@ -45,7 +45,7 @@ struct VisualEstimateOptions {
   // standard deviation of their positions in the image, as part of its diagonal; farthest from a place of the
   // survey, in its spacings.  REQUIRES: >= 0
   int min_num_agreeing = 4;
-  double min_agreeing_ratio = 0.35;
+  double min_agreeing_ratio = 0.3;
   double min_spread_ratio = 0.04;
   double max_distance_spacings = 0.75;
 };

@@ -303,7 +303,13 @@ TEST(MapDirectory, EntriesThatMakeNoSenseAreRefused) {
     return MapDirectory::Decode(changed.Encode(), 1'000'000).ok();
   };
   EXPECT_TRUE(with([](BlockEntry*) {}));
-  EXPECT_TRUE(with([](BlockEntry* entry) { entry->kind = 200; }));  // of a later minor version
+  MapDirectory later;
+  for (const BlockEntry& entry : blocks.directory.blocks()) later.Add(entry);
+  BlockEntry unknown = blocks.directory.blocks().back();
+  unknown.first = 0;
+  unknown.kind = 200;  // of a later minor version
+  later.Add(unknown);
+  EXPECT_TRUE(MapDirectory::Decode(later.Encode(), 1'000'000).ok());
   EXPECT_FALSE(with([](BlockEntry* entry) { entry->first = 1; }));
   EXPECT_FALSE(with([](BlockEntry* entry) { entry->count = 1000; }));
   EXPECT_FALSE(with([](BlockEntry* entry) { entry->count = 0; }));

@@ -13,6 +13,7 @@
 #include "core/random.h"
 #include "runtime/localizer.h"
 #include "runtime/route.h"
+#include "runtime/visual_estimate.h"
 
 namespace cairn {
 namespace {

@@ -156,7 +156,10 @@ inline SyntheticRoom MakeSyntheticRoom(uint64_t seed, int num_landmarks = 1600) 
                            region.landmarks.end());
   }
   NoProgress progress;
-  rows.vocabulary = *BuildVocabulary(documents, {}, seed, 2, progress);
+  BuildVocabularyOptions options;  // few words, as those of a large survey: images from elsewhere share some
+  options.tree.descriptors_per_word = 40;
+  options.tree.min_num_descriptors_to_split = 20;
+  rows.vocabulary = *BuildVocabulary(documents, options, seed, 2, progress);
   return room;
 }
 
