@@ -361,7 +361,7 @@ class Estimator {
   static double Entropy(const VisualPose& pose) {
     double entropy = pose.elsewhere > 0 ? -pose.elsewhere * std::log(pose.elsewhere) : 0;
     for (const double share : pose.at_place) entropy -= share > 0 ? share * std::log(share) : 0;
-    return entropy;
+    return std::max(0.0, entropy);  // not a rounding error below
   }
 
   // Of a camera that may be anywhere in the survey.
