@@ -3,7 +3,7 @@
 
 From random survey images to random others by the way of least entropy and by the shortest one (`--weight links`), put
 near each image of it (`--servo ideal`).  Half-way a robot is carried to a place farther along its own way, 3 m or more
-away, and must notice and find out where it is.  Prints for each way: how often robots looked anew, how often they then
+away, up to 0.4 m beside the survey's image there and turned by up to 20 degrees, and must notice and find out where it is.  Prints for each way: how often robots looked anew, how often they then
 took the wrong place (more than 1 m or 45 degrees from where they stood) for the right one, goals reached by truth
 (within 0.3 m and 10 degrees), images and metres driven.
 """
@@ -18,6 +18,7 @@ import tempfile
 
 LEAST_WAY_IMAGES = 10  # shorter ways are not driven
 LEAST_CARRIED_M = 3
+BESIDE_M, TURNED_DEG = 0.4, 20
 
 
 def survey_poses(path):
@@ -87,16 +88,28 @@ def main():
                 half = len(way) // 2
                 farther = [name for name in way[half:] if apart(poses[name], poses[way[half - 1]]) > LEAST_CARRIED_M]
                 if len(way) >= LEAST_WAY_IMAGES and farther:
-                    carried[weight] = f"{half - 1}:" + ",".join(f"{v:.3f}" for v in poses[farther[0]])
+                    x, y, heading = poses[farther[0]]
+                    side, bearing = draw.uniform(0, BESIDE_M), draw.uniform(0, 2 * math.pi)
+                    carried[weight] = (f"{half - 1}:{x + side * math.cos(bearing):.3f},{y + side * math.sin(bearing):.3f},"
+                                       f"{heading + draw.uniform(-TURNED_DEG, TURNED_DEG):.3f}")
             if len(carried) < len(tallies):
                 continue
-            num_done += 1
-            for weight, tally in tallies.items():
-                subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", str(num_done),
+            runs = {}
+            for weight in tallies:
+                if os.path.exists(out):
+                    os.remove(out)
+                subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", str(num_done + 1),
                                 "--start", ",".join(f"{v:.3f}" for v in poses[start]), "--kidnap", carried[weight],
                                 "--weight", weight, "--servo", "ideal", "--ideal-reach-m", "2", "-o", out, *options],
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-                run = json.load(open(out))
+                if not os.path.exists(out):  # carried into a wall
+                    break
+                runs[weight] = json.load(open(out))
+            if len(runs) < len(tallies):
+                continue
+            num_done += 1
+            for weight, tally in tallies.items():
+                run = runs[weight]
                 tally.add(run, not run["error"] and run["goal_error_m"] < 0.3 and run["goal_error_deg"] < 10)
     for weight, tally in tallies.items():
         print(f"{weight}: {num_done} runs; looked anew {tally.looked} times, {tally.wrong} of them wrong, in "
