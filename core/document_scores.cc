@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace cairn {
 
@@ -45,6 +46,13 @@ std::vector<double> ScoreDocuments(const Vocabulary& vocabulary, const BagOfWord
     if (scores[i] > 0) scores[i] = std::min(1.0, scores[i] / (norm * vocabulary.document_norms[i]));
   }
   return scores;
+}
+
+std::vector<int32_t> BestFirst(const std::vector<double>& scores) {
+  std::vector<int32_t> order(scores.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return scores[a] > scores[b]; });
+  return order;
 }
 
 std::vector<double> ProbabilitiesOfScores(const std::vector<double>& scores, double exponent) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/features.h"
@@ -26,6 +27,9 @@ std::vector<BagOfWords> DocumentWords(const Vocabulary& vocabulary);
 // Score of every document, 1 - |q - d|^2 / 2 of the L2-normalised vectors, in [0, 1] [Mariottini11 §IV].
 // Touches shared words only.  A bag without words that score gives zeros.
 std::vector<double> ScoreDocuments(const Vocabulary& vocabulary, const BagOfWords& bag);
+
+// Indices of scores, best first, ties to the smaller.
+std::vector<int32_t> BestFirst(const std::vector<double>& scores);
 
 // --- Scores as probabilities [Mariottini11 §IV: "normalised so as to represent a pdf"; how is not given]
 

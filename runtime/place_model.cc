@@ -1,7 +1,6 @@
 #include "runtime/place_model.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "runtime/no_throw.h"
 
@@ -86,10 +85,7 @@ Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
                                            const RerankOptions& options) const {
   return WithoutExceptions("place model", [&]() -> Result<PlaceScores> {
     const std::vector<double> by_words = ImageScores(CountWords(vocabulary_, query.features.descriptors));
-    std::vector<int32_t> order(by_words.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(),
-                     [&](int32_t a, int32_t b) { return by_words[a] > by_words[b]; });
+    const std::vector<int32_t> order = BestFirst(by_words);
     std::vector<PlaceView> views;
     for (const int32_t image : order) {
       if (by_words[image] <= 0 || static_cast<int>(views.size()) >= options.num_candidates) break;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <set>
 
 namespace cairn {
@@ -27,9 +26,7 @@ std::vector<NodeIdx> WithinReach(const AppearanceGraph& graph, NodeIdx start, in
 // The nodes that may be the start, best score first: each stands for those near to it.
 std::vector<NodeIdx> Candidates(const AppearanceGraph& graph, const std::vector<double>& scores,
                                 const StartHypothesesOptions& options) {
-  std::vector<NodeIdx> order(scores.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](NodeIdx a, NodeIdx b) { return scores[a] > scores[b]; });
+  const std::vector<NodeIdx> order = BestFirst(scores);
   const double min_score = options.min_score_ratio * scores[order[0]];
   std::vector<char> is_taken(scores.size(), 0);
   std::vector<NodeIdx> candidates;

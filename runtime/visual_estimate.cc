@@ -11,16 +11,14 @@
 #include <Eigen/LU>
 
 #include "core/camera_turn.h"
+#include "core/document_scores.h"
 #include "core/pose.h"
 #include "runtime/no_throw.h"
-#include "runtime/visual_fit.h"
+#include "runtime/visual_search.h"
 
 namespace cairn {
 namespace {
 
-// Scales of keypoints lie within this many octaves: the density of a wrong match's scale.
-constexpr double kScaleOctaves = 6;
-constexpr int kNumTurnSteps = 3;
 constexpr int kNumPoseSteps = 10;
 // Best poses between places that are refined.
 constexpr int kNumRefined = 3;
@@ -32,36 +30,19 @@ constexpr double kFlaggedUniform = 0.5;
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
-// One place and heading of the survey, or a point near a place.
-struct Hypothesis {
-  int32_t place = 0;
-  int32_t heading = 0;
-  Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // from the place, metres
-  Turn turn;
-  double log_mass = -std::numeric_limits<double>::infinity();  // unnormalised
-};
-
-// A match with a model that extends to a place.
-struct Term {
-  int match;
-  const VisualMap::Model* model;
-  const VisualMap::AtPlace* at;
-};
-
 class Estimator {
  public:
   Estimator(const VisualMap& map, const std::vector<SeenLandmark>& seen, const VisualEstimateOptions& options,
             const std::vector<double>& prior)
-      : map_(map), seen_(seen), options_(options), num_places_(static_cast<int32_t>(map.places().size())) {
+      : map_(map),
+        seen_(seen),
+        options_(options),
+        num_places_(static_cast<int32_t>(map.places().size())),
+        search_(map, seen, options, log_prior_) {
     for (int32_t place = 0; place < num_places_; ++place) {
       const double share = prior.empty() ? 1.0 / num_places_ : prior[place];
       log_prior_.push_back(std::log((1 - options.elsewhere_ratio) * share));
     }
-    fit_.focal_px = map.focal_px();
-    fit_.tilt_sigma_rad = RadFromDeg(options.tilt_sigma_deg);
-    const double half_step_deg = 180.0 / static_cast<double>(map.headings_deg().size());
-    fit_.max_left_rad = RadFromDeg(options.heading_margin_deg + (map.has_learnt_focal() ? half_step_deg : 0));
-    log_no_match_ = std::log(options.outlier_ratio) * static_cast<double>(seen.size());
   }
 
   VisualPose Run() {
@@ -72,7 +53,7 @@ class Estimator {
       return Flagged(std::move(pose), VisualFlag::kTooFewMatches,
                      fmt::format("{} matched landmarks, at least 2 are needed", pose.num_matches));
     }
-    Search();
+    search_.Run();
     Normalise(&pose);
     const auto refined = BestRefined();
     if (!refined) {
@@ -85,7 +66,7 @@ class Estimator {
 
  private:
   struct Refined {
-    Hypothesis start;
+    VisualHypothesis start;
     Eigen::Vector2d position;
     Turn turn;
     double log_ratio = 0;
@@ -100,144 +81,59 @@ class Estimator {
     return static_cast<int>(std::unique(landmarks.begin(), landmarks.end()) - landmarks.begin());
   }
 
-  // `spread_m`: the item stands for points this far around, standard deviation per axis.
-  FitItem MakeItem(const Term& term, const Eigen::Vector2d& offset, double spread_m) const {
-    FitItem item;
-    item.match = term.match;
-    item.seen = seen_[term.match].seen;
-    item.seen.head<2>() -= map_.middle_px();
-    item.predicted = term.at->seen + term.at->gradient * offset;
-    item.variance = Variance(*term.model) + spread_m * spread_m * term.at->gradient.rowwise().squaredNorm();
-    item.log_odds = LogOdds(*term.model, item.variance);
-    return item;
-  }
-
-  Eigen::Vector3d Variance(const VisualMap::Model& model) const {
-    const double px = options_.visual_sigma_px, octaves = options_.visual_sigma_octaves;
-    return model.sigma.cwiseAbs2() + Eigen::Vector3d(px * px, px * px, octaves * octaves);
-  }
-
-  double LogOdds(const VisualMap::Model& model, const Eigen::Vector3d& variance) const {
-    const double outliers =
-        model.predicts_badly ? 0.5 * (1 + options_.outlier_ratio) : options_.outlier_ratio;
-    const double space = kScaleOctaves * map_.image_width_px() * map_.image_height_px();
-    return std::log((1 - outliers) / outliers * space) - 1.5 * std::log(2 * std::numbers::pi) -
-           0.5 * std::log(variance.prod());
-  }
-
-  void Search() {
-    const auto num_headings = static_cast<int32_t>(map_.headings_deg().size());
-    terms_.assign(static_cast<size_t>(num_places_) * num_headings, {});
-    for (int match = 0; match < static_cast<int>(seen_.size()); ++match) {
-      for (const int32_t index : map_.ModelsOf(seen_[match].landmark)) {
-        const VisualMap::Model& model = map_.models()[index];
-        for (const VisualMap::AtPlace& at : model.extent)
-          terms_[static_cast<size_t>(model.heading) * num_places_ + at.place].push_back({match, &model, &at});
-      }
-    }
-    const double spread_m = map_.spacing_m() / std::sqrt(12.0);
-    std::vector<FitItem> items;
-    for (int32_t heading = 0; heading < num_headings; ++heading) {
-      for (int32_t place = 0; place < num_places_; ++place) {
-        Hypothesis hypothesis{.place = place, .heading = heading};
-        items.clear();
-        for (const Term& term : TermsOf(hypothesis)) items.push_back(MakeItem(term, {0, 0}, spread_m));
-        hypothesis.turn.left = VoteForLeft(items, fit_);
-        hypothesis.log_mass =
-            log_prior_[place] + log_no_match_ + FitTurn(items, fit_, kNumTurnSteps, &hypothesis.turn);
-        coarse_.push_back(hypothesis);
-      }
-    }
-    Subdivide(&items);
-  }
-
-  const std::vector<Term>& TermsOf(const Hypothesis& hypothesis) const {
-    return terms_[static_cast<size_t>(hypothesis.heading) * num_places_ + hypothesis.place];
-  }
-
-  // Replaces the best hypotheses by those of points around their places.
-  void Subdivide(std::vector<FitItem>* items) {
-    std::vector<size_t> order(coarse_.size());
-    std::iota(order.begin(), order.end(), size_t{0});
-    const size_t count = std::min<size_t>(order.size(), options_.num_refined_places);
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-                      [&](size_t a, size_t b) {
-                        return std::pair(-coarse_[a].log_mass, a) < std::pair(-coarse_[b].log_mass, b);
-                      });
-    const int n = options_.num_subdivisions;
-    const double step_m = map_.spacing_m() / n;
-    for (size_t i = 0; i < count; ++i) {
-      Hypothesis& place = coarse_[order[i]];
-      for (int row = 0; row < n; ++row) {
-        for (int col = 0; col < n; ++col) {
-          Hypothesis point = place;
-          point.offset = {(col - 0.5 * (n - 1)) * step_m, (row - 0.5 * (n - 1)) * step_m};
-          items->clear();
-          for (const Term& term : TermsOf(point))
-            items->push_back(MakeItem(term, point.offset, step_m / std::sqrt(12.0)));
-          point.log_mass = log_prior_[point.place] + log_no_match_ - 2 * std::log(n) +
-                           FitTurn(*items, fit_, kNumTurnSteps, &point.turn);
-          fine_.push_back(point);
-        }
-      }
-      place.log_mass = -std::numeric_limits<double>::infinity();
-    }
-  }
-
   void Normalise(VisualPose* pose) {
     const double log_elsewhere = std::log(options_.elsewhere_ratio);
     double largest = log_elsewhere;
-    for (const auto* hypotheses : {&coarse_, &fine_}) {
-      for (const Hypothesis& hypothesis : *hypotheses) largest = std::max(largest, hypothesis.log_mass);
-    }
+    for (const VisualHypothesis& hypothesis : search_.hypotheses())
+      largest = std::max(largest, hypothesis.log_mass);
     double sum = std::exp(log_elsewhere - largest);
-    for (const auto* hypotheses : {&coarse_, &fine_}) {
-      for (const Hypothesis& hypothesis : *hypotheses) sum += std::exp(hypothesis.log_mass - largest);
-    }
+    for (const VisualHypothesis& hypothesis : search_.hypotheses())
+      sum += std::exp(hypothesis.log_mass - largest);
     log_sum_ = largest + std::log(sum);
     pose->elsewhere = std::exp(log_elsewhere - log_sum_);
     const size_t num_headings = map_.headings_deg().size();
     pose->at_heading.assign(num_places_, std::vector<double>(num_headings, 0));
     pose->turn_rad.assign(num_places_, std::vector<double>(num_headings, 0));
     std::vector<std::vector<double>> best(num_places_, std::vector<double>(num_headings, -1));
-    for (const auto* hypotheses : {&coarse_, &fine_}) {
-      for (const Hypothesis& hypothesis : *hypotheses) {
-        const double share = ShareOf(hypothesis);
-        pose->at_heading[hypothesis.place][hypothesis.heading] += share;
-        if (share <= best[hypothesis.place][hypothesis.heading]) continue;
-        best[hypothesis.place][hypothesis.heading] = share;
-        pose->turn_rad[hypothesis.place][hypothesis.heading] = hypothesis.turn.left;
-      }
+    for (const VisualHypothesis& hypothesis : search_.hypotheses()) {
+      const double share = ShareOf(hypothesis);
+      pose->at_heading[hypothesis.place][hypothesis.heading] += share;
+      if (share <= best[hypothesis.place][hypothesis.heading]) continue;
+      best[hypothesis.place][hypothesis.heading] = share;
+      pose->turn_rad[hypothesis.place][hypothesis.heading] = hypothesis.turn.left;
     }
     for (const std::vector<double>& of_place : pose->at_heading)
       pose->at_place.push_back(std::accumulate(of_place.begin(), of_place.end(), 0.0));
   }
 
-  double ShareOf(const Hypothesis& hypothesis) const { return std::exp(hypothesis.log_mass - log_sum_); }
+  double ShareOf(const VisualHypothesis& hypothesis) const {
+    return std::exp(hypothesis.log_mass - log_sum_);
+  }
 
   std::optional<Refined> BestRefined() const {
-    std::vector<size_t> order(fine_.size());
-    std::iota(order.begin(), order.end(), size_t{0});
+    const std::vector<VisualHypothesis>& hypotheses = search_.hypotheses();
+    std::vector<size_t> order(hypotheses.size() - search_.first_point());
+    std::iota(order.begin(), order.end(), search_.first_point());
     std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-      return std::pair(-fine_[a].log_mass, a) < std::pair(-fine_[b].log_mass, b);
+      return std::pair(-hypotheses[a].log_mass, a) < std::pair(-hypotheses[b].log_mass, b);
     });
     std::optional<Refined> best;
     std::vector<std::pair<int32_t, int32_t>> tried;
     for (const size_t i : order) {
-      const std::pair place(fine_[i].place, fine_[i].heading);
+      const std::pair place(hypotheses[i].place, hypotheses[i].heading);
       if (std::find(tried.begin(), tried.end(), place) != tried.end()) continue;
       if (static_cast<int>(tried.size()) == kNumRefined) break;
       tried.push_back(place);
-      const auto refined = Refine(fine_[i]);
+      const auto refined = Refine(hypotheses[i]);
       if (refined && (!best || refined->log_ratio > best->log_ratio)) best = refined;
     }
     return best;
   }
 
   // Gauss-Newton over place and turn with the models themselves.
-  std::optional<Refined> Refine(const Hypothesis& start) const {
-    const std::vector<Term>& terms = TermsOf(start);
-    const double tilt_weight = 1 / (fit_.tilt_sigma_rad * fit_.tilt_sigma_rad);
+  std::optional<Refined> Refine(const VisualHypothesis& start) const {
+    const std::vector<VisualTerm>& terms = search_.TermsOf(start);
+    const double tilt_weight = 1 / (search_.fit().tilt_sigma_rad * search_.fit().tilt_sigma_rad);
     Refined refined{
         .start = start, .position = map_.places()[start.place] + start.offset, .turn = start.turn};
     for (int step = 0;; ++step) {
@@ -248,18 +144,19 @@ class Estimator {
       Vector5d gradient(0, 0, 0, tilt_weight * turn.up, tilt_weight * turn.clockwise);
       refined.log_ratio = -0.5 * tilt_weight * (turn.up * turn.up + turn.clockwise * turn.clockwise);
       refined.agreeing.clear();
-      for (const Term& term : terms) {
+      for (const VisualTerm& term : terms) {
         const LandmarkModel::Prediction prediction = term.model->interpolation.Predict(refined.position);
-        FitItem item = MakeItem(term, {0, 0}, 0);
+        FitItem item = search_.MakeItem(term, {0, 0}, 0);
         item.predicted = prediction.seen;
         Eigen::Vector3d error;
         Eigen::Matrix3d by_turn;
-        if (!ItemError(item, rotation, fit_.focal_px, &error, &by_turn)) continue;
+        if (!ItemError(item, rotation, search_.fit().focal_px, &error, &by_turn)) continue;
         const ItemScore score = ScoreItem(item, error);
         refined.log_ratio += score.log_ratio;
         if (score.weight > 0.5) refined.agreeing.push_back(term.match);
         Eigen::Matrix<double, 3, 5> jacobian;
-        jacobian << TurnGradient(item.predicted, rotation, fit_.focal_px) * prediction.gradient, by_turn;
+        jacobian << TurnGradient(item.predicted, rotation, search_.fit().focal_px) * prediction.gradient,
+            by_turn;
         const Eigen::Vector3d weight = score.weight * item.variance.cwiseInverse();
         normal += jacobian.transpose() * weight.asDiagonal() * jacobian;
         gradient += jacobian.transpose() * weight.asDiagonal() * error;
@@ -338,30 +235,28 @@ class Estimator {
     pose->covariance = refined.covariance;
     pose->mean.setZero();
     double sum = 0;
-    for (const auto* hypotheses : {&coarse_, &fine_}) {
-      for (const Hypothesis& hypothesis : *hypotheses) {
-        const double share = ShareOf(hypothesis);
-        const Eigen::Vector2d at = map_.places()[hypothesis.place] + hypothesis.offset;
-        pose->mean += share * at;
-        sum += share;
-        const Eigen::Vector2d away = at - pose->position;
-        if (away.norm() < map_.spacing_m()) continue;
-        pose->covariance.topLeftCorner<2, 2>() += share * away * away.transpose();
-        const double turn = std::remainder(RadFromDeg(map_.headings_deg()[hypothesis.heading]) +
-                                               hypothesis.turn.left - RadFromDeg(pose->heading_deg),
-                                           2 * std::numbers::pi);
-        pose->covariance(2, 2) += share * turn * turn;
-      }
+    for (const VisualHypothesis& hypothesis : search_.hypotheses()) {
+      const double share = ShareOf(hypothesis);
+      const Eigen::Vector2d at = map_.places()[hypothesis.place] + hypothesis.offset;
+      pose->mean += share * at;
+      sum += share;
+      const Eigen::Vector2d away = at - pose->position;
+      if (away.norm() < map_.spacing_m()) continue;
+      pose->covariance.topLeftCorner<2, 2>() += share * away * away.transpose();
+      const double turn = std::remainder(RadFromDeg(map_.headings_deg()[hypothesis.heading]) +
+                                             hypothesis.turn.left - RadFromDeg(pose->heading_deg),
+                                         2 * std::numbers::pi);
+      pose->covariance(2, 2) += share * turn * turn;
     }
     pose->mean = sum > 0 ? Eigen::Vector2d(pose->mean / sum) : pose->position;
     pose->covariance += pose->elsewhere * SurveyCovariance();
-    pose->entropy = Entropy(*pose);
+    pose->entropy = EntropyOf(*pose);
   }
 
-  static double Entropy(const VisualPose& pose) {
-    double entropy = pose.elsewhere > 0 ? -pose.elsewhere * std::log(pose.elsewhere) : 0;
-    for (const double share : pose.at_place) entropy -= share > 0 ? share * std::log(share) : 0;
-    return std::max(0.0, entropy);  // not a rounding error below
+  static double EntropyOf(const VisualPose& pose) {
+    std::vector<double> shares = pose.at_place;
+    shares.push_back(pose.elsewhere);
+    return Entropy(shares);
   }
 
   // Of a camera that may be anywhere in the survey.
@@ -391,9 +286,9 @@ class Estimator {
 
   VisualPose Judge(const Refined& refined, VisualPose pose) const {
     // Matches that could agree with it.
-    const Hypothesis found{.place = NearestPlace(pose.position), .heading = refined.start.heading};
+    const VisualHypothesis found{.place = NearestPlace(pose.position), .heading = refined.start.heading};
     const auto num_possible =
-        static_cast<double>(std::max(TermsOf(found).size(), TermsOf(refined.start).size()));
+        static_cast<double>(std::max(search_.TermsOf(found).size(), search_.TermsOf(refined.start).size()));
     if (pose.num_agreeing < options_.min_num_agreeing || pose.elsewhere > 0.5 ||
         pose.num_agreeing < options_.min_agreeing_ratio * num_possible) {
       return Flagged(std::move(pose), VisualFlag::kDisagree,
@@ -410,9 +305,7 @@ class Estimator {
                      fmt::format("the landmarks lie {:.0f} px apart, at least {:.0f} px are needed",
                                  spread_px, needed_px));
     }
-    double nearest_m = std::numeric_limits<double>::infinity();
-    for (const Eigen::Vector2d& place : map_.places())
-      nearest_m = std::min(nearest_m, (place - pose.position).norm());
+    const double nearest_m = (map_.places()[found.place] - pose.position).norm();
     const double farthest_m = options_.max_distance_spacings * map_.spacing_m();
     if (nearest_m > farthest_m) {
       return Flagged(std::move(pose), VisualFlag::kOutside,
@@ -444,7 +337,7 @@ class Estimator {
     }
     pose.elsewhere = (1 - kFlaggedUniform) * pose.elsewhere + kFlaggedUniform / (num_places_ + 1);
     pose.covariance = SurveyCovariance();
-    pose.entropy = Entropy(pose);
+    pose.entropy = EntropyOf(pose);
     return pose;
   }
 
@@ -453,10 +346,7 @@ class Estimator {
   const VisualEstimateOptions& options_;
   int32_t num_places_;
   std::vector<double> log_prior_;
-  TurnFitOptions fit_;
-  double log_no_match_ = 0;
-  std::vector<std::vector<Term>> terms_;  // per heading and place
-  std::vector<Hypothesis> coarse_, fine_;
+  VisualSearch search_;
   double log_sum_ = 0;
 };
 
@@ -487,52 +377,6 @@ Status CheckInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
 }
 
 }  // namespace
-
-OptionTable DescribeOptions(VisualEstimateOptions* o) {
-  return {
-      {"visual_sigma_px", &o->visual_sigma_px,
-       "visual map: standard deviation of a query's keypoint beside its model's, px", 1e-3},
-      {"visual_sigma_octaves", &o->visual_sigma_octaves, "visual map: the same of its scale, octaves", 1e-3},
-      {"outlier_ratio", &o->outlier_ratio, "visual map: share of wrong matches", 1e-6, 0.999},
-      {"tilt_sigma_deg", &o->tilt_sigma_deg,
-       "visual map: standard deviation of the camera's pitch and roll against the survey's, degrees", 1e-3,
-       45},
-      {"heading_margin_deg", &o->heading_margin_deg,
-       "visual map: headings count this far beyond half way to the next of the survey, degrees", 0, 90},
-      {"num_refined_places", &o->num_refined_places,
-       "visual map: places and headings that are looked at between places", 1},
-      {"num_subdivisions", &o->num_subdivisions, "visual map: parts a side into which they are divided", 1,
-       100},
-      {"shared_sigma_m", &o->shared_sigma_m,
-       "visual map: what does not average out over landmarks, per axis, metres", 0},
-      {"shared_sigma_deg", &o->shared_sigma_deg, "visual map: the same of the heading, degrees", 0},
-      {"elsewhere_ratio", &o->elsewhere_ratio,
-       "visual map: prior probability that the camera is at no place of the survey", 1e-9, 0.999},
-      {"min_num_agreeing", &o->min_num_agreeing,
-       "visual map: least matches that agree with a pose without a flag", 0},
-      {"min_agreeing_ratio", &o->min_agreeing_ratio,
-       "visual map: and least part of the matches whose models extend to it", 0, 1},
-      {"min_spread_ratio", &o->min_spread_ratio,
-       "visual map: least spread of them in the image, as part of its diagonal", 0, 1},
-      {"max_distance_spacings", &o->max_distance_spacings,
-       "visual map: farthest from the survey without a flag, in its spacings", 0}};
-}
-
-const char* VisualFlagName(VisualFlag flag) {
-  switch (flag) {
-    case VisualFlag::kNone:
-      return "none";
-    case VisualFlag::kTooFewMatches:
-      return "too_few_matches";
-    case VisualFlag::kOneSpot:
-      return "one_spot";
-    case VisualFlag::kDisagree:
-      return "disagree";
-    case VisualFlag::kOutside:
-      return "outside";
-  }
-  return "none";
-}
 
 Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                                       const VisualEstimateOptions& options,

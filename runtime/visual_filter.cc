@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/document_scores.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -151,11 +152,9 @@ Result<VisualPose> VisualFilter::See(const std::vector<SeenLandmark>& seen) {
   Eigen::Matrix2d spread =
       Eigen::Matrix2d::Identity() * kCellVariance * map_->spacing_m() * map_->spacing_m();
   pose.mean.setZero();
-  pose.entropy = 0;
+  pose.entropy = Entropy(pose.at_place);
   for (size_t place = 0; place < belief_.size(); ++place) {
-    const double share = pose.at_place[place];
-    pose.mean += share * map_->places()[place];
-    if (share > 0) pose.entropy -= share * std::log(share);
+    pose.mean += pose.at_place[place] * map_->places()[place];
   }
   for (size_t place = 0; place < belief_.size(); ++place) {
     const Eigen::Vector2d away = map_->places()[place] - pose.mean;

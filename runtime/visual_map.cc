@@ -11,6 +11,7 @@
 
 #include "core/descriptor_matcher.h"
 #include "core/floor_pose.h"
+#include "core/median.h"
 #include "core/visual_map.h"
 #include "runtime/no_throw.h"
 #include "runtime/visual_fit.h"
@@ -26,13 +27,6 @@ constexpr double kGuessedFocal = 1.2;  // of the longer side
 // needs.
 constexpr size_t kNumLeftOutImages = 40, kNumOfLeftOutImage = 40, kMinNumOfImage = 8;
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double MedianSpacing(const std::vector<Eigen::Vector2d>& places) {
   std::vector<double> nearest;
   for (size_t i = 0; i < places.size(); ++i) {
@@ -42,9 +36,7 @@ double MedianSpacing(const std::vector<Eigen::Vector2d>& places) {
     }
     nearest.push_back(least);
   }
-  if (nearest.size() < 2) return 1;
-  std::nth_element(nearest.begin(), nearest.begin() + nearest.size() / 2, nearest.end());
-  return nearest[nearest.size() / 2];
+  return nearest.size() < 2 ? 1 : Median(nearest);
 }
 
 }  // namespace
@@ -188,6 +180,7 @@ void VisualMap::LearnSharedError(const VisualMapData& data) {
     chance_m.push_back((found->second(0, 0) + found->second(1, 1)) / 2);
     chance_rad.push_back(found->second(2, 2));
   }
+  if (squared_m.empty()) return;
   // Medians of chi squared: 2 ln 2 of two degrees of freedom, 0.455 of one.
   shared_sigma_m_ = std::sqrt(std::max(0.0, Median(squared_m) / std::numbers::ln2 - Median(chance_m)));
   shared_sigma_rad_ = std::sqrt(std::max(0.0, Median(squared_rad) / 0.455 - Median(chance_rad)));

@@ -3,38 +3,23 @@
 
 From random survey images to random others by the way of least entropy and by the shortest one (`--weight links`), put
 near each image of it (`--servo ideal`).  Half-way a robot is carried to a place farther along its own way, 3 m or more
-away, up to 0.4 m beside the survey's image there and turned by up to 20 degrees, and must notice and find out where it is.  Prints for each way: how often robots looked anew, how often they then
-took the wrong place (more than 1 m or 45 degrees from where they stood) for the right one, goals reached by truth
-(within 0.3 m and 10 degrees), images and metres driven.
+away, up to 0.4 m beside the survey's image there and turned by up to 20 degrees, and must notice and find out where it
+is.  Prints for each way: how often robots looked anew, how often they then took the wrong place (more than 1 m or 45
+degrees from where they stood) for the right one, goals reached by truth (within 0.3 m and 10 degrees), images and metres
+driven.
 """
-import json
 import math
 import os
 import random
 import statistics
 import subprocess
 import sys
-import tempfile
+
+from drives import drive, has_arrived, survey_poses
 
 LEAST_WAY_IMAGES = 10  # shorter ways are not driven
 LEAST_CARRIED_M = 3
 BESIDE_M, TURNED_DEG = 0.4, 20
-
-
-def survey_poses(path):
-    """(x m, y m, heading degrees) by image name, from COLMAP's images.txt."""
-    poses = {}
-    for line in open(path):
-        fields = line.split()
-        if line.startswith("#") or len(fields) < 10:
-            continue
-        w, x, y, z, *t = map(float, fields[1:8])
-        rotation = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-        centre = [-sum(rotation[r][c] * t[r] for r in range(3)) for c in range(2)]
-        poses[fields[9]] = (*centre, math.degrees(math.atan2(rotation[2][1], rotation[2][0])))
-    return poses
 
 
 def apart(a, b):
@@ -74,43 +59,36 @@ def main():
     draw = random.Random(1)
     tallies = {"entropy": Tally(), "links": Tally()}
     num_done = 0
-    with tempfile.TemporaryDirectory() as folder:
-        out = os.path.join(folder, "run.json")
-        while num_done < num:
-            start, goal = draw.choice(names), draw.choice(names)
-            ways = {}
-            for weight in tallies:
-                listing = subprocess.run([cairn, "route", map_path, start, goal, "--weight", weight],
-                                         capture_output=True, text=True).stdout
-                ways[weight] = [word for word in listing.split() if word in poses]
-            carried = {}
-            for weight, way in ways.items():
-                half = len(way) // 2
-                farther = [name for name in way[half:] if apart(poses[name], poses[way[half - 1]]) > LEAST_CARRIED_M]
-                if len(way) >= LEAST_WAY_IMAGES and farther:
-                    x, y, heading = poses[farther[0]]
-                    side, bearing = draw.uniform(0, BESIDE_M), draw.uniform(0, 2 * math.pi)
-                    carried[weight] = (f"{half - 1}:{x + side * math.cos(bearing):.3f},{y + side * math.sin(bearing):.3f},"
-                                       f"{heading + draw.uniform(-TURNED_DEG, TURNED_DEG):.3f}")
-            if len(carried) < len(tallies):
-                continue
-            runs = {}
-            for weight in tallies:
-                if os.path.exists(out):
-                    os.remove(out)
-                subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", str(num_done + 1),
-                                "--start", ",".join(f"{v:.3f}" for v in poses[start]), "--kidnap", carried[weight],
-                                "--weight", weight, "--servo", "ideal", "--ideal-reach-m", "2", "-o", out, *options],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-                if not os.path.exists(out):  # carried into a wall
-                    break
-                runs[weight] = json.load(open(out))
-            if len(runs) < len(tallies):
-                continue
-            num_done += 1
-            for weight, tally in tallies.items():
-                run = runs[weight]
-                tally.add(run, not run["error"] and run["goal_error_m"] < 0.3 and run["goal_error_deg"] < 10)
+    while num_done < num:
+        start, goal = draw.choice(names), draw.choice(names)
+        ways = {}
+        for weight in tallies:
+            listing = subprocess.run([cairn, "route", map_path, start, goal, "--weight", weight],
+                                     capture_output=True, text=True).stdout
+            ways[weight] = [word for word in listing.split() if word in poses]
+        carried = {}
+        for weight, way in ways.items():
+            half = len(way) // 2
+            farther = [name for name in way[half:] if apart(poses[name], poses[way[half - 1]]) > LEAST_CARRIED_M]
+            if len(way) >= LEAST_WAY_IMAGES and farther:
+                x, y, heading = poses[farther[0]]
+                side, bearing = draw.uniform(0, BESIDE_M), draw.uniform(0, 2 * math.pi)
+                carried[weight] = (f"{half - 1}:{x + side * math.cos(bearing):.3f},{y + side * math.sin(bearing):.3f},"
+                                   f"{heading + draw.uniform(-TURNED_DEG, TURNED_DEG):.3f}")
+        if len(carried) < len(tallies):
+            continue
+        runs = {}
+        for weight in tallies:
+            runs[weight] = drive(cairn, map_path, recipe, poses[start], goal, num_done + 1, "--kidnap", carried[weight],
+                                 "--weight", weight, "--servo", "ideal", "--ideal-reach-m", "2", *options)
+            if not runs[weight]:  # carried into a wall
+                break
+        if not all(runs.values()):
+            continue
+        num_done += 1
+        for weight, tally in tallies.items():
+            run = runs[weight]
+            tally.add(run, has_arrived(run))
     for weight, tally in tallies.items():
         print(f"{weight}: {num_done} runs; looked anew {tally.looked} times, {tally.wrong} of them wrong, in "
               f"{tally.wrong_runs} runs; goal reached {tally.goals}; {statistics.mean(tally.images):.1f} images, "

@@ -4,14 +4,11 @@
 From beside random survey images (up to 0.3 m in x and y, 15 degrees) to random others.  Prints every drive: whether the
 robot says that it is there, how far it is from the goal by truth, the way, how often it looked anew, and why it gave up.
 """
-import json
 import os
 import random
-import subprocess
 import sys
-import tempfile
 
-from kidnapped import survey_poses
+from drives import drive, survey_poses
 
 
 def main():
@@ -21,24 +18,17 @@ def main():
     names = sorted(poses)
     draw = random.Random(int(seed))
     num_done, num_reached = 0, 0
-    with tempfile.TemporaryDirectory() as folder:
-        out = os.path.join(folder, "run.json")
-        while num_done < num:
-            x, y, heading = poses[draw.choice(names)]
-            x, y, heading = x + draw.uniform(-.3, .3), y + draw.uniform(-.3, .3), heading + draw.uniform(-15, 15)
-            goal = draw.choice(names)
-            if os.path.exists(out):
-                os.remove(out)
-            subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", seed,
-                            "--start", f"{x:.3f},{y:.3f},{heading:.2f}", "-o", out, *options],
-                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            if not os.path.exists(out):  # a start in a wall
-                continue
-            run = json.load(open(out))
-            num_done += 1
-            num_reached += run["reached"]
-            print(f"{'there' if run['reached'] else 'lost'}: {run['goal_error_m']:.3f} m, {run['goal_error_deg']:.2f} degrees "
-                  f"from {goal}; {run['way_m']:.1f} m, looked anew {run['num_relocalizations']} times  {run['error']}", flush=True)
+    while num_done < num:
+        x, y, heading = poses[draw.choice(names)]
+        x, y, heading = x + draw.uniform(-.3, .3), y + draw.uniform(-.3, .3), heading + draw.uniform(-15, 15)
+        goal = draw.choice(names)
+        run = drive(cairn, map_path, recipe, (x, y, round(heading, 2)), goal, seed, *options)
+        if not run:  # a start in a wall
+            continue
+        num_done += 1
+        num_reached += run["reached"]
+        print(f"{'there' if run['reached'] else 'lost'}: {run['goal_error_m']:.3f} m, {run['goal_error_deg']:.2f} degrees "
+              f"from {goal}; {run['way_m']:.1f} m, looked anew {run['num_relocalizations']} times  {run['error']}", flush=True)
     print(f"{num_reached} of {num_done} reached their goals")
 
 

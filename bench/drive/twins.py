@@ -5,13 +5,11 @@ The starts look out of either wing, from where the way out leads past the panel 
 for those whose first choice was in the wrong wing, the median posterior of the right start after T = 0 ... 4 images, the
 share that reaches the goal image, by truth: within 0.3 m and 10 degrees, and the way to it.
 """
-import json
-import os
 import random
 import statistics
-import subprocess
 import sys
-import tempfile
+
+from drives import drive, has_arrived
 
 WINGS_X = (1.75, 5.45)  # their middles in maps/drive_twins
 LOW_Y, HIGH_Y = 5.0, 6.8
@@ -26,27 +24,21 @@ def main():
     options = sys.argv[6:]
     draw = random.Random(1)
     runs = []
-    with tempfile.TemporaryDirectory() as folder:
-        out = os.path.join(folder, "run.json")
-        for i in range(num):
-            x = WINGS_X[i % 2] + draw.uniform(-0.2, 0.2)
-            y, heading = draw.uniform(LOW_Y, HIGH_Y), -90 + draw.uniform(-8, 8)
-            code = subprocess.run([cairn, "drive", map_path, "--building", recipe, "--goal", goal, "--seed", str(i),
-                                   "--start", f"{x:.3f},{y:.3f},{heading:.2f}", "-o", out, *options],
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
-            run = json.load(open(out))
-            first = run["legs"][0]["hypotheses"]
-            right = [h["start"] for h in first if is_near(h["start_pose"], run["start"])]
-            followed = first[run["legs"][0]["followed"]]["start"] if first else None
-            posteriors = []
-            for leg in run["legs"]:
-                if leg["kind"] == "relocalize":
-                    break
-                if leg["hypotheses"]:
-                    posteriors.append(sum(h["posterior"] for h in leg["hypotheses"] if h["start"] in right))
-            reached = code == 0 and run["goal_error_m"] < 0.3 and run["goal_error_deg"] < 10
-            runs.append((followed not in right, posteriors, reached, run["num_switches"], run["num_relocalizations"],
-                         len(first), run["way_m"]))
+    for i in range(num):
+        x = WINGS_X[i % 2] + draw.uniform(-0.2, 0.2)
+        y, heading = draw.uniform(LOW_Y, HIGH_Y), -90 + draw.uniform(-8, 8)
+        run = drive(cairn, map_path, recipe, (x, y, round(heading, 2)), goal, i, *options)
+        first = run["legs"][0]["hypotheses"]
+        right = [h["start"] for h in first if is_near(h["start_pose"], run["start"])]
+        followed = first[run["legs"][0]["followed"]]["start"] if first else None
+        posteriors = []
+        for leg in run["legs"]:
+            if leg["kind"] == "relocalize":
+                break
+            if leg["hypotheses"]:
+                posteriors.append(sum(h["posterior"] for h in leg["hypotheses"] if h["start"] in right))
+        runs.append((followed not in right, posteriors, has_arrived(run), run["num_switches"], run["num_relocalizations"],
+                     len(first), run["way_m"]))
     for name, part in (("all", runs), ("first choice wrong", [r for r in runs if r[0]])):
         if not part:
             continue

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "core/cancel_only.h"
 #include "stages/decompose_views/check_rings.h"
 #include "stages/decompose_views/join_walls.h"
 #include "stages/decompose_views/node_segments.h"
@@ -16,19 +17,6 @@ namespace {
 constexpr int kNumThreads = 1;
 
 using Vec2 = Eigen::Vector2d;
-
-// Says nothing: a plan's walls alone are few.
-class QuietProgress final : public Progress {
- public:
-  explicit QuietProgress(const Progress& asked) : asked_(asked) {}
-  void Begin(std::string_view, int64_t, std::string_view) override {}
-  void Advance(int64_t) override {}
-  void End() override {}
-  bool Cancelled() const override { return asked_.Cancelled(); }
-
- private:
-  const Progress& asked_;
-};
 
 // A wall in grid coordinates.
 struct Wall {
@@ -228,7 +216,7 @@ class Cleaner {
   }
 
   Result<NodedSegments> Noded(const std::vector<TaggedSegment>& segments) {
-    QuietProgress progress(progress_);
+    CancelOnly progress(progress_);  // a plan's walls alone are few
     return SegmentNoder(segments).Node(kNumThreads, progress);
   }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "core/cancel_only.h"
 #include "core/parallel.h"
 #include "stages/link_appearance/domination.h"
 #include "stages/link_appearance/greedy_dominating_set.h"
@@ -76,23 +77,10 @@ struct ChosenSets {
   std::vector<std::vector<int>> position;
 };
 
-// What is left out is reported, not the tries of each search.
-class CancelOnly final : public Progress {
- public:
-  explicit CancelOnly(const Progress& progress) : progress_(progress) {}
-  void Begin(std::string_view, int64_t, std::string_view) override {}
-  void Advance(int64_t) override {}
-  void End() override {}
-  bool Cancelled() const override { return progress_.Cancelled(); }
-
- private:
-  const Progress& progress_;
-};
-
 ChosenSets Choose(const AppearanceGraph& graph, NodeIdx left_out, const std::vector<Kind>& sets,
                   const std::vector<Kind>& curves, int max_size, uint64_t seed, Progress& progress) {
   ChosenSets chosen;
-  CancelOnly quiet(progress);
+  CancelOnly quiet(progress);  // what is left out is reported, not the tries of each search
   for (const Kind& kind : sets) {
     const std::vector<NodeRole> roles = ChooseKept(graph, kind.options, seed, nullptr, &quiet);
     std::vector<char> kept(graph.num_nodes(), 0);

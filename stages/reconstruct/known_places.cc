@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/file.h"
+#include "core/median.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -48,12 +49,6 @@ Status SplitNames(const std::vector<std::string>& words, size_t last, const std:
   }
   return MakeError(ErrorCode::kCorrupt, "'{}' are not the names of two images of the capture",
                    Join(words, 0, last));
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double WrapLongitude(double longitude_deg) { return std::remainder(longitude_deg, 360.0); }

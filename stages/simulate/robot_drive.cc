@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/pose.h"
 
@@ -110,10 +109,7 @@ class Driver {
   // does.
   Status KeepSeen(const Features& seen, PlaceScores* scores) {
     if (options_.min_start_inliers == 0) return Ok();
-    std::vector<NodeIdx> order(scores->scores.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(),
-                     [&](NodeIdx a, NodeIdx b) { return scores->scores[a] > scores->scores[b]; });
+    std::vector<NodeIdx> order = BestFirst(scores->scores);
     if (static_cast<int>(order.size()) > options_.max_num_start_checks)
       order.resize(options_.max_num_start_checks);
     std::vector<double> kept(scores->scores.size(), 0);

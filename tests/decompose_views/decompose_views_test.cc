@@ -10,9 +10,7 @@
 #include "core/file.h"
 #include "core/random.h"
 #include "core/views_database.h"
-#include "core/visible_walls.h"
 #include "stages/decompose_views/label_faces.h"
-#include "stages/decompose_views/picture.h"
 #include "tests/decompose_views/plan_fixture.h"
 
 namespace cairn {
@@ -429,39 +427,6 @@ TEST(DecomposeViews, SmallRegionsAreJoinedOnRequestAndTheLossIsSaid) {
   }
   EXPECT_GE(same, (1 - merged.loss.area_m2 / TotalArea(exact.views)) * num - 60);
   EXPECT_LT(same, num);
-}
-
-TEST(ViewsPicture, HasTheWallsTheRegionsAndWhatIsLaidOverThem) {
-  const auto result = Decomposed("0,0,2,0\n1,1,3,2");
-  ViewsOverlay overlay;
-  overlay.robots = {{{1, 0.5}, 0, "here"}};
-  overlay.paths = {{{0, 0.5}, {1, 0.5}}};
-  overlay.captions = {"a caption"};
-  const std::string svg = DrawViews(result.views, overlay);
-  EXPECT_THAT(svg, HasSubstr(fmt::format(">{} regions, 2 walls<", result.views.num_faces())));
-  EXPECT_THAT(svg, HasSubstr("<path fill="));
-  EXPECT_THAT(svg, HasSubstr("here"));
-  EXPECT_THAT(svg, HasSubstr("<polyline"));
-  EXPECT_THAT(svg, HasSubstr("a caption"));
-  EXPECT_THAT(DrawViews(result.views, overlay, /*regions=*/false), testing::Not(HasSubstr("id=\"regions\"")));
-}
-
-TEST(VisibleStretches, HideWhatIsBehindAndAreInOrder) {
-  // A screen before the upper wall of a room.
-  const auto result = Decomposed("0,0,4,0\n4,0,4,4\n4,4,0,4\n0,4,0,0\n1,3,3,3");
-  const Views& views = result.views;
-  const Vec2 place(2, 1);
-  const auto stretches = VisibleStretches(views.plan, LabelsAt(views, place), place);
-  double upper = 0, screen = 0;
-  for (const VisibleStretch& stretch : stretches) {
-    if (std::abs(stretch.start.y() - 4) < 1e-6 && std::abs(stretch.end.y() - 4) < 1e-6)
-      upper += stretch.Length();
-    if (std::abs(stretch.start.y() - 3) < 1e-6 && std::abs(stretch.end.y() - 3) < 1e-6)
-      screen += stretch.Length();
-  }
-  // Rays through the screen's ends reach y = 4 at x = 2 -+ 1.5.
-  EXPECT_NEAR(upper, 2 * 0.5, 1e-6);
-  EXPECT_NEAR(screen, 2, 1e-6);
 }
 
 }  // namespace

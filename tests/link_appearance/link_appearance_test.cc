@@ -328,7 +328,7 @@ TEST(LinkAppearance, ImagesTurnedTooFarAgainstEachOtherAreNotLinked) {
   Capture capture;
   for (int i = 0; i < 3; ++i) {
     const std::string name = fmt::format("{}.jpg", i);
-    images.images.push_back({.image_id = i + 1, .name = name});
+    images.images.push_back({.image_id = static_cast<ImageId>(i + 1), .name = name});
     const Eigen::AngleAxisd turn(RadFromDeg(30 * i), Eigen::Vector3d::UnitY());
     capture.images.push_back({name, 1, Pose{Eigen::Quaterniond(turn), Eigen::Vector3d::Zero()}});
   }
