@@ -15,34 +15,39 @@ double LinkWeight(const AppearanceMap& appearance, const RouteOptions& options, 
   return 1;
 }
 
-// Per node what the way to the goal costs and leads to next; -1: no way.
+// Per node what the way to the goal costs, how many links it has and what it leads to next; -1: no way.
 struct Ways {
   std::vector<double> cost;
+  std::vector<int> num_links;
   std::vector<NodeIdx> next;
 };
 
-// Dijkstra from the goal; a way's inner nodes are kept ones.
+// Dijkstra from the goal; a way's inner nodes are kept ones.  Links may cost nothing: of ways that cost the
+// same the one of fewest links is taken, so that none leads in a circle.
 Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& options) {
   const size_t num_nodes = appearance.is_kept.size();
   Ways ways{std::vector<double>(num_nodes, std::numeric_limits<double>::infinity()),
+            std::vector<int>(num_nodes, std::numeric_limits<int>::max()),
             std::vector<NodeIdx>(num_nodes, -1)};
-  using Entry = std::pair<double, NodeIdx>;
+  using Entry = std::tuple<double, int, NodeIdx>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   ways.cost[goal] = 0;
+  ways.num_links[goal] = 0;
   ways.next[goal] = goal;
-  open.emplace(0, goal);
+  open.emplace(0, 0, goal);
   while (!open.empty()) {
-    const auto [cost, node] = open.top();
+    const auto [cost, num_links, node] = open.top();
     open.pop();
-    if (cost > ways.cost[node] || (node != goal && !appearance.is_kept[node])) continue;
+    const bool is_old = std::tie(cost, num_links) > std::tie(ways.cost[node], ways.num_links[node]);
+    if (is_old || (node != goal && !appearance.is_kept[node])) continue;
     for (const AppearanceGraph::Neighbour& neighbour : appearance.graph.Neighbours(node)) {
-      const double through = cost + LinkWeight(appearance, options, node, neighbour);
-      const bool is_better =
-          std::tie(through, node) < std::tie(ways.cost[neighbour.node], ways.next[neighbour.node]);
-      if (neighbour.node == goal || !is_better) continue;
-      if (through < ways.cost[neighbour.node]) open.emplace(through, neighbour.node);
-      ways.cost[neighbour.node] = through;
-      ways.next[neighbour.node] = node;
+      const NodeIdx other = neighbour.node;
+      const auto through = std::tuple(cost + LinkWeight(appearance, options, node, neighbour), num_links + 1);
+      auto known = std::tie(ways.cost[other], ways.num_links[other]);
+      if (other == goal || through > known || (through == known && node >= ways.next[other])) continue;
+      if (through < known) open.emplace(std::get<0>(through), num_links + 1, other);
+      known = through;
+      ways.next[other] = node;
     }
   }
   return ways;

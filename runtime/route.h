@@ -27,9 +27,10 @@ struct NodePath {
 };
 
 // From each start the way of least cost to the goal over kept nodes (its ends may be others) [Booij06 §IV:
-// paths over the connected dominating set; Mariottini11 §V: Dijkstra], of equal ones the one through the
-// smallest nodes; nothing where there is none.  O(links log links).  REQUIRES: nodes of the graph.  Errors:
-// InvalidArgument (no such weight), NotFound (weight "entropy" in a map without entropies).
+// paths over the connected dominating set; Mariottini11 §V: Dijkstra], of equal ones the one of fewest links,
+// of these the one through the smallest nodes; nothing where there is none.  O(links log links).  REQUIRES:
+// nodes of the graph.  Errors: InvalidArgument (no such weight), NotFound (weight "entropy" in a map without
+// entropies).
 Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
                                                        const std::vector<NodeIdx>& starts, NodeIdx goal,
                                                        const RouteOptions& options);

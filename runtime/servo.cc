@@ -17,6 +17,10 @@ constexpr double kRetreatRatio = 0.15;
 constexpr double kApproachable = 0.8;
 // Towards the height of the target a robot goes up to this part of a retreat before it.
 constexpr double kHeightOfTarget = 0.1;
+// Away from what stopped it: as far, over the scene's distance.
+constexpr double kAwayRatio = 0.2;
+// However long it takes, tolerances are doubled no more often.
+constexpr int kMostDoublings = 3;
 // Weight of what own commands taught, after each further command; squared ratio that the first guess weighs.
 constexpr double kForget = 0.9;
 constexpr double kGuessWeight = 2e-4;
@@ -48,6 +52,7 @@ OptionTable DescribeOptions(ServoOptions* o) {
        "arrived: turn from the target's heading, degrees, at most", 1e-3, 45},
       {"arrive_distance_ratio", &o->arrive_distance_ratio,
        "arrived: distance from the target over that of the scene, at most", 1e-4, 1},
+      {"patience_commands", &o->patience_commands, "both double after each so many commands", 1},
       {"max_retreat_ratio", &o->max_retreat_ratio,
        "a retreat ends at this distance behind the target, over that of the scene", 1e-3, 10},
       {"min_num_matches_to_turn", &o->min_num_matches_to_turn,
@@ -115,12 +120,27 @@ void Servo::LearnScale(const PlanarPose& pose) {
   way_ratio_ = kForget * way_ratio_ + ratio * ratio;
 }
 
+double Servo::Patience() const {
+  return std::ldexp(1.0, std::min(num_commands_ / options_.patience_commands, kMostDoublings));
+}
+
+void Servo::Blocked() {
+  if (!last_ || last_speed_m_s_ == 0) return;
+  const PlanarPose pose = last_->PoseInTarget();
+  leg_ = last_speed_m_s_ > 0 ? Leg::kRetreat : Leg::kToHeightOfTarget;
+  leg_side_ = Sign(pose.position.y());
+  blocked_at_ = pose.position;
+  last_speed_m_s_ = 0;
+}
+
 void Servo::ChooseLeg(const PlanarPose& pose) {
+  if (blocked_at_ && (pose.position - *blocked_at_).norm() < kAwayRatio) return;
+  blocked_at_.reset();
   const double behind = -pose.position.x(), beside = std::abs(pose.position.y());
   const double max_heading = RadFromDeg(options_.max_heading_deg);
   const double direction = std::atan2(beside, std::abs(behind));  // |delta|, or of the mirrored way backwards
   const bool in_cone = direction <= max_heading / options_.approach_gain;
-  const bool on_axis = beside <= options_.arrive_distance_ratio;
+  const bool on_axis = beside <= options_.arrive_distance_ratio * Patience();
   const Leg before = leg_;
   switch (leg_) {
     case Leg::kApproach:
@@ -152,7 +172,7 @@ double Servo::WantedHeading(const PlanarPose& pose, int num_inliers) const {
   const double behind = -pose.position.x(), left = pose.position.y();
   if (leg_ == Leg::kRetreat) return leg_side_ * limit;
   if (leg_ == Leg::kToHeightOfTarget) return -leg_side_ * limit;
-  const double tolerance = options_.arrive_distance_ratio;
+  const double tolerance = options_.arrive_distance_ratio * Patience();
   if (std::abs(behind) <= tolerance) return 0;
   // The direction to the target, less what its uncertainty is near the target.
   const double offset = Sign(left) * std::max(0.0, std::abs(left) - 0.5 * tolerance);
@@ -185,8 +205,10 @@ ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {
   last_speed_m_s_ = 0;
 
   const double distance = last_->distance_ratio;
-  const bool is_there = distance <= options_.arrive_distance_ratio;
-  if (is_there && std::abs(pose.heading_rad) <= RadFromDeg(options_.arrive_heading_deg)) {
+  const bool is_there = distance <= options_.arrive_distance_ratio * Patience();
+  const double max_turn = RadFromDeg(options_.arrive_heading_deg) * Patience();
+  ++num_commands_;
+  if (is_there && std::abs(pose.heading_rad) <= max_turn) {
     command.state = ServoState::kArrived;
     command.why = fmt::format("{:.2f} degrees and {:.4f} of the scene's distance from the target",
                               DegFromRad(pose.heading_rad), distance);

@@ -33,7 +33,7 @@ namespace cairn {
 // That needs |gain * delta| within the turn allowed: a robot beside the target first retreats, reversing with
 // its heading turned by max_heading_deg towards the axis, until it stands in one of those cones; where the
 // scene gets too small, it goes forwards to the height of the target with the opposite turn and retreats
-// again.
+// again.  Something that stops the robot ends the leg: from there it goes the other way.
 // The focal length that matches show is remembered from image to image.  Only the speed depends on a scale:
 // the scene's distance is learnt from the way that own commands should have made, from scene_distance_m on.
 struct ServoOptions {
@@ -55,6 +55,9 @@ struct ServoOptions {
   // REQUIRES: > 0
   double arrive_heading_deg = 0.5;
   double arrive_distance_ratio = 0.007;
+  // Both double after each so many commands: where matches are too poor for them the robot would shuttle to
+  // and fro for ever.  REQUIRES: > 0
+  int patience_commands = 40;
   // A retreat ends at this distance behind the target, over that of the scene.  REQUIRES: in (0, 10]
   double max_retreat_ratio = 0.6;
   // With fewer matches than this the robot looks along the target's heading, the fewer the straighter.
@@ -100,6 +103,9 @@ class Servo {
   // that agree, in one spot, not finite.  Deterministic.
   ServoCommand Step(const std::vector<PixelPair>& pairs);
 
+  // The last command did not move the robot: something stands in the way.
+  void Blocked();
+
   // Distance of the scene as learnt so far, metres.
   double scene_distance_m() const { return way_m_ / way_ratio_; }
 
@@ -109,6 +115,7 @@ class Servo {
   void LearnScale(const PlanarPose& pose);
   void ChooseLeg(const PlanarPose& pose);
   double WantedHeading(const PlanarPose& pose, int num_inliers) const;
+  double Patience() const;
 
   Camera camera_;
   ServoOptions options_;
@@ -116,8 +123,12 @@ class Servo {
   // Of the last two: the side of the axis on which they began, 1 left, -1 right; they keep it, however
   // uncertain the side is near the target.
   double leg_side_ = 1;
+  // Where something stopped the robot, in the target's frame over the scene's distance; the leg that followed
+  // goes on until it is away from there.
+  std::optional<Eigen::Vector2d> blocked_at_;
   std::optional<PlanarEpipoles> last_;
   double last_speed_m_s_ = 0;
+  int num_commands_ = 0;
   double way_m_ = 0, way_ratio_ = 0;  // scene distance = first / second
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace cairn {
@@ -48,13 +49,31 @@ class AmbiguitySearch {
     }
   }
 
-  NodeScores Score(NodeIdx node) const {
+  bool OverPlaces() const { return options_.entropy_over == "places"; }
+
+  // The best score that a node's images get at another one that shows the same; 0 where there is none.
+  double BestNearby(NodeIdx node) const {
+    double best = 0;
+    for (const int32_t document : documents_[node]) {
+      const std::vector<double> scores = ScoresOf(document);
+      for (size_t i = 0; i < scores.size(); ++i) {
+        const NodeIdx other = node_of_document_[i];
+        if (static_cast<int32_t>(i) != document && other >= 0 && scores[i] > best && ShowTheSame(node, other))
+          best = scores[i];
+      }
+    }
+    return best;
+  }
+
+  // `again`: what an image scores at least where it was taken, when it is taken another time.
+  NodeScores Score(NodeIdx node, double again) const {
     const size_t num_nodes = appearance_.nodes.size();
     std::vector<double> probabilities(num_nodes, 0.0), best(num_nodes, 0.0);
     for (const int32_t document : documents_[node]) {
-      std::vector<double> scores = ScoreDocuments(vocabulary_, bags_[document]);
-      for (size_t i = 0; i < scores.size(); ++i) {
-        if (node_of_document_[i] < 0) scores[i] = 0;  // of no node: no survey image
+      std::vector<double> scores = ScoresOf(document);
+      if (OverPlaces() && scores[document] > 0) {
+        scores[document] = 0;
+        scores[document] = std::max(again, *std::max_element(scores.begin(), scores.end()));
       }
       const std::vector<double> p = ProbabilitiesOfScores(scores, options_.score_exponent);
       for (size_t i = 0; i < scores.size(); ++i) {
@@ -67,7 +86,7 @@ class AmbiguitySearch {
     double sum = 0;  // less than 1 where other documents share nothing either
     for (const double p : probabilities) sum += p;
     for (double& p : probabilities) p = sum > 0 ? p / sum : 1.0 / static_cast<double>(num_nodes);
-    NodeScores result{.entropy = Entropy(probabilities)};
+    NodeScores result{.entropy = Entropy(OverPlaces() ? OfPlaces(node, probabilities) : probabilities)};
     best[node] = 0;
     const double best_other = *std::max_element(best.begin(), best.end());
     result.apart = LookAlikesApart(node, best, options_.confusable_score_ratio * best_other);
@@ -75,6 +94,41 @@ class AmbiguitySearch {
   }
 
  private:
+  std::vector<double> ScoresOf(int32_t document) const {
+    std::vector<double> scores = ScoreDocuments(vocabulary_, bags_[document]);
+    for (size_t i = 0; i < scores.size(); ++i) {
+      if (node_of_document_[i] < 0) scores[i] = 0;  // of no node: no survey image
+    }
+    return scores;
+  }
+
+  // Of places instead of nodes: the first is the node's own, each other one that of the likeliest node that
+  // is left; a place takes in the nodes that show the same as its first one.
+  std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
+    std::vector<int32_t> order = BestFirst(probabilities);
+    order.insert(order.begin(), node);
+    std::vector<char> is_taken(probabilities.size(), 0);
+    std::vector<double> places;
+    for (const NodeIdx first : order) {
+      if (is_taken[first] || (probabilities[first] <= 0 && first != node)) continue;
+      double sum = 0;
+      for (size_t other = 0; other < probabilities.size(); ++other) {
+        if (is_taken[other] || probabilities[other] <= 0 || !ShowTheSame(first, static_cast<NodeIdx>(other)))
+          continue;
+        is_taken[other] = 1;
+        sum += probabilities[other];
+      }
+      places.push_back(sum);
+    }
+    return places;
+  }
+
+  bool ShowTheSame(NodeIdx a, NodeIdx b) const {
+    if (a == b || appearance_.graph.AreLinked(a, b)) return true;
+    return !places_.empty() && places_[a] && places_[b] &&
+           (places_[a]->position - places_[b]->position).norm() < options_.confusable_distance_m;
+  }
+
   bool AreApart(NodeIdx a, NodeIdx b) const {
     if (places_.empty() || !places_[a] || !places_[b]) return false;
     return (places_[a]->position - places_[b]->position).norm() >= options_.confusable_distance_m &&
@@ -114,6 +168,10 @@ OptionTable DescribeOptions(AmbiguityOptions* options) {
        .help = "probabilities go with scores to this power; more: the best-looking place counts for more",
        .min = 1e-3,
        .max = 100},
+      {.name = "entropy_over",
+       .value = &options->entropy_over,
+       .help = "what a place's entropy counts: places, each with the images around it, or every image",
+       .choices = {"places", "images"}},
       {.name = "confusable_score_ratio",
        .value = &options->confusable_score_ratio,
        .help = "places are confusable when each scores at least this part of the other's best look-alike",
@@ -138,12 +196,20 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
   const AmbiguitySearch search(vocabulary, places, options, *appearance);
   const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
   std::vector<NodeScores> scores(num_nodes);
-  if (progress) progress->Begin("tell places apart", num_nodes, "nodes");
-  ParallelFor(num_nodes, num_threads, [&](int64_t node) {
-    if (progress && progress->Cancelled()) return;
-    scores[node] = search.Score(static_cast<NodeIdx>(node));
-    if (progress) progress->Advance();
-  });
+  std::vector<double> nearby(search.OverPlaces() ? num_nodes : 0);
+  const auto num_passes = static_cast<int64_t>(search.OverPlaces() ? 2 : 1);
+  if (progress) progress->Begin("tell places apart", num_passes * num_nodes, "nodes");
+  const auto for_all_nodes = [&](const auto& work) {
+    ParallelFor(num_nodes, num_threads, [&](int64_t node) {
+      if (progress && progress->Cancelled()) return;
+      work(static_cast<NodeIdx>(node));
+      if (progress) progress->Advance();
+    });
+  };
+  if (search.OverPlaces()) for_all_nodes([&](NodeIdx node) { nearby[node] = search.BestNearby(node); });
+  std::erase(nearby, 0);
+  const double again = nearby.empty() ? 1 : Median(nearby);
+  for_all_nodes([&](NodeIdx node) { scores[node] = search.Score(node, again); });
   if (progress) progress->End();
   if (progress && progress->Cancelled())
     return MakeError(ErrorCode::kCancelled, "telling places apart was stopped");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/appearance.h"
@@ -16,6 +17,13 @@ namespace cairn {
 struct AmbiguityOptions {
   // Of ProbabilitiesOfScores.  REQUIRES: > 0
   double score_exponent = kScoreExponent;
+  // What the entropy of an image is taken over.  "images": all of them [Mariottini11 eq. 1], so that it is
+  // the greater, the more images show the same place, and the smaller, the less alike two images of one place
+  // are. "places": images that are linked or lie nearer to each other than confusable_distance_m count as
+  // one, and the image itself scores what one taken again at its place would: as much as the best other one,
+  // and no less than images of one place do (median of their best). Then it tells places apart, however
+  // densely they were surveyed.
+  std::string entropy_over = "places";
   // Two places are confusable when each scores at least this part of what the other one's best look-alike
   // does.  REQUIRES: in (0, 1]
   double confusable_score_ratio = 0.6;
@@ -27,11 +35,11 @@ struct AmbiguityOptions {
 OptionTable DescribeOptions(AmbiguityOptions* options);
 
 // Sets every node's entropy [Mariottini11 eq. 1] and the confusable pairs.  The distribution of an image is
-// that of the scores that it gets as a query, its own included; of several images at one node, their mean;
-// nodes collect their images'.  Pairs are found among nodes with places (one per node; none without poses)
-// that are not linked: what is linked shows the same.  An image that the vocabulary lacks could be anywhere.
-// Same result for any number of threads.  O(nodes * postings of their words).  Errors: InvalidArgument (an
-// option), Cancelled.
+// that of the scores that it gets as a query, its own included (see entropy_over); of several images at one
+// node, their mean; nodes collect their images'.  Pairs are found among nodes with places (one per node; none
+// without poses) that are not linked: what is linked shows the same.  An image that the vocabulary lacks
+// could be anywhere. Same result for any number of threads.  O(nodes * postings of their words).  Errors:
+// InvalidArgument (an option), Cancelled.
 Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
                      const AmbiguityOptions& options, int num_threads, Progress* progress,
                      Appearance* appearance);

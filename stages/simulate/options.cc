@@ -18,6 +18,8 @@ OptionTable DescribeOptions(SimulateOptions* o) {
       {"pillars_per_room", &o->pillars_per_room, "Free-standing pillars per room", 0, 10},
       {"twin_wings", &o->twin_wings,
        "Two wings that look alike, a spine and a goal room instead of rooms along corridors"},
+      {"back_corridor", &o->back_corridor,
+       "Wings lead on to a second corridor, as does the goal room: several ways there"},
       {"panel_width_m", &o->panel_width_m, "Greatest width of a wall panel, metres", 0.5, 10},
       {"repetition_ratio", &o->repetition_ratio, "Share of wall panels with a texture of the shared set", 0,
        1},

@@ -36,6 +36,9 @@ struct SimulateOptions {
   // Two wings that look alike, a spine and a goal room instead of rooms along corridors: perceptual aliasing
   // of whole places (twin_wings.h).
   bool twin_wings = false;
+  // The wings lead on to a second corridor, to which the goal room opens as well: ways that look alike, and
+  // one that does not.  Counts with twin_wings only.
+  bool back_corridor = false;
 
   // --- Its surfaces
   // Walls are covered with panels of at most this width, each with a texture.  REQUIRES: in [0.5, 10]

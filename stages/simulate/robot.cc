@@ -14,7 +14,7 @@ namespace {
 
 // Turns on the spot, degrees from where it lost the target, in order.
 constexpr double kSearchDeg[] = {20, -20, 40, -40, 60, -60};
-// Commands in a row that a wall stops, before the robot gives up.
+// Commands to one image that something stops, before the robot gives up.
 constexpr int kMaxNumBlocked = 8;
 constexpr DescriptorMatcherOptions kMatcher{.max_ratio = 0.85, .max_angle_rad = 0.8};
 
@@ -200,11 +200,12 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
     }
     leg.seen = true;
     num_searched = 0;
-    num_blocked = Move(command) ? 0 : num_blocked + 1;
-    if (num_blocked == kMaxNumBlocked) {
+    if (Move(command)) continue;
+    if (++num_blocked == kMaxNumBlocked) {
       leg.why = "something stands in the way: " + leg.why;
       return leg;
     }
+    servo.Blocked();
   }
   leg.why = fmt::format("not there after {} commands: {}", options_.max_num_commands, leg.why);
   return leg;

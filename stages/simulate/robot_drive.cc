@@ -127,6 +127,15 @@ class Driver {
     return Ok();
   }
 
+  // Whether it shows what the image at `index` of the way does; the goal's after the last one.
+  Result<bool> SeesNode(const Features& seen, size_t index) const {
+    if (options_.min_start_inliers == 0) return false;
+    CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, index < way_.size()
+                                                         ? TargetOfNode(way_[index])
+                                                         : TargetOfImage(map_, drive_.goal_image));
+    return robot_.NumAgreeing(seen, target) >= options_.min_start_inliers;
+  }
+
   Result<ServoTarget> TargetOfNode(NodeIdx node) const {
     return TargetOfImage(map_, model_.appearance().node_images[node].front());
   }
@@ -142,11 +151,16 @@ class Driver {
   }
 
   // An image of the way is not where the followed start has it: another one is tried, as long as there is
-  // any. An image that was seen and not reached is where it should be, and says nothing against the start.
+  // any. An image that was seen and not reached is where it should be, and says nothing against the start; it
+  // is left out where the robot sees what the one after it shows.
   Status GiveUp(DriveLeg* leg) {
     if (leg->seen) {
       Note(leg);
-      return Relocalize(leg->why);
+      unreached_ = leg->node;
+      CAIRN_ASSIGN_OR_RETURN(const bool next_is_seen, SeesNode(robot_.Look(), next_ + 1));
+      if (!next_is_seen) return Relocalize(leg->why);
+      ++next_;
+      return Ok();
     }
     const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
     leg->verdict = VerdictName(has_other ? HypothesisVerdict::kSwitch : HypothesisVerdict::kLost);
@@ -175,14 +189,18 @@ class Driver {
     return TakeWay(hypotheses_->hypotheses()[followed].path, robot_.Look());
   }
 
-  // From its first image on, where what the second one shows is not to be seen from here.
+  // From its first image on, where what the second one shows is not to be seen from here; without the image
+  // that it could not reach before, where what comes after that is seen.
   Status TakeWay(const NodePath& path, const Features& seen) {
     way_ = path.nodes;
     next_ = std::min<size_t>(1, way_.size());
     if (way_.size() > 1) way_.pop_back();  // the goal's image itself comes last
     if (path.nodes.size() < 2 || options_.min_start_inliers == 0) return Ok();
-    CAIRN_ASSIGN_OR_RETURN(const ServoTarget second, TargetOfNode(path.nodes[1]));
-    if (robot_.NumAgreeing(seen, second) < options_.min_start_inliers) next_ = 0;
+    CAIRN_ASSIGN_OR_RETURN(const bool second_is_seen, SeesNode(seen, 1));
+    if (!second_is_seen) next_ = 0;
+    if (next_ >= way_.size() || way_[next_] != unreached_) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(const bool is_dispensable, SeesNode(seen, next_ + 1));
+    if (is_dispensable) ++next_;
     return Ok();
   }
 
@@ -227,6 +245,7 @@ class Driver {
   std::vector<ServoTarget> trail_;  // its own images since the start, that first
   std::vector<NodeIdx> way_;        // without the goal, unless it is the start
   size_t next_ = 0;                 // of the way; past it: the goal
+  NodeIdx unreached_ = -1;          // seen last and not reached
   int num_legs_ = 0;
 };
 

@@ -22,8 +22,10 @@ Result<Layout> MakeTwinLayout(const SimulateOptions& options) {
   const double offset = std::ceil((c + 2 * kMarginM + t) / floor_texel_m) * floor_texel_m;
   const double first = kMarginM, second = first + offset;
   const double goal_x = second + c + std::max(kMarginM, 2 * t);
-  const double upper_y = c + t;  // above the spine and its wall
-  const double least_width = goal_x + kMinGoalM, least_depth = upper_y + std::max(kMinWingM, kMinGoalM);
+  const double upper_y = c + t;                                  // above the spine and its wall
+  const double top_y = options.back_corridor ? d - upper_y : d;  // where wings and goal room end
+  const double least_width = goal_x + kMinGoalM;
+  const double least_depth = upper_y + std::max(kMinWingM, kMinGoalM) + d - top_y;
   if (w < least_width || d < least_depth) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -40,34 +42,39 @@ Result<Layout> MakeTwinLayout(const SimulateOptions& options) {
   layout.walls.push_back({{w, 0, w + t, d}, false, {}});
   const Rect& near = layout.twins->rect;
   layout.walls[0].joints = {near.x0, near.x1, near.x0 + offset, near.x1 + offset};
-  layout.walls[1].joints = {first, first + c, second, second + c};
+  layout.walls[1].joints = layout.walls[0].joints;
+  if (!options.back_corridor) layout.walls[1].joints = {first, first + c, second, second + c};
 
   // The solid parts between the wings: walls around what nobody enters.
   double x = 0;
+  const auto add_along_spines = [&](double low, double high, std::vector<std::pair<double, double>> doors) {
+    layout.walls.push_back({{low, c, high, upper_y}, true, doors});
+    if (options.back_corridor) layout.walls.push_back({{low, top_y, high, top_y + t}, true, doors});
+  };
   const auto add_solid = [&](double low, double high) {
-    layout.walls.push_back({{low, c, high, upper_y}, true, {}});
-    if (low > 0) layout.walls.push_back({{low, upper_y, low + t, d}, false, {}});
-    layout.walls.push_back({{high - t, upper_y, high, d}, false, {}});
-    const Rect inside = {low > 0 ? low + t : low, upper_y, high - t, d};
+    add_along_spines(low, high, {});
+    if (low > 0) layout.walls.push_back({{low, upper_y, low + t, top_y}, false, {}});
+    layout.walls.push_back({{high - t, upper_y, high, top_y}, false, {}});
+    const Rect inside = {low > 0 ? low + t : low, upper_y, high - t, top_y};
     if (inside.width() > 0) layout.furniture.push_back({inside, options.height_m, true});
   };
   for (const double wing : {first, second}) {
     add_solid(x, wing);
     layout.rooms.push_back(
-        {fmt::format("wing {}", wing == first ? 0 : 1), {wing, upper_y, wing + c, d}, true});
+        {fmt::format("wing {}", wing == first ? 0 : 1), {wing, upper_y, wing + c, top_y}, true});
     x = wing + c;
   }
-  layout.walls.push_back({{x, c, goal_x - t, upper_y}, true, {}});
-  layout.walls.push_back({{x, upper_y, x + t, d}, false, {}});
+  add_along_spines(x, goal_x - t, {});
+  layout.walls.push_back({{x, upper_y, x + t, top_y}, false, {}});
   if (goal_x - t > x + t) {
-    layout.furniture.push_back({{x + t, upper_y, goal_x - t, d}, options.height_m, true});
+    layout.furniture.push_back({{x + t, upper_y, goal_x - t, top_y}, options.height_m, true});
   }
-  layout.walls.push_back({{goal_x - t, c, goal_x, d}, false, {}});
+  layout.walls.push_back({{goal_x - t, c, goal_x, options.back_corridor ? top_y + t : d}, false, {}});
   const double door = 0.5 * (goal_x + w);
-  layout.walls.push_back(
-      {{goal_x, c, w, upper_y}, true, {{door - options.door_width_m / 2, door + options.door_width_m / 2}}});
+  add_along_spines(goal_x, w, {{door - options.door_width_m / 2, door + options.door_width_m / 2}});
   layout.rooms.push_back({"spine", {0, 0, w, c}, true});
-  layout.rooms.push_back({"goal", {goal_x, upper_y, w, d}, false});
+  if (options.back_corridor) layout.rooms.push_back({"back corridor", {0, top_y + t, w, d}, true});
+  layout.rooms.push_back({"goal", {goal_x, upper_y, w, top_y}, false});
   return layout;
 }
 

@@ -16,8 +16,9 @@ namespace cairn {
 //      |            spine               |
 //      +--------------------------------+
 //
-// num_rooms, extra_door_ratio do not count.  No furniture but in the goal room.
-// Errors: InvalidArgument when this does not fit width_m and depth_m; says what does.
+// With back_corridor the wings and the goal room do not end at the building's wall but open to a corridor
+// like the spine, so that three ways lead there.  num_rooms, extra_door_ratio do not count.  No furniture but
+// in the goal room. Errors: InvalidArgument when this does not fit width_m and depth_m; says what does.
 Result<Layout> MakeTwinLayout(const SimulateOptions& options);
 
 }  // namespace cairn

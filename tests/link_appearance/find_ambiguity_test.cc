@@ -53,6 +53,29 @@ TEST(FindAmbiguity, TwinsHaveTheEntropyOfTwoPlacesAndAreConfusable) {
   EXPECT_EQ(appearance.confusable[0], (ConfusablePair{0, 2, 1}));
 }
 
+TEST(FindAmbiguity, ImagesOfOnePlaceAreNoLookAlikes) {
+  // 0, 1, 2 stand side by side, 3 is linked to 0, and 4, 5 side by side far away: all show the same.
+  const std::vector<std::vector<WordIdx>> words = {{0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {0, 1}, {2}};
+  const auto places = PlacesAt({0, 1, 2, 8, 20, 21, 40});
+  const auto entropies = [&](const AmbiguityOptions& options) {
+    Appearance appearance = NodesWithAnImageEach(7, {{0, 3}});
+    EXPECT_TRUE(FindAmbiguity(VocabularyOf(words, 3), places, options, 1, nullptr, &appearance).ok());
+    std::vector<double> values;
+    for (const AppearanceNode& node : appearance.nodes) values.push_back(*node.entropy);
+    return values;
+  };
+  const auto of_two = [](double p) { return -p * std::log(p) - (1 - p) * std::log(1 - p); };
+  const std::vector<double> over_places = entropies({});
+  EXPECT_NEAR(over_places[0], of_two(4 / 6.0), 1e-3);
+  EXPECT_NEAR(over_places[1], -std::log(.5) / 2 - std::log(1 / 3.) / 3 - std::log(1 / 6.) / 6,
+              1e-3);  // 3 apart
+  EXPECT_NEAR(over_places[4], of_two(2 / 6.0), 1e-3);
+  EXPECT_EQ(over_places[6], 0);
+  const std::vector<double> over_images = entropies({.entropy_over = "images"});
+  EXPECT_NEAR(over_images[0], std::log(6.0), 1e-3);
+  EXPECT_EQ(over_images[6], 0);
+}
+
 TEST(FindAmbiguity, WhatIsNearLinkedOrWithoutPlaceIsNotConfusable) {
   const auto pairs = [](const std::vector<std::optional<FloorPose>>& places, bool linked) {
     Appearance appearance = NodesWithAnImageEach(4, {{0, 1}, {linked ? 0 : 1, 2}, {1, 3}});
@@ -69,7 +92,7 @@ TEST(FindAmbiguity, WhatIsNearLinkedOrWithoutPlaceIsNotConfusable) {
 TEST(FindAmbiguity, AnImageWithoutWordsCouldBeAnywhere) {
   std::vector<std::vector<WordIdx>> words = kTwins;
   words[1].clear();
-  Appearance appearance = NodesWithAnImageEach(5, {{0, 1}});  // image 5 is no document
+  Appearance appearance = NodesWithAnImageEach(5, {});  // image 5 is no document
   ASSERT_TRUE(
       FindAmbiguity(VocabularyOf(words, 10), PlacesAt({0, 5, 10, 15, 20}), {}, 1, nullptr, &appearance).ok());
   EXPECT_NEAR(*appearance.nodes[4].entropy, std::log(5.0), 1e-3);

@@ -68,6 +68,20 @@ TEST(PlanRoute, SaysWhyThereIsNone) {
   EXPECT_THAT(PlanRoute(**Map::FromRows(rows), 0, 1).error().message, HasSubstr("has no appearance graph"));
 }
 
+TEST(PlanRoute, PlacesThatAreLikeNoOtherCostNothingAndTheFewestLinksAreTaken) {
+  MapRows rows = PathRows();
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = 0, node.is_kept = true;
+  rows.appearance[0].links = {{1, 20}, {2, 20}};  // 0 - 2 as well: 1 is a detour
+  const auto map = *Map::FromRows(rows);
+  for (const auto& [from, to] : {std::pair(0, 4), std::pair(4, 0)}) {
+    const Result<Route> route = PlanRoute(*map, from, to, {.weight = "entropy"});
+    ASSERT_TRUE(route.ok()) << route.error().message;
+    EXPECT_EQ(route->num_links, 3);
+    EXPECT_EQ(route->cost, 0);
+  }
+  EXPECT_THAT(PlanRoute(*map, 1, 4, {.weight = "entropy"})->images, ElementsAre(1, 2, 3, 4));
+}
+
 TEST(PlanRoute, SeveralImagesOfOnePlaceNeedNoLink) {
   MapRows rows = PathRows();
   rows.appearance[4].images = {4, 5};

@@ -208,6 +208,26 @@ TEST(TwinWings, DoNotLookAlikeOutsideOfThem) {
   EXPECT_GT(TwinDifference(building, 0.5 * (wing.x0 + wing.x1), 0.8, 0), 50);  // along the spine
 }
 
+TEST(TwinWings, LeadOnToABackCorridorLikeEachOther) {
+  SimulateOptions options = TwinOptions();
+  options.depth_m = 10;
+  options.num_different_panels = 0;
+  options.back_corridor = true;
+  const Building building = Make(options);
+  const Rect& wing = building.layout.rooms[0].rect;
+  const double x = 0.5 * (wing.x0 + wing.x1), middle = 0.5 * (wing.y0 + wing.y1);
+  for (const double heading : {-1.57, 0.3, 1.57})
+    EXPECT_LE(TwinDifference(building, x, middle, heading), 2) << heading;
+  // From the spine to the wall behind the back corridor, through either wing and the goal room's doors.
+  const Rect& goal = building.layout.rooms.back().rect;
+  for (const double way_x : {x, x + building.layout.twins->offset_m, 0.5 * (goal.x0 + options.width_m)}) {
+    const auto hit = CastRay(building, {way_x, 0.5, 1}, {0, 1, 0});
+    ASSERT_TRUE(hit.has_value());
+    EXPECT_NEAR(hit->distance, options.depth_m - 0.5, 1e-9);
+  }
+  EXPECT_GT(TwinDifference(building, x, options.depth_m - 0.8, 0), 50);  // along the back corridor
+}
+
 TEST(TwinWings, NeedRoom) {
   SimulateOptions options = TwinOptions();
   options.width_m = 6;
