@@ -19,6 +19,8 @@ constexpr double kApproachable = 0.8;
 constexpr double kHeightOfTarget = 0.1;
 // Away from what stopped it: as far, over the scene's distance.
 constexpr double kAwayRatio = 0.2;
+// Patience wears out from where it first comes as near as so many tolerances.
+constexpr double kNearRatio = 5;
 // However long it takes, tolerances are doubled no more often.
 constexpr int kMostDoublings = 3;
 // Weight of what own commands taught, after each further command; squared ratio that the first guess weighs.
@@ -52,7 +54,8 @@ OptionTable DescribeOptions(ServoOptions* o) {
        "arrived: turn from the target's heading, degrees, at most", 1e-3, 45},
       {"arrive_distance_ratio", &o->arrive_distance_ratio,
        "arrived: distance from the target over that of the scene, at most", 1e-4, 1},
-      {"patience_commands", &o->patience_commands, "both double after each so many commands", 1},
+      {"patience_commands", &o->patience_commands, "both double after each so many commands near the target",
+       1},
       {"max_retreat_ratio", &o->max_retreat_ratio,
        "a retreat ends at this distance behind the target, over that of the scene", 1e-3, 10},
       {"min_num_matches_to_turn", &o->min_num_matches_to_turn,
@@ -207,7 +210,7 @@ ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {
   const double distance = last_->distance_ratio;
   const bool is_there = distance <= options_.arrive_distance_ratio * Patience();
   const double max_turn = RadFromDeg(options_.arrive_heading_deg) * Patience();
-  ++num_commands_;
+  num_commands_ += num_commands_ > 0 || distance <= kNearRatio * options_.arrive_distance_ratio;
   if (is_there && std::abs(pose.heading_rad) <= max_turn) {
     command.state = ServoState::kArrived;
     command.why = fmt::format("{:.2f} degrees and {:.4f} of the scene's distance from the target",

@@ -55,8 +55,8 @@ struct ServoOptions {
   // REQUIRES: > 0
   double arrive_heading_deg = 0.5;
   double arrive_distance_ratio = 0.007;
-  // Both double after each so many commands: where matches are too poor for them the robot would shuttle to
-  // and fro for ever.  REQUIRES: > 0
+  // Both double after each so many commands near the target: where matches are too poor for them the robot
+  // would shuttle to and fro for ever.  REQUIRES: > 0
   int patience_commands = 40;
   // A retreat ends at this distance behind the target, over that of the scene.  REQUIRES: in (0, 10]
   double max_retreat_ratio = 0.6;
@@ -128,7 +128,7 @@ class Servo {
   std::optional<Eigen::Vector2d> blocked_at_;
   std::optional<PlanarEpipoles> last_;
   double last_speed_m_s_ = 0;
-  int num_commands_ = 0;
+  int num_commands_ = 0;              // since it first came near the target
   double way_m_ = 0, way_ratio_ = 0;  // scene distance = first / second
 };
 

@@ -20,10 +20,14 @@ struct Drive {
   double greatest_speed_m_s = 0, greatest_turn_rad_s = 0;
   bool went_backwards = false;
   double least_x_m = 0;  // of the floor frame
+  int num_blocked = 0;
 };
 
+// Something stands behind this x of the floor frame.
+constexpr double kNoWall = -std::numeric_limits<double>::infinity();
+
 Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose& target,
-              const ServoOptions& options = {}, double focal_factor = 1) {
+              const ServoOptions& options = {}, double focal_factor = 1, double wall_x_m = kNoWall) {
   Camera assumed = scene.camera;
   assumed.params[0] *= focal_factor;
   Servo servo = *Servo::Create(assumed, options);
@@ -35,7 +39,14 @@ Drive DriveTo(const ServoScene& scene, const PlanarPose& start, const PlanarPose
     drive.greatest_speed_m_s = std::max(drive.greatest_speed_m_s, std::abs(drive.last.speed_m_s));
     drive.greatest_turn_rad_s = std::max(drive.greatest_turn_rad_s, std::abs(drive.last.turn_rad_s));
     drive.went_backwards |= drive.last.speed_m_s < 0;
-    drive.end = Moved(drive.end, drive.last.speed_m_s, drive.last.turn_rad_s, options.step_s);
+    const PlanarPose moved = Moved(drive.end, drive.last.speed_m_s, drive.last.turn_rad_s, options.step_s);
+    drive.end.heading_rad = moved.heading_rad;
+    if (moved.position.x() > wall_x_m || moved.position.x() > drive.end.position.x()) {
+      drive.end.position = moved.position;
+    } else {
+      ++drive.num_blocked;
+      servo.Blocked();
+    }
     drive.least_x_m = std::min(drive.least_x_m, drive.end.position.x());
   }
   return drive;
@@ -119,6 +130,27 @@ TEST(Servo, ReversesAlongItsWayWithoutAFartherRetreat) {
     ExpectThere(drive, target, fmt::format("from {:g}, {:g}", start.position.x(), start.position.y()));
     EXPECT_GT(drive.least_x_m, -0.1) << "it must not need the room behind the target";
   }
+}
+
+TEST(Servo, GoesTheOtherWayWhereSomethingStopsIt) {
+  const PlanarPose target, start{{0, 0.5}, 0};
+  EXPECT_LT(DriveTo(Room(), start, target).least_x_m, -0.4);  // its retreat
+  const Drive drive = DriveTo(Room(), start, target, {}, 1, -0.25);
+  ExpectThere(drive, target, "a wall behind");
+  EXPECT_GT(drive.num_blocked, 0);
+  EXPECT_GE(drive.least_x_m, -0.25);
+}
+
+TEST(Servo, IsLessExactingTheLongerItTakes) {
+  ServoScene scene = Room();
+  scene.points.resize(200);
+  scene.noise_px = 2.5;
+  const PlanarPose target, start{{-0.5, 0.3}, 0.2};
+  const Drive exacting = DriveTo(scene, start, target, {.patience_commands = 1000});
+  EXPECT_NE(exacting.last.state, ServoState::kArrived);
+  const Drive patient = DriveTo(scene, start, target);
+  EXPECT_EQ(patient.last.state, ServoState::kArrived);
+  EXPECT_LT((patient.end.position - target.position).norm(), 0.3);
 }
 
 TEST(Servo, TurnsOnTheSpotWhereOnlyTheHeadingDiffers) {
