@@ -4,7 +4,6 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "core/median.h"
 #include "core/parallel.h"
 
 namespace cairn {
@@ -12,6 +11,16 @@ namespace {
 
 // As stored: the last bits of sums may differ between machines.
 double AsStored(double value) { return OfThousandths(Thousandths(value)); }
+
+// Nodes that together are less likely than this make an entropy no greater than the last digit stored.
+constexpr double kNegligible = 1e-4;
+
+// What nine of ten values exceed.  REQUIRES: not empty
+double LowerTenth(std::vector<double>* values) {
+  const auto tenth = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 10);
+  std::nth_element(values->begin(), tenth, values->end());
+  return *tenth;
+}
 
 // A node that looks like another one.
 struct LookAlike {
@@ -103,21 +112,26 @@ class AmbiguitySearch {
   }
 
   // Of places instead of nodes: the first is the node's own, each other one that of the likeliest node that
-  // is left; a place takes in the nodes that show the same as its first one.
+  // is left; a place takes in the nodes that show the same as its first one.  What is left of nodes that are
+  // next to impossible counts as one place.
   std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
-    std::vector<int32_t> order = BestFirst(probabilities);
-    order.insert(order.begin(), node);
-    std::vector<char> is_taken(probabilities.size(), 0);
-    std::vector<double> places;
-    for (const NodeIdx first : order) {
-      if (is_taken[first] || (probabilities[first] <= 0 && first != node)) continue;
+    std::vector<NodeIdx> left = {node};
+    double rest = 1 - probabilities[node];
+    for (const NodeIdx other : BestFirst(probabilities)) {
+      if (rest < kNegligible || probabilities[other] <= 0) break;
+      if (other == node) continue;
+      left.push_back(other);
+      rest -= probabilities[other];
+    }
+    std::vector<double> places = {std::max(rest, 0.0)};
+    while (!left.empty()) {
+      const NodeIdx first = left.front();
       double sum = 0;
-      for (size_t other = 0; other < probabilities.size(); ++other) {
-        if (is_taken[other] || probabilities[other] <= 0 || !ShowTheSame(first, static_cast<NodeIdx>(other)))
-          continue;
-        is_taken[other] = 1;
-        sum += probabilities[other];
-      }
+      std::erase_if(left, [&](NodeIdx other) {
+        const bool is_same = ShowTheSame(first, other);
+        if (is_same) sum += probabilities[other];
+        return is_same;
+      });
       places.push_back(sum);
     }
     return places;
@@ -208,7 +222,7 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
   };
   if (search.OverPlaces()) for_all_nodes([&](NodeIdx node) { nearby[node] = search.BestNearby(node); });
   std::erase(nearby, 0);
-  const double again = nearby.empty() ? 1 : Median(nearby);
+  const double again = nearby.empty() ? 1 : LowerTenth(&nearby);
   for_all_nodes([&](NodeIdx node) { scores[node] = search.Score(node, again); });
   if (progress) progress->End();
   if (progress && progress->Cancelled())

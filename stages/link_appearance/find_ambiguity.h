@@ -21,7 +21,7 @@ struct AmbiguityOptions {
   // the greater, the more images show the same place, and the smaller, the less alike two images of one place
   // are. "places": images that are linked or lie nearer to each other than confusable_distance_m count as
   // one, and the image itself scores what one taken again at its place would: as much as the best other one,
-  // and no less than images of one place do (median of their best). Then it tells places apart, however
+  // and no less than nine of ten images do with their neighbours. Then it tells places apart, however
   // densely they were surveyed.
   std::string entropy_over = "places";
   // Two places are confusable when each scores at least this part of what the other one's best look-alike
