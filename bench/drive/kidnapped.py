@@ -4,9 +4,9 @@
 From random survey images to random others by the way of least entropy and by the shortest one (`--weight links`), put
 near each image of it (`--servo ideal`).  Half-way a robot is carried to a place farther along its own way, 3 m or more
 away, up to 0.4 m beside the survey's image there and turned by up to 20 degrees, and must notice and find out where it
-is.  Prints for each way: how often robots looked anew, how often they then took the wrong place (more than 1 m or 45
-degrees from where they stood) for the right one, goals reached by truth (within 0.3 m and 10 degrees), images and metres
-driven.
+is.  Prints every run, then for each way: how often robots looked anew, how often they then took the wrong place (more
+than 1 m or 45 degrees from where they stood) for the right one, goals reached by truth (within 0.3 m and 10 degrees),
+images and metres driven.
 """
 import math
 import os
@@ -49,6 +49,7 @@ class Tally:
         self.goals += reached
         self.images.append(sum(leg["kind"] in ("go", "retrace") for leg in legs))
         self.metres.append(run["way_m"])
+        return f"{wrong} wrong, {self.images[-1]} images, {run['way_m']:.1f} m"
 
 
 def main():
@@ -86,9 +87,8 @@ def main():
         if not all(runs.values()):
             continue
         num_done += 1
-        for weight, tally in tallies.items():
-            run = runs[weight]
-            tally.add(run, has_arrived(run))
+        added = [f"{weight}: {tally.add(runs[weight], has_arrived(runs[weight]))}" for weight, tally in tallies.items()]
+        print(f"{start} to {goal}: {'; '.join(added)}", flush=True)
     for weight, tally in tallies.items():
         print(f"{weight}: {num_done} runs; looked anew {tally.looked} times, {tally.wrong} of them wrong, in "
               f"{tally.wrong_runs} runs; goal reached {tally.goals}; {statistics.mean(tally.images):.1f} images, "
