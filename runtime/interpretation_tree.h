@@ -28,8 +28,10 @@ namespace cairn {
 // has one segment, its branches are only the labels that keep the order in which a candidate sees its walls
 // (view_order.h).
 //
-// Once two pairings that are not parallel fix the pose, and `fix_pose_early`, the others are paired at that
-// pose without branching.
+// With `fix_pose_early` the tree has two levels: two pairings that cross fix the pose, and the others are
+// paired at it without branching, each with the seen label that fits best, and all once more at the pose that
+// follows.  Below a first pairing, only places
+// are searched along whose line enough other segments can have a wall (place_support.h).
 struct InterpretationTreeOptions {
   // "vir" or "standard".
   std::string search = "vir";
@@ -74,16 +76,17 @@ struct Interpretation {
   int num_matched = 0;
   double matched_length_m = 0;
   double hidden_length_m = 0;  // of what was seen and lies behind a wall at this pose: speaks against it
-  double rms_m = 0;            // of the matched segments' ends from their walls
+  double rms_m = 0;            // of the matched segments' ends from their walls; at most position_tolerance_m
 };
 
 struct InterpretationTreeResult {
   // Different poses only; most matched length less what speaks against it first, then least rms.
   std::vector<Interpretation> solutions;
-  int64_t num_nodes = 0;       // pairings tried, null matches included
-  int64_t num_expanded = 0;    // pairings that met the constraints
-  int64_t num_candidates = 0;  // regions that the index functions leave
-  bool complete = true;        // false: ended by max_num_nodes or cancelled
+  int64_t num_nodes = 0;        // pairings tried, null matches included
+  int64_t num_expanded = 0;     // pairings that met the constraints
+  int64_t num_bound_tests = 0;  // pairings that the bound on support looked at; not among the nodes
+  int64_t num_candidates = 0;   // regions that the index functions leave
+  bool complete = true;         // false: ended by max_num_nodes or cancelled
 };
 
 // Errors: InvalidArgument (options, or the VIR search without regions), NoData (fewer than two segments: no

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "core/pose.h"
 #include "core/vector_geometry.h"
 
 namespace cairn {
@@ -55,6 +57,63 @@ bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reac
     last = std::min(last, std::max(a, b));
   }
   return first <= last;
+}
+
+PairingTable::PairingTable(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
+                           const InterpretationTreeOptions& options)
+    : plan_(plan), segments_(segments), options_(options) {
+  for (LabelIdx label = 0; label < plan.num_labels(); ++label) {
+    along_.push_back((LabelEnd(plan, label) - LabelStart(plan, label)).normalized());
+    by_angle_.emplace_back(std::atan2(along_.back().y(), along_.back().x()), label);
+  }
+  std::sort(by_angle_.begin(), by_angle_.end());
+  pairings_.reserve(segments.size() * plan.num_labels());
+  for (const ScanSegment& segment : segments) {
+    for (LabelIdx label = 0; label < plan.num_labels(); ++label)
+      pairings_.push_back(MakePairing(plan, segment, label, options.length_tolerance_m));
+    angle_tolerance_.push_back(options.num_sigmas * segment.sigma_angle_rad);
+    // An angle moves the line of places by the distance along the wall, and its ends by that across.
+    const Vec2 along = (segment.end - segment.start).normalized();
+    const double lever = std::abs(along.dot(segment.Middle())),
+                 across = std::abs(Cross(along, segment.Middle()));
+    const double offset = std::hypot(segment.sigma_offset_m, lever * segment.sigma_angle_rad);
+    place_tolerance_.push_back(options.num_sigmas * offset);
+    const double wall_angle = RadFromDeg(options.sigma_wall_deg);
+    loose_place_tolerance_.push_back(options.num_sigmas *
+                                     std::hypot(offset, options.sigma_wall_m, lever * wall_angle));
+    end_tolerance_.push_back(options.num_sigmas * across * std::hypot(segment.sigma_angle_rad, wall_angle));
+  }
+}
+
+double PairingTable::AngleTolerance(int a, int b) const {
+  return std::hypot(angle_tolerance_[a], angle_tolerance_[b]) + RadFromDeg(options_.angle_tolerance_deg);
+}
+
+double PairingTable::LoosePlaceTolerance(int a, int b) const {
+  return loose_place_tolerance_[a] + loose_place_tolerance_[b] + 2 * options_.position_tolerance_m;
+}
+
+bool PairingTable::Agree(int a, LabelIdx label_a, int b, LabelIdx label_b) const {
+  const Pairing &pa = Of(a, label_a), &pb = Of(b, label_b);
+  if (std::abs(WrapAngle(pa.heading - pb.heading)) > AngleTolerance(a, b)) return false;
+  const double place = std::hypot(place_tolerance_[a], place_tolerance_[b]) + options_.position_tolerance_m;
+  return LineToLine(pa, pb) <= place;
+}
+
+void PairingTable::LabelsWithHeading(int segment, double heading, double tolerance_rad,
+                                     std::vector<LabelIdx>* labels) const {
+  const auto append = [&](double low, double high) {
+    for (auto at = std::lower_bound(by_angle_.begin(), by_angle_.end(), std::pair{low, LabelIdx{-1}});
+         at != by_angle_.end() && at->first <= high; ++at) {
+      if (Of(segment, at->second).possible) labels->push_back(at->second);
+    }
+  };
+  constexpr double kPi = std::numbers::pi;
+  if (tolerance_rad >= kPi) return append(-kPi, kPi);
+  const double angle = WrapAngle(heading + segments_[segment].Angle());
+  append(angle - tolerance_rad, angle + tolerance_rad);
+  if (angle - tolerance_rad < -kPi) append(angle - tolerance_rad + 2 * kPi, kPi);
+  if (angle + tolerance_rad > kPi) append(-kPi, angle + tolerance_rad - 2 * kPi);
 }
 
 }  // namespace cairn

@@ -1,5 +1,6 @@
 #include "runtime/view_search_index.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace cairn {
@@ -10,36 +11,55 @@ int64_t FaceSet::Count() const {
   return count;
 }
 
-FaceSet Intersection(const FaceSet& a, const FaceSet& b) {
-  FaceSet both;
+namespace {
+
+// Calls visit(word of a, word of b) for the blocks of both, until it returns true; whether it did.  A short
+// set leaps through a long one.
+template <typename Visit>
+bool ForCommonBlocks(const FaceSet& a, const FaceSet& b, const Visit& visit) {
+  const auto leap = [](const std::vector<FaceSet::Word>& words, size_t at, int32_t block) {
+    size_t step = 1;
+    while (at + step < words.size() && words[at + step].block < block) step *= 2;
+    const auto end = words.begin() + static_cast<std::ptrdiff_t>(std::min(words.size(), at + step + 1));
+    return static_cast<size_t>(
+        std::lower_bound(words.begin() + static_cast<std::ptrdiff_t>(at), end, block,
+                         [](const FaceSet::Word& word, int32_t other) { return word.block < other; }) -
+        words.begin());
+  };
   for (size_t i = 0, j = 0; i < a.words.size() && j < b.words.size();) {
     if (a.words[i].block < b.words[j].block) {
-      ++i;
+      i = leap(a.words, i, b.words[j].block);
     } else if (a.words[i].block > b.words[j].block) {
-      ++j;
-    } else {
-      const uint64_t bits = a.words[i].bits & b.words[j].bits;
-      if (bits != 0) both.words.push_back({a.words[i].block, bits});
-      ++i;
-      ++j;
+      j = leap(b.words, j, a.words[i].block);
+    } else if (visit(a.words[i++], b.words[j++])) {
+      return true;
     }
   }
+  return false;
+}
+
+}  // namespace
+
+FaceSet Intersection(const FaceSet& a, const FaceSet& b) {
+  FaceSet both;
+  ForCommonBlocks(a, b, [&](const FaceSet::Word& x, const FaceSet::Word& y) {
+    if ((x.bits & y.bits) != 0) both.words.push_back({x.block, x.bits & y.bits});
+    return false;
+  });
   return both;
 }
 
 bool Intersects(const FaceSet& a, const FaceSet& b) {
-  for (size_t i = 0, j = 0; i < a.words.size() && j < b.words.size();) {
-    if (a.words[i].block < b.words[j].block) {
-      ++i;
-    } else if (a.words[i].block > b.words[j].block) {
-      ++j;
-    } else {
-      if ((a.words[i].bits & b.words[j].bits) != 0) return true;
-      ++i;
-      ++j;
-    }
+  return ForCommonBlocks(
+      a, b, [](const FaceSet::Word& x, const FaceSet::Word& y) { return (x.bits & y.bits) != 0; });
+}
+
+FaceSet ViewSearchIndex::BlocksNear(const Eigen::AlignedBox2f& box, const FaceSet& set) const {
+  FaceSet near;
+  for (const FaceSet::Word& word : set.words) {
+    if (block_boxes_[word.block].intersects(box)) near.words.push_back(word);
   }
-  return false;
+  return near;
 }
 
 ViewSearchIndex::Spectrum DirectionSpectrum(const std::vector<double>& angles_rad) {
@@ -60,6 +80,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
   walls_by_length_.assign(views.num_faces(), {});
   spectra_.resize(views.num_faces());
   boxes_.resize(views.num_faces());
+  block_boxes_.resize((static_cast<size_t>(views.num_faces()) + 63) / 64);
   std::vector<std::complex<double>> turns;
   for (LabelIdx label = 0; label < num_labels; ++label) {
     const Eigen::Vector2d along = LabelEnd(views.plan, label) - LabelStart(views.plan, label);
@@ -69,6 +90,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
   views.ForEachLabelSet([&](FaceIdx face, const std::vector<LabelIdx>& labels) {
     for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i)
       boxes_[face].extend(views.plan.Metres(views.vertices[views.face_vertices[i]]).cast<float>());
+    block_boxes_[face / 64].extend(boxes_[face]);
     std::fill(bits.begin(), bits.end(), 0);
     std::array<std::complex<double>, kNumHarmonics> sums{};
     for (const LabelIdx label : labels) {

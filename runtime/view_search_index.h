@@ -55,6 +55,8 @@ class ViewSearchIndex {
   const Spectrum& SpectrumOf(FaceIdx face) const { return spectra_[face]; }
   // The box around a region, metres.
   const Eigen::AlignedBox2f& BoxOf(FaceIdx face) const { return boxes_[face]; }
+  // Those of a set's blocks of 64 regions that reach into a box.
+  FaceSet BlocksNear(const Eigen::AlignedBox2f& box, const FaceSet& set) const;
   // How many of a region's walls are at least so long.
   const LengthCounts& WallsByLength(FaceIdx face) const { return walls_by_length_[face]; }
 
@@ -66,6 +68,7 @@ class ViewSearchIndex {
   std::vector<LengthCounts> walls_by_length_;
   std::vector<Spectrum> spectra_;
   std::vector<Eigen::AlignedBox2f> boxes_;
+  std::vector<Eigen::AlignedBox2f> block_boxes_;  // around 64 regions each
 };
 
 // The same of any directions.

@@ -117,7 +117,7 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
             ? IsRight(all.solutions[i], *pose, metres, degrees)
             : std::abs(WrapAngle(all.solutions[i].pose.heading_rad - pose->heading_rad)) <= degrees * kDegree;
     sample.listed = sample.listed || right;
-    sample.first_right = sample.first_right || (i == 0 && right);
+    sample.first_right = sample.first_right || (i == 0 && right && all.complete);
   }
   // Ambiguous: without noise the same portions fit elsewhere too, or nowhere in particular.  Uncertain: they
   // do so within what the noise allows, or from the right pairings a pose follows that has twice its standard

@@ -7,6 +7,7 @@
 
 #include "core/pose.h"
 #include "runtime/pairing.h"
+#include "runtime/place_support.h"
 #include "runtime/view_order.h"
 #include "tests/decompose_views/plan_fixture.h"
 #include "tests/runtime/simulated_scan.h"
@@ -207,6 +208,119 @@ TEST(InterpretationTree, WhatLiesBehindAWallSpeaksAgainstAPose) {
   EXPECT_NEAR(in_room(12)->hidden_length_m, 0, 1e-9);
   EXPECT_GT(in_room(2)->hidden_length_m, 0.5);
   EXPECT_LT(in_room(12), in_room(2));
+}
+
+// The complete tree of the same constraints is the oracle: what it puts first, the pairs that fix the pose
+// find.
+TEST(InterpretationTree, PairsThatFixThePoseFindWhatTheWholeTreeFinds) {
+  const Flat flat;
+  int tried = 0, found = 0;
+  int64_t fewer = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    Random random(seed);
+    const auto pose = RandomPose(flat.views, flat.locator, 0.2, &random);
+    const auto segments = SimulateScan(
+        flat.views, flat.locator.Find(pose->position), *pose,
+        {.sigma_m = 0.02, .missing_ratio = 0.2, .spurious_ratio = 0.1, .min_length_m = 0.3}, &random);
+    if (segments.size() < 4) continue;
+    InterpretationTreeOptions options{.max_null_ratio = 0.25, .one_segment_per_wall = false};
+    options.fix_pose_early = false;
+    const auto whole = SearchInterpretations(flat.index, segments, options);
+    if (whole->solutions.empty() || !whole->solutions[0].determined) continue;
+    ++tried;
+    for (const char* search : {"vir", "standard"}) {
+      options.search = search;
+      options.fix_pose_early = true;
+      const auto pairs = SearchInterpretations(flat.index, segments, options);
+      found +=
+          std::any_of(pairs->solutions.begin(), pairs->solutions.end(), [&](const Interpretation& solution) {
+            return IsRight(solution, whole->solutions[0].pose, 0.1, 2);
+          });
+      if (options.search == "vir") fewer += whole->num_nodes - pairs->num_nodes;
+    }
+  }
+  EXPECT_GT(tried, 30);
+  EXPECT_EQ(found, 2 * tried);
+  EXPECT_GT(fewer, 0);
+}
+
+TEST(InterpretationTree, ASegmentBehindAWallIsNoneOfItsSegments) {
+  // A room of 4 x 3 m; behind its right wall, 0.15 m farther, a cupboard's.
+  const Views views = Decomposed("0,0,4,0\n4,0,4,3\n4,3,0,3\n0,3,0,0\n4.15,0.5,4.15,2.5").views;
+  const ViewSearchIndex index(views);
+  const std::vector<ScanSegment> segments = {{{-2, -1}, {2, -1}, 1e-3, 1e-3, 50},
+                                             {{2, 2}, {-2, 2}, 1e-3, 1e-3, 50},
+                                             {{2.05, -0.4}, {2.05, 0.9}, 1e-3, 1e-3, 50},
+                                             {{-2, 1.9}, {-2, -0.9}, 1e-3, 1e-3, 50}};
+  const auto result = SearchInterpretations(index, segments, {.one_segment_per_wall = false});
+  ASSERT_FALSE(result->solutions.empty());
+  EXPECT_NEAR(result->solutions[0].pose.position.x(), 2, 0.05);
+  EXPECT_NEAR(result->solutions[0].pose.position.y(), 1, 0.05);
+  EXPECT_EQ(WallOf(result->solutions[0].labels[2]), 1);
+}
+
+// Places along a line, each over so many segments (letters):
+//   0    1    2    3    4    5
+//   aaaaaaaaaaa    aaaaaa
+//        bbbbbbbbbbbbbb
+//             c                (at one place)
+TEST(PlacesWithSupport, CountsEachSegmentOnce) {
+  const std::vector<PlaceStretch> stretches = {
+      {0, 2, 0, 0}, {0.5, 1.5, 0, 2}, {3, 4, 0, 4}, {1, 3.5, 1, 0}, {2, 2, 2, 0}};
+  const auto places = PlacesWithSupport(stretches, 2);
+  ASSERT_EQ(places.size(), 3u);
+  EXPECT_EQ(places[0].low, 1);
+  EXPECT_EQ(places[0].high, 2);
+  EXPECT_EQ(places[0].num_segments, 2);
+  EXPECT_EQ(places[1].low, 2);
+  EXPECT_EQ(places[1].high, 2);
+  EXPECT_EQ(places[1].num_segments, 3);
+  EXPECT_EQ(places[2].low, 3);
+  EXPECT_EQ(places[2].high, 3.5);
+  EXPECT_TRUE(PlacesWithSupport(stretches, 4).empty());
+  EXPECT_TRUE(PlacesWithSupport({}, 1).empty());
+}
+
+TEST(StretchesAlong, HoldThePlaceOfEveryNoisyScan) {
+  const Flat flat;
+  int tried = 0, held = 0;
+  for (int seed = 0; seed < 100; ++seed) {
+    Random random(seed);
+    const auto pose = RandomPose(flat.views, flat.locator, 0.2, &random);
+    const FaceIdx face = flat.locator.Find(pose->position);
+    const auto segments =
+        SimulateScan(flat.views, face, *pose, {.sigma_m = 0.02, .min_length_m = 0.3}, &random);
+    InterpretationTreeOptions options;
+    options.sigma_wall_m = options.sigma_wall_deg = 0;
+    const PairingTable table(flat.views.plan, segments, options);
+    // The walls that the segments were taken from: those that they lie on at the true pose.
+    std::vector<LabelIdx> labels;
+    for (const ScanSegment& segment : segments) {
+      LabelIdx own = -1;
+      for (const LabelIdx label : flat.views.LabelSet(face)) {
+        const Vec2 from = LabelStart(flat.views.plan, label), to = LabelEnd(flat.views.plan, label);
+        const Vec2 start = pose->FloorFromRobot(segment.start), end = pose->FloorFromRobot(segment.end);
+        if ((to - from).dot(end - start) > 0 &&
+            PointToLine(start, from, to) + PointToLine(end, from, to) < 0.15)
+          own = label;
+      }
+      labels.push_back(own);
+    }
+    for (int first = 0; first < static_cast<int>(segments.size()); ++first) {
+      if (labels[first] < 0) continue;
+      const Pairing& pairing = table.Of(first, labels[first]);
+      const double place = table.Along(labels[first]).dot(pose->position - pairing.from);
+      for (int other = 0; other < static_cast<int>(segments.size()); ++other) {
+        if (other == first || labels[other] < 0) continue;
+        ++tried;
+        const auto stretches = StretchesAlong(table, first, labels[first], {other},
+                                              [&](LabelIdx label) { return label == labels[other]; });
+        held += stretches.size() == 1 && stretches[0].low <= place && place <= stretches[0].high;
+      }
+    }
+  }
+  EXPECT_GT(tried, 2000);
+  EXPECT_GE(held, 0.999 * tried);
 }
 
 // An elbow of different walls: in a region that sees all six, only one way keeps their order.
