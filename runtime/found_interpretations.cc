@@ -58,6 +58,12 @@ int FoundInterpretations::WorstPairing(const Interpretation& found) const {
   return worst;
 }
 
+bool FoundInterpretations::IsInPlan(const Vec2& place) const {
+  const Eigen::Array2d low = plan_.Metres(plan_.low).array() - options_.position_tolerance_m,
+                       high = plan_.Metres(plan_.high).array() + options_.position_tolerance_m;
+  return (place.array() >= low).all() && (place.array() <= high).all();
+}
+
 bool FoundInterpretations::Add(const std::vector<LabelIdx>& labels) {
   Interpretation found;
   found.labels = labels;
@@ -71,6 +77,7 @@ bool FoundInterpretations::Add(const std::vector<LabelIdx>& labels) {
     if (worst < 0) break;
     found.labels[worst] = -1;
   }
+  if (!IsInPlan(found.pose.position)) return false;
   for (Interpretation& other : solutions_) {
     if (other.determined != found.determined ||
         (other.pose.position - found.pose.position).norm() > 2 * options_.position_tolerance_m ||

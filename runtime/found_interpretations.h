@@ -33,6 +33,8 @@ class FoundInterpretations {
   std::vector<Interpretation> TakeRanked();
 
  private:
+  // Whether a place lies in the box of the plan's domain.
+  bool IsInPlan(const Eigen::Vector2d& place) const;
   // The matched segment that lies farthest from its wall or is not seen, -1: all fit.
   int WorstPairing(const Interpretation& found) const;
 

@@ -338,6 +338,8 @@ class TreeSearch {
              (i < j ? places[i].high >= places[j].low : places[j].high >= places[i].low);
     };
     const int first = order_[num_nulls];
+    if (places.empty()) return;
+    if (candidates != nullptr && regions_.Seeing(*candidates, table_, first, labels_[first]).empty()) return;
     for (size_t i = 0; i < places.size() && !done_; ++i) {
       if ((i > 0 && rises(i, i - 1)) || (i + 1 < places.size() && rises(i, i + 1))) continue;
       const double middle = 0.5 * (places[i].low + places[i].high);
@@ -407,9 +409,8 @@ Result<InterpretationTreeResult> SearchInterpretations(const ViewSearchIndex& in
   InterpretationTreeOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (segments.size() < 2) {
-    return MakeError(ErrorCode::kNoData,
-                     "{} straight stretches of walls; a pose needs at least two that are not parallel",
-                     segments.size());
+    return MakeError(ErrorCode::kNoData, "{} of a wall seen; a pose needs at least two that are not parallel",
+                     segments.empty() ? "no straight stretch" : "only one straight stretch");
   }
   return TreeSearch(index, segments, options).Run();
 }

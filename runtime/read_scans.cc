@@ -10,6 +10,9 @@
 namespace cairn {
 namespace {
 
+// No laser sees farther, metres.
+constexpr double kMaxRangeM = 1e5;
+
 Result<ScanView> ParseSegments(const std::string& text, const std::string& what, double sigma_m) {
   ScanView view;
   int number = 0;
@@ -21,11 +24,16 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
     std::vector<double> values(fields.size());
     bool ok = fields.size() == 4 || fields.size() == 6;
     for (size_t i = 0; i < fields.size() && ok; ++i)
-      ok = ParseNumber(fields[i], &values[i]) && std::isfinite(values[i]);
+      ok = ParseNumber(fields[i], &values[i]) && std::abs(values[i]) <= kMaxRangeM;
     if (!ok) {
-      return Corrupt(what, "line {}: \"{}\" is not x0,y0,x1,y1 or x0,y0,x1,y1,sigma_angle_deg,sigma_offset_m",
-                     number, trimmed.substr(0, 80));
+      return Corrupt(what,
+                     "line {}: {:?} is not x0,y0,x1,y1 or x0,y0,x1,y1,sigma_angle_deg,sigma_offset_m (finite "
+                     "numbers up to {:g})",
+                     number, trimmed.substr(0, 80), kMaxRangeM);
     }
+    if (values.size() == 6 && (values[4] <= 0 || values[5] <= 0))
+      return Corrupt(what, "line {}: standard deviations {} and {}; both must be more than 0", number,
+                     values[4], values[5]);
     ScanSegment segment;
     segment.start = {values[0], values[1]};
     segment.end = {values[2], values[3]};

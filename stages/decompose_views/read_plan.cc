@@ -114,8 +114,15 @@ class GeoJsonReader {
 };
 
 Result<InputPlan> ParseGeoJson(const std::string& text, const std::string& what) {
-  const json document = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (document.is_discarded()) return Corrupt(what, "begins with '{{' but is not JSON");
+  json document;
+  try {
+    document = json::parse(text);
+  } catch (const json::parse_error& error) {
+    return Corrupt(what, "begins with '{{' but is not JSON: it goes wrong at byte {} of {}", error.byte,
+                   text.size());
+  } catch (const json::out_of_range&) {
+    return Corrupt(what, "a number in it is too large; expected metres up to {:g}", kMaxCoordinateM);
+  }
   GeoJsonReader reader(what);
   CAIRN_RETURN_IF_ERROR(reader.Read(document));
   if (reader.plan.rings.empty()) return MakeError(ErrorCode::kNoData, "{}: no polygon in it", what);
@@ -136,7 +143,7 @@ Result<InputPlan> ParseSegments(const std::string& text, const std::string& what
       ok = ParseNumber(fields[i], &values[i]) && std::abs(values[i]) <= kMaxCoordinateM;
     }
     if (!ok) {
-      return Corrupt(what, "line {}: \"{}\" is not x0,y0,x1,y1 in metres (four finite numbers up to {:g})",
+      return Corrupt(what, "line {}: {:?} is not x0,y0,x1,y1 in metres (four finite numbers up to {:g})",
                      number, trimmed.substr(0, 80), kMaxCoordinateM);
     }
     plan.segments.push_back({{values[0], values[1]}, {values[2], values[3]}, number});

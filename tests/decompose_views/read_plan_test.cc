@@ -32,6 +32,16 @@ TEST(ReadPlan, NamesTheLineThatIsNoSegment) {
   }
 }
 
+TEST(ReadPlan, QuotesNoBytesThatAreNoText) {
+  EXPECT_THAT(ErrorOf("\x01\xff\x1b[2J").message, HasSubstr("line 1: \"\\x01\\xff\\x1b[2J\""));
+}
+
+TEST(ReadPlan, SaysWhereJsonGoesWrong) {
+  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", ").message, HasSubstr("byte 21 of 20"));
+  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1e400,0],[0,1],[0,0]]]}").message,
+              HasSubstr("too large"));
+}
+
 TEST(ReadPlan, AFileWithoutWallsIsNoPlan) {
   EXPECT_EQ(ErrorOf("").code, ErrorCode::kNoData);
   EXPECT_EQ(ErrorOf("# nothing\n").code, ErrorCode::kNoData);

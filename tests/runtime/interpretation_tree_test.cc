@@ -118,6 +118,19 @@ TEST(InterpretationTree, ParallelWallsLeaveThePlaceAlongThemOpen) {
   EXPECT_LT(result->solutions[0].covariance(1, 1), 1e-4);
 }
 
+TEST(InterpretationTree, NoPlaceOutsideThePlanExplainsAScan) {
+  const Flat flat;
+  // Pieces of one wall, as far off as a robot on the Moon would see them.
+  const std::vector<ScanSegment> segments = {{{1e6, 0}, {1e6, 1}, 1e-3, 1e-3, 10},
+                                             {{1e6, 1}, {1e6, 2}, 1e-3, 1e-3, 10}};
+  for (const char* search : {"vir", "standard"}) {
+    const auto result =
+        SearchInterpretations(flat.index, segments, {.search = search, .one_segment_per_wall = false});
+    ASSERT_TRUE(result.ok());
+    EXPECT_TRUE(result->solutions.empty());
+  }
+}
+
 TEST(InterpretationTree, TooFewSegmentsAreRefused) {
   const Flat flat;
   EXPECT_EQ(SearchInterpretations(flat.index, {}, {}).error().code, ErrorCode::kNoData);

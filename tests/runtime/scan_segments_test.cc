@@ -105,7 +105,12 @@ TEST(ReadScans, SegmentsAreTurnedSoThatTheRobotSeesThem) {
   EXPECT_EQ((*scans)[0].segments[1].start, Vec2(-1, 3));
   EXPECT_NEAR((*scans)[0].segments[1].sigma_angle_rad, 0.5 * std::numbers::pi / 180, 1e-12);
   EXPECT_EQ(ParseScans("1,1,2,2\n", "scan", {}).error().code, ErrorCode::kCorrupt);
-  EXPECT_EQ(ParseScans("1,1,2\n", "scan", {}).error().code, ErrorCode::kCorrupt);
+  for (const char* line : {"1,1,2", "1,nan,2,2", "1,1,2,1e300", "1,1,2,3,0,0.01", "1,1,2,3,0.5,-1"}) {
+    const auto refused = ParseScans(line, "scan", {});
+    ASSERT_FALSE(refused.ok()) << line;
+    EXPECT_EQ(refused.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(refused.error().message, HasSubstr("scan: line 1: "));
+  }
   EXPECT_EQ(ParseScans("\n", "scan", {}).error().code, ErrorCode::kNoData);
 }
 
