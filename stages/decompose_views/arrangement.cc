@@ -57,11 +57,18 @@ class FaceWalker {
     const size_t num_vertices = arrangement_.vertices.size();
     const auto num_halves = static_cast<int64_t>(2 * arrangement_.edges.size());
     offsets_.assign(num_vertices + 1, 0);
-    for (int64_t half = 0; half < num_halves; ++half) ++offsets_[Origin(half) + 1];
+    const auto stopped = [&](int64_t item) { return item % kItemsPerBlock == 0 && progress.Cancelled(); };
+    for (int64_t half = 0; half < num_halves; ++half) {
+      if (stopped(half)) return false;
+      ++offsets_[Origin(half) + 1];
+    }
     std::partial_sum(offsets_.begin(), offsets_.end(), offsets_.begin());
     around_.resize(num_halves);
     std::vector<int64_t> next(offsets_.begin(), offsets_.end() - 1);
-    for (int64_t half = 0; half < num_halves; ++half) around_[next[Origin(half)]++] = half;
+    for (int64_t half = 0; half < num_halves; ++half) {
+      if (stopped(half)) return false;
+      around_[next[Origin(half)]++] = half;
+    }
     place_.resize(num_halves);
     const int64_t num_blocks = (static_cast<int64_t>(num_vertices) + kItemsPerBlock - 1) / kItemsPerBlock;
     ParallelFor(num_blocks, num_threads, [&](int64_t block) {
@@ -147,6 +154,7 @@ Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, in
   const auto lower_first = [](const NodedEdge& edge) { return std::minmax(edge.start, edge.end); };
   std::vector<int8_t> solid_sides;
   for (size_t i = 0; i < noded.size(); ++i) {
+    if (i % kItemsPerBlock == 0 && progress.Cancelled()) break;
     const auto [start, end] = lower_first(noded[i]);
     if (i == 0 || lower_first(noded[i - 1]) != lower_first(noded[i])) {
       arrangement.edges.push_back({.start = start, .end = end});

@@ -118,6 +118,8 @@ Result<InputPlan> ParseGeoJson(const std::string& text, const std::string& what)
   try {
     document = json::parse(text);
   } catch (const json::parse_error& error) {
+    if (error.byte > text.size())
+      return Corrupt(what, "JSON that ends too early, after {} bytes", text.size());
     return Corrupt(what, "begins with '{{' but is not JSON: it goes wrong at byte {} of {}", error.byte,
                    text.size());
   } catch (const json::out_of_range&) {

@@ -37,7 +37,8 @@ TEST(ReadPlan, QuotesNoBytesThatAreNoText) {
 }
 
 TEST(ReadPlan, SaysWhereJsonGoesWrong) {
-  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", ").message, HasSubstr("byte 21 of 20"));
+  EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", ").message, HasSubstr("after 20 bytes"));
+  EXPECT_THAT(ErrorOf("{\"type\": Polygon}").message, HasSubstr("byte 10 of 17"));
   EXPECT_THAT(ErrorOf("{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1e400,0],[0,1],[0,0]]]}").message,
               HasSubstr("too large"));
 }
