@@ -92,7 +92,7 @@ bool FoundInterpretations::Add(const std::vector<LabelIdx>& labels) {
     return false;
   }
   solutions_.push_back(std::move(found));
-  return true;
+  return solutions_.back().rms_m <= options_.position_tolerance_m;
 }
 
 bool FoundInterpretations::HasBoth(int a, LabelIdx label_a, int b, LabelIdx label_b) const {

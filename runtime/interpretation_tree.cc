@@ -321,11 +321,11 @@ class TreeSearch {
       if (!CountNode()) return kNull;
       if (!table_.Of(segment, label).possible) continue;
       const double misfit = found_.Misfit(found, segment, label);
-      if (misfit >= best_misfit || !found_.IsSeen(found, segment)) continue;
+      if (misfit >= best_misfit) continue;
       best = label;
       best_misfit = misfit;
     }
-    return best;
+    return best != kNull && found_.IsSeen(found, segment) ? best : kNull;
   }
 
   // Walls of one direction: where along them most segments have a wall, each gets the one that lies there.
