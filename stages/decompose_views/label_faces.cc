@@ -17,6 +17,7 @@ using Vec2 = Eigen::Vector2d;
 constexpr double kSameDirection = 1e-12;
 // Regions so deep in the tree begin one of their own, so that a label set is found in few steps.
 constexpr int kMaxDepth = 128;
+constexpr int64_t kItemsPerBlock = 4096;  // between questions whether to stop
 
 Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
 
@@ -32,18 +33,17 @@ class FaceLabeller {
 
   Status Run(Progress& progress, LabelFacesResult* result) {
     result_ = result;
-    ListBorders();
+    const auto cancelled = MakeError(ErrorCode::kCancelled, "cancelled");
+    if (!ListBorders(progress)) return cancelled;
     new_index_.assign(num_faces_, -1);
     hashes_.assign(num_faces_, 0);
+    const std::vector<int32_t> roots = Roots(progress);
+    if (progress.Cancelled()) return cancelled;
     progress.Begin("label sets", num_faces_, "regions");
-    for (const int32_t root : Roots()) {
-      if (!Walk(root, progress)) {
-        progress.End();
-        return MakeError(ErrorCode::kCancelled, "cancelled");
-      }
-    }
+    bool walked = true;
+    for (size_t i = 0; i < roots.size() && walked; ++i) walked = Walk(roots[i], progress);
     progress.End();
-    if (!TakeLinks(progress)) return MakeError(ErrorCode::kCancelled, "cancelled");
+    if (!walked || !TakeLinks(progress)) return cancelled;
     return Ok();
   }
 
@@ -53,13 +53,15 @@ class FaceLabeller {
     int32_t other;
   };
 
-  // For each face the edges to others, shared ends first in the order of edges.
-  void ListBorders() {
+  // For each face the edges to others, shared ends first in the order of edges.  False: cancelled.
+  bool ListBorders(const Progress& progress) {
     border_offsets_.assign(num_faces_ + 1, 0);
     const auto is_link = [](const Arrangement::Edge& edge) {
       return !edge.is_wall && edge.left >= 0 && edge.right >= 0 && edge.left != edge.right;
     };
-    for (const Arrangement::Edge& edge : arrangement_.edges) {
+    for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
+      if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
+      const Arrangement::Edge& edge = arrangement_.edges[i];
       if (!is_link(edge)) continue;
       ++border_offsets_[edge.left + 1];
       ++border_offsets_[edge.right + 1];
@@ -68,15 +70,18 @@ class FaceLabeller {
     borders_.resize(border_offsets_.back());
     std::vector<int64_t> next(border_offsets_.begin(), border_offsets_.end() - 1);
     for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
+      if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
       const Arrangement::Edge& edge = arrangement_.edges[i];
       if (!is_link(edge)) continue;
       borders_[next[edge.left]++] = {static_cast<int64_t>(i), edge.right};
       borders_[next[edge.right]++] = {static_cast<int64_t>(i), edge.left};
     }
+    return true;
   }
 
-  // The largest face of each connected part, large ones first.
-  std::vector<int32_t> Roots() const {
+  // The largest face of each connected part, large ones first; some only if cancelled.
+  std::vector<int32_t> Roots(const Progress& progress) const {
+    int64_t num_visited = 0;
     std::vector<bool> seen(num_faces_, false);
     std::vector<std::pair<double, int32_t>> roots;  // area, -face: of equal ones the first
     std::vector<int32_t> open;
@@ -86,6 +91,7 @@ class FaceLabeller {
       seen[face] = true;
       open.push_back(face);
       while (!open.empty()) {
+        if (++num_visited % kItemsPerBlock == 0 && progress.Cancelled()) return {};
         const int32_t at = open.back();
         open.pop_back();
         largest = std::max(largest, {Area(at), -at});
@@ -227,18 +233,21 @@ class FaceLabeller {
     Views& views = result_->views;
     std::vector<int64_t> ends(num_faces_ + 1, 0);
     const auto visit_links = [&](auto&& visit) {
-      for (const Arrangement::Edge& edge : arrangement_.edges) {
+      for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
+        if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
+        const Arrangement::Edge& edge = arrangement_.edges[i];
         if (edge.is_wall || edge.left < 0 || edge.right < 0 || edge.left == edge.right) continue;
         const FaceIdx left = new_index_[edge.left], right = new_index_[edge.right];
         visit(left < right ? ViewLink{left, right, edge.start, edge.end}
                            : ViewLink{right, left, edge.end, edge.start});
       }
+      return true;
     };
-    visit_links([&](const ViewLink& link) { ++ends[link.a + 1]; });
+    if (!visit_links([&](const ViewLink& link) { ++ends[link.a + 1]; })) return false;
     std::partial_sum(ends.begin(), ends.end(), ends.begin());
     views.links.resize(ends.back());
     const std::vector<int64_t> starts = ends;
-    visit_links([&](const ViewLink& link) { views.links[ends[link.a]++] = link; });
+    if (!visit_links([&](const ViewLink& link) { views.links[ends[link.a]++] = link; })) return false;
     for (int32_t face = 0; face < num_faces_; ++face) {
       if (face % 65536 == 0 && progress.Cancelled()) return false;
       std::sort(views.links.begin() + starts[face], views.links.begin() + starts[face + 1]);
