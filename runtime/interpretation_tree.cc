@@ -332,54 +332,31 @@ class TreeSearch {
   // Walls that cross a little fix the pose nevertheless.
   void PairParallels(int num_nulls, const std::vector<PlaceStretch>& stretches, int least,
                      const FaceSet* candidates) {
-    const std::vector<SupportedPlaces> places = PlacesWithSupport(stretches, least);
-    const auto rises = [&](size_t i, size_t j) {  // from one to its neighbour
-      return places[i].num_segments < places[j].num_segments &&
-             (i < j ? places[i].high >= places[j].low : places[j].high >= places[i].low);
-    };
-    const int first = order_[num_nulls];
+    const std::vector<SupportedPlaces> places = BestSupported(PlacesWithSupport(stretches, least));
     if (places.empty()) return;
+    const int first = order_[num_nulls];
     if (candidates != nullptr && regions_.Seeing(*candidates, table_, first, labels_[first]).empty()) return;
-    for (size_t i = 0; i < places.size() && !done_; ++i) {
-      if ((i > 0 && rises(i, i - 1)) || (i + 1 < places.size() && rises(i, i + 1))) continue;
-      const double middle = 0.5 * (places[i].low + places[i].high);
-      const std::vector<LabelIdx> before = labels_;
-      int widest = -1;
-      for (const PlaceStretch& stretch : stretches) {
-        if (stretch.low > middle || stretch.high < middle) continue;
-        if (labels_[stretch.segment] >= 0 && !Nearer(stretch, labels_[stretch.segment], stretches, middle))
-          continue;
-        if (!CountNode()) break;
-        labels_[stretch.segment] = stretch.label;
-        if (widest < 0 || SineBetween(first, stretch.segment) > SineBetween(first, widest))
-          widest = stretch.segment;
-      }
+    for (const SupportedPlaces& place : places) {
+      const std::vector<PlaceStretch> over = StretchesOver(stretches, 0.5 * (place.low + place.high));
       Interpretation found;
       found.labels = labels_;
+      int widest = over.front().segment;
+      for (const PlaceStretch& stretch : over) {
+        if (!CountNode()) return;
+        found.labels[stretch.segment] = stretch.label;
+        if (SineBetween(first, stretch.segment) > SineBetween(first, widest)) widest = stretch.segment;
+      }
       FitPose(plan_, segments_, &found);
-      labels_ = before;
-      if (done_) return;
       if (found.determined) {
         labels_[widest] = found.labels[widest];
         PairRestOf(first, widest, num_nulls, candidates);
-        labels_ = before;
+        labels_[widest] = kOpen;
       } else {
         std::replace(found.labels.begin(), found.labels.end(), kOpen, kNull);
         Finish(found.labels);
       }
+      if (done_) return;
     }
-  }
-
-  // Whether the middle of a stretch lies nearer to a place than that of its segment's label so far.
-  static bool Nearer(const PlaceStretch& stretch, LabelIdx so_far, const std::vector<PlaceStretch>& stretches,
-                     double place) {
-    const auto from_middle = [&](const PlaceStretch& of) {
-      return std::abs(0.5 * (of.low + of.high) - place);
-    };
-    const auto other = std::find_if(stretches.begin(), stretches.end(), [&](const PlaceStretch& candidate) {
-      return candidate.segment == stretch.segment && candidate.label == so_far;
-    });
-    return other == stretches.end() || from_middle(stretch) < from_middle(*other);
   }
 
   void Finish(const std::vector<LabelIdx>& labels) {

@@ -119,4 +119,30 @@ std::vector<SupportedPlaces> PlacesWithSupport(const std::vector<PlaceStretch>& 
   return places;
 }
 
+std::vector<SupportedPlaces> BestSupported(const std::vector<SupportedPlaces>& places) {
+  std::vector<SupportedPlaces> best;
+  for (size_t i = 0; i < places.size(); ++i) {
+    const bool left =
+        i > 0 && places[i - 1].high >= places[i].low && places[i - 1].num_segments > places[i].num_segments;
+    const bool right = i + 1 < places.size() && places[i + 1].low <= places[i].high &&
+                       places[i + 1].num_segments > places[i].num_segments;
+    if (!left && !right) best.push_back(places[i]);
+  }
+  return best;
+}
+
+std::vector<PlaceStretch> StretchesOver(const std::vector<PlaceStretch>& stretches, double place) {
+  const auto from_middle = [&](const PlaceStretch& of) { return std::abs(0.5 * (of.low + of.high) - place); };
+  std::vector<PlaceStretch> over;
+  for (const PlaceStretch& stretch : stretches) {
+    if (stretch.low > place || stretch.high < place) continue;
+    if (over.empty() || over.back().segment != stretch.segment) {
+      over.push_back(stretch);
+    } else if (from_middle(stretch) < from_middle(over.back())) {
+      over.back() = stretch;
+    }
+  }
+  return over;
+}
+
 }  // namespace cairn

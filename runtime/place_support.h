@@ -35,4 +35,10 @@ std::vector<PlaceStretch> StretchesAlong(const PairingTable& table, int segment,
 // none where `least` is 0 and there is no stretch.  `stretches`: by segment.  O(n log n)
 std::vector<SupportedPlaces> PlacesWithSupport(const std::vector<PlaceStretch>& stretches, int least);
 
+// Those of ascending places that touch none with more support.
+std::vector<SupportedPlaces> BestSupported(const std::vector<SupportedPlaces>& places);
+
+// Of each segment the stretch over a place whose middle is nearest to it; by segment as `stretches`.
+std::vector<PlaceStretch> StretchesOver(const std::vector<PlaceStretch>& stretches, double place);
+
 }  // namespace cairn

@@ -292,6 +292,16 @@ TEST(PlacesWithSupport, CountsEachSegmentOnce) {
   EXPECT_EQ(places[2].high, 3.5);
   EXPECT_TRUE(PlacesWithSupport(stretches, 4).empty());
   EXPECT_TRUE(PlacesWithSupport({}, 1).empty());
+
+  const auto best = BestSupported(places);
+  ASSERT_EQ(best.size(), 2u);
+  EXPECT_EQ(best[0].num_segments, 3);
+  EXPECT_EQ(best[1].low, 3);
+  const auto over = StretchesOver(stretches, 1.2);  // the middles of a's are at 1 and 1
+  ASSERT_EQ(over.size(), 2u);
+  EXPECT_EQ(over[0].label, 0);
+  EXPECT_EQ(over[1].segment, 1);
+  EXPECT_EQ(StretchesOver(stretches, 3.2).front().label, 4);
 }
 
 TEST(StretchesAlong, HoldThePlaceOfEveryNoisyScan) {
