@@ -13,6 +13,31 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
+constexpr int kMaxSteps = 8;
+constexpr double kSmallestStep = 1e-7;  // metres and radians
+
+// What is seen of a wall ends where the wall does or before: an end beyond it pulls the pose back.
+void AddEndsBeyondWalls(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
+                        const Interpretation& found, Eigen::Matrix3d* information,
+                        Eigen::Vector3d* gradient) {
+  const Eigen::Rotation2Dd rotation(found.pose.heading_rad);
+  for (size_t i = 0; i < segments.size(); ++i) {
+    if (found.labels[i] < 0) continue;
+    const Vec2 start = LabelStart(plan, found.labels[i]), end = LabelEnd(plan, found.labels[i]);
+    const double length = (end - start).norm();
+    const Vec2 along = (end - start) / length;
+    const double weight = 1 / std::pow(std::max(1e-6, segments[i].sigma_end_m), 2);
+    for (const Vec2& seen : {segments[i].start, segments[i].end}) {
+      const Vec2 arm = rotation * seen;
+      const double place = along.dot(found.pose.position + arm - start);
+      if (place >= 0 && place <= length) continue;
+      const Eigen::Vector3d row(along.x(), along.y(), along.dot(Vec2(-arm.y(), arm.x())));
+      *information += weight * row * row.transpose();
+      *gradient += weight * row * (std::clamp(place, 0.0, length) - place);
+    }
+  }
+}
+
 }  // namespace
 
 void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
@@ -36,9 +61,9 @@ void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
   }
   if (found.num_matched == 0) return;
   found.pose.heading_rad = WrapAngle(reference + heading / weight_sum);
-  // Offsets: x and heading together, two steps of Gauss-Newton.
+  // Place and heading together, by Gauss-Newton; ends count once there is a place.
   Vec2 middle_of_range = Vec2::Zero();
-  for (int step = 0; step < 3; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     middle_of_range = Vec2::Zero();
@@ -75,10 +100,13 @@ void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
       const double weight = 1 / (range * range);
       information += weight * row * row.transpose();
       gradient += weight * row * free.dot(middle_of_range - found.pose.position);
+    } else if (step > 0) {
+      AddEndsBeyondWalls(plan, segments, found, &information, &gradient);
     }
     const Eigen::Vector3d change = information.ldlt().solve(gradient);
     found.pose.position += change.head<2>();
     found.pose.heading_rad = WrapAngle(found.pose.heading_rad + change[2]);
+    if (step > 1 && change.norm() < kSmallestStep) break;
   }
   found.covariance = information.inverse();
   double sum = 0;

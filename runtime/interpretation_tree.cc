@@ -389,7 +389,10 @@ Result<InterpretationTreeResult> SearchInterpretations(const ViewSearchIndex& in
     return MakeError(ErrorCode::kNoData, "{} of a wall seen; a pose needs at least two that are not parallel",
                      segments.empty() ? "no straight stretch" : "only one straight stretch");
   }
-  return TreeSearch(index, segments, options).Run();
+  std::vector<ScanSegment> uncertain = segments;
+  for (ScanSegment& segment : uncertain)
+    segment.sigma_end_m = std::hypot(segment.sigma_end_m, options.sigma_wall_m);
+  return TreeSearch(index, uncertain, options).Run();
 }
 
 }  // namespace cairn

@@ -56,8 +56,9 @@ struct InterpretationTreeOptions {
   // one before; 1: all at once.  REQUIRES: >= 1
   int rank_growth = 1;
   bool fix_pose_early = true;
-  // Walls stand about where the plan says, each by itself: standard deviation of their offset and direction,
-  // part of the covariance of solutions.  A laser measures better than plans are drawn.  REQUIRES: >= 0
+  // Walls stand about where the plan says, each by itself: standard deviation of their offset, ends and
+  // direction, part of the covariance of solutions.  A laser measures better than plans are drawn.  REQUIRES:
+  // >= 0
   double sigma_wall_m = 0.03;
   double sigma_wall_deg = 0.8;
   // Search ends after this many pairings; what was found until then is returned, not complete.
@@ -95,8 +96,9 @@ Result<InterpretationTreeResult> SearchInterpretations(const ViewSearchIndex& in
                                                        const std::vector<ScanSegment>& segments,
                                                        const InterpretationTreeOptions& options);
 
-// The pose that brings segments onto the lines of their labels' walls best, from an estimate; labels of -1
-// are left out.  Fills pose, covariance, determined, num_matched, matched_length_m and rms_m.
+// The pose that brings segments onto the lines of their labels' walls best, and their ends not beyond the
+// walls' (short walls in a row tell the place along them), from an estimate; labels of -1 are left out. Fills
+// pose, covariance, determined, num_matched, matched_length_m and rms_m.
 void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments, Interpretation* interpretation);
 
 }  // namespace cairn

@@ -137,6 +137,7 @@ ScanSegment FitSegment(const Points& points, double sigma_m) {
   segment.sigma_offset_m = sigma / std::sqrt(num);
   segment.sigma_angle_rad = sigma / std::sqrt(std::max(1e-12, solver.eigenvalues()[1]));
   segment.num_points = static_cast<int>(points.size());
+  segment.sigma_end_m = sigma;
   return segment;
 }
 

@@ -18,6 +18,8 @@ struct ScanSegment {
   double sigma_angle_rad = 0;
   double sigma_offset_m = 0;
   int num_points = 0;
+  // Of the ends, along the line.
+  double sigma_end_m = 0.02;
 
   double Length() const { return (end - start).norm(); }
   Eigen::Vector2d Middle() const { return 0.5 * (start + end); }
