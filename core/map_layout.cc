@@ -240,7 +240,7 @@ VisualBlock MapLayout::MakeVisualBlock(const BlockEntry& entry) const {
   const VisualMapData& all = rows_.visual_map;
   const auto begin = all.landmarks.begin() + entry.first;
   return {static_cast<LandmarkIdx>(entry.first),
-          {all.camera_id, all.focal_px, all.headings_deg, {begin, begin + entry.count}}};
+          {all.camera_id, all.focal_px, all.errors, all.headings_deg, {begin, begin + entry.count}}};
 }
 
 std::vector<float> MapLayout::MakeDocumentNorms() const {

@@ -1,5 +1,6 @@
 // Blocks of the visual map as bytes: drawn in schemas/FORMAT.md.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/blob.h"
@@ -43,6 +44,10 @@ template <typename... Args>
 Error Invalid(fmt::format_string<Args...> format, Args&&... args) {
   return MakeError(ErrorCode::kInvalidArgument, "visual map: {}",
                    fmt::format(format, std::forward<Args>(args)...));
+}
+
+std::array<float, 4> ValuesOf(const VisualErrors& errors) {
+  return {errors.shared_m, errors.shared_rad, errors.growth_per_m, errors.tilt_rad};
 }
 
 Status CheckModel(const HeadingModel& model, size_t landmark, int64_t num_images) {
@@ -128,6 +133,9 @@ Status CheckVisualMap(const VisualMapData& visual_map, int64_t num_landmarks, in
   if (static_cast<int64_t>(visual_map.landmarks.size()) != num_landmarks)
     return Invalid("models of {} landmarks of {}", visual_map.landmarks.size(), num_landmarks);
   if (!(visual_map.focal_px >= 0 && visual_map.focal_px < 1e6F)) return Invalid("its focal length is none");
+  for (const float value : ValuesOf(visual_map.errors)) {
+    if (!(value >= 0 && value < 1e6F)) return Invalid("its errors are no valid numbers");
+  }
   const std::vector<double>& headings = visual_map.headings_deg;
   if (headings.empty() || headings.size() > kMaxNumHeadings || !(headings.front() >= 0) ||
       !(headings.back() < 360) || !IsAscending(headings)) {
@@ -149,6 +157,7 @@ std::string EncodeBlock(const VisualBlock& block) {
   BlobWriter writer;
   writer.Varint(block.part.camera_id);
   writer.Float32(block.part.focal_px);
+  for (const float value : ValuesOf(block.part.errors)) writer.Float32(value);
   writer.UInt8(static_cast<uint8_t>(block.part.headings_deg.size()));
   for (const double heading : block.part.headings_deg) writer.Varint(HeadingCode(heading));
   for (const std::vector<HeadingModel>& models : block.part.landmarks) {
@@ -168,6 +177,10 @@ Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& 
   const uint64_t camera_id = reader.Varint();
   block.part.camera_id = static_cast<CameraId>(camera_id);
   block.part.focal_px = reader.Float32();
+  VisualErrors& errors = block.part.errors;
+  for (float* value : {&errors.shared_m, &errors.shared_rad, &errors.growth_per_m, &errors.tilt_rad}) {
+    *value = reader.Float32();
+  }
   const int num_headings = reader.UInt8();
   for (int i = 0; i < num_headings && reader.ok(); ++i) {
     const uint64_t code = reader.Varint();
@@ -201,9 +214,10 @@ Status AppendModels(const VisualBlock& block, const std::string& what, VisualMap
   if (visual_map->landmarks.empty()) {
     visual_map->camera_id = block.part.camera_id;
     visual_map->focal_px = block.part.focal_px;
+    visual_map->errors = block.part.errors;
     visual_map->headings_deg = block.part.headings_deg;
   } else if (visual_map->camera_id != block.part.camera_id || visual_map->focal_px != block.part.focal_px ||
-             visual_map->headings_deg != block.part.headings_deg) {
+             visual_map->errors != block.part.errors || visual_map->headings_deg != block.part.headings_deg) {
     return Corrupt(what, "its camera and headings are not those of the block before");
   }
   visual_map->landmarks.insert(visual_map->landmarks.end(), block.part.landmarks.begin(),

@@ -31,12 +31,27 @@ struct HeadingModel {
   std::vector<LandmarkSight> sights;  // ascending image, at least kMinNumSights
 };
 
+// What the survey's own images say about how good its visual map is: they are placed by models that were
+// shown nothing from within a spacing of the survey around them.
+struct VisualErrors {
+  // Standard deviation of what landmarks' errors share (heights of cameras, ways between places): per axis,
+  // and of the heading.  It does not average out over landmarks.
+  float shared_m = 0, shared_rad = 0;
+  // A model's standard deviation at a distance d from the nearest of its sights: sigma sqrt(1 + (growth
+  // d)^2).
+  float growth_per_m = 0;
+  // Pitch and roll of the survey's cameras, root mean square.  Sights are stored as a level camera's.
+  float tilt_rad = 0;
+  friend bool operator==(const VisualErrors&, const VisualErrors&) = default;
+};
+
 struct VisualMapData {
   // The camera of all sights; queries are its images too.
   CameraId camera_id = 0;
   // What a turn of the camera does to an image, as the survey itself shows it: that of a pinhole with this
   // focal length, px; 0: the survey does not tell.
   float focal_px = 0;
+  VisualErrors errors;
   // The headings of models, floor frame, degrees, ascending in [0, 360).  Sights from headings between are
   // turned to the nearest.
   std::vector<double> headings_deg;

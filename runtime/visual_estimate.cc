@@ -146,8 +146,8 @@ class Estimator {
       refined.agreeing.clear();
       for (const VisualTerm& term : terms) {
         const LandmarkModel::Prediction prediction = term.model->interpolation.Predict(refined.position);
-        FitItem item = search_.MakeItem(term, {0, 0}, 0);
-        item.predicted = prediction.seen;
+        const FitItem item =
+            search_.MakeItem(term, prediction.seen, map_.Variance(*term.model, refined.position));
         Eigen::Vector3d error;
         Eigen::Matrix3d by_turn;
         if (!ItemError(item, rotation, search_.fit().focal_px, &error, &by_turn)) continue;
@@ -164,8 +164,8 @@ class Estimator {
       const Matrix5d inverse = normal.inverse();
       if (!inverse.allFinite()) return std::nullopt;
       if (is_last) {
-        const double shared_m = std::hypot(options_.shared_sigma_m, map_.shared_sigma_m());
-        const double shared_rad = std::hypot(RadFromDeg(options_.shared_sigma_deg), map_.shared_sigma_rad());
+        const double shared_m = std::hypot(options_.shared_sigma_m, map_.errors().shared_m);
+        const double shared_rad = std::hypot(RadFromDeg(options_.shared_sigma_deg), map_.errors().shared_rad);
         refined.covariance = inverse.topLeftCorner<3, 3>();
         refined.covariance.diagonal() +=
             Eigen::Vector3d(shared_m * shared_m, shared_m * shared_m, shared_rad * shared_rad);

@@ -26,7 +26,8 @@ struct VisualEstimateOptions {
   // Share of wrong matches, o; of landmarks whose model predicts badly it is halfway to 1.  REQUIRES: in
   // (0, 1)
   double outlier_ratio = 0.3;
-  // Standard deviation of the camera's pitch and roll against the survey's, degrees.  REQUIRES: > 0
+  // Standard deviation of the camera's pitch and roll beside what the survey's cameras have, degrees.
+  // REQUIRES: > 0
   double tilt_sigma_deg = 2;
   // Headings farther than half way to the next of the survey count up to this much, degrees; where the survey
   // does not tell how far a turn moves the image, this is all.  REQUIRES: >= 0
@@ -35,7 +36,7 @@ struct VisualEstimateOptions {
   // REQUIRES: >= 1
   int num_refined_places = 12;
   int num_subdivisions = 5;
-  // What does not average out over landmarks beside what the survey itself shows (VisualMap::shared_sigma_m),
+  // What does not average out over landmarks beside what the survey itself shows (VisualErrors),
   // per axis, m and degrees.  REQUIRES: >= 0
   double shared_sigma_m = 0.002;
   double shared_sigma_deg = 0.05;

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -10,6 +8,7 @@
 #include "core/error.h"
 #include "core/landmark_model.h"
 #include "core/options.h"
+#include "core/visual_map.h"
 #include "runtime/map.h"
 #include "runtime/measurement.h"
 
@@ -36,6 +35,16 @@ struct SeenLandmark {
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();  // x px, y px, log2 of the scale in px
 };
 
+// Where a survey was taken, and with which camera.
+struct VisualSurvey {
+  std::vector<Eigen::Vector2d> places;  // the pose lattice, each place once; floor frame, metres
+  std::vector<Eigen::Vector2d> images;  // where each image of the map was taken
+  int width_px = 0, height_px = 0;      // of the images
+};
+
+// Stations nearer than a centimetre are one place.
+std::vector<Eigen::Vector2d> DistinctPlaces(const std::vector<Eigen::Vector2d>& stations);
+
 // The visual map of a map, ready to use: immutable, shareable.
 class VisualMap {
  public:
@@ -44,6 +53,7 @@ class VisualMap {
     int32_t place = 0;
     Eigen::Vector3d seen;                  // from the image's middle
     Eigen::Matrix<double, 3, 2> gradient;  // d seen / d place, per metre
+    Eigen::Vector3d variance;              // of seen
   };
   struct Model {
     LandmarkIdx landmark = 0;
@@ -51,30 +61,32 @@ class VisualMap {
     LandmarkModel interpolation;
     Eigen::Vector3d sigma;  // as HeadingModel::sigma
     bool predicts_badly = false;
+    std::vector<Eigen::Vector2d> sight_places;
     std::vector<AtPlace> extent;  // ascending place
   };
 
   // Loads all models.  Errors: NotFound where the map has none; Corrupt (sights of an image that the map
   // lacks, or that make no model; a camera that it lacks); Io.
   static Result<std::shared_ptr<const VisualMap>> Load(const Map& map, const VisualMapOptions& options = {});
+  // Without descriptors: Match finds nothing.  Errors: Corrupt, as above.
+  static Result<std::shared_ptr<const VisualMap>> Make(const VisualMapData& data, VisualSurvey survey,
+                                                       const VisualMapOptions& options = {});
 
   // Where the survey was taken, floor frame, metres: the pose lattice, each place once.
-  const std::vector<Eigen::Vector2d>& places() const { return places_; }
+  const std::vector<Eigen::Vector2d>& places() const { return survey_.places; }
   // Median distance from a place to the next.
   double spacing_m() const { return spacing_m_; }
   const std::vector<double>& headings_deg() const { return headings_deg_; }
   // px; where the survey does not tell how far a turn moves the image, a guess: 1.2 max(width, height).
   double focal_px() const { return focal_px_; }
   bool has_learnt_focal() const { return has_learnt_focal_; }
-  // How far off the survey's own images are placed by models that leave them out, per axis and of the
-  // heading, less what chance in so many landmarks explains: what landmarks' errors share (cameras' heights,
-  // places between which models interpolate).
-  double shared_sigma_m() const { return shared_sigma_m_; }
-  double shared_sigma_rad() const { return shared_sigma_rad_; }
+  const VisualErrors& errors() const { return errors_; }
   // Size of the images that it is for.
-  int image_width_px() const { return width_px_; }
-  int image_height_px() const { return height_px_; }
-  Eigen::Vector2d middle_px() const { return {0.5 * width_px_, 0.5 * height_px_}; }
+  int image_width_px() const { return survey_.width_px; }
+  int image_height_px() const { return survey_.height_px; }
+  Eigen::Vector2d middle_px() const { return {0.5 * survey_.width_px, 0.5 * survey_.height_px}; }
+  // Of what a model says at a place: that of left-out sights, grown with the distance from its sights.
+  Eigen::Vector3d Variance(const Model& model, const Eigen::Vector2d& position) const;
   const std::vector<Model>& models() const { return models_; }
   // Of a landmark: indices in models().
   const std::vector<int32_t>& ModelsOf(LandmarkIdx landmark) const { return models_of_landmark_[landmark]; }
@@ -86,27 +98,20 @@ class VisualMap {
 
  private:
   VisualMap() = default;
-  Status AddModels(const Map& map, const VisualMapData& data);
-  Status AddPlaces(const Map& map);
-  void FillExtents();
-  void LearnSharedError(const VisualMapData& data);
-  // The error (x m, y m, heading rad) at which the models in which an image is a sight place it when they
-  // leave it out, to first order, and the covariance that their own errors give it.  `in_models`: model,
-  // sight.
-  std::optional<std::pair<Eigen::Vector3d, Eigen::Matrix3d>> PlaceLeftOut(
-      const std::vector<std::pair<size_t, size_t>>& in_models, const VisualMapData& data) const;
+  static Result<std::shared_ptr<VisualMap>> MakeMutable(const VisualMapData& data, VisualSurvey survey,
+                                                        const VisualMapOptions& options);
+  Status AddModels(const VisualMapData& data);
+  void FillExtent(Model* model) const;
 
   VisualMapOptions options_;
-  std::vector<Eigen::Vector2d> places_;
+  VisualSurvey survey_;
   double spacing_m_ = 0;
   std::vector<double> headings_deg_;
   double focal_px_ = 0;
   bool has_learnt_focal_ = false;
-  double shared_sigma_m_ = 0, shared_sigma_rad_ = 0;
-  int width_px_ = 0, height_px_ = 0;
+  VisualErrors errors_;
   std::vector<Model> models_;
   std::vector<std::vector<int32_t>> models_of_landmark_;
-  std::vector<std::vector<Sight>> sights_;  // of every model, while it is loaded
   std::shared_ptr<const LandmarkSet> landmarks_;
 };
 

@@ -20,7 +20,7 @@ VisualSearch::VisualSearch(const VisualMap& map, const std::vector<SeenLandmark>
                            const VisualEstimateOptions& options, const std::vector<double>& log_prior)
     : map_(map), seen_(seen), options_(options), log_prior_(log_prior) {
   fit_.focal_px = map.focal_px();
-  fit_.tilt_sigma_rad = RadFromDeg(options.tilt_sigma_deg);
+  fit_.tilt_sigma_rad = std::hypot(RadFromDeg(options.tilt_sigma_deg), map.errors().tilt_rad);
   const double half_step_deg = 180.0 / static_cast<double>(map.headings_deg().size());
   fit_.max_left_rad = RadFromDeg(options.heading_margin_deg + (map.has_learnt_focal() ? half_step_deg : 0));
 }
@@ -58,14 +58,21 @@ const std::vector<VisualTerm>& VisualSearch::TermsOf(const VisualHypothesis& hyp
 }
 
 FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const {
+  FitItem item = MakeItem(term, term.at->seen + term.at->gradient * offset, term.at->variance);
+  item.variance += spread_m * spread_m * term.at->gradient.rowwise().squaredNorm();
+  item.log_odds = LogOdds(*term.model, item.variance);
+  return item;
+}
+
+FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted,
+                               const Eigen::Vector3d& variance) const {
   const double px = options_.visual_sigma_px, octaves = options_.visual_sigma_octaves;
   FitItem item;
   item.match = term.match;
   item.seen = seen_[term.match].seen;
   item.seen.head<2>() -= map_.middle_px();
-  item.predicted = term.at->seen + term.at->gradient * offset;
-  item.variance = term.model->sigma.cwiseAbs2() + Eigen::Vector3d(px * px, px * px, octaves * octaves) +
-                  spread_m * spread_m * term.at->gradient.rowwise().squaredNorm();
+  item.predicted = predicted;
+  item.variance = variance + Eigen::Vector3d(px * px, px * px, octaves * octaves);
   item.log_odds = LogOdds(*term.model, item.variance);
   return item;
 }

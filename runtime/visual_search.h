@@ -46,6 +46,9 @@ class VisualSearch {
   // `offset`: from the term's place, metres; `spread_m`: the item stands for points this far around, standard
   // deviation per axis.
   FitItem MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const;
+  // Of what the term's model says anywhere.
+  FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted,
+                   const Eigen::Vector3d& variance) const;
 
  private:
   double LogOdds(const VisualMap::Model& model, const Eigen::Vector3d& variance) const;

@@ -16,6 +16,7 @@
 #include "core/views_database.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 
 namespace cairn {
@@ -125,6 +126,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (arguments.options.visual_map) {
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map,
                            ModelLandmarks(classes, rows, arguments.options, environment.num_threads));
+    CAIRN_ASSIGN_OR_RETURN(rows.visual_map.errors,
+                           LearnVisualErrors(classes, rows, rows.visual_map, environment.num_threads));
   }
   CAIRN_RETURN_IF_ERROR(AddDrops(arguments, classes, world, &rows));
   CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));

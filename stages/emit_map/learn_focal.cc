@@ -21,6 +21,10 @@ struct Axes {
   Eigen::Vector2d forward, right;
 };
 
+double Length(const Eigen::Vector2d& of_sight, double focal_px) {
+  return of_sight[0] + focal_px * of_sight[1];
+}
+
 Axes AxesOf(const FloorSight& sight) {
   const double c = std::cos(sight.heading_rad), s = std::sin(sight.heading_rad);
   return {{c, s}, {s, -c}};
@@ -34,7 +38,8 @@ Eigen::Vector2d MeetingPoint(const std::vector<FloorSight>& sights, double focal
     Eigen::Vector2d right_side = Eigen::Vector2d::Zero();
     for (const FloorSight& sight : sights) {
       const auto [forward, right] = AxesOf(sight);
-      const Eigen::Vector2d across = (sight.right_px * forward - focal_px * right).normalized();
+      const Eigen::Vector2d across =
+          (Length(sight.right, focal_px) * forward - Length(sight.ahead, focal_px) * right).normalized();
       const double weight = round == 0 ? 1 : 1 / std::max(0.01, (point - sight.place).squaredNorm());
       normal += weight * across * across.transpose();
       right_side += weight * across.dot(sight.place) * across;
@@ -52,8 +57,9 @@ double Cost(const std::vector<std::vector<FloorSight>>& landmarks, double focal_
     for (const FloorSight& sight : sights) {
       const auto [forward, right] = AxesOf(sight);
       const double ahead = forward.dot(point - sight.place);
+      const double ratio = Length(sight.right, focal_px) / Length(sight.ahead, focal_px);
       const double error =
-          ahead > 0 ? focal_px * right.dot(point - sight.place) / ahead - sight.right_px : kBehindPx;
+          ahead > 0 ? focal_px * (right.dot(point - sight.place) / ahead - ratio) : kBehindPx;
       cost += std::log1p(error * error / (kErrorPx * kErrorPx));
     }
   }

@@ -6,11 +6,13 @@
 
 namespace cairn {
 
-// A keypoint as a bearing on the floor: from where, with which heading, how far right of the image's middle.
+// A keypoint as a bearing on the floor: from where, with which heading, how far to the right per how far
+// ahead. Each is a length in px plus a part of the focal length, which the camera's tilt mixes into it.
 struct FloorSight {
   Eigen::Vector2d place = Eigen::Vector2d::Zero();  // floor frame, metres
   double heading_rad = 0;
-  double right_px = 0;
+  Eigen::Vector2d right = {0, 0};  // px, focal lengths
+  Eigen::Vector2d ahead = {0, 1};
 };
 
 // What a survey with known places and headings says about how far a turn of the camera moves its image: the

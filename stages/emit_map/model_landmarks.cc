@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "core/camera_turn.h"
 #include "core/floor_pose.h"
@@ -25,6 +26,16 @@ constexpr double kFarthestOutPx = 2000;
 
 bool IsFarOut(const Eigen::Vector3d& from_middle, const Eigen::Vector2d& middle) {
   return (from_middle.head<2>().cwiseAbs() - middle).maxCoeff() > kFarthestOutPx;
+}
+
+// To a camera at the same place with the same heading that neither pitches nor rolls.
+Eigen::Matrix3d LevelFromCamera(const Pose& cam_from_world, const Pose& floor_from_world) {
+  const double heading_rad = RadFromDeg(FloorPoseOf(cam_from_world, floor_from_world).heading_deg);
+  const double c = std::cos(heading_rad), s = std::sin(heading_rad);
+  Eigen::Matrix3d level_from_floor;
+  level_from_floor << s, -c, 0, 0, 0, -1, c, s, 0;
+  return level_from_floor *
+         (floor_from_world.rotation * cam_from_world.rotation.conjugate()).toRotationMatrix();
 }
 
 struct PlacedSight {
@@ -110,13 +121,22 @@ class Modeller {
       }
     }
     std::vector<FloorPose> of_camera;
+    std::vector<double> squared_tilts;
     const Pose given_from_camera = rows.camera_from_given.Inverse();
     for (size_t i = 0; i < rows.images.size(); ++i) {
       const MapImage& image = rows.images[i];
       image_of_id_[image.image_id] = static_cast<int32_t>(i);
-      poses_.push_back(FloorPoseOf(given_from_camera * image.cam_from_world, rows.floor_from_world));
-      if (image.camera_id == result_.camera_id) of_camera.push_back(poses_.back());
+      const Pose cam_from_world = given_from_camera * image.cam_from_world;
+      poses_.push_back(FloorPoseOf(cam_from_world, rows.floor_from_world));
+      level_from_camera_.push_back(LevelFromCamera(cam_from_world, rows.floor_from_world));
+      if (image.camera_id != result_.camera_id) continue;
+      of_camera.push_back(poses_.back());
+      const double lean = Eigen::AngleAxisd(level_from_camera_.back()).angle();
+      squared_tilts.push_back(0.5 * lean * lean);  // of two axes
     }
+    result_.errors.tilt_rad =
+        static_cast<float>(std::sqrt(std::accumulate(squared_tilts.begin(), squared_tilts.end(), 0.0) /
+                                     static_cast<double>(std::max<size_t>(squared_tilts.size(), 1))));
     result_.headings_deg = FindHeadings(of_camera);
     LearnTurn();
   }
@@ -130,7 +150,7 @@ class Modeller {
   }
 
  private:
-  // Calls visit(image index, pose, keypoint) for the class's observations by the camera.
+  // Calls visit(image index, keypoint) for the class's observations by the camera.
   template <typename Visit>
   void VisitSights(ClassId class_id, const Visit& visit) const {
     const auto found = class_of_id_.find(class_id);
@@ -138,7 +158,7 @@ class Modeller {
     for (const Observation& observation : found->second->observations) {
       const auto image = image_of_id_.find(observation.image_id);
       if (image == image_of_id_.end() || rows_.images[image->second].camera_id != result_.camera_id) continue;
-      visit(image->second, poses_[image->second], observation.keypoint);
+      visit(image->second, observation.keypoint);
     }
   }
 
@@ -146,8 +166,14 @@ class Modeller {
     std::vector<std::vector<FloorSight>> landmarks;
     for (const auto& [class_id, feature_class] : class_of_id_) {
       std::vector<FloorSight>& sights = landmarks.emplace_back();
-      VisitSights(class_id, [&](int32_t, const FloorPose& pose, const Keypoint& keypoint) {
-        sights.push_back({pose.position, RadFromDeg(pose.heading_deg), keypoint.x - middle_.x()});
+      VisitSights(class_id, [&](int32_t image, const Keypoint& keypoint) {
+        const FloorPose& pose = poses_[image];
+        const Eigen::Matrix3d& level = level_from_camera_[image];
+        const Eigen::Vector2d px = Eigen::Vector2d(keypoint.x, keypoint.y) - middle_;
+        sights.push_back({pose.position,
+                          RadFromDeg(pose.heading_deg),
+                          {level.block<1, 2>(0, 0).dot(px), level(0, 2)},
+                          {level.block<1, 2>(2, 0).dot(px), level(2, 2)}});
       });
     }
     result_.focal_px = static_cast<float>(LearnFocal(landmarks, width_px_));
@@ -155,14 +181,16 @@ class Modeller {
 
   std::vector<HeadingModel> ModelsOf(ClassId class_id) const {
     std::map<int, std::vector<PlacedSight>> of_heading;
-    VisitSights(class_id, [&](int32_t image, const FloorPose& pose, const Keypoint& keypoint) {
+    VisitSights(class_id, [&](int32_t image, const Keypoint& keypoint) {
+      const FloorPose& pose = poses_[image];
       const int heading = NearestHeading(result_.headings_deg, pose.heading_deg);
       const double turn_deg = std::remainder(result_.headings_deg[heading] - pose.heading_deg, 360);
       Eigen::Vector3d seen(keypoint.x - middle_.x(), keypoint.y - middle_.y(),
                            std::log2(std::max(keypoint.scale, 1e-3F)));
       if (std::abs(turn_deg) > kSameHeadingDeg || result_.focal_px > 0) {
         if (result_.focal_px == 0) return;
-        const auto turned = TurnedSight(seen, CameraTurn(RadFromDeg(turn_deg)), result_.focal_px);
+        const auto turned =
+            TurnedSight(seen, CameraTurn(RadFromDeg(turn_deg)) * level_from_camera_[image], result_.focal_px);
         if (!turned) return;
         seen = *turned;
         if (IsFarOut(seen, middle_)) return;
@@ -199,6 +227,7 @@ class Modeller {
   std::map<ClassId, const FeatureClass*> class_of_id_;
   std::map<ImageId, int32_t> image_of_id_;
   std::vector<FloorPose> poses_;
+  std::vector<Eigen::Matrix3d> level_from_camera_;
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
   int width_px_ = 0;
 };

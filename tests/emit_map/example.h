@@ -124,6 +124,7 @@ inline VisualMapData MakeExampleVisualMap() {
   VisualMapData visual_map;
   visual_map.camera_id = 3;
   visual_map.focal_px = 321.5F;
+  visual_map.errors = {0.01F, 0.02F, 1.5F, 0.06F};
   visual_map.headings_deg = {0, 90, 180.25};
   visual_map.landmarks.resize(3);
   HeadingModel model{.heading = 0, .shape = {2, 3}, .sigma = {0.5, 0.25, 0.125}};

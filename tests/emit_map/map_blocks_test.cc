@@ -248,6 +248,8 @@ TEST(MapBlocks, ReferencesToWhatIsNotThereAreRefused) {
                [](VisualMapData& part) { part.headings_deg[2] = 90; },
                [](VisualMapData& part) { part.headings_deg.clear(); },
                [](VisualMapData& part) { part.focal_px = -1; },
+               [](VisualMapData& part) { part.errors.growth_per_m = -1; },
+               [](VisualMapData& part) { part.errors.shared_m = std::nanf(""); },
                [](VisualMapData& part) { part.focal_px = std::nanf(""); }}) {
         VisualBlock models = layout.MakeVisualBlock(entry);
         change(models.part);

@@ -229,6 +229,7 @@ TEST(MapFile, VisualMapsReadBackAsTheyWere) {
   EXPECT_EQ(found.camera_id, 3u);
   EXPECT_EQ(found.focal_px, 321.5F);
   EXPECT_EQ(found.headings_deg, rows.visual_map.headings_deg);
+  EXPECT_EQ(found.errors, rows.visual_map.errors);
   ASSERT_EQ(found.landmarks.size(), 3u);
   EXPECT_TRUE(found.landmarks[1].empty());
   ASSERT_EQ(found.landmarks[2].size(), 2u);
