@@ -1,14 +1,17 @@
 #!/bin/sh
 # Maps of one survey, of all filtered features and of regions with k = 10 and 4 common ones (tau = 0 and 1, rho = 3, B.2
 # [Sala06 §VI-B]), each with a visual map; then the tables.
-#   bench/visual_map/tables.sh CAIRN TABLES BUILD CAPTURE OUT [options of TABLES]
+#   [K="10 4"] [TAU="0 1"] [RHO=3] [ALGORITHM=b2] bench/visual_map/tables.sh CAIRN TABLES BUILD CAPTURE OUT [options of TABLES]
+# CAIRN and TABLES are programs of build/release (-DCAIRN_BUILD_BENCHMARKS=ON), BUILD the build folder of the survey's map.
+# OUT/regions_*.svg show which places belong to which region, and its landmarks.
 set -eu
 cairn=$1 tables=$2 build=$3 capture=$4 out=$5
 shift 5
 mkdir -p "$out"
 emit() {
   "$cairn" emit-map --classes "$build/classes.db" --world "$build/world.db" --vocabulary "$build/vocabulary.db" \
-    --regions "$1" --name "$2" --visual-map true -o "$out/$2.cairn" --log-level error
+    --regions "$1" --name "$2" --visual-map true -o "$out/$2.cairn" --log-level error --progress none > /dev/null
+  "$cairn" inspect "$out/$2.cairn" --svg "$out/regions_$2.svg" > /dev/null
 }
 # One region that keeps every feature of the world.
 python3 - "$build/world.db" "$out/all.json" <<'EOF'
@@ -22,11 +25,11 @@ json.dump({"format": "cairn-regions", "version": 1, "algorithm": "all", "k": fea
 EOF
 emit "$out/all.json" all
 maps=$out/all.cairn
-for k in 10 4; do
-  for tau in 0 1; do
+for k in ${K:-10 4}; do
+  for tau in ${TAU:-0 1}; do
     name=k${k}_tau${tau}
     "$cairn" decompose-regions "$build/world.db" --classes "$build/classes.db" --algorithm "${ALGORITHM:-b2}" \
-      --k $k --tau $tau --rho 3 -o "$out/$name.db" --log-level error
+      --k $k --tau $tau --rho "${RHO:-3}" -o "$out/$name.db" --log-level error --progress none > "$out/$name.txt"
     emit "$out/$name.db" $name
     maps="$maps $out/$name.cairn"
   done

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "core/median.h"
 #include "runtime/visual_estimate.h"
+#include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 #include "tests/runtime/visual_room.h"
 
@@ -14,8 +16,10 @@ struct Surveyed {
   std::shared_ptr<const Map> map;
   std::shared_ptr<const VisualMap> visual;
 
-  explicit Surveyed(double noise_px = 0) : room(160, noise_px) {
+  explicit Surveyed(double noise_px = 0, const VisualRoom::Carried& carried = {})
+      : room(160, noise_px, {}, carried) {
     room.rows.visual_map = *ModelLandmarks(room.classes, room.rows, {}, 1);
+    room.rows.visual_map.errors = *LearnVisualErrors(room.classes, room.rows, room.rows.visual_map, 1);
     map = *Map::FromRows(room.rows);
     visual = *VisualMap::Load(*map);
   }
@@ -64,6 +68,44 @@ TEST(ModelLandmarks, SameForAnyNumberOfThreads) {
       EXPECT_EQ(one.landmarks[i][k].sigma, three.landmarks[i][k].sigma);
     }
   }
+}
+
+TEST(ModelLandmarks, LevelsWhatTiltedCamerasSaw) {
+  // Pitched by 5 degrees, 28 px: without, no model would predict to less.
+  const Surveyed tilted(0, {.tilt_rad = RadFromDeg(5)});
+  const VisualMapData& data = tilted.room.rows.visual_map;
+  EXPECT_NEAR(data.focal_px, VisualRoom::kFocalPx, 2);
+  EXPECT_NEAR(DegFromRad(data.errors.tilt_rad), 5 / std::sqrt(2.0), 0.5);
+  std::vector<double> errors_px;
+  for (const std::vector<HeadingModel>& models : data.landmarks) {
+    for (const HeadingModel& model : models) errors_px.push_back(model.sigma.head<2>().norm());
+  }
+  EXPECT_LT(Median(errors_px), 3);
+  EXPECT_EQ(Clean().room.rows.visual_map.errors.tilt_rad, 0);
+}
+
+TEST(LearnVisualErrors, GrowWithWhatTheModelsDoNotKnow) {
+  const VisualErrors& clean = Clean().room.rows.visual_map.errors;
+  EXPECT_LT(clean.shared_m, 0.05);
+  EXPECT_LT(DegFromRad(clean.shared_rad), 2);
+  EXPECT_GT(clean.growth_per_m, 0);
+  // Cameras at heights that differ by decimetres move all landmarks together.
+  const Surveyed carried(0, {.height_m = 0.2});
+  const VisualErrors& errors = carried.room.rows.visual_map.errors;
+  EXPECT_GT(errors.shared_m, 1.5 * clean.shared_m);
+  EXPECT_EQ(*LearnVisualErrors(carried.room.classes, carried.room.rows, carried.room.rows.visual_map, 3),
+            errors);
+}
+
+TEST(LearnVisualErrors, NothingIsKnownWithoutImagesToTry) {
+  // Three landmarks: too few in any image.
+  const VisualRoom room(3);
+  const auto data = ModelLandmarks(room.classes, room.rows, {}, 1);
+  ASSERT_TRUE(data.ok());
+  const auto errors = LearnVisualErrors(room.classes, room.rows, *data, 1);
+  ASSERT_TRUE(errors.ok());
+  EXPECT_FLOAT_EQ(errors->shared_m, 0.5F * VisualRoom::kSpacingM);
+  EXPECT_GT(DegFromRad(errors->shared_rad), 4);
 }
 
 TEST(EstimateVisualPose, FindsPlacesBetweenThoseOfTheSurvey) {

@@ -25,8 +25,13 @@ struct VisualRoom {
   Classes classes;
   MapRows rows;
 
+  // How much the survey's cameras vary, standard deviations: pitch, and height.
+  struct Carried {
+    double tilt_rad = 0, height_m = 0;
+  };
+
   explicit VisualRoom(int num_points = 160, double noise_px = 0,
-                      const std::vector<Eigen::Vector3d>& more_points = {}) {
+                      const std::vector<Eigen::Vector3d>& more_points = {}, const Carried& carried = {}) {
     Random random(5);
     for (int i = 0; i < num_points; ++i) {
       const double along = random.Uniform(), height = random.Uniform(0, 2.5);
@@ -36,7 +41,7 @@ struct VisualRoom {
       points.emplace_back(x, y, height);
     }
     points.insert(points.end(), more_points.begin(), more_points.end());
-    AddSurvey(noise_px);
+    AddSurvey(noise_px, carried);
   }
 
   static Eigen::Vector2d Place(int column, int row) {
@@ -44,13 +49,14 @@ struct VisualRoom {
   }
 
   // x right, y down, z forward; pitched up.
-  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0) {
+  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0,
+                     double height_m = 1) {
     const double c = std::cos(heading_rad), s = std::sin(heading_rad);
     Eigen::Matrix3d level;
     level << s, -c, 0, 0, 0, -1, c, s, 0;
     Pose pose;
     pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(-up_rad, Eigen::Vector3d::UnitX()) * level);
-    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), 1));
+    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), height_m));
     return pose;
   }
 
@@ -77,7 +83,7 @@ struct VisualRoom {
   }
 
  private:
-  void AddSurvey(double noise_px) {
+  void AddSurvey(double noise_px, const Carried& carried) {
     Random random(6);
     Camera camera;
     camera.width = kWidthPx;
@@ -96,7 +102,9 @@ struct VisualRoom {
           image.name = "image" + std::to_string(image.image_id);
           image.camera_id = camera.camera_id;
           image.station = station;
-          image.cam_from_world = PoseAt(Place(column, row), heading * std::numbers::pi / 2);
+          image.cam_from_world =
+              PoseAt(Place(column, row), heading * std::numbers::pi / 2, random.Normal(0, carried.tilt_rad),
+                     random.Normal(1, carried.height_m));
           for (auto [point, keypoint] : See(image.cam_from_world)) {
             keypoint.x += static_cast<float>(random.Normal(0, noise_px));
             keypoint.y += static_cast<float>(random.Normal(0, noise_px));
