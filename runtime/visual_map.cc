@@ -94,9 +94,12 @@ Result<std::shared_ptr<const VisualMap>> VisualMap::Load(const Map& map, const V
   return WithoutExceptions("visual map", [&]() -> Result<std::shared_ptr<const VisualMap>> {
     CAIRN_ASSIGN_OR_RETURN(const VisualMapData data, map.LandmarkModels());
     CAIRN_ASSIGN_OR_RETURN(VisualSurvey survey, SurveyOf(map, data.camera_id));
-    CAIRN_ASSIGN_OR_RETURN(auto visual, MakeMutable(data, std::move(survey), options));
+    auto made = MakeMutable(data, std::move(survey), options);
+    if (!made.ok())
+      return MakeError(made.error().code, "map '{}': {}", map.head().name, made.error().message);
+    const std::shared_ptr<VisualMap> visual = *std::move(made);
     CAIRN_ASSIGN_OR_RETURN(visual->landmarks_, map.AllLandmarks());
-    return std::shared_ptr<const VisualMap>(std::move(visual));
+    return std::shared_ptr<const VisualMap>(visual);
   });
 }
 

@@ -68,7 +68,8 @@ class VisualMap {
   // Loads all models.  Errors: NotFound where the map has none; Corrupt (sights of an image that the map
   // lacks, or that make no model; a camera that it lacks); Io.
   static Result<std::shared_ptr<const VisualMap>> Load(const Map& map, const VisualMapOptions& options = {});
-  // Without descriptors: Match finds nothing.  Errors: Corrupt, as above.
+  // Without descriptors: Match finds nothing.  Errors: Corrupt (no place, sights that make no model),
+  // InvalidArgument.  REQUIRES: the survey has all images of the data
   static Result<std::shared_ptr<const VisualMap>> Make(const VisualMapData& data, VisualSurvey survey,
                                                        const VisualMapOptions& options = {});
 

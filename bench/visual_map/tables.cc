@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "bench/visual_map/pictures.h"
 #include "core/capture.h"
@@ -34,6 +35,7 @@ struct Arguments {
   double uniform_weight = 0.1;
   VisualMapOptions map_options;
   VisualEstimateOptions estimate_options;
+  bool is_halved = false;
   bool print_all = false;
 };
 
@@ -83,6 +85,20 @@ bool IsInHull(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d&
   return true;
 }
 
+Result<Features> ExtractFeatures(const cv::Mat& grey, const Arguments& arguments) {
+  if (!arguments.is_halved) return ExtractSift(grey, {.max_num_features = arguments.max_num_features});
+  cv::Mat half;
+  cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  CAIRN_ASSIGN_OR_RETURN(Features features,
+                         ExtractSift(half, {.max_num_features = arguments.max_num_features}));
+  for (Keypoint& keypoint : features.keypoints) {
+    keypoint.x *= 2;
+    keypoint.y *= 2;
+    keypoint.scale *= 2;
+  }
+  return features;
+}
+
 Result<std::vector<TestImage>> ReadTestImages(const Arguments& arguments, const Map& map,
                                               const VisualMap& visual) {
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
@@ -98,8 +114,7 @@ Result<std::vector<TestImage>> ReadTestImages(const Arguments& arguments, const 
     TestImage& test = images.emplace_back();
     test.name = image.name;
     const double start = CpuSeconds();
-    CAIRN_ASSIGN_OR_RETURN(Features features,
-                           ExtractSift(grey, {.max_num_features = arguments.max_num_features}));
+    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractFeatures(grey, arguments));
     test.query = MakeQuery(std::move(features), capture.cameras.at(image.camera_id), {});
     test.feature_seconds = CpuSeconds() - start;
     test.truth = FloorPoseOf(*image.cam_from_world, map.head().floor_from_world);
@@ -273,6 +288,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--extent-spacings", arguments.map_options.extent_spacings, "As cairn localize's")
       ->capture_default_str();
+  app.add_flag("--halve", arguments.is_halved,
+               "Features of the queries at half their size: without the octave of the doubled image");
   app.add_flag("--print-all", arguments.print_all, "A line per image and map on stderr");
   CLI11_PARSE(app, argc, argv);
   const cairn::Status status = cairn::Run(arguments);

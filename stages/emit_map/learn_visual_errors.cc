@@ -15,6 +15,9 @@ namespace cairn {
 namespace {
 
 constexpr double kReachSpacings = 1.05;
+// Models reach from the diagonal neighbours, the nearest that are left on a lattice, to the place in
+// question.
+constexpr double kExtentSpacings = 1.5;
 // Tried at most, and needed.
 constexpr size_t kNumImages = 80, kMinNumImages = 8, kMinNumSeen = 8;
 constexpr size_t kNumModels = 400, kNumSightsOfModel = 12, kMinNumOfModel = 8;
@@ -167,15 +170,12 @@ class Learner {
   std::optional<Try> PlaceWithoutNeighbours(int32_t image) const {
     const FloorPose& truth = poses_[image];
     const auto is_near = [&](const Eigen::Vector2d& at) { return (at - truth.position).norm() <= reach_m_; };
-    VisualSurvey survey = survey_;
-    std::erase_if(survey.places, is_near);
-    if (survey.places.empty()) return std::nullopt;
     VisualMapData data = WithoutModels();
     std::vector<SeenLandmark> seen;
     for (const SeenLandmark& match : seen_[image]) {
       std::vector<HeadingModel> models = data_.landmarks[match.landmark];
       for (HeadingModel& model : models)
-        std::erase_if(model.sights, [&](const auto& sight) { return is_near(survey.images[sight.image]); });
+        std::erase_if(model.sights, [&](const auto& sight) { return is_near(survey_.images[sight.image]); });
       std::erase_if(models, [&](const HeadingModel& model) {
         return !LandmarkModel::Make(SightsOf(model), model.shape);
       });
@@ -183,7 +183,7 @@ class Learner {
       seen.push_back({static_cast<LandmarkIdx>(data.landmarks.size()), match.seen});
       data.landmarks.push_back(std::move(models));
     }
-    const auto map = VisualMap::Make(data, std::move(survey));
+    const auto map = VisualMap::Make(data, survey_, {.extent_spacings = kExtentSpacings});
     if (!map.ok()) return std::nullopt;
     const Result<VisualPose> pose = EstimateVisualPose(**map, seen);
     if (!pose.ok() || pose->flag != VisualFlag::kNone) return std::nullopt;

@@ -16,7 +16,7 @@ struct Surveyed {
   std::shared_ptr<const Map> map;
   std::shared_ptr<const VisualMap> visual;
 
-  explicit Surveyed(double noise_px = 0, const VisualRoom::Carried& carried = {})
+  explicit Surveyed(double noise_px = 0, const CarriedSurvey& carried = {})
       : room(160, noise_px, {}, carried) {
     room.rows.visual_map = *ModelLandmarks(room.classes, room.rows, {}, 1);
     room.rows.visual_map.errors = *LearnVisualErrors(room.classes, room.rows, room.rows.visual_map, 1);

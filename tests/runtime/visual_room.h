@@ -13,6 +13,11 @@
 
 namespace cairn {
 
+// How much a survey's cameras vary, standard deviations: pitch, and height.
+struct CarriedSurvey {
+  double tilt_rad = 0, height_m = 0;
+};
+
 // A room of 5 x 4 m with points on its walls, surveyed in its middle on 9 x 7 places 25 cm apart with four
 // headings, as classes and as the rows of a map.
 struct VisualRoom {
@@ -25,13 +30,9 @@ struct VisualRoom {
   Classes classes;
   MapRows rows;
 
-  // How much the survey's cameras vary, standard deviations: pitch, and height.
-  struct Carried {
-    double tilt_rad = 0, height_m = 0;
-  };
-
   explicit VisualRoom(int num_points = 160, double noise_px = 0,
-                      const std::vector<Eigen::Vector3d>& more_points = {}, const Carried& carried = {}) {
+                      const std::vector<Eigen::Vector3d>& more_points = {},
+                      const CarriedSurvey& carried = {}) {
     Random random(5);
     for (int i = 0; i < num_points; ++i) {
       const double along = random.Uniform(), height = random.Uniform(0, 2.5);
@@ -83,7 +84,7 @@ struct VisualRoom {
   }
 
  private:
-  void AddSurvey(double noise_px, const Carried& carried) {
+  void AddSurvey(double noise_px, const CarriedSurvey& carried) {
     Random random(6);
     Camera camera;
     camera.width = kWidthPx;
