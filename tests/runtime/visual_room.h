@@ -13,9 +13,9 @@
 
 namespace cairn {
 
-// How much a survey's cameras vary, standard deviations: pitch, and height.
+// How much a survey's cameras pitch, standard deviation.
 struct CarriedSurvey {
-  double tilt_rad = 0, height_m = 0;
+  double tilt_rad = 0;
 };
 
 // A room of 5 x 4 m with points on its walls, surveyed in its middle on 9 x 7 places 25 cm apart with four
@@ -50,14 +50,13 @@ struct VisualRoom {
   }
 
   // x right, y down, z forward; pitched up.
-  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0,
-                     double height_m = 1) {
+  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0) {
     const double c = std::cos(heading_rad), s = std::sin(heading_rad);
     Eigen::Matrix3d level;
     level << s, -c, 0, 0, 0, -1, c, s, 0;
     Pose pose;
     pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(-up_rad, Eigen::Vector3d::UnitX()) * level);
-    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), height_m));
+    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), 1));
     return pose;
   }
 
@@ -104,8 +103,7 @@ struct VisualRoom {
           image.camera_id = camera.camera_id;
           image.station = station;
           image.cam_from_world =
-              PoseAt(Place(column, row), heading * std::numbers::pi / 2, random.Normal(0, carried.tilt_rad),
-                     random.Normal(1, carried.height_m));
+              PoseAt(Place(column, row), heading * std::numbers::pi / 2, random.Normal(0, carried.tilt_rad));
           for (auto [point, keypoint] : See(image.cam_from_world)) {
             keypoint.x += static_cast<float>(random.Normal(0, noise_px));
             keypoint.y += static_cast<float>(random.Normal(0, noise_px));
