@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/capture.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+std::vector<json> JsonLines(const std::string& text) {
+  std::vector<json> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(json::parse(line));
+  return lines;
+}
+
+// One small survey, compiled with its visual map and without.
+class VisualMapRun : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder("visual_map_test");
+    WriteTinyRecipe(*folder_ / "visual.toml", "visual_map = true\n");
+    const ProgramRun compiled =
+        RunShell("cd " + folder_->string() + " && cairn compile visual.toml -o visual.cairn");
+    ASSERT_EQ(compiled.exit_code, 0) << compiled.err;
+    const Result<Capture> capture = ReadCapture(*folder_ / "visual.build/capture");
+    ASSERT_TRUE(capture.ok());
+    for (const CaptureImage& query : capture->queries) images_ += " " + capture->ImagePath(query);
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static ProgramRun Localize(const std::string& arguments) {
+    return RunShell("cd " + folder_->string() + " && cairn localize " + arguments);
+  }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+  static inline std::string images_;
+};
+
+TEST_F(VisualMapRun, TwoEstimatorsThatShareNothingAgree) {
+  const ProgramRun run = Localize("visual.cairn" + images_ + " --estimator both -o both.txt");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  int num_agreeing = 0;
+  const std::vector<json> answers = JsonLines(run.out);
+  ASSERT_EQ(answers.size(), 6u);
+  for (const json& answer : answers) {
+    const bool both = answer["fix"].get<bool>() && answer["visual_map"]["fix"].get<bool>();
+    EXPECT_EQ(answer.contains("disagreement"), both);
+    if (!both) continue;
+    EXPECT_LT(answer["disagreement"]["mahalanobis"].get<double>(), 4) << answer.dump(1);
+    ++num_agreeing;
+  }
+  EXPECT_GE(num_agreeing, 2);
+}
+
+TEST_F(VisualMapRun, EachEstimatorAnswersInItsOwnWay) {
+  const ProgramRun both = Localize("visual.cairn" + images_ + " --estimator both");
+  const ProgramRun visual = Localize("visual.cairn" + images_ + " --estimator visual-map");
+  const ProgramRun pnp = Localize("visual.cairn" + images_ + " --estimator pnp");
+  ASSERT_EQ(visual.exit_code, 0) << visual.err;
+  ASSERT_EQ(pnp.exit_code, 0) << pnp.err;
+  const std::vector<json> of_both = JsonLines(both.out), of_visual = JsonLines(visual.out),
+                          of_pnp = JsonLines(pnp.out);
+  ASSERT_EQ(of_visual.size(), of_both.size());
+  ASSERT_EQ(of_pnp.size(), of_both.size());
+  for (size_t i = 0; i < of_both.size(); ++i) {
+    EXPECT_EQ(of_visual[i]["floor_m"], of_both[i]["visual_map"]["floor_m"]);
+    EXPECT_EQ(of_visual[i]["covariance"].size(), 9u);
+    EXPECT_FALSE(of_visual[i].contains("center_m"));
+    EXPECT_EQ(of_pnp[i].value("center_m", json()), of_both[i].value("center_m", json()));
+    EXPECT_FALSE(of_pnp[i].contains("visual_map"));
+    if (!of_visual[i]["fix"].get<bool>()) EXPECT_FALSE(of_visual[i]["message"].get<std::string>().empty());
+  }
+}
+
+TEST_F(VisualMapRun, WhatCannotBeDoneIsRefused) {
+  const std::string build = "visual.build/";
+  const ProgramRun plain =
+      RunShell("cd " + folder_->string() + " && cairn emit-map --classes " + build + "classes.db --world " +
+               build + "world.db --regions " + build + "regions.db --vocabulary " + build +
+               "vocabulary.db --name plain -o plain.cairn");
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  for (const char* estimator : {"visual-map", "both"}) {
+    const ProgramRun run = Localize("plain.cairn" + images_ + " --estimator " + estimator);
+    EXPECT_NE(run.exit_code, 0);
+    EXPECT_THAT(run.err, HasSubstr("visual_map = true"));
+  }
+  const ProgramRun poses = Localize("visual.cairn" + images_ + " --estimator visual-map -o poses.txt");
+  EXPECT_NE(poses.exit_code, 0);
+  EXPECT_THAT(poses.err, HasSubstr("--estimator both"));
+  EXPECT_EQ(Localize("visual.cairn" + images_ + " --estimator dice").exit_code, 2);
+}
+
+}  // namespace
+}  // namespace cairn
