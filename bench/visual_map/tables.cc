@@ -184,16 +184,19 @@ Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
 }
 
 void PrintRow(const Row& row) {
+  const std::string divergence =
+      row.divergences.empty()
+          ? "–"
+          : fmt::format("{:.3f} ± {:.3f}", Mean(row.divergences), Deviation(row.divergences));
   fmt::print(
       "| {} | {} | {:.2f} | {:.0f} | {} of {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | "
-      "{:.4f} | {:.3f} ± {:.3f} | "
+      "{:.4f} | {} | "
       "{:.2f} | {:.0f} | {} of {} | {} | {} | {:.1f} | {:.1f} | {:.3f} |\n",
       row.name, row.num_landmarks, row.megabytes, row.model_bytes, row.num_fixes, row.num_inside,
       row.num_wrong, Mean(row.errors_cm), Median(row.errors_cm), Mean(row.all_errors_cm),
-      Mean(row.lattice_cm), Median(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds),
-      Mean(row.divergences), Deviation(row.divergences), Mean(row.nees), Mean(row.matches),
-      row.num_flagged_outside, row.num_outside, row.num_honest_outside, row.num_pnp, Mean(row.pnp_cm),
-      Median(row.pnp_cm), Mean(row.pnp_seconds));
+      Mean(row.lattice_cm), Median(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds), divergence,
+      Mean(row.nees), Mean(row.matches), row.num_flagged_outside, row.num_outside, row.num_honest_outside,
+      row.num_pnp, Mean(row.pnp_cm), Median(row.pnp_cm), Mean(row.pnp_seconds));
 }
 
 Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,
