@@ -57,7 +57,7 @@ struct ServoOptions {
   double arrive_distance_ratio = 0.007;
   // Both double after each so many commands near the target: where matches are too poor for them the robot
   // would shuttle to and fro for ever.  REQUIRES: > 0
-  int patience_commands = 40;
+  int patience_commands = 100;
   // A retreat ends at this distance behind the target, over that of the scene.  REQUIRES: in (0, 10]
   double max_retreat_ratio = 0.6;
   // With fewer matches than this the robot looks along the target's heading, the fewer the straighter.

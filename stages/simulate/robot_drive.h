@@ -24,7 +24,8 @@ struct RobotDriveOptions {
   // Places that are checked so, those that score best.  REQUIRES: >= 1
   int max_num_start_checks = 40;
   RobotOptions robot;
-  ServoOptions servo;
+  // On its way a robot is less exacting than a servo by default: no image is worth long shuttling.
+  ServoOptions servo{.patience_commands = 40};
   StartHypothesesOptions hypotheses;
 };
 OptionTable DescribeOptions(RobotDriveOptions* options);
