@@ -71,6 +71,7 @@ class Driver {
         continue;
       }
       ++next_;
+      has_left_out_ = false;
       const Features seen = robot_.Look();
       trail_.push_back(TargetOfFeatures(seen, robot_.pose()));
       const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(seen.descriptors));
@@ -152,15 +153,18 @@ class Driver {
 
   // An image of the way is not where the followed start has it: another one is tried, as long as there is
   // any. An image that was seen and not reached is where it should be, and says nothing against the start; it
-  // is left out where the robot sees what the one after it shows.
+  // is left out where the robot sees what the one after it shows, but no two in a row: it may be off its way.
   Status GiveUp(DriveLeg* leg) {
     if (leg->seen) {
       Note(leg);
       unreached_ = leg->node;
-      CAIRN_ASSIGN_OR_RETURN(const bool next_is_seen, SeesNode(robot_.Look(), next_ + 1));
-      if (!next_is_seen) return Relocalize(leg->why);
-      ++next_;
-      return Ok();
+      if (!has_left_out_) {
+        CAIRN_ASSIGN_OR_RETURN(has_left_out_, SeesNode(robot_.Look(), next_ + 1));
+        if (has_left_out_) ++next_;
+        if (has_left_out_) return Ok();
+      }
+      has_left_out_ = false;
+      return Relocalize(leg->why);
     }
     const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
     leg->verdict = VerdictName(has_other ? HypothesisVerdict::kSwitch : HypothesisVerdict::kLost);
@@ -246,6 +250,7 @@ class Driver {
   std::vector<NodeIdx> way_;        // without the goal, unless it is the start
   size_t next_ = 0;                 // of the way; past it: the goal
   NodeIdx unreached_ = -1;          // seen last and not reached
+  bool has_left_out_ = false;       // the image before the next one
   int num_legs_ = 0;
 };
 
