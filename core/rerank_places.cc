@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/deciles.h"
 #include "core/descriptor_matcher.h"
 #include "core/estimate_two_view.h"
 #include "core/parallel.h"
@@ -57,9 +58,7 @@ double BaselineRatio(const Pose& cam2_from_cam1, const Correspondences& c) {
     const double across = cam2_from_cam1.translation.cross(c.bearings2[i]).norm();
     ratios.push_back(ray1.cross(c.bearings2[i]).norm() / std::max(across, 1e-9));
   }
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return Median(std::move(ratios));
 }
 
 }  // namespace

@@ -7,12 +7,26 @@
 #include "core/pose.h"
 
 namespace cairn {
+namespace {
+
+template <typename Keep>
+void KeepIf(FaceSet* set, const Keep& keep) {
+  for (FaceSet::Word& word : set->words) {
+    for (uint64_t bits = word.bits; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      if (!keep(static_cast<FaceIdx>(word.block * 64 + bit))) word.bits &= ~(uint64_t{1} << bit);
+    }
+  }
+  std::erase_if(set->words, [](const FaceSet::Word& word) { return word.bits == 0; });
+}
+
+}  // namespace
 
 CandidateRegions::CandidateRegions(const ViewSearchIndex& index, const std::vector<ScanSegment>& segments,
                                    const InterpretationTreeOptions& options)
     : index_(index), segments_(segments), options_(options) {
   const auto num = static_cast<double>(segments.size());
-  max_nulls_ = static_cast<int>(std::floor(options.max_null_ratio * num));
+  max_nulls_ = MaxNumNulls(segments.size(), options);
   std::vector<double> angles;
   blur_ = RadFromDeg(num * options.angle_tolerance_deg);
   for (const ScanSegment& segment : segments) {
@@ -74,17 +88,6 @@ bool CandidateRegions::HasDirections(FaceIdx face, double heading) const {
     if (std::abs(expected[m] - turn * spectrum_[m]) > others + 2 * (m + 1) * blur_ + 1e-3) return false;
   }
   return true;
-}
-
-template <typename Keep>
-void CandidateRegions::KeepIf(FaceSet* set, const Keep& keep) const {
-  for (FaceSet::Word& word : set->words) {
-    for (uint64_t bits = word.bits; bits != 0; bits &= bits - 1) {
-      const int bit = std::countr_zero(bits);
-      if (!keep(static_cast<FaceIdx>(word.block * 64 + bit))) word.bits &= ~(uint64_t{1} << bit);
-    }
-  }
-  std::erase_if(set->words, [](const FaceSet::Word& word) { return word.bits == 0; });
 }
 
 FaceSet CandidateRegions::Seeing(const FaceSet& candidates, const PairingTable& table, int segment,

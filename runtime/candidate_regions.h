@@ -31,8 +31,6 @@ class CandidateRegions {
  private:
   double NumOthers(FaceIdx face) const;
   bool HasDirections(FaceIdx face, double heading) const;
-  template <typename Keep>
-  void KeepIf(FaceSet* set, const Keep& keep) const;
 
   const ViewSearchIndex& index_;
   const std::vector<ScanSegment>& segments_;

@@ -67,13 +67,11 @@ bool FoundInterpretations::IsInPlan(const Vec2& place) const {
 bool FoundInterpretations::Add(const std::vector<LabelIdx>& labels) {
   Interpretation found;
   found.labels = labels;
-  const auto num_segments = static_cast<double>(segments_.size());
-  const int least =
-      std::max(2, static_cast<int>(num_segments - std::floor(options_.max_null_ratio * num_segments)));
-  for (int worst = -1;;) {
+  const int least = std::max(2, static_cast<int>(segments_.size()) - MaxNumNulls(segments_.size(), options_));
+  while (true) {
     FitPose(plan_, segments_, &found);
     if (found.num_matched < least) return false;
-    worst = found.determined ? WorstPairing(found) : -1;
+    const int worst = found.determined ? WorstPairing(found) : -1;
     if (worst < 0) break;
     found.labels[worst] = -1;
   }

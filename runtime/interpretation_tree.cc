@@ -38,7 +38,7 @@ class TreeSearch {
     std::iota(order_.begin(), order_.end(), 0);
     std::stable_sort(order_.begin(), order_.end(),
                      [&](int a, int b) { return segments[a].Length() > segments[b].Length(); });
-    max_nulls_ = static_cast<int>(std::floor(options.max_null_ratio * num_segments));
+    max_nulls_ = MaxNumNulls(segments.size(), options);
     labels_.assign(num_segments, kOpen);
     used_.assign(plan_.num_labels(), false);
   }

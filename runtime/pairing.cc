@@ -59,6 +59,10 @@ bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reac
   return first <= last;
 }
 
+int MaxNumNulls(size_t num_segments, const InterpretationTreeOptions& options) {
+  return static_cast<int>(std::floor(options.max_null_ratio * static_cast<double>(num_segments)));
+}
+
 PairingTable::PairingTable(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
                            const InterpretationTreeOptions& options)
     : plan_(plan), segments_(segments), options_(options) {

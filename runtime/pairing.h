@@ -28,6 +28,9 @@ double LineToLine(const Pairing& a, const Pairing& b);
 // Whether a pairing's line of places comes within `reach` of a box.
 bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach);
 
+// Most null matches that an interpretation of so many segments may have.
+int MaxNumNulls(size_t num_segments, const InterpretationTreeOptions& options);
+
 // All pairings of segments with labels, and how far two that are both true may differ: by what the options
 // allow and by what the fits do.
 class PairingTable {

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "core/deciles.h"
 #include "core/vector_geometry.h"
 
 namespace cairn {
@@ -152,12 +153,11 @@ std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurem
 
 // Noise variance from the median of squared residuals, most of which belong to inliers; the 6 parameters took
 // their part.
-double VarianceFromMedian(std::vector<double> squares) {
+double VarianceFromMedian(const std::vector<double>& squares) {
   constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
   const double num_residuals = 2.0 * static_cast<double>(squares.size());
-  return std::max(1e-6, *middle / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
+  return std::max(1e-6,
+                  Median(squares) / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
 }
 
 // Sum of squared residuals of n two-dimensional inliers, as a variance whose inverse has the right mean for

@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
+#include "core/deciles.h"
 #include "core/descriptor_matcher.h"
 #include "core/floor_pose.h"
-#include "core/median.h"
 #include "core/visual_map.h"
 #include "runtime/no_throw.h"
 

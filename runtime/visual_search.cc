@@ -58,21 +58,19 @@ const std::vector<VisualTerm>& VisualSearch::TermsOf(const VisualHypothesis& hyp
 }
 
 FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const {
-  FitItem item = MakeItem(term, term.at->seen + term.at->gradient * offset, term.at->variance);
-  item.variance += spread_m * spread_m * term.at->gradient.rowwise().squaredNorm();
-  item.log_odds = LogOdds(*term.model, item.variance);
-  return item;
+  return MakeItem(term, term.at->seen + term.at->gradient * offset, term.at->variance,
+                  spread_m * spread_m * term.at->gradient.rowwise().squaredNorm());
 }
 
 FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted,
-                               const Eigen::Vector3d& variance) const {
+                               const Eigen::Vector3d& variance, const Eigen::Vector3d& spread) const {
   const double px = options_.visual_sigma_px, octaves = options_.visual_sigma_octaves;
   FitItem item;
   item.match = term.match;
   item.seen = seen_[term.match].seen;
   item.seen.head<2>() -= map_.middle_px();
   item.predicted = predicted;
-  item.variance = variance + Eigen::Vector3d(px * px, px * px, octaves * octaves);
+  item.variance = variance + Eigen::Vector3d(px * px, px * px, octaves * octaves) + spread;
   item.log_odds = LogOdds(*term.model, item.variance);
   return item;
 }

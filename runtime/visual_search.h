@@ -46,9 +46,9 @@ class VisualSearch {
   // `offset`: from the term's place, metres; `spread_m`: the item stands for points this far around, standard
   // deviation per axis.
   FitItem MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const;
-  // Of what the term's model says anywhere.
-  FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted,
-                   const Eigen::Vector3d& variance) const;
+  // Of what the term's model says anywhere; `spread`: variance for the points that the item stands for.
+  FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted, const Eigen::Vector3d& variance,
+                   const Eigen::Vector3d& spread = Eigen::Vector3d::Zero()) const;
 
  private:
   double LogOdds(const VisualMap::Model& model, const Eigen::Vector3d& variance) const;

@@ -65,8 +65,10 @@ def main():
         ways = {}
         for weight in tallies:
             listing = subprocess.run([cairn, "route", map_path, start, goal, "--weight", weight],
-                                     capture_output=True, text=True).stdout
-            ways[weight] = [word for word in listing.split() if word in poses]
+                                     capture_output=True, text=True)
+            if listing.returncode and "no path" not in listing.stderr:
+                sys.exit(listing.stderr)
+            ways[weight] = [word for word in listing.stdout.split() if word in poses]
         carried = {}
         for weight, way in ways.items():
             half = len(way) // 2

@@ -22,6 +22,7 @@
 #include <opencv2/flann.hpp>
 
 #include "core/colmap_database.h"
+#include "core/deciles.h"
 #include "core/descriptor_matcher.h"
 
 namespace cairn {
@@ -49,11 +50,6 @@ double CpuMs() {
   timespec time;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
-
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 // COLMAP's tests of candidates (FindBestMatches in src/feature/matching.cc of 3.8).

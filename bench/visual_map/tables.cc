@@ -17,6 +17,7 @@
 
 #include "bench/visual_map/pictures.h"
 #include "core/capture.h"
+#include "core/deciles.h"
 #include "core/file.h"
 #include "core/floor_pose.h"
 #include "core/image_file.h"
@@ -58,10 +59,8 @@ double Deviation(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(std::max<size_t>(values.size(), 1)));
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
+double MedianOrNan(const std::vector<double>& values) {
+  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : Median(values);
 }
 
 struct TestImage {
@@ -193,10 +192,10 @@ void PrintRow(const Row& row) {
       "{:.4f} | {} | "
       "{:.2f} | {:.0f} | {} of {} | {} | {} | {:.1f} | {:.1f} | {:.3f} |\n",
       row.name, row.num_landmarks, row.megabytes, row.model_bytes, row.num_fixes, row.num_inside,
-      row.num_wrong, Mean(row.errors_cm), Median(row.errors_cm), Mean(row.all_errors_cm),
-      Mean(row.lattice_cm), Median(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds), divergence,
-      Mean(row.nees), Mean(row.matches), row.num_flagged_outside, row.num_outside, row.num_honest_outside,
-      row.num_pnp, Mean(row.pnp_cm), Median(row.pnp_cm), Mean(row.pnp_seconds));
+      row.num_wrong, Mean(row.errors_cm), MedianOrNan(row.errors_cm), Mean(row.all_errors_cm),
+      Mean(row.lattice_cm), MedianOrNan(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds),
+      divergence, Mean(row.nees), Mean(row.matches), row.num_flagged_outside, row.num_outside,
+      row.num_honest_outside, row.num_pnp, Mean(row.pnp_cm), MedianOrNan(row.pnp_cm), Mean(row.pnp_seconds));
 }
 
 Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,

@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/deciles.h"
 #include "core/floor_pose.h"
 
 namespace cairn {
@@ -154,12 +155,11 @@ std::vector<Vec2> LandmarkPlaces(const MapRows& rows, double band_m) {
   for (const MapImage& image : rows.images)
     heights.push_back((rows.floor_from_world * image.cam_from_world.Center()).z());
   if (heights.empty()) return {};
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
+  const double middle = Median(std::move(heights));
   std::vector<Vec2> places;
   for (const MapLandmark& landmark : rows.landmarks) {
     const Eigen::Vector3d place = rows.floor_from_world * landmark.position;
-    if (std::abs(place.z() - *middle) <= band_m) places.emplace_back(place.head<2>());
+    if (std::abs(place.z() - middle) <= band_m) places.emplace_back(place.head<2>());
   }
   const size_t step = places.size() / kMaxNumLandmarks + 1;
   std::vector<Vec2> some;
@@ -236,10 +236,9 @@ Result<PlanFit> FitPlan(const MapRows& rows, const PlanFitOptions& options) {
       return distance <= options.plan_wall_distance_m;
     }));
   };
-  std::vector<double> distances = fitter.Distances({});
+  const std::vector<double> distances = fitter.Distances({});
   fit.num_on_walls = num_on_walls(distances);
-  std::nth_element(distances.begin(), distances.begin() + fit.num_landmarks / 2, distances.end());
-  fit.median_wall_distance_m = distances[fit.num_landmarks / 2];
+  fit.median_wall_distance_m = Median(distances);
 
   Motion best = fitter.Best();
   if (fitter.Score(best, kFineScaleM) < kMinGainRatio * fitter.Score({}, kFineScaleM)) best = {};

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "core/deciles.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -43,8 +44,7 @@ struct Grid {
       direction += std::polar(1.0, 4.0 * std::atan2(difference.y(), difference.x()));
     }
     if (!lengths.empty()) {
-      std::nth_element(lengths.begin(), lengths.begin() + lengths.size() / 2, lengths.end());
-      side_m = lengths[lengths.size() / 2];
+      side_m = Median(std::move(lengths));
       angle_rad = std::abs(direction) > 1e-9 ? std::arg(direction) / 4.0 : 0.0;
     }
     if (world.lattice_spacing_m > 0) side_m = world.lattice_spacing_m;

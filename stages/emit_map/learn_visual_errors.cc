@@ -6,8 +6,8 @@
 #include <map>
 #include <optional>
 
+#include "core/deciles.h"
 #include "core/floor_pose.h"
-#include "core/median.h"
 #include "core/parallel.h"
 #include "runtime/visual_estimate.h"
 
@@ -26,12 +26,6 @@ constexpr double kUnknownSpacings = 0.5, kUnknownDeg = 5;
 constexpr double kNineOfTen1 = 2.706, kNineOfTen2 = 4.605, kNineOfTen3 = 2.084;
 // What rounding alone is off by, added to models' variances: px, px, octaves.
 const Eigen::Vector3d kRounding(0.01, 0.01, 1e-4);
-
-double NineOfTen(std::vector<double> values) {
-  const size_t at = values.size() * 9 / 10;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
-  return values[at];
-}
 
 // Every step-th makes at most about `count` of `size`.
 size_t StepFor(size_t size, size_t count) { return std::max<size_t>(1, size / count); }
@@ -130,7 +124,7 @@ class Learner {
     }
     if (ratios.empty()) return 0;
     const double squared_m = sum / static_cast<double>(ratios.size());
-    return std::sqrt(std::max(0.0, NineOfTen(ratios) / kNineOfTen3 - 1) / squared_m);
+    return std::sqrt(std::max(0.0, Decile(ratios, 9) / kNineOfTen3 - 1) / squared_m);
   }
 
   std::vector<Sight> SightsOf(const HeadingModel& model) const {
@@ -161,8 +155,8 @@ class Learner {
       own_rad.push_back(tried->own_rad);
     }
     if (squared_m.size() < kMinNumImages) return;
-    const double of_m = NineOfTen(squared_m) / kNineOfTen2 - Median(own_m);
-    const double of_rad = NineOfTen(squared_rad) / kNineOfTen1 - Median(own_rad);
+    const double of_m = Decile(squared_m, 9) / kNineOfTen2 - Median(own_m);
+    const double of_rad = Decile(squared_rad, 9) / kNineOfTen1 - Median(own_rad);
     errors_.shared_m = static_cast<float>(std::sqrt(std::max(0.0, of_m)));
     errors_.shared_rad = static_cast<float>(std::sqrt(std::max(0.0, of_rad)));
   }

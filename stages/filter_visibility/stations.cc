@@ -7,6 +7,7 @@
 #include <optional>
 #include <tuple>
 
+#include "core/deciles.h"
 #include "core/floor_pose.h"
 
 namespace cairn {
@@ -112,8 +113,7 @@ double MedianNearestDistance(const std::vector<Place>& places) {
       if (i != j) nearest[i] = std::min(nearest[i], (places[i].position - places[j].position).norm());
     }
   }
-  std::nth_element(nearest.begin(), nearest.begin() + nearest.size() / 2, nearest.end());
-  return nearest[nearest.size() / 2];
+  return Median(std::move(nearest));
 }
 
 // The grid that the places lie on: spacing from neighbouring pairs, direction and origin as circular means.

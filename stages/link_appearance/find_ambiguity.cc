@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "core/deciles.h"
 #include "core/parallel.h"
 
 namespace cairn {
@@ -14,13 +15,6 @@ double AsStored(double value) { return OfThousandths(Thousandths(value)); }
 
 // Nodes that together are less likely than this make an entropy no greater than the last digit stored.
 constexpr double kNegligible = 1e-4;
-
-// What nine of ten values exceed.  REQUIRES: not empty
-double LowerTenth(std::vector<double>* values) {
-  const auto tenth = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 10);
-  std::nth_element(values->begin(), tenth, values->end());
-  return *tenth;
-}
 
 // A node that looks like another one.
 struct LookAlike {
@@ -222,7 +216,7 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
   };
   if (search.OverPlaces()) for_all_nodes([&](NodeIdx node) { nearby[node] = search.BestNearby(node); });
   std::erase(nearby, 0);
-  const double again = nearby.empty() ? 1 : LowerTenth(&nearby);
+  const double again = nearby.empty() ? 1 : Decile(nearby, 1);
   for_all_nodes([&](NodeIdx node) { scores[node] = search.Score(node, again); });
   if (progress) progress->End();
   if (progress && progress->Cancelled())

@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/deciles.h"
 #include "core/descriptor_distance.h"
 #include "core/pose.h"
 #include "core/two_view_error.h"
@@ -47,9 +48,7 @@ class KeypointChange {
       sine += std::sin(Turn(match));
       cosine += std::cos(Turn(match));
     }
-    const auto middle = log_ratios.begin() + static_cast<std::ptrdiff_t>(log_ratios.size() / 2);
-    std::nth_element(log_ratios.begin(), middle, log_ratios.end());
-    log_ratio_ = *middle;
+    log_ratio_ = Median(std::move(log_ratios));
     turn_ = std::atan2(sine, cosine);
   }
 

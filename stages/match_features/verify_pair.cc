@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/deciles.h"
 #include "core/estimate_two_view.h"
 #include "core/relative_pose.h"
 #include "core/two_view_error.h"
@@ -232,8 +233,7 @@ bool IsWatermark(const ViewForVerification& view1, const ViewForVerification& vi
   const auto median = [&](int axis) {
     std::vector<double> values;
     for (const Eigen::Vector2d& shift : shifts) values.push_back(shift[axis]);
-    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-    return values[values.size() / 2];
+    return Median(std::move(values));
   };
   const Eigen::Vector2d shift(median(0), median(1));
   const auto num_followers = std::count_if(shifts.begin(), shifts.end(), [&](const Eigen::Vector2d& s) {

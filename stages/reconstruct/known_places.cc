@@ -5,8 +5,8 @@
 #include <functional>
 #include <set>
 
+#include "core/deciles.h"
 #include "core/file.h"
-#include "core/median.h"
 #include "core/text.h"
 
 namespace cairn {

@@ -158,13 +158,14 @@ class Driver {
     if (leg->seen) {
       Note(leg);
       unreached_ = leg->node;
-      if (!has_left_out_) {
+      if (has_left_out_) {
+        has_left_out_ = false;
+      } else {
         CAIRN_ASSIGN_OR_RETURN(has_left_out_, SeesNode(robot_.Look(), next_ + 1));
-        if (has_left_out_) ++next_;
-        if (has_left_out_) return Ok();
       }
-      has_left_out_ = false;
-      return Relocalize(leg->why);
+      if (!has_left_out_) return Relocalize(leg->why);
+      ++next_;
+      return Ok();
     }
     const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
     leg->verdict = VerdictName(has_other ? HypothesisVerdict::kSwitch : HypothesisVerdict::kLost);

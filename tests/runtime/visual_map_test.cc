@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/median.h"
+#include "core/deciles.h"
 #include "runtime/visual_estimate.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
