@@ -2,7 +2,10 @@
 
 #include "pipeline/clean_command.h"
 #include "pipeline/compile_command.h"
+#include "pipeline/delta_commands.h"
+#include "pipeline/diff_command.h"
 #include "pipeline/drive_command.h"
+#include "pipeline/explain_command.h"
 #include "pipeline/export_command.h"
 #include "pipeline/import_command.h"
 #include "pipeline/inspect_command.h"
@@ -30,15 +33,44 @@ namespace cairn {
 
 std::vector<Command> AllCommands() {
   return {
-      SimulateCommand(),        ExtractFeaturesCommand(),  MatchFeaturesCommand(),    ReconstructCommand(),
-      GroupClassesCommand(),    FilterVisibilityCommand(), DecomposeRegionsCommand(), CheckRegionsCommand(),
-      BuildVocabularyCommand(), EmitMapCommand(),          CheckMapCommand(),         LocalizeCommand(),
-      ImportCommand(),          ExportCommand(),           InspectCommand(),          SimulateWorldsCommand(),
-      CompileCommand(),         ConfigureCommand(),        RecipeReferenceCommand(),  CleanCommand(),
-      JoinCapturesCommand(),    VerifyCommand(),           KeygenCommand(),           SignCommand(),
-      MigrateCommand(),         LinkAppearanceCommand(),   CheckAppearanceCommand(),  RouteCommand(),
-      DecomposeViewsCommand(),  LocateScanCommand(),       PlanPathCommand(),         TellApartCommand(),
+      SimulateCommand(),
+      ExtractFeaturesCommand(),
+      MatchFeaturesCommand(),
+      ReconstructCommand(),
+      GroupClassesCommand(),
+      FilterVisibilityCommand(),
+      DecomposeRegionsCommand(),
+      CheckRegionsCommand(),
+      BuildVocabularyCommand(),
+      EmitMapCommand(),
+      CheckMapCommand(),
+      LocalizeCommand(),
+      ImportCommand(),
+      ExportCommand(),
+      InspectCommand(),
+      SimulateWorldsCommand(),
+      CompileCommand(),
+      ConfigureCommand(),
+      RecipeReferenceCommand(),
+      CleanCommand(),
+      JoinCapturesCommand(),
+      VerifyCommand(),
+      KeygenCommand(),
+      SignCommand(),
+      MigrateCommand(),
+      LinkAppearanceCommand(),
+      CheckAppearanceCommand(),
+      RouteCommand(),
+      DecomposeViewsCommand(),
+      LocateScanCommand(),
+      PlanPathCommand(),
+      TellApartCommand(),
       DriveCommand(),
+      ExplainCommand(),
+      DiffCommand(),
+      DeltaCommand(),
+      ApplyCommand(),
+      RollbackCommand(),
   };
 }
 

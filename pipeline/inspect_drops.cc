@@ -6,15 +6,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/explain/station_losses.h"
+#include "pipeline/explain/station_text.h"
+
 namespace cairn {
 namespace {
 
 constexpr size_t kMaxReasonsOfStation = 4;
-
-std::string PlaceText(const MapStation& station) {
-  const std::string place = fmt::format("{:.2f}, {:.2f}", station.position.x(), station.position.y());
-  return station.heading_deg ? fmt::format("{}, {:.0f} deg", place, *station.heading_deg) : place;
-}
 
 // "lost 120 few_observations, 30 not_chosen; in no region: few_features"
 std::string LossesText(const std::vector<DropCount>& drops, size_t station) {
@@ -37,22 +35,6 @@ std::string LossesText(const std::vector<DropCount>& drops, size_t station) {
 
 }  // namespace
 
-std::vector<int> LandmarksSeenAt(const MapRows& rows) {
-  std::vector<std::vector<LandmarkIdx>> seen(rows.stations.size());
-  for (const MapImage& image : rows.images) {
-    if (image.station < 0) continue;
-    std::vector<LandmarkIdx>& at_station = seen[image.station];
-    at_station.insert(at_station.end(), image.landmarks.begin(), image.landmarks.end());
-  }
-  std::vector<int> counts;
-  for (std::vector<LandmarkIdx>& at_station : seen) {
-    std::sort(at_station.begin(), at_station.end());
-    counts.push_back(
-        static_cast<int>(std::unique(at_station.begin(), at_station.end()) - at_station.begin()));
-  }
-  return counts;
-}
-
 std::string DropsText(const MapRows& rows, int max_num_stations) {
   const std::vector<DropCount>& drops = rows.findings.drops;
   if (drops.empty()) return "";
@@ -70,7 +52,7 @@ std::string DropsText(const MapRows& rows, int max_num_stations) {
   if (order.size() > static_cast<size_t>(max_num_stations)) order.resize(max_num_stations);
   text += "\nstations that see the fewest landmarks\n";
   for (const size_t station : order) {
-    text += fmt::format("  station {} ({}): {} {}, {}\n", station, PlaceText(rows.stations[station]),
+    text += fmt::format("  {}: {} {}, {}\n", StationText(rows, static_cast<StationIdx>(station)),
                         num_seen[station], num_seen[station] == 1 ? "landmark" : "landmarks",
                         LossesText(drops, station));
   }

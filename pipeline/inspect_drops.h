@@ -8,9 +8,6 @@
 
 namespace cairn {
 
-// Distinct landmarks that the images taken at each station see.
-std::vector<int> LandmarksSeenAt(const MapRows& rows);
-
 // What the stages dropped, for people: how much for which reason, and what the stations that see the fewest
 // landmarks have lost, at most `max_num_stations` of them.  Empty for a map that does not know.
 std::string DropsText(const MapRows& rows, int max_num_stations);

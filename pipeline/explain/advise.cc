@@ -1,0 +1,261 @@
+#include "pipeline/explain/advise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include "core/drop_reason.h"
+#include "pipeline/explain/station_losses.h"
+#include "pipeline/explain/station_text.h"
+
+namespace cairn {
+namespace {
+
+// A place that could as well be one other has this entropy; more is a place that looks like several.
+constexpr double kAmbiguousEntropy = std::numbers::ln2;
+// Below it, held-out images of a region fail too often.
+constexpr double kPoorLocalizedRatio = 0.8;
+
+std::vector<std::vector<StationIdx>> Neighbours(const MapRows& rows) {
+  std::vector<std::vector<StationIdx>> neighbours(rows.stations.size());
+  for (const auto& [u, v] : rows.station_edges) {
+    neighbours[u].push_back(v);
+    neighbours[v].push_back(u);
+  }
+  return neighbours;
+}
+
+// Connected sets of these stations (ascending), largest first.
+std::vector<std::vector<StationIdx>> Components(const std::vector<StationIdx>& stations,
+                                                const std::vector<std::vector<StationIdx>>& neighbours) {
+  std::set<StationIdx> left(stations.begin(), stations.end());
+  std::vector<std::vector<StationIdx>> components;
+  while (!left.empty()) {
+    std::vector<StationIdx> component = {*left.begin()};
+    left.erase(left.begin());
+    for (size_t i = 0; i < component.size(); ++i) {
+      for (const StationIdx next : neighbours[component[i]]) {
+        if (left.erase(next) > 0) component.push_back(next);
+      }
+    }
+    std::sort(component.begin(), component.end());
+    components.push_back(std::move(component));
+  }
+  std::stable_sort(components.begin(), components.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  return components;
+}
+
+// Half way to the neighbouring places, looking as the stations do: from there, what these stations see is
+// seen from one more place.  Those nearest the middle of the stations first.
+std::vector<Advice::View> ViewsBetween(const MapRows& rows, const std::vector<StationIdx>& stations,
+                                       const std::vector<std::vector<StationIdx>>& neighbours) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const StationIdx station : stations) middle += rows.stations[station].position / stations.size();
+  std::map<std::array<int64_t, 3>, Advice::View> views;  // by place (mm) and heading: no view twice
+  for (const StationIdx station : stations) {
+    const MapStation& here = rows.stations[station];
+    for (const StationIdx next : neighbours[station]) {
+      if ((rows.stations[next].position - here.position).norm() < 0.01) continue;  // another heading
+      const Eigen::Vector2d place = (here.position + rows.stations[next].position) / 2;
+      const std::array<int64_t, 3> key = {std::llround(place.x() * 1e3), std::llround(place.y() * 1e3),
+                                          std::llround(here.heading_deg.value_or(0))};
+      views.emplace(key, Advice::View{place, here.heading_deg});
+    }
+  }
+  std::vector<Advice::View> list;
+  for (const auto& [key, view] : views) list.push_back(view);
+  std::stable_sort(list.begin(), list.end(), [&](const Advice::View& a, const Advice::View& b) {
+    return (a.position - middle).norm() < (b.position - middle).norm();
+  });
+  if (list.size() > Advice::kMaxViews) list.resize(Advice::kMaxViews);
+  return list;
+}
+
+// "4 stations around station 57 (2.00, 1.25, 90 deg)": the one nearest their middle.
+std::string WhereText(const MapRows& rows, const std::vector<StationIdx>& stations) {
+  if (stations.size() == 1) return StationText(rows, stations[0]);
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const StationIdx station : stations) middle += rows.stations[station].position / stations.size();
+  const StationIdx center =
+      *std::min_element(stations.begin(), stations.end(), [&](StationIdx a, StationIdx b) {
+        return (rows.stations[a].position - middle).norm() < (rows.stations[b].position - middle).norm();
+      });
+  return fmt::format("{} stations around {}", stations.size(), StationText(rows, center));
+}
+
+int MeanOf(const std::vector<StationIdx>& stations, const auto& number) {
+  int64_t sum = 0;
+  for (const StationIdx station : stations) sum += number(station);
+  return static_cast<int>(sum / static_cast<int64_t>(stations.size()));
+}
+
+Advice AboutUncovered(const MapRows& rows, const StationLosses& losses, std::vector<StationIdx> stations,
+                      const std::vector<std::vector<StationIdx>>& neighbours) {
+  Advice advice;
+  const std::string where = WhereText(rows, stations);
+  const char* verb = stations.size() == 1 ? "is" : "are";
+  const int num_visible = MeanOf(stations, [&](StationIdx i) { return losses.NumVisible(i); });
+  const int num_seldom = MeanOf(stations, [&](StationIdx i) { return losses.NumSeenTooSeldom(i); });
+  const int num_alike = MeanOf(stations, [&](StationIdx i) { return losses.NumAlike(i); });
+  const std::optional<DropReason> reason = losses.WhyUncovered(stations[0]);
+  if (!reason) {
+    advice.text = fmt::format("{} {} not covered.", where, verb);
+  } else if (*reason == DropReason::kLeftOver) {
+    advice.text = fmt::format(
+        "{} {} not covered, though {} features are in view, k = {} are needed: the algorithm left {} over. "
+        "[decompose_regions] algorithm = \"best\" or a smaller rho (now {}) covers more.",
+        where, verb, num_visible, rows.k, stations.size() == 1 ? "it" : "them", rows.rho);
+  } else if (*reason == DropReason::kFewCommonFeatures) {
+    advice.text = fmt::format(
+        "{} {} not covered: {} features are in view, but fewer than k = {} of them also from all stations "
+        "within tau = {} hops. Images between them, or a smaller tau, would help.",
+        where, verb, num_visible, rows.k, rows.tau);
+    advice.images_to_take = ViewsBetween(rows, stations, neighbours);
+  } else if (num_seldom >= rows.k - num_visible && num_seldom >= num_alike) {
+    advice.text = fmt::format(
+        "{} {} not covered: only {} features are in view, k = {} are needed, but {} more were seen from too "
+        "few "
+        "places. Take images around there.",
+        where, verb, num_visible, rows.k, num_seldom);
+    advice.images_to_take = ViewsBetween(rows, stations, neighbours);
+  } else if (num_alike > num_seldom) {
+    advice.text = fmt::format(
+        "{} {} not covered: only {} features are in view, k = {} are needed, and {} look like others "
+        "elsewhere. "
+        "More images will not help; something unlike the rest on the walls there would.",
+        where, verb, num_visible, rows.k, num_alike);
+  } else {
+    advice.text = fmt::format(
+        "{} {} not covered: only {} features are in view, k = {} are needed, and hardly more were found in "
+        "the "
+        "images (blank walls, darkness, blur). A smaller k, a camera that sees more, or something with "
+        "texture "
+        "there would help.",
+        where, verb, num_visible, rows.k);
+  }
+  advice.stations = std::move(stations);
+  return advice;
+}
+
+bool Concerns(const std::vector<StationIdx>& stations, const std::vector<StationIdx>& about) {
+  if (about.empty()) return true;
+  return std::any_of(stations.begin(), stations.end(), [&](StationIdx station) {
+    return std::binary_search(about.begin(), about.end(), station);
+  });
+}
+
+void AddPoorRegions(const MapRows& rows, const std::vector<StationIdx>& about,
+                    const std::vector<std::vector<StationIdx>>& neighbours, std::vector<Advice>* advice) {
+  std::vector<const RegionSelfTest*> poor;
+  for (const RegionSelfTest& test : rows.findings.self_test_regions) {
+    if (test.region != kOutsideRegions && test.num_held_out > 0 &&
+        test.LocalizedRatio() < kPoorLocalizedRatio && Concerns(rows.regions[test.region].stations, about)) {
+      poor.push_back(&test);
+    }
+  }
+  std::stable_sort(poor.begin(), poor.end(), [](const RegionSelfTest* a, const RegionSelfTest* b) {
+    return a->num_held_out - a->num_localized > b->num_held_out - b->num_localized;
+  });
+  for (const RegionSelfTest* test : poor) {
+    const MapRegion& region = rows.regions[test->region];
+    advice->push_back(
+        {.text = fmt::format(
+             "Region {} ({}) localizes {} of {} held-out images with its {} landmarks. A larger k, or "
+             "images between its stations, would help.",
+             test->region, WhereText(rows, region.stations), test->num_localized, test->num_held_out,
+             region.landmarks.size()),
+         .stations = region.stations,
+         .images_to_take = ViewsBetween(rows, region.stations, neighbours)});
+  }
+}
+
+void AddAmbiguousRegions(const MapRows& rows, const std::vector<StationIdx>& about,
+                         std::vector<Advice>* advice) {
+  std::vector<const RegionEntropy*> ambiguous;
+  for (const RegionEntropy& entry : rows.findings.region_entropies) {
+    if (entry.entropy >= kAmbiguousEntropy && Concerns(rows.regions[entry.region].stations, about))
+      ambiguous.push_back(&entry);
+  }
+  std::stable_sort(ambiguous.begin(), ambiguous.end(),
+                   [](const auto* a, const auto* b) { return a->entropy > b->entropy; });
+  for (const RegionEntropy* entry : ambiguous) {
+    const std::vector<StationIdx>& stations = rows.regions[entry->region].stations;
+    advice->push_back(
+        {.text = fmt::format(
+             "Region {} ({}) looks like other places: {:.2f} nats, as {:.1f} places alike. A robot that "
+             "starts there has to move before it knows where it is; something unlike the rest on "
+             "its walls would help.",
+             entry->region, WhereText(rows, stations), entry->entropy, std::exp(entry->entropy)),
+         .stations = stations});
+  }
+}
+
+// About options, from the map as a whole.
+void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
+  const auto localized = rows.self_test.find("localized_ratio");
+  int64_t num_not_chosen = 0;
+  for (const DropCount& drop : rows.findings.drops) {
+    if (drop.reason_id == static_cast<int>(DropReason::kNotChosen)) num_not_chosen = drop.num_dropped;
+  }
+  if (localized != rows.self_test.end() && localized->second < 0.95 && num_not_chosen > 0 &&
+      rows.landmark_choice == "regions") {
+    advice->push_back(
+        {.text = fmt::format(
+             "{:.0f} % of the held-out images are localized, and {} features that regions could keep "
+             "were not chosen: [decompose_regions] k above {} keeps more of them, about in proportion "
+             "in bytes; [emit_map] landmarks = \"all\" keeps every one.",
+             100 * localized->second, num_not_chosen, rows.k)});
+  }
+  if (rows.self_test.empty()) {
+    advice->push_back({.text =
+                           "No images were held out: queries = \"queries.txt\" in the capture tells how well "
+                           "the map localizes."});
+  }
+}
+
+}  // namespace
+
+std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& about) {
+  std::vector<Advice> advice;
+  const StationLosses losses(rows);
+  const auto neighbours = Neighbours(rows);
+  // Stations that lie together and for one reason are one piece of advice.
+  std::map<int, std::vector<StationIdx>> uncovered;
+  for (size_t i = 0; i < rows.stations.size(); ++i) {
+    const auto station = static_cast<StationIdx>(i);
+    const std::optional<DropReason> reason = losses.WhyUncovered(station);
+    if (!rows.stations[i].is_covered || reason)
+      uncovered[reason ? static_cast<int>(*reason) : 0].push_back(station);
+  }
+  for (const auto& [reason, stations] : uncovered) {
+    for (std::vector<StationIdx>& component : Components(stations, neighbours)) {
+      if (Concerns(component, about))
+        advice.push_back(AboutUncovered(rows, losses, std::move(component), neighbours));
+    }
+  }
+  std::stable_sort(advice.begin(), advice.end(),
+                   [](const Advice& a, const Advice& b) { return a.stations.size() > b.stations.size(); });
+  AddPoorRegions(rows, about, neighbours, &advice);
+  AddAmbiguousRegions(rows, about, &advice);
+  AddOptions(rows, &advice);
+  return advice;
+}
+
+std::string AdviceText(const std::vector<Advice>& advice) {
+  std::string text;
+  for (size_t i = 0; i < advice.size(); ++i) {
+    text += fmt::format("  {}. {}\n", i + 1, advice[i].text);
+    for (const Advice::View& view : advice[i].images_to_take) {
+      text += fmt::format("       image at {:.2f}, {:.2f}", view.position.x(), view.position.y());
+      text += view.heading_deg ? fmt::format(" looking towards {:.0f} deg\n", *view.heading_deg) : "\n";
+    }
+  }
+  return text;
+}
+
+}  // namespace cairn

@@ -1,0 +1,214 @@
+#include "runtime/update_map.h"
+
+#include <filesystem>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "core/map_delta.h"
+#include "core/map_file.h"
+#include "runtime/map.h"
+#include "tests/runtime/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+// The map of a room, and that of the room after the first of its eight regions was surveyed anew: other
+// landmarks there.
+class UpdateMapTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    SyntheticRoom room = MakeSyntheticRoom(3);
+    ASSERT_TRUE(WriteMapRows(room.rows, Path("old.cairn")).ok());
+    Random random(1);
+    for (const LandmarkIdx landmark : room.rows.regions[0].landmarks) {
+      room.rows.landmarks[landmark].position.x() += random.Normal(0, 0.02);
+      room.rows.descriptors.row(landmark) = RandomDescriptor(random);
+    }
+    room.rows.name = "room, again";
+    ASSERT_TRUE(WriteMapRows(room.rows, Path("new.cairn")).ok());
+  }
+
+  void SetUp() override {
+    for (const char* name : {"made.cairn", "never.cairn", "key.cairn"}) fs::remove(Path(name));
+  }
+
+  static std::string Path(const std::string& name) { return testing::TempDir() + "/update_" + name; }
+
+  // A delta from old.cairn to new.cairn under this name.
+  static std::string WriteDelta(const std::string& name, const std::optional<SecretKey>& key = std::nullopt) {
+    EXPECT_TRUE(WriteFileAtomically(Path(name),
+                                    EncodeMapDelta(*MakeMapDelta(Path("old.cairn"), Path("new.cairn"), key)))
+                    .ok());
+    return Path(name);
+  }
+
+  // A fresh copy of a map under another name.
+  static std::string Copy(const std::string& name, const std::string& copy) {
+    fs::copy_file(Path(name), Path(copy), fs::copy_options::overwrite_existing);
+    fs::remove(PreviousMapPath(Path(copy)));
+    return Path(copy);
+  }
+};
+
+TEST_F(UpdateMapTest, MakesTheSameBytesAndCostsWhatChanged) {
+  const std::string delta = WriteDelta("delta");
+  ASSERT_TRUE(ApplyDelta(Path("old.cairn"), delta, Path("made.cairn")).ok());
+  EXPECT_EQ(*ReadFile(Path("made.cairn")), *ReadFile(Path("new.cairn")));
+  // An eighth of the map's landmarks is new, and whatever is new has to travel: descriptors do not shrink.
+  const Result<std::shared_ptr<const Map>> map = Map::Open(Path("new.cairn"));
+  const double new_ratio =
+      static_cast<double>((*ReadMapRows(Path("new.cairn"))).regions[0].landmarks.size()) /
+      static_cast<double>((*map)->num_landmarks());
+  const double ratio =
+      static_cast<double>(fs::file_size(delta)) / static_cast<double>(fs::file_size(Path("new.cairn")));
+  EXPECT_LT(ratio, 1.2 * new_ratio);
+  EXPECT_GT(ratio, 0.3 * new_ratio);
+}
+
+TEST_F(UpdateMapTest, SameMapsMakeASmallDeltaAndTheSameBytes) {
+  const std::string bytes = EncodeMapDelta(*MakeMapDelta(Path("new.cairn"), Path("new.cairn"), std::nullopt));
+  EXPECT_LT(bytes.size(), 600U);
+  ASSERT_TRUE(WriteFileAtomically(Path("none"), bytes).ok());
+  ASSERT_TRUE(ApplyDelta(Path("new.cairn"), Path("none"), Path("same.cairn")).ok());
+  EXPECT_EQ(*ReadFile(Path("same.cairn")), *ReadFile(Path("new.cairn")));
+  EXPECT_EQ(EncodeMapDelta(*MakeMapDelta(Path("new.cairn"), Path("new.cairn"), std::nullopt)), bytes);
+}
+
+TEST_F(UpdateMapTest, AnotherMapIsRefusedWithASentence) {
+  const std::string delta = WriteDelta("delta");
+  const Status status = ApplyDelta(Path("new.cairn"), delta, Path("made.cairn"));
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("map 'room, again'"));
+  EXPECT_THAT(status.error().message, HasSubstr("ask for a delta from this map"));
+  EXPECT_FALSE(fs::exists(Path("made.cairn")));
+  EXPECT_EQ(ApplyDelta(Path("no.cairn"), delta, Path("made.cairn")).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(UpdateMapTest, TruncatedAndFlippedDeltasMakeNothing) {
+  const std::string bytes = *ReadFile(WriteDelta("delta"));
+  const auto refused = [&](const std::string& broken) {
+    std::FILE* const file = std::fopen(Path("broken").c_str(), "wb");
+    std::fwrite(broken.data(), 1, broken.size(), file);
+    std::fclose(file);
+    const Status status = ApplyDelta(Path("old.cairn"), Path("broken"), Path("never.cairn"));
+    return !status.ok() && !fs::exists(Path("never.cairn"));
+  };
+  EXPECT_TRUE(refused(""));
+  EXPECT_TRUE(refused("What I wrote last night.\n"));
+  EXPECT_TRUE(refused(bytes + "x"));
+  // All lengths of the head, and some of the rest.
+  for (size_t length = 0; length < 260; ++length) EXPECT_TRUE(refused(bytes.substr(0, length))) << length;
+  Random random(1);
+  for (int i = 0; i < 100; ++i) {
+    const size_t length = random.UniformInt(0, bytes.size() - 1);
+    EXPECT_TRUE(refused(bytes.substr(0, length))) << length;
+  }
+  for (int i = 0; i < 2000; ++i) {
+    const size_t bit = i < 1000 ? random.UniformInt(0, 8 * 260) : random.UniformInt(0, 8 * bytes.size() - 1);
+    std::string flipped = bytes;
+    flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ 1 << bit % 8);
+    EXPECT_TRUE(refused(flipped)) << "bit " << bit;
+  }
+}
+
+// Somebody who writes deltas by hand can make the hash of the payload right.
+TEST_F(UpdateMapTest, HostileDeltasAreRefused) {
+  const MapDelta good = *MakeMapDelta(Path("old.cairn"), Path("new.cairn"), std::nullopt);
+  const auto code = [&](const std::function<void(MapDelta*)>& change) {
+    MapDelta bad = good;
+    change(&bad);
+    EXPECT_TRUE(WriteFileAtomically(Path("hostile"), EncodeMapDelta(bad)).ok());
+    const Status status = ApplyDelta(Path("old.cairn"), Path("hostile"), Path("never.cairn"));
+    EXPECT_FALSE(fs::exists(Path("never.cairn")));
+    return status.ok() ? ErrorCode{} : status.error().code;
+  };
+  EXPECT_EQ(code([](MapDelta* delta) { delta->payload = ""; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->payload.resize(delta->payload.size() / 2); }),
+            ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->payload += delta->payload; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_num_bytes = uint64_t{1} << 40; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_num_bytes += delta->new_page_size; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_num_bytes -= delta->new_page_size; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 0; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 512; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->old_page_size = 3; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->old_num_bytes = delta->old_page_size; }),
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_hash[5] ^= 1; }), ErrorCode::kCorrupt);
+  EXPECT_TRUE(WriteFileAtomically(Path("hostile"), EncodeMapDelta(good)).ok());
+  EXPECT_TRUE(ApplyDelta(Path("old.cairn"), Path("hostile"), Path("made.cairn")).ok());
+}
+
+TEST_F(UpdateMapTest, ForgedAndUnsignedDeltasAreRefusedWhereAKeyIsRequired) {
+  const KeyPair keys = MakeKeyPair(), others = MakeKeyPair();
+  Copy("new.cairn", "unsigned.cairn");
+  const auto code = [&](const std::string& delta, const PublicKey& required) {
+    const Status status = ApplyDelta(Path("old.cairn"), delta, Path("key.cairn"), {.public_key = required});
+    return status.ok() ? ErrorCode{} : status.error().code;
+  };
+  EXPECT_EQ(code(WriteDelta("delta"), keys.public_key), ErrorCode::kNotSigned);
+  const std::string signed_delta = WriteDelta("signed", keys.secret_key);
+  EXPECT_EQ(code(signed_delta, others.public_key), ErrorCode::kWrongKey);
+  // The delta is signed, but the map that it leads to is not: a robot with the key could not open it.
+  EXPECT_EQ(code(signed_delta, keys.public_key), ErrorCode::kNotSigned);
+  EXPECT_FALSE(fs::exists(Path("key.cairn")));
+  ASSERT_TRUE(SignMap(Path("new.cairn"), keys.secret_key, Path("signed.cairn")).ok());
+  MapDelta delta = *MakeMapDelta(Path("old.cairn"), Path("signed.cairn"), keys.secret_key);
+  ASSERT_TRUE(WriteFileAtomically(Path("both"), EncodeMapDelta(delta)).ok());
+  EXPECT_EQ(code(Path("both"), keys.public_key), ErrorCode{});
+  EXPECT_EQ(*ReadFile(Path("key.cairn")), *ReadFile(Path("signed.cairn")));
+  delta.public_key = others.public_key;
+  ASSERT_TRUE(WriteFileAtomically(Path("both"), EncodeMapDelta(delta)).ok());
+  EXPECT_EQ(code(Path("both"), others.public_key), ErrorCode::kWrongKey);
+}
+
+TEST_F(UpdateMapTest, InPlaceKeepsTheOldMapAndRollsBack) {
+  const std::string map = Copy("old.cairn", "robot.cairn");
+  const std::string old_bytes = *ReadFile(map), new_bytes = *ReadFile(Path("new.cairn"));
+  EXPECT_EQ(RollBackMap(map).error().code, ErrorCode::kNotFound);
+  const auto open = Map::Open(map, {.memory_budget_bytes = 0});  // a robot that is driving
+  ASSERT_TRUE(open.ok());
+  const std::string delta = WriteDelta("delta");
+  const Result<bool> updated = UpdateMap(map, delta);
+  ASSERT_TRUE(updated.ok()) << updated.error().message;
+  EXPECT_TRUE(*updated);
+  EXPECT_EQ(*ReadFile(map), new_bytes);
+  EXPECT_EQ(*ReadFile(PreviousMapPath(map)), old_bytes);
+  EXPECT_EQ((*open)->head().name, "room");
+  for (int64_t block = 0; block < (*open)->directory().NumBlocks(BlockKind::kLandmarks); ++block)
+    EXPECT_TRUE((*open)->Landmarks(block).ok());
+  // Sent twice.
+  EXPECT_FALSE(*UpdateMap(map, delta));
+  EXPECT_EQ(*ReadFile(PreviousMapPath(map)), old_bytes);
+  ASSERT_TRUE(RollBackMap(map).ok());
+  EXPECT_EQ(*ReadFile(map), old_bytes);
+  EXPECT_EQ(*ReadFile(PreviousMapPath(map)), new_bytes);
+  ASSERT_TRUE(RollBackMap(map).ok());
+  EXPECT_EQ(*ReadFile(map), new_bytes);
+}
+
+TEST_F(UpdateMapTest, DamagedPreviousMapIsNotRolledBackTo) {
+  const std::string map = Copy("old.cairn", "robot.cairn");
+  ASSERT_TRUE(UpdateMap(map, WriteDelta("delta")).ok());
+  std::string bytes = *ReadFile(PreviousMapPath(map));
+  bytes[bytes.size() - 100] ^= 1;
+  ASSERT_TRUE(WriteFileAtomically(PreviousMapPath(map), bytes).ok());
+  EXPECT_EQ(RollBackMap(map).error().code, ErrorCode::kCorrupt);
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("new.cairn")));
+}
+
+TEST_F(UpdateMapTest, OldMapIsNotWrittenOver) {
+  const std::string map = Copy("old.cairn", "robot.cairn");
+  EXPECT_EQ(ApplyDelta(map, WriteDelta("delta"), map).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
+}
+
+}  // namespace
+}  // namespace cairn
