@@ -47,10 +47,10 @@ std::string TextAfter(const std::string& build_dir, std::string_view before, std
   return config->substr(begin, config->find(after, begin) - begin);
 }
 
-// The value of an option of [reconstruct].
-std::string ReconstructOptionText(const Recipe& recipe, const std::string& name) {
+// The value of an option of a stage.
+std::string OptionText(const Recipe& recipe, const std::string& stage_name, const std::string& name) {
   for (const StageOptions& stage : recipe.stages) {
-    if (stage.stage != "reconstruct") continue;
+    if (stage.stage != stage_name) continue;
     for (const Option& option : stage.table) {
       if (option.name == name) return OptionValueText(option);
     }
@@ -62,7 +62,7 @@ std::string ReconstructOptionText(const Recipe& recipe, const std::string& name)
 Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture) {
   std::string files;
   for (const char* name : {"control_points", "distances"}) {
-    const std::string file = ReconstructOptionText(recipe, name);
+    const std::string file = OptionText(recipe, "reconstruct", name);
     if (file.empty()) continue;
     if (IsJoined(recipe)) {
       return MakeError(
@@ -81,6 +81,21 @@ Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture
     files += (files.empty() ? "" : " ") + path;
   }
   return files;
+}
+
+// The file whose words [build_vocabulary] takes over; empty: none.
+Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
+  const std::string file = OptionText(recipe, "build_vocabulary", "tree_from");
+  if (file.empty()) return file;
+  const std::string path = (fs::path(paths.recipe).parent_path() / file).lexically_normal().string();
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("[build_vocabulary] tree_from", path));
+  if (!fs::exists(path)) {
+    return MakeError(
+        ErrorCode::kNotFound,
+        "[build_vocabulary] tree_from = \"{}\": there is no {} (paths are relative to the recipe)", file,
+        path);
+  }
+  return path;
 }
 
 // The folder that the stages read.
@@ -118,7 +133,7 @@ std::string QueriesPath(const Recipe& recipe, const std::string& capture, const 
   if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
     return Absolute(recipe.captures.front().queries_path);
   if (IsReconstructed(recipe))
-    return ReconstructOptionText(recipe, "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
+    return OptionText(recipe, "reconstruct", "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
   const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
   return recipe.simulated || is_any ? capture + "/queries.txt" : "";
 }
@@ -185,13 +200,15 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   if (IsReconstructed(recipe)) {
     CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
   }
+  CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
   const std::string config = fmt::format(
       "{}{}{}\n"
       "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
-      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\nFLOOR_PLAN := {}\n",
+      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\nFLOOR_PLAN := {}\n"
+      "VOCABULARY_TREE := {}\n",
       kConfigHead, paths.recipe, kConfigHeadEnd, paths.map, capture, recipe.simulated ? "yes" : "no",
       IsReconstructed(recipe) ? "yes" : "no", known_places, queries, recipe.name, seed,
-      SizeAndDate(paths.program), sessions.folders, sessions.queries, floor_plan);
+      SizeAndDate(paths.program), sessions.folders, sessions.queries, floor_plan, tree);
   return WriteFileAtomically(paths.build_dir + "/config.mk", config);
 }
 

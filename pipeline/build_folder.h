@@ -29,7 +29,7 @@ bool HasFloorPlan(const Recipe& recipe);
 //   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
 //   options/program       hash of the program: another one redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
-//                         QUERIES, NAME, SEED and PROGRAM for map.mk
+//                         QUERIES, NAME, SEED, PROGRAM and VOCABULARY_TREE for map.mk
 // Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names beside several captures), NotFound
 // (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);

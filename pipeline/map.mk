@@ -61,7 +61,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, NAME, SEED and PROGRAM;
+# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM;
 # `cairn configure` writes it beside the options.
 include $(BUILD)/config.mk
 
@@ -251,12 +251,13 @@ $(BUILD)/regions.db.stamp: $(BUILD)/world.db $(BUILD)/classes.db $(BUILD)/option
 	    --options $(@D)/options/decompose_regions.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 # Held-out images of a reconstructed capture have features too, but no words.
+$(BUILD)/vocabulary.db.stamp: VOCABULARY_TREE := $(VOCABULARY_TREE)
 $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(BUILD)/options/build_vocabulary.toml $(BUILD)/options/seed \
-    $(PROGRAM_HASH) $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY))
+    $(PROGRAM_HASH) $(if $(filter yes,$(RECONSTRUCTED)),$(POSES_READY)) $(VOCABULARY_TREE)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) build-vocabulary $(@D)/features.db \
 	    $(if $(filter-out $(CAPTURE),$(POSES)),--capture $(POSES)) \
-	    --options $(@D)/options/build_vocabulary.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	    --options $(@D)/options/build_vocabulary.toml $(addprefix --tree-from ,$(VOCABULARY_TREE)) -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 # Held-out images of a reconstructed capture are linked in matches.db, but are no survey.
 $(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(BUILD)/options/link_appearance.toml $(BUILD)/options/seed \

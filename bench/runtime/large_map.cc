@@ -1,5 +1,10 @@
 // A map of many rooms, as large as asked, and what a robot pays for it:
-//   large_map make MAP NUM_ROOMS             about 230 kB a room; signed, with the key MAP.key
+//   large_map make MAP NUM_ROOMS                   about 190 kB a room, 8 regions each; signed, with the key
+//                                                  MAP.key
+//   large_map make MAP NUM_ROOMS NUM_NEW same-tree|new-tree
+//                                                  so many rooms surveyed anew: other landmarks, and fewer;
+//                                                  with the tree of the map without new rooms, or one grown
+//                                                  anew
 //   large_map query MAP NUM_QUERIES BUDGET_MIB    opening time, memory, fixes; every query in another room
 #include <chrono>
 #include <cstdio>
@@ -20,6 +25,7 @@ namespace cairn {
 namespace {
 
 constexpr int kLandmarksPerRoom = 1600;
+constexpr int kLandmarksOfNewRoom = 1500;
 constexpr int kRoomsPerRow = 64;
 constexpr int kNumHeadings = 8;
 
@@ -29,8 +35,9 @@ Eigen::Vector3d RoomOrigin(int room_number) {
 }
 
 // The same room for the same number.
-SyntheticRoom MakeRoom(int room_number) {
-  SyntheticRoom room = MakeUnmappedRoom(MixSeed(1, room_number), kLandmarksPerRoom);
+SyntheticRoom MakeRoom(int room_number, bool is_new = false) {
+  SyntheticRoom room = MakeUnmappedRoom(MixSeed(is_new ? 2 : 1, room_number),
+                                        is_new ? kLandmarksOfNewRoom : kLandmarksPerRoom);
   for (Eigen::Vector3d& point : room.points) point += RoomOrigin(room_number);
   return room;
 }
@@ -40,8 +47,8 @@ Pose RoomPose(int room_number, double x, double y, double heading_deg) {
 }
 
 // Six places with eight headings each; a region per heading.
-void AddRoom(int room_number, MapRows* rows) {
-  const SyntheticRoom room = MakeRoom(room_number);
+void AddRoom(int room_number, bool is_new, MapRows* rows) {
+  const SyntheticRoom room = MakeRoom(room_number, is_new);
   const auto first = static_cast<LandmarkIdx>(rows->landmarks.size());
   for (const Eigen::Vector3d& point : room.points) {
     rows->landmarks.push_back({.class_id = static_cast<ClassId>(rows->landmarks.size()),
@@ -49,7 +56,7 @@ void AddRoom(int room_number, MapRows* rows) {
                                .covariance = 1e-4 * Eigen::Matrix3d::Identity(),
                                .num_observations = 12});
   }
-  rows->descriptors.middleRows(first, kLandmarksPerRoom) = room.descriptors;
+  rows->descriptors.middleRows(first, room.descriptors.rows()) = room.descriptors;
   for (int heading = 0; heading < kNumHeadings; ++heading) {
     std::vector<LandmarkIdx> seen;
     MapRegion& region = rows->regions.emplace_back();
@@ -61,15 +68,16 @@ void AddRoom(int room_number, MapRows* rows) {
                        .camera_id = 1,
                        .cam_from_world = RoomPose(room_number, x, y, 45.0 * heading),
                        .station = station};
-        for (int i = 0; i < kLandmarksPerRoom; ++i) {
+        for (size_t i = 0; i < room.points.size(); ++i) {
           const auto pixel = ImageFromCamera(room.camera, image.cam_from_world * room.points[i]);
           if (pixel && pixel->x() > 0 && pixel->y() > 0 && pixel->x() < 640 && pixel->y() < 480) {
-            image.landmarks.push_back(first + i);
+            image.landmarks.push_back(first + static_cast<LandmarkIdx>(i));
           }
         }
         seen.insert(seen.end(), image.landmarks.begin(), image.landmarks.end());
         rows->images.push_back(std::move(image));
-        rows->stations.push_back({.position = {x, y}, .heading_deg = 45.0 * heading});
+        rows->stations.push_back({.position = Eigen::Vector2d(x, y) + RoomOrigin(room_number).head<2>(),
+                                  .heading_deg = 45.0 * heading});
         region.stations.push_back(station);
       }
     }
@@ -79,18 +87,33 @@ void AddRoom(int room_number, MapRows* rows) {
   }
 }
 
-Status Make(const std::string& path, int num_rooms) {
+// The descriptors of all rooms before any was surveyed anew.
+DescriptorMatrix OldDescriptors(int num_rooms) {
+  DescriptorMatrix descriptors(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
+  for (int room = 0; room < num_rooms; ++room)
+    descriptors.middleRows(room * kLandmarksPerRoom, kLandmarksPerRoom) = MakeRoom(room).descriptors;
+  QuantizeDescriptorValues(4, &descriptors);
+  return descriptors;
+}
+
+Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree) {
   MapRows rows;
   rows.name = "large";
   rows.writer = "large_map";
   rows.cameras = {MakeRoom(0).camera};
   rows.descriptors.resize(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
-  for (int room = 0; room < num_rooms; ++room) AddRoom(room, &rows);
+  // New rooms evenly among the others.
+  for (int room = 0; room < num_rooms; ++room) {
+    const bool is_new = (int64_t{room} + 1) * num_new / num_rooms > int64_t{room} * num_new / num_rooms;
+    AddRoom(room, is_new, &rows);
+  }
+  rows.descriptors.conservativeResize(static_cast<Eigen::Index>(rows.landmarks.size()), Eigen::NoChange);
   QuantizeDescriptorValues(4, &rows.descriptors);
-  const Eigen::Index num_training = std::min<Eigen::Index>(rows.descriptors.rows(), 200'000);
+  const DescriptorMatrix all_training = same_tree ? OldDescriptors(num_rooms) : rows.descriptors;
+  const Eigen::Index num_training = std::min<Eigen::Index>(all_training.rows(), 200'000);
   NoProgress progress;
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary tree,
-                         GrowVocabulary(rows.descriptors.topRows(num_training), rows.descriptors.rows(),
+                         GrowVocabulary(all_training.topRows(num_training), all_training.rows(),
                                         {.depth = 5, .min_num_descriptors_to_split = 8}, 0, 0, progress));
   const double landmarks_per_word = std::max(40.0, static_cast<double>(rows.descriptors.rows()) / 65536);
   rows.vocabulary = CutVocabulary(tree, rows.descriptors, rows.images,
@@ -164,10 +187,13 @@ Status Ask(const std::string& path, int num_queries, int64_t budget_mib) {
 
 int main(int argc, char** argv) {
   const std::string verb = argc > 1 ? argv[1] : "";
-  cairn::Status status =
-      cairn::MakeError(cairn::ErrorCode::kInvalidArgument,
-                       "usage: large_map make MAP NUM_ROOMS | large_map query MAP NUM BUDGET_MIB");
-  if (verb == "make" && argc == 4) status = cairn::Make(argv[2], std::atoi(argv[3]));
+  cairn::Status status = cairn::MakeError(cairn::ErrorCode::kInvalidArgument,
+                                          "usage: large_map make MAP NUM_ROOMS [NUM_NEW same-tree|new-tree] "
+                                          "| large_map query MAP NUM BUDGET_MIB");
+  if (verb == "make" && argc == 4) status = cairn::Make(argv[2], std::atoi(argv[3]), 0, false);
+  if (verb == "make" && argc == 6)
+    status =
+        cairn::Make(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), std::string(argv[5]) == "same-tree");
   if (verb == "query" && argc == 5) status = cairn::Ask(argv[2], std::atoi(argv[3]), std::atoi(argv[4]));
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
   return status.ok() ? 0 : 1;

@@ -99,12 +99,17 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
        .help = "words in more than this part of the images do not score (stop list); 1: all score",
        .min = 1e-9,
        .max = 1},
+      {.name = "tree_from",
+       .value = &o->tree_from,
+       .help = "vocabulary.db of an earlier compilation whose words are taken over; absolute or relative to "
+               "the recipe; "
+               "empty: words are learnt"},
   };
 }
 
 Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
-                                   Progress& progress) {
+                                   Progress& progress, const Vocabulary* tree) {
   BuildVocabularyOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   int64_t num_descriptors = 0;
@@ -120,10 +125,19 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
     return MakeError(ErrorCode::kNoData,
                      "build_vocabulary: no descriptors in {} images; are the images blank?", images.size());
   }
-  CAIRN_ASSIGN_OR_RETURN(
-      Vocabulary vocabulary,
-      GrowVocabulary(TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed),
-                     num_descriptors, options.tree, seed, num_threads, progress));
+  Vocabulary vocabulary;
+  if (tree != nullptr) {
+    vocabulary.branching = tree->branching;
+    vocabulary.depth = tree->depth;
+    vocabulary.nodes = tree->nodes;
+    vocabulary.centres = tree->centres;
+    CAIRN_RETURN_IF_ERROR(NumberVocabularyNodes(&vocabulary));
+  } else {
+    const DescriptorMatrix training =
+        TrainingDescriptors(images, num_descriptors, options.max_num_training_descriptors, seed);
+    CAIRN_ASSIGN_OR_RETURN(
+        vocabulary, GrowVocabulary(training, num_descriptors, options.tree, seed, num_threads, progress));
+  }
   FillInvertedFiles(images, options.max_document_ratio, num_threads, progress, &vocabulary);
   WeightVocabulary(&vocabulary);
   return vocabulary;

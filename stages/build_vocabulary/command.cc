@@ -53,9 +53,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                                            environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageDescriptors> images,
                          ReadDescriptors(arguments.features_path, survey));
+  std::optional<Vocabulary> tree;
+  if (!arguments.options.tree_from.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(tree, ReadVocabulary(arguments.options.tree_from));
+  }
   CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
                          BuildVocabulary(images, arguments.options, environment.seed, environment.num_threads,
-                                         *environment.progress));
+                                         *environment.progress, tree ? &*tree : nullptr));
   CAIRN_RETURN_IF_ERROR(WriteVocabulary(vocabulary, arguments.output_path));
   environment.report->in = {{"images", static_cast<int64_t>(images.size())}};
   environment.report->out = {{"words", vocabulary.num_words()}};

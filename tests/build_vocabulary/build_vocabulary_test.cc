@@ -46,6 +46,23 @@ std::string FileBytes(const Vocabulary& vocabulary, const std::string& name) {
   return *ReadFile(path);
 }
 
+TEST(BuildVocabulary, TakesOverTheWordsOfAnEarlierTree) {
+  const auto before = RandomImages(6, 300, 1), after = RandomImages(6, 300, 2);
+  const Vocabulary tree = *Build(before, {});
+  NoProgress progress;
+  const Vocabulary same = *BuildVocabulary(before, {}, 8, 2, progress, &tree);
+  EXPECT_EQ(FileBytes(same, "same.db"), FileBytes(tree, "tree.db"));
+  const Vocabulary other = *BuildVocabulary(after, {}, 8, 2, progress, &tree);
+  EXPECT_EQ(other.centres, tree.centres);
+  EXPECT_EQ(other.num_words(), tree.num_words());
+  EXPECT_NE(other.inverted_files, tree.inverted_files);
+  int64_t num_features = 0;
+  for (const auto& postings : other.inverted_files) {
+    for (const Posting& posting : postings) num_features += posting.count;
+  }
+  EXPECT_EQ(num_features, 6 * 300);
+}
+
 TEST(BuildVocabulary, SameBytesForAnyNumberOfThreads) {
   const auto images = RandomImages(12, 900, 1);
   const std::string one = FileBytes(*Build(images, {}, 1), "vocabulary_1.db");
