@@ -52,6 +52,8 @@ constexpr DropReasonEntry kReasons[] = {
      "fewer than k features are visible from it and all stations within tau hops"},
     {DropReason::kLeftOver, "decompose_regions", DropKind::kStation, "left_over",
      "it is coverable, but no region covers it: rho, or what the algorithm leaves"},
+    {DropReason::kOverBudget, "emit_map", DropKind::kFeature, "over_budget",
+     "max_bytes leaves no room for it, and others serve the survey's images better"},
 };
 
 }  // namespace

@@ -37,6 +37,8 @@ enum class DropReason : int {
   kFewFeatures = 42,
   kFewCommonFeatures = 43,
   kLeftOver = 44,
+  // emit_map
+  kOverBudget = 50,
 };
 
 // What is dropped, and so what is counted.

@@ -127,6 +127,12 @@ Status WriteClasses(const Classes& classes, const std::string& path) {
   return WriteClasses(classes, path, {});
 }
 
+Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum) {
+  const double norm = sum.norm();
+  if (norm > 0) sum *= 512.0 / norm;
+  return sum.array().round().cwiseMin(255.0).cast<uint8_t>();
+}
+
 Result<Classes> ReadClasses(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<Classes> {

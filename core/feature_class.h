@@ -39,6 +39,10 @@ struct SurveyImage {
   Pose given_cam_from_world;  // as the capture states it
 };
 
+// The mean of RootSIFT descriptors with this sum, renormalised to norm 512 and rounded.
+using DescriptorSum = Eigen::Matrix<double, 1, kDescriptorDim>;
+Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum);
+
 // How many of something were dropped, and why ("ambiguous", "few_observations", ...).
 using DropCounts = std::map<std::string, int64_t>;
 

@@ -12,6 +12,7 @@
 #include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
 #include "pipeline/locate_scan_command.h"
+#include "pipeline/pareto_command.h"
 #include "pipeline/plan_path_command.h"
 #include "pipeline/route_command.h"
 #include "pipeline/seal_commands.h"
@@ -71,6 +72,7 @@ std::vector<Command> AllCommands() {
       DeltaCommand(),
       ApplyCommand(),
       RollbackCommand(),
+      ParetoCommand(),
   };
 }
 

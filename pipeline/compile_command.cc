@@ -1,19 +1,13 @@
 #include "pipeline/compile_command.h"
 
-#include <spawn.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
-#include <thread>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -23,6 +17,7 @@
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/recipe.h"
+#include "pipeline/run_make.h"
 #include "pipeline/stop_signal.h"
 
 namespace cairn {
@@ -53,25 +48,6 @@ constexpr StageFile kStageFiles[] = {
     {"decompose_regions", "regions.db"},  {"build_vocabulary", "vocabulary.db"},
     {"link_appearance", "appearance.db"}, {"decompose_views", "views.db"},
     {"emit_map", "unsealed.cairn"}};
-
-Result<std::string> ProgramPath() {
-  std::error_code error;
-  const fs::path path = fs::read_symlink("/proc/self/exe", error);
-  if (error) return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
-  return path.string();
-}
-
-// map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
-Result<std::string> RulesPath(const std::string& program) {
-  const fs::path folder = fs::path(program).parent_path();
-  for (const char* place : {"share/cairn/map.mk", "../share/cairn/map.mk"}) {
-    const fs::path path = (folder / place).lexically_normal();
-    if (fs::exists(path)) return path.string();
-  }
-  return MakeError(ErrorCode::kNotFound,
-                   "share/cairn/map.mk is neither beside {} nor one folder up; install the program again",
-                   program);
-}
 
 Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
   const fs::path map = fs::absolute(arguments.output).lexically_normal();
@@ -133,40 +109,6 @@ std::map<std::string, fs::file_time_type> StampDates(const std::string& build_di
     if (entry.path().extension() == ".stamp") dates[entry.path()] = entry.last_write_time(error);
   }
   return dates;
-}
-
-// Runs a program with this one's terminal and `variable` added to its environment; returns its wait status.
-// Asked to stop, it asks the program to stop and waits for it.
-Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
-                              const Progress& progress) {
-  std::vector<char*> argv, envp;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  for (char** entry = environ; *entry != nullptr; ++entry) {
-    // An outer make's flags are not meant for this one.
-    if (std::strncmp(*entry, "MAKEFLAGS=", 10) != 0 && std::strncmp(*entry, "MAKELEVEL=", 10) != 0 &&
-        std::strncmp(*entry, kBuildSessionVariable, std::strlen(kBuildSessionVariable)) != 0) {
-      envp.push_back(*entry);
-    }
-  }
-  envp.push_back(const_cast<char*>(variable.c_str()));
-  envp.push_back(nullptr);
-  pid_t pid = 0;
-  const int reason = posix_spawnp(&pid, argv[0], nullptr, nullptr, argv.data(), envp.data());
-  if (reason != 0) {
-    return MakeError(ErrorCode::kNotFound, "{}: cannot be started: {}; install GNU Make", words[0],
-                     std::strerror(reason));
-  }
-  int wait_status = 0;
-  bool is_told = false;
-  while (true) {
-    const pid_t ended = waitpid(pid, &wait_status, WNOHANG);
-    if (ended == pid) return wait_status;
-    if (ended < 0 && errno != EINTR)
-      return MakeError(ErrorCode::kFailed, "waiting for {}: {}", words[0], std::strerror(errno));
-    if (progress.Cancelled() && !std::exchange(is_told, true)) kill(pid, SIGTERM);
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
 }
 
 // The stage has printed its message already.

@@ -285,18 +285,33 @@ STAGE_OPTIONS := extract_features match_features $(if $(filter yes,$(RECONSTRUCT
 $(BUILD)/%: STAGE_OPTIONS := $(STAGE_OPTIONS)
 VIEWS := $(if $(FLOOR_PLAN),$(BUILD)/views.db)
 $(BUILD)/%: VIEWS := $(VIEWS)
-$(BUILD)/unsealed.cairn.stamp: $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
+# emit-map and all that it reads, from the folder $(1).
+CAIRN_EMIT = emit-map --matches $(1)/matches.db --classes $(1)/classes.db --world $(1)/world.db --regions $(1)/regions.db \
+    --vocabulary $(1)/vocabulary.db --appearance $(1)/appearance.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
+    $(addprefix --sessions ,$(SESSION_LIST)) $(addprefix --views ,$(VIEWS)) \
+    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(1)/options/$(stage).toml) --options $(1)/options/emit_map.toml
+EMIT_NEEDS := $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
     $(BUILD)/vocabulary.db $(BUILD)/appearance.db $(VIEWS) $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) \
     $(BUILD)/options/name $(BUILD)/options/floor_plan $(PROGRAM_HASH) $(POSES_READY) $(SESSION_LIST)
+$(BUILD)/unsealed.cairn.stamp: $(EMIT_NEEDS)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) emit-map --matches $(@D)/matches.db --classes $(@D)/classes.db --world $(@D)/world.db \
-	    --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --appearance $(@D)/appearance.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
-	    $(addprefix --sessions ,$(SESSION_LIST)) $(addprefix --views ,$(VIEWS)) \
-	    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(@D)/options/$(stage).toml) \
-	    --options $(@D)/options/emit_map.toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+	$(CAIRN_LAUNCH) $(CAIRN) $(call CAIRN_EMIT,$(@D)) -o $(@:.stamp=) $(CAIRN_FLAGS)
 
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
     $(BUILD)/options/seed $(PROGRAM_HASH) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
+
+# The map in other sizes, for `cairn pareto`: pareto/N.cairn has at most N bytes (0: every class) and pareto/N.json what
+# the held-out images say of it; no gate.
+.PRECIOUS: $(BUILD)/pareto/%.unsealed.stamp
+$(BUILD)/pareto/%.unsealed.stamp: $(EMIT_NEEDS)
+	$(CAIRN_LAUNCH) $(CAIRN) $(call CAIRN_EMIT,$(@D)/..) --landmarks all --max-bytes $* -o $(@:.stamp=) $(CAIRN_FLAGS)
+
+$(BUILD)/pareto/%.json: $(BUILD)/pareto/%.unsealed.stamp $(BUILD)/options/check_map.toml $(BUILD)/options/queries \
+    $(QUERY_LIST) $(QUERY_IMAGES)
+	$(CAIRN_LAUNCH) $(CAIRN) check-map $(<:.stamp=) --queries $(QUERIES) --capture $(POSES) \
+	    --options $(@D)/../options/check_map.toml --min-localized-ratio 0 --min-precision-ratio 0 \
+	    --min-region-localized-ratio 0 --min-region-precision-ratio 0 --json -o $(@:.json=.cairn) --seed $(SEED) \
+	    --threads $(THREADS) --progress $(PROGRESS) --log-level $(LOG_LEVEL) > $@

@@ -4,7 +4,9 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -13,9 +15,11 @@
 #include "core/file.h"
 #include "core/sessions.h"
 #include "core/sift.h"
+#include "core/temporary.h"
 #include "core/views_database.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/fit_size.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 
@@ -48,7 +52,8 @@ Result<int64_t> CountRejects(const std::string& path) {
   });
 }
 
-Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
+// `options`: those that the map was made with.
+Status AddProvenance(const Arguments& arguments, EmitMapOptions options, uint64_t seed, MapRows* rows) {
   rows->name = arguments.name;
   rows->writer = "cairn " CAIRN_VERSION;
   rows->instruction_set = SiftInstructionSet();
@@ -72,7 +77,6 @@ Status AddProvenance(const Arguments& arguments, uint64_t seed, MapRows* rows) {
     }
     CAIRN_ASSIGN_OR_RETURN(rows->stage_options[text.substr(0, equals)], ReadFile(text.substr(equals + 1)));
   }
-  EmitMapOptions options = arguments.options;
   rows->stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
   return Ok();
 }
@@ -95,9 +99,31 @@ Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
   return all;
 }
 
-Status AddDrops(const Arguments& arguments, const Classes& classes, const World& world, MapRows* rows) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<DroppedItem> dropped, ReadAllDropped(arguments));
-  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(classes, world, dropped));
+// What emit-map reads.
+struct Inputs {
+  Classes classes;
+  World world;
+  Decomposition decomposition;
+  Vocabulary vocabulary;
+  std::optional<Appearance> appearance;
+  std::vector<DroppedItem> dropped;
+};
+
+Result<Inputs> ReadInputs(const Arguments& arguments) {
+  Inputs inputs;
+  CAIRN_ASSIGN_OR_RETURN(inputs.classes, ReadClasses(arguments.classes_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.world, ReadWorld(arguments.world_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.decomposition, ReadDecomposition(arguments.regions_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.vocabulary, ReadVocabulary(arguments.vocabulary_path));
+  if (!arguments.appearance_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(inputs.appearance, ReadAppearance(arguments.appearance_path));
+  }
+  CAIRN_ASSIGN_OR_RETURN(inputs.dropped, ReadAllDropped(arguments));
+  return inputs;
+}
+
+Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, MapRows* rows) {
+  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.world, dropped));
   for (const DroppedItem& item : dropped) {
     if (DescribeDropReason(item.reason).kind == DropKind::kStation)
       rows->stations[item.item_id].is_covered = false;
@@ -105,47 +131,124 @@ Status AddDrops(const Arguments& arguments, const Classes& classes, const World&
   return Ok();
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes_path));
-  CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world_path));
-  CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions_path));
-  CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary_path));
-  std::optional<Appearance> appearance;
-  if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(appearance, ReadAppearance(arguments.appearance_path));
+// The classes that a limit of bytes keeps out, beside those that the stages before dropped.
+std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<char>& may_keep,
+                                     const std::vector<char>& keep) {
+  std::vector<DroppedItem> dropped = inputs.dropped;
+  for (size_t i = 0; i < keep.size(); ++i) {
+    if (may_keep[i] != 0 && keep[i] == 0)
+      dropped.push_back({.reason = DropReason::kOverBudget, .item_id = inputs.classes.classes[i].class_id});
   }
-  CAIRN_ASSIGN_OR_RETURN(MapRows rows, EmitMap(classes, world, decomposition, vocabulary, arguments.options,
-                                               appearance ? &*appearance : nullptr));
+  return dropped;
+}
+
+// The world without images that the classes lack.
+World WorldOf(const Classes& classes, World world) {
+  std::set<ImageId> images;
+  for (const SurveyImage& image : classes.images) images.insert(image.image_id);
+  for (std::vector<ImageId>& of_station : world.station_images)
+    std::erase_if(of_station, [&](ImageId image) { return !images.contains(image); });
+  return world;
+}
+
+// The whole map but for its self-test.  `classes` and `world` may be those of a part of the survey.
+Result<MapRows> MakeRows(const Arguments& arguments, const Inputs& inputs, const Classes& classes,
+                         const World& world, const EmitMapOptions& options, const std::vector<char>* keep,
+                         uint64_t seed, int num_threads) {
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows,
+                         EmitMap(classes, world, inputs.decomposition, inputs.vocabulary, options,
+                                 inputs.appearance ? &*inputs.appearance : nullptr, keep));
   if (!arguments.frame_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.frame, ReadCaptureFrame(arguments.frame_path));
   }
   if (!arguments.sessions_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(rows.sessions, ReadSessionsText(arguments.sessions_path));
   }
-  if (arguments.options.visual_map) {
-    CAIRN_ASSIGN_OR_RETURN(rows.visual_map,
-                           ModelLandmarks(classes, rows, arguments.options, environment.num_threads));
+  if (options.visual_map) {
+    CAIRN_ASSIGN_OR_RETURN(rows.visual_map, ModelLandmarks(classes, rows, options, num_threads));
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map.errors,
-                           LearnVisualErrors(classes, rows, rows.visual_map, environment.num_threads));
+                           LearnVisualErrors(classes, rows, rows.visual_map, num_threads));
   }
-  CAIRN_RETURN_IF_ERROR(AddDrops(arguments, classes, world, &rows));
-  CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, environment.seed, &rows));
+  CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, options, seed, &rows));
   if (!arguments.views_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(Views views, ReadViews(arguments.views_path));
     CAIRN_RETURN_IF_ERROR(AddViews(std::move(views), &rows));
   }
+  return rows;
+}
+
+std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, int max_bytes) {
+  const SizeGuarantee guarantee = GuaranteeOf(rows);
+  return fmt::format(
+      "emit_map: at most {} bytes: {} bits a descriptor value; at least {} common landmarks in every region; "
+      "{} of "
+      "{} stations see fewer than k = {}; recall {:.1f} % of {} left-out survey images, {:.1f} % with "
+      "everything\n",
+      max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks, guarantee.num_stations_below_k,
+      rows.stations.size(), rows.k, 100 * fitted.trial.RightRatio(), fitted.trial.num_tried,
+      100 * fitted.trial_of_all.RightRatio());
+}
+
+// The rows of the best map within max_bytes, and what it promises.
+Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& arguments, const Inputs& inputs,
+                                                       const CommandEnvironment& environment) {
+  if (arguments.matches_path.empty()) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: max_bytes needs --matches: landmarks are chosen by what the survey's images show");
+  }
+  EmitMapOptions options = arguments.options;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep,
+                         KeptClasses(inputs.classes, inputs.world, inputs.decomposition, options));
+  const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
+                            int descriptor_bits) -> Result<MapRows> {
+    options.descriptor_bits = descriptor_bits;
+    const bool is_whole = classes.images.size() == inputs.classes.images.size();
+    options.visual_map = arguments.options.visual_map && is_whole;
+    CAIRN_ASSIGN_OR_RETURN(MapRows rows, MakeRows(arguments, inputs, classes,
+                                                  is_whole ? inputs.world : WorldOf(classes, inputs.world),
+                                                  options, &keep, environment.seed, environment.num_threads));
+    if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep), inputs, &rows));
+    return rows;
+  };
+  const FitSizeOptions fit_options{.max_bytes = options.max_bytes,
+                                   .descriptor_bits = options.descriptor_bits,
+                                   .limits = {options.left_out_max_error_m, options.left_out_max_error_deg}};
+  CAIRN_ASSIGN_OR_RETURN(
+      const FittedSize fitted,
+      FitSize(inputs.classes, may_keep, arguments.matches_path, emit, fit_options,
+              TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress));
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits));
+  std::string text = GuaranteeText(rows, fitted, arguments.options.max_bytes);
+  return std::pair(std::move(rows), std::move(text));
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  EmitMapOptions checked = arguments.options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments));
+  MapRows rows;
+  std::string guarantee;
+  if (arguments.options.max_bytes > 0) {
+    CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsWithin(arguments, inputs, environment));
+  } else {
+    CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(arguments, inputs, inputs.classes, inputs.world, arguments.options,
+                                          nullptr, environment.seed, environment.num_threads));
+    CAIRN_RETURN_IF_ERROR(AddDrops(inputs.dropped, inputs, &rows));
+  }
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
-  environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
+  environment.report->in = {{"classes", static_cast<int64_t>(inputs.classes.classes.size())}};
   environment.report->out = {
       {"landmarks", static_cast<int64_t>(rows.landmarks.size())},
       {"regions", static_cast<int64_t>(rows.regions.size())},
       {"bytes", static_cast<int64_t>(std::filesystem::file_size(arguments.output_path))}};
   *environment.out << fmt::format(
       "emit_map: {} landmarks of {} classes in {} regions, {} images, {} words, {:.2f} MB\n",
-      rows.landmarks.size(), classes.classes.size(), rows.regions.size(), rows.images.size(),
+      rows.landmarks.size(), inputs.classes.classes.size(), rows.regions.size(), rows.images.size(),
       rows.vocabulary.num_words(),
       static_cast<double>(std::filesystem::file_size(arguments.output_path)) / 1e6);
+  *environment.out << guarantee;
   return Ok();
 }
 

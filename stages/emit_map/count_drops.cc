@@ -81,7 +81,7 @@ class StationFinder {
                     std::vector<StationIdx>* stations) const {
     if (stage == "group_classes") {
       AddKeypoints(item, stations);
-    } else if (stage == "filter_visibility") {
+    } else if (stage == "filter_visibility" || stage == "emit_map") {
       const auto found = std::lower_bound(
           classes_.classes.begin(), classes_.classes.end(), item.item_id,
           [](const FeatureClass& feature_class, int64_t id) { return feature_class.class_id < id; });

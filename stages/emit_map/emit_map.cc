@@ -56,10 +56,41 @@ Result<std::vector<std::vector<size_t>>> ClassesOfRegions(const Classes& classes
   return classes_of_regions;
 }
 
-// Kept classes in the order in which the map stores them.
+// Per region, the classes that `keep` marks and that can be seen from all of its stations.
+std::vector<std::vector<size_t>> CommonClasses(const Classes& classes, const World& world,
+                                               const Decomposition& decomposition,
+                                               const std::vector<char>& keep) {
+  const std::map<ClassId, size_t> class_index = IndexClasses(classes);
+  const std::vector<std::vector<FeatureIdx>> seen_from = VisibilitySets(world);
+  std::vector<std::vector<size_t>> common(decomposition.regions.size());
+  for (size_t region = 0; region < decomposition.regions.size(); ++region) {
+    const std::vector<StationIdx>& stations = decomposition.regions[region].stations;
+    if (stations.empty()) continue;
+    for (const FeatureIdx feature : seen_from[stations[0]]) {
+      const auto found = class_index.find(world.class_ids[feature]);
+      if (found == class_index.end() || keep[found->second] == 0) continue;
+      const std::vector<StationIdx>& area = world.areas[feature];
+      if (std::includes(area.begin(), area.end(), stations.begin(), stations.end()))
+        common[region].push_back(found->second);
+    }
+  }
+  return common;
+}
+
+// Per class, whether a map without a limit keeps it.
+std::vector<char> MarkKept(size_t num_classes, const std::vector<std::vector<size_t>>& classes_of_regions,
+                           bool keep_all) {
+  std::vector<char> kept(num_classes, keep_all ? 1 : 0);
+  for (const std::vector<size_t>& of_region : classes_of_regions) {
+    for (const size_t i : of_region) kept[i] = 1;
+  }
+  return kept;
+}
+
+// The classes that `keep` marks in the order in which the map stores them.
 std::vector<size_t> OrderLandmarks(const Classes& classes,
                                    const std::vector<std::vector<size_t>>& classes_of_regions,
-                                   bool keep_all) {
+                                   const std::vector<char>& keep) {
   std::vector<RegionIdx> first_region(classes.classes.size(), kNoRegion);
   for (size_t region = 0; region < classes_of_regions.size(); ++region) {
     for (const size_t i : classes_of_regions[region]) {
@@ -68,7 +99,7 @@ std::vector<size_t> OrderLandmarks(const Classes& classes,
   }
   std::vector<size_t> order;
   for (size_t i = 0; i < classes.classes.size(); ++i) {
-    if (keep_all || first_region[i] != kNoRegion) order.push_back(i);
+    if (keep[i] != 0) order.push_back(i);
   }
   std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     const auto key = [&](size_t i) {
@@ -221,6 +252,20 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->landmarks,
        .help = "classes that become landmarks: those that regions keep, or all",
        .choices = {"regions", "all"}},
+      {.name = "max_bytes",
+       .value = &options->max_bytes,
+       .help = "most bytes of the sealed map; the landmarks are kept with which left-out survey images are "
+               "localized "
+               "best; 0: no limit",
+       .min = 0},
+      {.name = "left_out_max_error_m",
+       .value = &options->left_out_max_error_m,
+       .help = "with max_bytes: a left-out survey image is localized right within this of its place, m",
+       .min = 1e-6},
+      {.name = "left_out_max_error_deg",
+       .value = &options->left_out_max_error_deg,
+       .help = "with max_bytes: and within this of its rotation, degrees",
+       .min = 1e-6},
       {.name = "descriptor_bits",
        .value = &options->descriptor_bits,
        .help = "bits in which a value of a landmark's descriptor is stored; 8: as it is",
@@ -261,7 +306,7 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
-                        const Appearance* appearance) {
+                        const Appearance* appearance, const std::vector<char>* keep) {
   EmitMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (options.words == "survey" && options.documents == "kept") {
@@ -269,8 +314,13 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
         ErrorCode::kInvalidArgument,
         "emit_map: words = \"survey\" with documents = \"kept\"; one of them must be the default");
   }
-  CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
-  const std::vector<size_t> order = OrderLandmarks(classes, classes_of_regions, options.landmarks == "all");
+  CAIRN_ASSIGN_OR_RETURN(auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
+  std::vector<char> kept = MarkKept(classes.classes.size(), classes_of_regions, options.landmarks == "all");
+  if (keep != nullptr) {
+    kept = *keep;
+    classes_of_regions = CommonClasses(classes, world, decomposition, kept);
+  }
+  const std::vector<size_t> order = OrderLandmarks(classes, classes_of_regions, kept);
   if (order.empty()) {
     return MakeError(
         ErrorCode::kNoData,
@@ -326,6 +376,12 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   }
   CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
   return rows;
+}
+
+Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
+                                      const Decomposition& decomposition, const EmitMapOptions& options) {
+  CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
+  return MarkKept(classes.classes.size(), classes_of_regions, options.landmarks == "all");
 }
 
 Status AddViews(Views views, MapRows* rows) {

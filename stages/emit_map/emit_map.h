@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/appearance.h"
 #include "core/decomposition.h"
@@ -23,6 +24,13 @@ namespace cairn {
 struct EmitMapOptions {
   // "regions": the classes that regions keep; "all": every class.
   std::string landmarks = "regions";
+  // Most bytes of the sealed map, 0: no limit.  Of the classes that become landmarks, those are kept with
+  // which left-out survey images are localized best (fit_size.h).  REQUIRES: >= 0
+  int max_bytes = 0;
+  // A left-out image is localized right within this of its place and rotation, metres (units where the map's
+  // is arbitrary) and degrees.  REQUIRES: > 0
+  double left_out_max_error_m = 0.1;
+  double left_out_max_error_deg = 5;
   // Bits in which a value of a landmark's descriptor is stored; 8: as it is.  REQUIRES: in [1, 8]
   int descriptor_bits = 5;
   // A map with at least so many landmarks gets a vocabulary; in a smaller one every landmark is its own word.
@@ -51,13 +59,18 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // Landmarks are ordered by the first region that has them (of no region: last), then by the first image that
 // sees them, then by class: a region's landmarks lie together.  `vocabulary` is a tree over the survey's
 // features, with its inverted files for words = "survey".  `appearance` may be null: the map then leads from
-// no image to another. Its images that `classes` lacks are left out.  The result has no name, seed, options
-// or hashes: those are the caller's. Pure.  O(observations). Errors: InvalidArgument (inputs that do not
-// belong together: a region's feature, a feature's class or a station's image does not exist; documents =
-// "kept" without kept images), NoData (no class is kept).
+// no image to another. Its images that `classes` lacks are left out.  `keep`, where given, marks the classes
+// that may be landmarks; a region then has all of them that can be seen from all of its stations.  The result
+// has no name, seed, options or hashes: those are the caller's. Pure.  O(observations). Errors:
+// InvalidArgument (inputs that do not belong together: a region's feature, a feature's class or a station's
+// image does not exist; documents = "kept" without kept images), NoData (no class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
-                        const Appearance* appearance = nullptr);
+                        const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr);
+
+// The classes that a map keeps where nothing limits it: per class.  Errors: as EmitMap.
+Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
+                                      const Decomposition& decomposition, const EmitMapOptions& options);
 
 // Puts a floor plan and its regions, floor frame, into a map.  Errors: InvalidArgument where the map's unit
 // is not the metre, in which plans are.

@@ -5,6 +5,7 @@
 
 #include "core/descriptor_distance.h"
 #include "core/descriptor_matcher.h"
+#include "core/feature_class.h"
 
 namespace cairn {
 namespace {
@@ -51,13 +52,11 @@ void FindNearest(const DescriptorMatrix& centres, int begin, int end, std::vecto
 }  // namespace
 
 void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearance* appearance) {
-  Eigen::Matrix<double, 1, kDescriptorDim> sum = Eigen::Matrix<double, 1, kDescriptorDim>::Zero();
+  DescriptorSum sum = DescriptorSum::Zero();
   for (const uint8_t* descriptor : descriptors) {
     sum += Eigen::Map<const Eigen::Matrix<uint8_t, 1, kDescriptorDim>>(descriptor).cast<double>();
   }
-  const double norm = sum.norm();
-  if (norm > 0) sum *= 512.0 / norm;
-  appearance->centre = sum.array().round().cwiseMin(255.0).cast<uint8_t>();
+  appearance->centre = MeanDescriptor(sum);
   double squared_sum = 0;
   for (const uint8_t* descriptor : descriptors) {
     const double angle = DescriptorAngleRad(DescriptorDot(descriptor, appearance->centre.data()));

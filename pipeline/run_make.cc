@@ -1,0 +1,71 @@
+#include "pipeline/run_make.h"
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include "pipeline/folder_lock.h"
+
+namespace cairn {
+
+namespace fs = std::filesystem;
+
+Result<std::string> ProgramPath() {
+  std::error_code error;
+  const fs::path path = fs::read_symlink("/proc/self/exe", error);
+  if (error) return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
+  return path.string();
+}
+
+Result<std::string> RulesPath(const std::string& program) {
+  const fs::path folder = fs::path(program).parent_path();
+  for (const char* place : {"share/cairn/map.mk", "../share/cairn/map.mk"}) {
+    const fs::path path = (folder / place).lexically_normal();
+    if (fs::exists(path)) return path.string();
+  }
+  return MakeError(ErrorCode::kNotFound,
+                   "share/cairn/map.mk is neither beside {} nor one folder up; install the program again",
+                   program);
+}
+
+Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
+                              const Progress& progress) {
+  std::vector<char*> argv, envp;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    // An outer make's flags are not meant for this one.
+    if (std::strncmp(*entry, "MAKEFLAGS=", 10) != 0 && std::strncmp(*entry, "MAKELEVEL=", 10) != 0 &&
+        std::strncmp(*entry, kBuildSessionVariable, std::strlen(kBuildSessionVariable)) != 0) {
+      envp.push_back(*entry);
+    }
+  }
+  envp.push_back(const_cast<char*>(variable.c_str()));
+  envp.push_back(nullptr);
+  pid_t pid = 0;
+  const int reason = posix_spawnp(&pid, argv[0], nullptr, nullptr, argv.data(), envp.data());
+  if (reason != 0) {
+    return MakeError(ErrorCode::kNotFound, "{}: cannot be started: {}; install GNU Make", words[0],
+                     std::strerror(reason));
+  }
+  int wait_status = 0;
+  bool is_told = false;
+  while (true) {
+    const pid_t ended = waitpid(pid, &wait_status, WNOHANG);
+    if (ended == pid) return wait_status;
+    if (ended < 0 && errno != EINTR)
+      return MakeError(ErrorCode::kFailed, "waiting for {}: {}", words[0], std::strerror(errno));
+    if (progress.Cancelled() && !std::exchange(is_told, true)) kill(pid, SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+}  // namespace cairn

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/progress.h"
+
+namespace cairn {
+
+// This program's own file, for rules that run it.  Errors: Failed.
+Result<std::string> ProgramPath();
+
+// map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
+// Errors: NotFound.
+Result<std::string> RulesPath(const std::string& program);
+
+// Runs a program with this one's terminal and `variable` added to its environment; returns its wait status.
+// Asked to stop, it asks the program to stop and waits for it.  Errors: NotFound, Failed.
+Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
+                              const Progress& progress);
+
+}  // namespace cairn

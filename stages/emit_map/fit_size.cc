@@ -1,0 +1,227 @@
+#include "stages/emit_map/fit_size.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <limits>
+#include <set>
+
+#include "stages/emit_map/choose_landmarks.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Landmarks an image that it aims at (OrderByUse).
+constexpr std::array<double, 3> kEnough = {20, 8, 50};
+constexpr std::array<int, 4> kBits = {5, 4, 3, 2};
+// Fewer bits, and other numbers than the first, have to pay: with few bits, other things look like landmarks.
+constexpr double kClearMargin = 0.03;
+// The search for a size ends so near below the limit.
+constexpr double kNearLimitRatio = 0.995;
+constexpr int kMaxNumMeasurements = 10;
+// Figures of the self-test that are yet to come: more than check_map knows, and longer names.
+constexpr int kNumFigures = 30;
+constexpr size_t kFigureNameBytes = 26;
+constexpr size_t kCheckMapOptionsBytes = 2048;
+
+// Bytes of the file once its self-test is in it.
+Result<int64_t> SealedBytes(MapRows rows, const std::string& scratch_path) {
+  for (int i = 0; i < kNumFigures; ++i)
+    rows.self_test[fmt::format("{:a>{}}", i, kFigureNameBytes)] = 1.0 / (i + 3);
+  rows.stage_options["check_map"] = std::string(kCheckMapOptionsBytes, 'a');
+  rows.findings.self_test_regions.clear();
+  for (RegionIdx region = kOutsideRegions; region < static_cast<RegionIdx>(rows.regions.size()); ++region)
+    rows.findings.self_test_regions.push_back(
+        {region, 1000, 1000, 1000, RegionSelfTest::Errors{0.1, 0.2, 0.3, 0.4}});
+  CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, scratch_path));
+  std::error_code error;
+  const auto num_bytes = static_cast<int64_t>(fs::file_size(scratch_path, error));
+  fs::remove(scratch_path, error);
+  return num_bytes;
+}
+
+class SizeFitter {
+ public:
+  SizeFitter(const EmitKept& emit, const FitSizeOptions& options, std::string scratch_path,
+             Progress& progress)
+      : emit_(emit), options_(options), scratch_path_(std::move(scratch_path)), progress_(progress) {}
+
+  // The most of the first classes of `order` that fit; 0: not even one.
+  Result<size_t> MostThatFit(const Classes& classes, const std::vector<size_t>& order, int bits,
+                             int64_t* num_bytes) {
+    const auto measure = [&](size_t n) -> Result<int64_t> {
+      CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit_(classes, FirstOf(order, n, classes.classes.size()), bits));
+      return SealedBytes(std::move(rows), scratch_path_);
+    };
+    CAIRN_ASSIGN_OR_RETURN(int64_t fewest_bytes, measure(1));
+    least_bytes_ = std::min(least_bytes_, fewest_bytes);
+    if (fewest_bytes > options_.max_bytes) return size_t{0};
+    CAIRN_ASSIGN_OR_RETURN(int64_t most_bytes, measure(order.size()));
+    *num_bytes = most_bytes;
+    if (most_bytes <= options_.max_bytes) return order.size();
+    // Bytes grow about in proportion: aim a little below the limit, then narrow down.
+    size_t fits = 1, too_many = order.size();
+    *num_bytes = fewest_bytes;
+    for (int i = 0; i < kMaxNumMeasurements && too_many - fits > 1; ++i) {
+      if (progress_.Cancelled())
+        return MakeError(ErrorCode::kCancelled, "fitting the map's size was stopped");
+      const double per_landmark =
+          static_cast<double>(most_bytes - fewest_bytes) / static_cast<double>(too_many - fits);
+      const double room = (1 + kNearLimitRatio) / 2 * static_cast<double>(options_.max_bytes) -
+                          static_cast<double>(fewest_bytes);
+      const auto step = static_cast<int64_t>(room / per_landmark);
+      const size_t n =
+          fits + static_cast<size_t>(std::clamp<int64_t>(step, 1, static_cast<int64_t>(too_many - fits) - 1));
+      CAIRN_ASSIGN_OR_RETURN(const int64_t bytes, measure(n));
+      if (bytes > options_.max_bytes) {
+        too_many = n;
+        most_bytes = bytes;
+        continue;
+      }
+      fits = n;
+      *num_bytes = fewest_bytes = bytes;
+      if (static_cast<double>(bytes) >= kNearLimitRatio * static_cast<double>(options_.max_bytes)) break;
+    }
+    return fits;
+  }
+
+  // Per class, whether it is among the first n of an order.
+  static std::vector<char> FirstOf(const std::vector<size_t>& order, size_t n, size_t num_classes) {
+    std::vector<char> keep(num_classes, 0);
+    for (size_t i = 0; i < std::min(n, order.size()); ++i) keep[order[i]] = 1;
+    return keep;
+  }
+
+  int64_t least_bytes() const { return least_bytes_; }
+
+ private:
+  const EmitKept& emit_;
+  const FitSizeOptions& options_;
+  std::string scratch_path_;
+  Progress& progress_;
+  int64_t least_bytes_ = std::numeric_limits<int64_t>::max();
+};
+
+std::vector<size_t> Pool(const std::vector<char>& may_keep) {
+  std::vector<size_t> pool;
+  for (size_t i = 0; i < may_keep.size(); ++i) {
+    if (may_keep[i] != 0) pool.push_back(i);
+  }
+  return pool;
+}
+
+// Positions of the same classes in a survey that lacks some.
+std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
+                           const std::vector<char>& may_keep) {
+  std::set<ClassId> ids;
+  for (size_t i = 0; i < may_keep.size(); ++i) {
+    if (may_keep[i] != 0) ids.insert(classes.classes[i].class_id);
+  }
+  std::vector<size_t> pool;
+  for (size_t i = 0; i < survey.classes.classes.size(); ++i) {
+    if (ids.contains(survey.classes.classes[i].class_id)) pool.push_back(i);
+  }
+  return pool;
+}
+
+// More images right; of as many, by a clearly wider margin.
+bool IsBetter(const LeftOutTrial& a, const LeftOutTrial& b) {
+  if (a.num_right != b.num_right) return a.num_right > b.num_right;
+  return a.mean_margin > b.mean_margin + kClearMargin;
+}
+
+}  // namespace
+
+Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_keep,
+                           const std::string& matches_path, const EmitKept& emit,
+                           const FitSizeOptions& options, const std::string& scratch_path, int num_threads,
+                           Progress& progress) {
+  SizeFitter fitter(emit, options, scratch_path, progress);
+  const std::vector<size_t> pool = Pool(may_keep);
+  std::vector<int> bits_tried;
+  for (const int bits : kBits) {
+    if (bits < options.descriptor_bits) bits_tried.push_back(bits);
+  }
+  bits_tried.insert(bits_tried.begin(), options.descriptor_bits);
+
+  // How many landmarks fit, by bits: it hardly depends on which.
+  const std::vector<size_t> usual_order = OrderByUse(classes, pool, kEnough[0], num_threads);
+  std::vector<size_t> num_that_fit;
+  int64_t num_bytes = 0;
+  for (const int bits : bits_tried) {
+    CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, usual_order, bits, &num_bytes));
+    num_that_fit.push_back(n);
+    if (n == pool.size()) break;  // all fit: no reason for fewer bits
+  }
+  if (*std::max_element(num_that_fit.begin(), num_that_fit.end()) == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "emit_map: max_bytes = {}, but the least possible is {} with a single landmark: the rest are "
+        "{} images and their appearance graph, stations, options and findings",
+        options.max_bytes, fitter.least_bytes(), classes.images.size());
+  }
+
+  CAIRN_ASSIGN_OR_RETURN(const LeftOutSurvey survey,
+                         LeaveOutImages(classes, matches_path, options.max_num_left_out));
+  const std::vector<size_t> survey_pool = PoolIn(survey, classes, may_keep);
+  const auto try_first = [&](const std::vector<size_t>& order, size_t n, int bits) -> Result<LeftOutTrial> {
+    CAIRN_ASSIGN_OR_RETURN(
+        MapRows rows,
+        emit(survey.classes, SizeFitter::FirstOf(order, n, survey.classes.classes.size()), bits));
+    return TryLeftOutImages(std::move(rows), survey.images, options.limits, num_threads);
+  };
+  FittedSize fitted;
+  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all,
+                         try_first(survey_pool, survey_pool.size(), options.descriptor_bits));
+  double best_enough = kEnough[0];
+  fitted.descriptor_bits = bits_tried[0];
+  if (num_that_fit[0] == pool.size()) {
+    fitted.trial = fitted.trial_of_all;
+  } else {
+    progress.Begin("trying what to keep", static_cast<int64_t>(kEnough.size() * num_that_fit.size()), "maps");
+    bool is_first = true;
+    std::vector<std::vector<size_t>> orders;
+    for (const double enough : kEnough)
+      orders.push_back(OrderByUse(survey.classes, survey_pool, enough, num_threads));
+    for (size_t i = 0; i < num_that_fit.size(); ++i) {
+      for (size_t k = 0; k < kEnough.size(); ++k) {
+        if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
+        progress.Advance();
+        if (num_that_fit[i] == 0) continue;
+        CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial,
+                               try_first(orders[k], num_that_fit[i], bits_tried[i]));
+        if (!is_first && !IsBetter(trial, fitted.trial)) continue;
+        is_first = false;
+        fitted.trial = trial;
+        fitted.descriptor_bits = bits_tried[i];
+        best_enough = kEnough[k];
+      }
+    }
+    progress.End();
+  }
+  const std::vector<size_t> order =
+      best_enough == kEnough[0] ? usual_order : OrderByUse(classes, pool, best_enough, num_threads);
+  CAIRN_ASSIGN_OR_RETURN(const size_t n,
+                         fitter.MostThatFit(classes, order, fitted.descriptor_bits, &fitted.num_bytes));
+  fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
+  return fitted;
+}
+
+SizeGuarantee GuaranteeOf(const MapRows& rows) {
+  SizeGuarantee guarantee;
+  for (size_t i = 0; i < rows.regions.size(); ++i) {
+    const int num = static_cast<int>(rows.regions[i].landmarks.size());
+    guarantee.min_common_landmarks = i == 0 ? num : std::min(guarantee.min_common_landmarks, num);
+  }
+  std::vector<std::set<LandmarkIdx>> seen(rows.stations.size());
+  for (const MapImage& image : rows.images) {
+    if (image.station >= 0) seen[image.station].insert(image.landmarks.begin(), image.landmarks.end());
+  }
+  guarantee.num_stations_below_k = static_cast<int>(std::count_if(
+      seen.begin(), seen.end(), [&](const auto& landmarks) { return std::ssize(landmarks) < rows.k; }));
+  return guarantee;
+}
+
+}  // namespace cairn

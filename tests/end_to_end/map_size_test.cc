@@ -1,0 +1,140 @@
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+// One small survey as a whole map and within a number of bytes, and what is said of and made from the two.
+class MapSize : public testing::Test {
+ protected:
+  static constexpr int kMaxBytes = 60000;
+
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder("map_size_test");
+    WriteTinyRecipe(*folder_ / "tiny.toml");
+    WriteTinyRecipe(*folder_ / "small.toml", fmt::format("max_bytes = {}\n", kMaxBytes));
+    const ProgramRun whole = Run("cairn compile tiny.toml -o tiny.cairn");
+    ASSERT_EQ(whole.exit_code, 0) << whole.err;
+    const ProgramRun small = Run("cairn compile small.toml -o small.cairn && cat small.report.json");
+    ASSERT_EQ(small.exit_code, 0) << small.err;
+    small_output_ = small.out;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static ProgramRun Run(const std::string& command) {
+    return RunShell("cd " + folder_->string() + " && " + command);
+  }
+  static std::string Path(const std::string& name) { return *folder_ / name; }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+  static inline std::string small_output_;
+};
+
+TEST_F(MapSize, SealedMapKeepsToItsBytesAndSaysWhatItPromises) {
+  ASSERT_GT(fs::file_size(Path("tiny.cairn")), size_t{kMaxBytes});
+  EXPECT_LE(fs::file_size(Path("small.cairn")), size_t{kMaxBytes});
+  EXPECT_GE(fs::file_size(Path("small.cairn")), size_t{kMaxBytes} * 8 / 10);
+  EXPECT_THAT(small_output_, HasSubstr("common landmarks in every region"));
+  EXPECT_THAT(small_output_, HasSubstr("left-out survey images"));
+  const json inspected = json::parse(Run("cairn inspect small.cairn --json").out);
+  bool is_told = false;
+  for (const json& drop : inspected["dropped"])
+    is_told |= drop["name"] == "over_budget" && drop["num_dropped"] > 0;
+  EXPECT_TRUE(is_told) << inspected["dropped"].dump(1);
+  EXPECT_EQ(Run("cairn verify small.cairn").exit_code, 0);
+}
+
+TEST_F(MapSize, SameBytesForAnyNumberOfThreads) {
+  const ProgramRun again = Run("cairn compile small.toml -o again.cairn --threads 1 --progress none");
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(*ReadFile(Path("again.build/unsealed.cairn")), *ReadFile(Path("small.build/unsealed.cairn")));
+}
+
+TEST_F(MapSize, BudgetThatNothingMeetsSaysTheLeastPossible) {
+  WriteTinyRecipe(Path("none.toml"), "max_bytes = 3000\n");
+  fs::copy(Path("small.build"), Path("none.build"), fs::copy_options::recursive);
+  const ProgramRun run = Run("cairn compile none.toml -o none.cairn");
+  EXPECT_EQ(run.exit_code, static_cast<int>(ErrorCode::kInvalidArgument));
+  EXPECT_THAT(run.err, HasSubstr("the least possible is"));
+  EXPECT_FALSE(fs::exists(Path("none.cairn")));
+}
+
+TEST_F(MapSize, ParetoWritesTableAndPictureAndStopsWhereNothingFits) {
+  const ProgramRun run =
+      Run("cairn pareto tiny.toml -o tiny.cairn --sizes 60000,80000 --peer 'Other <1>,2e6,0.9,0.05' "
+          "--progress none");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::istringstream csv(*ReadFile(Path("tiny.pareto.csv")));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(csv, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 4U) << run.out;
+  EXPECT_EQ(lines[1].substr(0, 2), "0,");
+  EXPECT_EQ(lines[2].substr(0, 6), "80000,");
+  EXPECT_EQ(lines[3].substr(0, 6), "60000,");
+  const std::string svg = *ReadFile(Path("tiny.pareto.svg"));
+  EXPECT_THAT(svg, HasSubstr("Other &lt;1&gt;"));
+  EXPECT_THAT(svg, HasSubstr("bytes of the map"));
+  const ProgramRun again = Run("cairn pareto tiny.toml -o tiny.cairn --sizes 60000,80000 --progress none");
+  EXPECT_THAT(run.out, HasSubstr("emit_map:"));
+  EXPECT_THAT(again.out, testing::Not(HasSubstr("emit_map:")));  // nothing is done again
+  EXPECT_EQ(again.out.substr(again.out.rfind("at most      bytes")),
+            run.out.substr(run.out.rfind("at most      bytes")));
+  EXPECT_EQ(Run("cairn pareto tiny.toml -o tiny.cairn --sizes 60000,x").exit_code, 2);
+  EXPECT_EQ(Run("cairn pareto tiny.toml -o tiny.cairn --peer a,b").exit_code, 2);
+}
+
+TEST_F(MapSize, DeltaMakesTheSmallMapFromTheWholeOneAndRollsBack) {
+  const std::string deploy =
+      "cp tiny.cairn robot.cairn && cairn keygen k && cairn sign small.cairn --key k -o s.cairn && "
+      "cairn delta robot.cairn s.cairn -o d --key k && cairn apply robot.cairn d --in-place --public-key "
+      "k.pub && "
+      "cmp robot.cairn s.cairn && cmp robot.cairn.previous tiny.cairn";
+  const ProgramRun run = Run(deploy);
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  EXPECT_EQ(Run("cairn apply robot.cairn d --in-place").exit_code, 0);  // sent twice
+  EXPECT_EQ(Run("cairn apply small.cairn d -o x.cairn").exit_code,
+            static_cast<int>(ErrorCode::kInvalidArgument));
+  EXPECT_EQ(Run("head -c 1000 d > half; cairn apply tiny.cairn half -o x.cairn").exit_code,
+            static_cast<int>(ErrorCode::kCorrupt));
+  EXPECT_EQ(Run("cairn apply tiny.cairn d").exit_code, 2);
+  EXPECT_FALSE(fs::exists(Path("x.cairn")));
+  // The map before is not signed: a robot that requires it does not go back.
+  EXPECT_EQ(Run("cairn rollback robot.cairn --public-key k.pub").exit_code,
+            static_cast<int>(ErrorCode::kNotSigned));
+  EXPECT_EQ(Run("cairn rollback robot.cairn && cmp robot.cairn tiny.cairn").exit_code, 0);
+}
+
+TEST_F(MapSize, DiffNamesTheOptionAndExplainTheLosses) {
+  const ProgramRun diff = Run("cairn diff tiny.cairn small.cairn");
+  EXPECT_EQ(diff.exit_code, 0) << diff.err;
+  EXPECT_THAT(diff.out, HasSubstr("[emit_map] max_bytes"));
+  const json changes = json::parse(Run("cairn diff tiny.cairn small.cairn --json").out);
+  EXPECT_EQ(changes["num_landmarks_shared"], changes["landmarks"][1]);  // all of the small map's
+  const json stations = json::parse(Run("cairn explain small.cairn --at 1,1 --json").out)["stations"];
+  ASSERT_FALSE(stations.empty());
+  bool lost = false;
+  for (const json& drop : stations[0]["dropped"]) lost |= drop["name"] == "over_budget";
+  EXPECT_TRUE(lost) << stations.dump(1);
+  EXPECT_EQ(Run("cairn explain small.cairn --at 100,100").exit_code, static_cast<int>(ErrorCode::kNotFound));
+  EXPECT_EQ(Run("cairn explain small.cairn --at nowhere").exit_code, 2);
+  EXPECT_EQ(Run("cairn explain small.cairn --image none.jpg").exit_code,
+            static_cast<int>(ErrorCode::kNotFound));
+  const std::string image = stations[0]["images"][0];
+  EXPECT_THAT(Run("cairn explain small.cairn --image " + image).out, HasSubstr("taken at"));
+}
+
+}  // namespace
+}  // namespace cairn
