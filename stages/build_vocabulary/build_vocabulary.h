@@ -27,8 +27,8 @@ struct BuildVocabularyOptions {
   // Stop list [Mariottini11 §VII-A]: words that occur in more than this part of the images do not score (the
   // source gives no value; 1 = no stop list).  REQUIRES: in (0, 1]
   double max_document_ratio = 1;
-  // vocabulary.db of an earlier compilation whose tree is taken over, so that a place that did not change keeps
-  // its words and a delta of the maps its size (docs/updates.md); empty: a tree is grown.
+  // vocabulary.db of an earlier compilation whose tree is taken over, so that a place that did not change
+  // keeps its words and a delta of the maps its size (docs/updates.md); empty: a tree is grown.
   std::string tree_from;
 };
 OptionTable DescribeOptions(BuildVocabularyOptions* options);
