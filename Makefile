@@ -20,7 +20,7 @@ OPTIONAL_PACKAGES := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-s
 export CCACHE_BASEDIR := $(CURDIR)
 export CCACHE_NOHASHDIR := true
 
-SOURCES = $(shell git ls-files '*.h' '*.cc')
+SOURCES = $(shell git ls-files '*.h' '*.cc' '*.c')
 
 .DEFAULT_GOAL := all
 .PHONY: all help deps demo test bench maps compile install format format-check tidy docs clean

@@ -12,6 +12,7 @@
 #include "pipeline/join_command.h"
 #include "pipeline/localize_command.h"
 #include "pipeline/locate_scan_command.h"
+#include "pipeline/manual_command.h"
 #include "pipeline/pareto_command.h"
 #include "pipeline/plan_path_command.h"
 #include "pipeline/route_command.h"
@@ -73,6 +74,7 @@ std::vector<Command> AllCommands() {
       ApplyCommand(),
       RollbackCommand(),
       ParetoCommand(),
+      ManualCommand(),
   };
 }
 

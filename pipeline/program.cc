@@ -21,6 +21,7 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "pipeline/build_step.h"
+#include "pipeline/common_arguments.h"
 #include "pipeline/progress.h"
 #include "pipeline/stop_signal.h"
 
@@ -29,51 +30,6 @@ namespace {
 
 constexpr int kUsageExitCode = 2;
 const Error kStopped = {ErrorCode::kCancelled, "stopped on request"};
-
-struct CommonArguments {
-  int num_threads = 0;
-  uint64_t seed = 0;
-  std::string progress = "auto";
-  std::string log_level = "info";
-  int64_t memory_mib = 0;
-  std::string report_file;
-  std::string stamp;
-};
-
-void AddCommonArguments(CLI::App& app, CommonArguments* arguments) {
-  app.add_option("--threads", arguments->num_threads, "Threads to use; 0 = all cores [0]")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("N")
-      ->group("Common options");
-  app.add_option("--seed", arguments->seed, "Seed of everything random; same seed, same bytes [0]")
-      ->type_name("S")
-      ->group("Common options");
-  app.add_option("--progress", arguments->progress,
-                 "auto|bar|lines|json|none; auto: a bar on a terminal [auto]")
-      ->check(CLI::IsMember({"auto", "bar", "lines", "json", "none"}))
-      ->type_name("STYLE")
-      ->group("Common options");
-  app.add_option("--log-level", arguments->log_level, "trace|debug|info|warning|error|off [info]")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
-      ->type_name("LEVEL")
-      ->group("Common options");
-  app.add_option("--memory", arguments->memory_mib,
-                 "Most memory to use, MiB [4/5 of the machine's or the control group's]")
-      ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
-      ->type_name("MIB")
-      ->group("Common options");
-  app.add_option("--report", arguments->report_file,
-                 "Also write counts, rejects, times and memory of this run (docs/build_report.md)")
-      ->type_name("FILE.json")
-      ->group("Common options");
-  app.add_option(
-         "--stamp", arguments->stamp,
-         "For Makefiles: hold DIR, leave DIR/NAME.report.json and the stamp there, dated when the command "
-         "began; a failure leaves DIR/error.json")
-      ->type_name("DIR/NAME.stamp")
-      ->group("Common options");
-  app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
-}
 
 std::unique_ptr<Progress> MakeTerminalProgress(ProgressStyle style) {
   return MakeProgress(
@@ -189,20 +145,11 @@ int ReportUsage(const CLI::App& app, const CLI::ParseError& error, std::ostream&
 
 }  // namespace
 
-const char* ProgramVersion() { return CAIRN_VERSION; }
-
 int RunProgram(const std::vector<Command>& commands, int argc, const char* const* argv, std::ostream& out,
                std::ostream& err) {
-  CLI::App app("cairn compiles survey captures into landmark maps: survey images in, one small map file out.",
-               "cairn");
-  app.require_subcommand(1);
-  app.set_version_flag("--version", std::string("cairn ") + ProgramVersion());
   CommonArguments arguments;
-  for (const Command& command : commands) {
-    CLI::App* subcommand = app.add_subcommand(command.name, command.summary);
-    command.add_arguments(*subcommand);
-    AddCommonArguments(*subcommand, &arguments);
-  }
+  const std::unique_ptr<CLI::App> parser = MakeParser(commands, &arguments);
+  CLI::App& app = *parser;
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {  // --help, --version

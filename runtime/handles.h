@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+
+namespace cairn {
+
+// Handles that a foreign language holds: `Handle` is an opaque C type, never defined.  A handle is a number
+// that is given out once, not an address: what was closed is found to be closed, however often memory is used
+// again, and nothing of what a caller passes is ever followed.  Kinds are told apart by their residue, so
+// that one passed for another is found too. May be used from all threads; an object lives until the last Find
+// that returned it is done with it.
+template <typename Handle, typename Object, uint64_t kKind, uint64_t kNumKinds>
+class Handles {
+ public:
+  Handle* Add(std::shared_ptr<Object> object) {
+    const std::lock_guard lock(mutex_);
+    next_ += kNumKinds;
+    objects_.emplace(next_, std::move(object));
+    return reinterpret_cast<Handle*>(static_cast<uintptr_t>(next_));
+  }
+  // Null where the handle is none of these, or was removed.
+  std::shared_ptr<Object> Find(const Handle* handle) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = objects_.find(Number(handle));
+    return found == objects_.end() ? nullptr : found->second;
+  }
+  bool Remove(const Handle* handle) {
+    std::shared_ptr<Object> removed;  // destroyed after the lock is given back
+    const std::lock_guard lock(mutex_);
+    const auto found = objects_.find(Number(handle));
+    if (found == objects_.end()) return false;
+    removed = std::move(found->second);
+    objects_.erase(found);
+    return true;
+  }
+
+ private:
+  static uint64_t Number(const Handle* handle) { return reinterpret_cast<uintptr_t>(handle); }
+
+  mutable std::mutex mutex_;
+  uint64_t next_ = kKind;
+  std::unordered_map<uint64_t, std::shared_ptr<Object>> objects_;
+};
+
+}  // namespace cairn
