@@ -1,0 +1,183 @@
+/* The C API as a C11 program uses it, and misuses it:  c_api_misuse MAP IMAGE.pgm */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "runtime/cairn.h"
+#include "runtime/examples/robot/pgm.h"
+
+static int num_failures = 0;
+
+static void Check(int holds, const char* what, int line) {
+  if (holds) return;
+  ++num_failures;
+  fprintf(stderr, "line %d: not so: %s (last error: %s)\n", line, what, cairn_last_error());
+}
+#define CHECK(condition) Check((condition) != 0, #condition, __LINE__)
+/* The call fails with this code, and the sentence has these words in it. */
+#define CHECK_ERROR(call, code, words)                  \
+  do {                                                  \
+    CHECK((call) == (code));                            \
+    CHECK(strstr(cairn_last_error(), (words)) != NULL); \
+  } while (0)
+
+static void CheckMaps(const char* path) {
+  cairn_map* map = (cairn_map*)&map;
+  CHECK_ERROR(cairn_map_open(NULL, NULL, &map), CAIRN_INVALID_ARGUMENT, "path is NULL");
+  CHECK(map == NULL);
+  CHECK_ERROR(cairn_map_open(path, NULL, NULL), CAIRN_INVALID_ARGUMENT, "map is NULL");
+  CHECK_ERROR(cairn_map_open("/nowhere/a.cairn", NULL, &map), CAIRN_NOT_FOUND, "/nowhere/a.cairn");
+  const uint8_t key[32] = {1};
+  cairn_map_options options = CAIRN_MAP_OPTIONS_INIT;
+  options.public_key = key;
+  CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_NOT_SIGNED, path);
+  options.public_key = NULL;
+  options.memory_budget_bytes = -1;
+  CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_INVALID_ARGUMENT, "memory_budget_bytes is -1");
+  options.size = 3;
+  CHECK_ERROR(cairn_map_open(path, &options, &map), CAIRN_INVALID_ARGUMENT, "options->size is 3");
+
+  CHECK(cairn_map_open(path, NULL, &map) == CAIRN_OK);
+  cairn_map_description description = CAIRN_MAP_DESCRIPTION_INIT;
+  CHECK(cairn_map_describe(map, &description) == CAIRN_OK);
+  CHECK(strcmp(description.name, "poster") == 0 && description.num_images == 3 &&
+        description.num_landmarks > 50);
+  CHECK(description.is_metric == 1 && description.has_visual_map == 0);
+  CHECK_ERROR(cairn_map_describe(map, NULL), CAIRN_INVALID_ARGUMENT, "description is NULL");
+  cairn_camera camera = CAIRN_CAMERA_INIT;
+  CHECK(cairn_map_camera_for_size(map, 320, 240, &camera) == CAIRN_OK);
+  CHECK(camera.model == 0 && camera.num_params == 3 && camera.params[0] == 280);
+  CHECK_ERROR(cairn_map_camera_for_size(map, 321, 240, &camera), CAIRN_NOT_FOUND, "320");
+  /* Another kind of handle, a closed one, one that never was. */
+  CHECK_ERROR(cairn_localizer_destroy((cairn_localizer*)map), CAIRN_INVALID_ARGUMENT, "no localizer");
+  CHECK(cairn_map_close(map) == CAIRN_OK);
+  CHECK_ERROR(cairn_map_close(map), CAIRN_INVALID_ARGUMENT, "no open map");
+  CHECK_ERROR(cairn_map_describe(map, &description), CAIRN_INVALID_ARGUMENT, "no open map");
+  CHECK_ERROR(cairn_map_describe((cairn_map*)&description, &description), CAIRN_INVALID_ARGUMENT,
+              "no open map");
+  CHECK(cairn_map_close(NULL) == CAIRN_OK);
+  /* A map opened after another was closed is never taken for it. */
+  cairn_map* next = NULL;
+  CHECK(cairn_map_open(path, NULL, &next) == CAIRN_OK);
+  CHECK(next != map && cairn_map_describe(map, &description) == CAIRN_INVALID_ARGUMENT);
+  CHECK(cairn_map_close(next) == CAIRN_OK);
+}
+
+static void CheckBadImages(cairn_localizer* localizer, const cairn_image* good) {
+  cairn_fix fix = CAIRN_FIX_INIT;
+  cairn_image image = *good;
+  CHECK_ERROR(cairn_localize(NULL, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "localizer is NULL");
+  CHECK_ERROR(cairn_localize(localizer, NULL, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "image is NULL");
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, NULL), CAIRN_INVALID_ARGUMENT, "fix is NULL");
+  image.pixels = NULL;
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "pixels is NULL");
+  image = *good;
+  image.stride = 319;
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "319");
+  image = *good;
+  image.height = -240;
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "-240");
+  image = *good;
+  image.height = 239;
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_NOT_FOUND, "239");
+  fix.size = 8;
+  CHECK_ERROR(cairn_localize(localizer, good, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "fix->size is 8");
+  fix.size = sizeof fix;
+
+  cairn_camera camera = CAIRN_CAMERA_INIT;
+  camera.model = 77;
+  CHECK_ERROR(cairn_localize(localizer, good, &camera, NULL, &fix), CAIRN_UNSUPPORTED, "77");
+  camera.model = 1; /* PINHOLE takes four */
+  camera.width = 320;
+  camera.height = 240;
+  camera.num_params = 3;
+  CHECK_ERROR(cairn_localize(localizer, good, &camera, NULL, &fix), CAIRN_INVALID_ARGUMENT,
+              "takes 4 parameters");
+  camera.num_params = 1000;
+  CHECK_ERROR(cairn_localize(localizer, good, &camera, NULL, &fix), CAIRN_INVALID_ARGUMENT, "1000");
+  cairn_prior prior = CAIRN_PRIOR_INIT;
+  prior.rotation_wxyz[0] = 0;
+  CHECK_ERROR(cairn_localize(localizer, good, NULL, &prior, &fix), CAIRN_INVALID_ARGUMENT, "unit quaternion");
+  prior.rotation_wxyz[0] = 1;
+  prior.sigma_m = NAN;
+  CHECK_ERROR(cairn_localize(localizer, good, NULL, &prior, &fix), CAIRN_INVALID_ARGUMENT, "sigma_m is nan");
+  cairn_floor_fix floor_fix = CAIRN_FLOOR_FIX_INIT;
+  CHECK_ERROR(cairn_localize_on_floor(localizer, good, NULL, &floor_fix), CAIRN_NOT_FOUND, "visual map");
+}
+
+static void CheckFixes(cairn_localizer* localizer, const cairn_image* image) {
+  cairn_fix fix = CAIRN_FIX_INIT;
+  CHECK(cairn_localize(localizer, image, NULL, NULL, &fix) == CAIRN_OK);
+  CHECK(fix.has_fix == 1 && fix.reason == CAIRN_FIX && fix.num_inliers > 20 && fix.message[0] == 0);
+  CHECK(fabs(fix.center_m[0] - 0.4) < 0.05 && fabs(fix.center_m[1] - 0.1) < 0.05 &&
+        fabs(fix.center_m[2] - 1.6) < 0.05);
+  CHECK(fix.covariance[0] > 0 && fix.covariance[35] > 0 && fix.covariance[1] == fix.covariance[6]);
+
+  /* The same pixels with gaps between the rows, and a struct of a later release: the same fix, the rest
+   * untouched. */
+  const size_t stride = 512;
+  uint8_t* wide = malloc(stride * (size_t)image->height);
+  memset(wide, 255, stride * (size_t)image->height);
+  for (int y = 0; y < image->height; ++y)
+    memcpy(wide + (size_t)y * stride, image->pixels + (size_t)y * (size_t)image->width, (size_t)image->width);
+  cairn_image with_gaps = *image;
+  with_gaps.pixels = wide;
+  with_gaps.stride = stride;
+  struct {
+    cairn_fix fix;
+    int64_t later;
+  } larger = {CAIRN_FIX_INIT, 7};
+  larger.fix.size = sizeof larger;
+  CHECK(cairn_localize(localizer, &with_gaps, NULL, NULL, &larger.fix) == CAIRN_OK);
+  CHECK(memcmp(larger.fix.rotation_wxyz, fix.rotation_wxyz, sizeof fix.rotation_wxyz) == 0);
+  CHECK(memcmp(larger.fix.covariance, fix.covariance, sizeof fix.covariance) == 0);
+  CHECK(larger.later == 7 && larger.fix.size == sizeof larger);
+
+  cairn_prior prior = CAIRN_PRIOR_INIT;
+  memcpy(prior.rotation_wxyz, fix.rotation_wxyz, sizeof prior.rotation_wxyz);
+  memcpy(prior.translation_m, fix.translation_m, sizeof prior.translation_m);
+  cairn_fix with_prior = CAIRN_FIX_INIT;
+  CHECK(cairn_localize(localizer, image, NULL, &prior, &with_prior) == CAIRN_OK && with_prior.has_fix == 1);
+
+  memset(wide, 90, stride * (size_t)image->height);
+  CHECK(cairn_localize(localizer, &with_gaps, NULL, NULL, &fix) == CAIRN_OK);
+  CHECK(fix.has_fix == 0 && fix.reason == CAIRN_TOO_FEW_FEATURES && strlen(fix.message) > 10);
+  CHECK(strcmp(cairn_reason_name(fix.reason), "too_few_features") == 0);
+  free(wide);
+}
+
+int main(int argc, char** argv) {
+  int width = 0, height = 0;
+  uint8_t* pixels = argc == 3 ? ReadPgm(argv[2], &width, &height) : NULL;
+  if (pixels == NULL) return fprintf(stderr, "usage: c_api_misuse MAP IMAGE.pgm\n"), 2;
+  CHECK(strcmp(cairn_error_name(CAIRN_CORRUPT), "corrupt") == 0);
+  CHECK(strcmp(cairn_error_name(4711), "unknown") == 0 && strcmp(cairn_reason_name(-1), "unknown") == 0);
+  CHECK(strlen(cairn_version()) >= 5);
+  CheckMaps(argv[1]);
+
+  cairn_map* map = NULL;
+  cairn_localizer* localizer = NULL;
+  CHECK_ERROR(cairn_localizer_create(NULL, &localizer), CAIRN_INVALID_ARGUMENT, "map is NULL");
+  CHECK(cairn_map_open(argv[1], NULL, &map) == CAIRN_OK);
+  CHECK(cairn_localizer_create(map, &localizer) == CAIRN_OK);
+  CHECK(cairn_map_close(map) == CAIRN_OK); /* the localizer keeps what it needs */
+  cairn_image image = CAIRN_IMAGE_INIT;
+  image.pixels = pixels;
+  image.width = width;
+  image.height = height;
+  CheckBadImages(localizer, &image);
+  CheckFixes(localizer, &image);
+
+  CHECK_ERROR(cairn_localizer_set_option(localizer, "min_num_inlier", "9"), CAIRN_INVALID_ARGUMENT,
+              "'min_num_inliers'");
+  CHECK_ERROR(cairn_localizer_set_option(localizer, "min_num_inliers", "many"), CAIRN_INVALID_ARGUMENT,
+              "many");
+  CHECK(cairn_localizer_set_option(localizer, "min_num_inliers", "100000") == CAIRN_OK);
+  cairn_fix fix = CAIRN_FIX_INIT;
+  CHECK(cairn_localize(localizer, &image, NULL, NULL, &fix) == CAIRN_OK && fix.has_fix == 0);
+  CHECK(cairn_localizer_destroy(localizer) == CAIRN_OK);
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "destroyed");
+  free(pixels);
+  return num_failures == 0 ? 0 : 1;
+}

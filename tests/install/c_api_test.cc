@@ -1,0 +1,131 @@
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+#include "core/map_rows.h"
+#include "runtime/cairn.h"
+#include "runtime/localizer.h"
+#include "tests/runtime/poster_scene.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+class CApi : public testing::Test {
+ protected:
+  CApi() : path_(testing::TempDir() + "/c_api.cairn"), picture_(RenderPoster(scene_, PosterQueryPose())) {
+    EXPECT_TRUE(WriteMapRows(MakePosterMap(scene_), path_).ok());
+    EXPECT_EQ(cairn_map_open(path_.c_str(), nullptr, &map_), CAIRN_OK) << cairn_last_error();
+  }
+  ~CApi() override { EXPECT_EQ(cairn_map_close(map_), CAIRN_OK); }
+
+  cairn_image Picture() const {
+    cairn_image image = CAIRN_IMAGE_INIT;
+    image.pixels = picture_.data;
+    image.width = picture_.cols;
+    image.height = picture_.rows;
+    image.stride = picture_.step;
+    return image;
+  }
+  cairn_localizer* NewLocalizer() const {
+    cairn_localizer* localizer = nullptr;
+    EXPECT_EQ(cairn_localizer_create(map_, &localizer), CAIRN_OK);
+    return localizer;
+  }
+
+  PosterScene scene_ = MakePosterScene(1);
+  std::string path_;
+  cv::Mat picture_;
+  cairn_map* map_ = nullptr;
+};
+
+TEST_F(CApi, GivesThePoseOfTheCxxApiBitForBit) {
+  cairn_localizer* localizer = NewLocalizer();
+  const cairn_image image = Picture();
+  cairn_fix fix = CAIRN_FIX_INIT;
+  ASSERT_EQ(cairn_localize(localizer, &image, nullptr, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+  const auto map = Map::Open(path_);
+  const auto expected = Localizer(*map).Localize(picture_, *(*map)->CameraForSize(320, 240));
+  ASSERT_TRUE(expected->has_fix());
+  const Pose& pose = expected->cam_from_world;
+  EXPECT_EQ(Eigen::Vector4d(fix.rotation_wxyz),
+            Eigen::Vector4d(pose.rotation.w(), pose.rotation.x(), pose.rotation.y(), pose.rotation.z()));
+  EXPECT_EQ(Eigen::Vector3d(fix.translation_m), pose.translation);
+  EXPECT_EQ(Eigen::Vector3d(fix.center_m), pose.Center());
+  EXPECT_EQ(Matrix6d(fix.covariance), expected->covariance.transpose());  // rows here, columns in Eigen
+  EXPECT_EQ(fix.num_inliers, expected->num_inliers);
+  EXPECT_EQ(fix.region, expected->region);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+}
+
+TEST_F(CApi, LocalizerUsedByTwoThreadsAtOnceIsBusyAndStaysWhole) {
+  cairn_localizer* localizer = NewLocalizer();
+  const cairn_image image = Picture();
+  std::atomic<int> num_fixes = 0, num_busy = 0, num_other = 0;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&] {
+      for (int repeat = 0; repeat < 10; ++repeat) {
+        cairn_fix fix = CAIRN_FIX_INIT;
+        const int32_t code = cairn_localize(localizer, &image, nullptr, nullptr, &fix);
+        if (code == CAIRN_OK && fix.has_fix) {
+          ++num_fixes;
+        } else if (code == CAIRN_BUSY &&
+                   std::string(cairn_last_error()).find("one per thread") != std::string::npos) {
+          ++num_busy;
+        } else {
+          ++num_other;
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_GT(num_fixes, 0);
+  EXPECT_GT(num_busy, 0);
+  EXPECT_EQ(num_other, 0);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+}
+
+TEST_F(CApi, LocalizerDestroyedWhileInUseEndsItsCall) {
+  const cairn_image image = Picture();
+  for (int i = 0; i < 5; ++i) {
+    cairn_localizer* localizer = NewLocalizer();
+    int32_t code = -1;
+    std::thread thread([&] {
+      cairn_fix fix = CAIRN_FIX_INIT;
+      code = cairn_localize(localizer, &image, nullptr, nullptr, &fix);
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(2 * i));
+    EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+    thread.join();
+    EXPECT_THAT(code, testing::AnyOf(CAIRN_OK, CAIRN_INVALID_ARGUMENT));
+  }
+}
+
+TEST_F(CApi, ErrorsAreOfTheThreadThatMadeThem) {
+  EXPECT_EQ(cairn_map_describe(nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  std::thread([] { EXPECT_STREQ(cairn_last_error(), ""); }).join();
+  EXPECT_THAT(cairn_last_error(), HasSubstr("cairn_map_describe: map is NULL"));
+}
+
+TEST_F(CApi, DamagedMapGivesTheCodeOfItsDamage) {
+  const std::string bad = testing::TempDir() + "/bad.cairn";
+  cairn_map* map = nullptr;
+  ASSERT_TRUE(WriteFileAtomically(bad, "").ok());
+  EXPECT_EQ(cairn_map_open(bad.c_str(), nullptr, &map), CAIRN_EMPTY_FILE);
+  ASSERT_TRUE(WriteFileAtomically(bad, "no map at all, but a text").ok());
+  EXPECT_EQ(cairn_map_open(bad.c_str(), nullptr, &map), CAIRN_NOT_SQLITE);
+  const std::string whole = *ReadFile(path_);
+  ASSERT_TRUE(WriteFileAtomically(bad, whole.substr(0, whole.size() / 2)).ok());
+  EXPECT_EQ(cairn_map_open(bad.c_str(), nullptr, &map), CAIRN_TRUNCATED);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("bad.cairn"));
+  EXPECT_EQ(map, nullptr);
+}
+
+}  // namespace
+}  // namespace cairn
