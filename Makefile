@@ -11,7 +11,8 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev libsodium-dev libzstd-dev \
     coinor-libcbc-dev libgeos++-dev libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap slurmctld slurmd slurm-client munge procps jq \
-    python3 time clang libclang-rt-14-dev clang-format clang-tidy
+    pybind11-dev python3-dev python3-numpy \
+    python3 time man-db clang libclang-rt-14-dev clang-format clang-tidy
 # Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
 # instructions emulated, an ARM compiler and emulator.
 OPTIONAL_PACKAGES := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static

@@ -1,0 +1,13 @@
+"""Where is this camera?  The runtime of cairn's landmark maps.
+
+    map = cairn.Map.open("kitchen.cairn")   # immutable, shared by all threads
+    localizer = cairn.Localizer(map)        # one per thread
+    fix = localizer.localize(image)         # numpy uint8, height x width, grey
+    if fix:
+        print(fix.center, fix.covariance)   # metres; rotation (rad), translation (m)
+
+Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
+"""
+from ._cairn import Camera, Error, Fix, Localizer, Map, Prior, __version__
+
+__all__ = ["Camera", "Error", "Fix", "Localizer", "Map", "Prior", "__version__"]

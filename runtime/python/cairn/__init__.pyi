@@ -1,0 +1,117 @@
+from os import PathLike
+from typing import Literal, Sequence, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class Error(RuntimeError):
+    """What went wrong.  The message names what was found and what to do."""
+
+    code: int  # the program's exit codes
+    name: str  # "corrupt", "not_found", ...
+
+@final
+class Camera:
+    """Intrinsics: a COLMAP model by its name, with its parameters in its order, px."""
+
+    def __init__(self, model: str, width: int, height: int, params: Sequence[float]) -> None: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def params(self) -> list[float]: ...
+
+@final
+class Map:
+    """An open map: immutable, shared by all threads."""
+
+    @staticmethod
+    def open(
+        path: str | PathLike[str], *, memory_budget_bytes: int = ..., public_key: bytes | None = None
+    ) -> Map:
+        """Raises Error.  `public_key`: 32 bytes; maps that this key has not signed are refused."""
+    def camera_for_size(self, width: int, height: int) -> Camera:
+        """The survey's camera of this image size.  Raises Error (not_found) when none or more than one has it."""
+    @property
+    def name(self) -> str: ...
+    @property
+    def num_landmarks(self) -> int: ...
+    @property
+    def num_images(self) -> int: ...
+    @property
+    def num_regions(self) -> int: ...
+    @property
+    def is_metric(self) -> bool:
+        """False: nothing gave the survey its scale, "metres" are of arbitrary length."""
+
+@final
+class Prior:
+    """Where the camera is believed to be: cam_from_world, and its standard deviations."""
+
+    def __init__(
+        self,
+        rotation_wxyz: Sequence[float] | NDArray[np.float64],
+        translation: Sequence[float] | NDArray[np.float64],
+        *,
+        sigma_m: float = 1.0,
+        sigma_deg: float = 10.0,
+    ) -> None: ...
+
+@final
+class Fix:
+    """A fix (true), or the reason for none (false; its pose is None)."""
+
+    def __bool__(self) -> bool: ...
+    @property
+    def reason(self) -> str:
+        """"none" for a fix, else "too_few_matches", "ambiguous", ..."""
+    @property
+    def message(self) -> str: ...
+    @property
+    def rotation_wxyz(self) -> NDArray[np.float64] | None:
+        """cam_from_world, a unit quaternion: (4,)"""
+    @property
+    def translation(self) -> NDArray[np.float64] | None:
+        """cam_from_world, metres: (3,)"""
+    @property
+    def center(self) -> NDArray[np.float64] | None:
+        """Where the camera stands, world frame, metres: (3,)"""
+    @property
+    def cam_from_world(self) -> NDArray[np.float64] | None:
+        """Homogeneous: (4, 4)"""
+    @property
+    def covariance(self) -> NDArray[np.float64] | None:
+        """Rotation (rad), translation (m), of the left perturbation of cam_from_world: (6, 6)"""
+    @property
+    def region(self) -> int:
+        """With most inliers; -1: of none"""
+    @property
+    def scope(self) -> Literal["prior", "regions", "images", "all", "track"]: ...
+    @property
+    def num_features(self) -> int: ...
+    @property
+    def num_matches(self) -> int: ...
+    @property
+    def num_inliers(self) -> int: ...
+    @property
+    def candidates(self) -> list[int]:
+        """Survey images (their ids), most alike first"""
+
+@final
+class Localizer:
+    """Says where a camera is.  One per thread: use by two at once raises Error (busy)."""
+
+    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
+        """`options`: any that `cairn localize --help` lists under "Stage options", as min_num_inliers=9."""
+    def localize(
+        self, image: NDArray[np.uint8], camera: Camera | None = None, prior: Prior | None = None
+    ) -> Fix:
+        """From grey pixels, (height, width); rows may have gaps, views of other orders raise a ValueError.
+
+        `camera` None: the survey's of the image's size.  Releases the interpreter's lock meanwhile.
+        """

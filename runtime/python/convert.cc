@@ -1,0 +1,133 @@
+#include "runtime/python/convert.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+namespace py = pybind11;
+
+namespace cairn {
+namespace {
+
+PyObject* error_type = nullptr;  // cairn.Error, for the life of the module
+
+std::string ShapeText(const py::array& array) { return py::cast<std::string>(py::str(array.attr("shape"))); }
+
+}  // namespace
+
+void BindErrors(py::module_& module) {
+  error_type = PyErr_NewExceptionWithDoc("cairn.Error",
+                                         "What went wrong; `code` and `name` as in the program's exit codes.",
+                                         PyExc_RuntimeError, nullptr);
+  module.attr("Error") = py::handle(error_type);
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const PythonError& error) {
+      const py::object raised = py::handle(error_type)(error.error().message);
+      raised.attr("code") = static_cast<int>(error.error().code);
+      raised.attr("name") = ErrorCodeName(error.error().code);
+      PyErr_SetObject(error_type, raised.ptr());
+    }
+  });
+}
+
+cv::Mat PixelsOf(const py::array& image) {
+  if (!py::isinstance<py::array_t<uint8_t>>(image))
+    throw py::type_error(fmt::format("image has dtype {}, expected uint8: grey pixels, 0 to 255",
+                                     py::cast<std::string>(py::str(image.dtype()))));
+  if (image.ndim() != 2)
+    throw py::value_error(fmt::format("image has shape {}, expected (height, width): grey pixels{}",
+                                      ShapeText(image),
+                                      image.ndim() == 3 ? "; make one channel of its colours first" : ""));
+  if (image.shape(0) == 0 || image.shape(1) == 0 || image.shape(0) > 65536 || image.shape(1) > 65536)
+    throw py::value_error(fmt::format("image has shape {}; both must be in 1 .. 65536", ShapeText(image)));
+  // A row's pixels lie one after the other, rows themselves in order: OpenCV reads no others without a copy.
+  if ((image.strides(1) != 1 && image.shape(1) > 1) ||
+      (image.strides(0) < image.shape(1) && image.shape(0) > 1))
+    throw py::value_error(
+        fmt::format("image of shape {} has strides ({}, {}) bytes: not row by row (a transposed, mirrored or "
+                    "thinned view, or "
+                    "order 'F'); numpy.ascontiguousarray(image) makes a copy that is",
+                    ShapeText(image), image.strides(0), image.strides(1)));
+  const auto stride = static_cast<size_t>(image.shape(0) > 1 ? image.strides(0) : image.shape(1));
+  return cv::Mat(static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1)), CV_8UC1,
+                 const_cast<void*>(image.data()), stride);
+}
+
+void SetFromPython(const OptionTable& table, const std::string& name, const py::handle& value) {
+  const auto option =
+      std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
+  if (option == table.end()) {
+    std::vector<std::string> names;
+    for (const Option& known : table) names.push_back(known.name);
+    const std::string nearest = NearestWord(name, names);
+    throw PythonError(MakeError(
+        ErrorCode::kInvalidArgument, "unknown option '{}'{}", name,
+        nearest.empty() ? "; `cairn localize --help` lists them" : "; did you mean '" + nearest + "'?"));
+  }
+  const std::string text = py::isinstance<py::bool_>(value) ? (py::cast<bool>(value) ? "true" : "false")
+                                                            : py::cast<std::string>(py::str(value));
+  ThrowIfError(SetOption(*option, text));
+}
+
+PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
+                    double sigma_m, double sigma_deg) {
+  if (rotation_wxyz.size() != 4 || translation.size() != 3)
+    throw py::value_error(fmt::format("rotation_wxyz has {} numbers and translation {}; expected 4 and 3",
+                                      rotation_wxyz.size(), translation.size()));
+  const Eigen::Quaterniond q(rotation_wxyz[0], rotation_wxyz[1], rotation_wxyz[2], rotation_wxyz[3]);
+  if (!(std::abs(q.norm() - 1) < 1e-3))
+    throw py::value_error(
+        fmt::format("rotation_wxyz has the length {}; expected a unit quaternion, w first", q.norm()));
+  const Eigen::Vector3d t(translation[0], translation[1], translation[2]);
+  if (!t.allFinite()) throw py::value_error("translation is not finite");
+  if (!(sigma_m > 0 && sigma_deg > 0 && std::isfinite(sigma_m + sigma_deg)))
+    throw py::value_error(
+        fmt::format("sigma_m is {} and sigma_deg {}; both must be positive", sigma_m, sigma_deg));
+  return {.cam_from_world = {q.normalized(), t}, .sigma_m = sigma_m, .sigma_deg = sigma_deg};
+}
+
+py::object RotationOf(const Localization& found) {
+  if (!found.has_fix()) return py::none();
+  py::array_t<double> numbers(4);
+  const Eigen::Quaterniond& q = found.cam_from_world.rotation;
+  auto view = numbers.mutable_unchecked<1>();
+  view(0) = q.w();
+  view(1) = q.x();
+  view(2) = q.y();
+  view(3) = q.z();
+  return numbers;
+}
+
+py::object VectorOf(const Localization& found, const Eigen::Vector3d& vector) {
+  if (!found.has_fix()) return py::none();
+  py::array_t<double> numbers(3);
+  auto view = numbers.mutable_unchecked<1>();
+  for (int i = 0; i < 3; ++i) view(i) = vector[i];
+  return numbers;
+}
+
+py::object MatrixOf(const Localization& found) {
+  if (!found.has_fix()) return py::none();
+  py::array_t<double> numbers({4, 4});
+  auto view = numbers.mutable_unchecked<2>();
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  matrix.topRows<3>() = found.cam_from_world.Matrix();
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) view(i, j) = matrix(i, j);
+  return numbers;
+}
+
+py::object CovarianceOf(const Localization& found) {
+  if (!found.has_fix()) return py::none();
+  py::array_t<double> numbers({6, 6});
+  auto view = numbers.mutable_unchecked<2>();
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) view(i, j) = found.covariance(i, j);
+  return numbers;
+}
+
+}  // namespace cairn

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include "runtime/localizer.h"
+
+// Between Python's values and the runtime's.
+namespace cairn {
+
+// An Error on its way to Python, where it becomes cairn.Error with its code and name.
+class PythonError : public std::exception {
+ public:
+  explicit PythonError(Error error) : error_(std::move(error)) {}
+  const char* what() const noexcept override { return error_.message.c_str(); }
+  const Error& error() const { return error_; }
+
+ private:
+  Error error_;
+};
+
+template <typename T>
+T ValueOrThrow(Result<T> result) {
+  if (!result.ok()) throw PythonError(result.error());
+  return std::move(result).value();
+}
+inline void ThrowIfError(const Status& status) {
+  if (!status.ok()) throw PythonError(status.error());
+}
+
+// Makes cairn.Error, and PythonErrors into it.
+void BindErrors(pybind11::module_& module);
+
+// The pixels of an array of uint8, height x width, not copied; rows may have gaps.  Throws a TypeError for
+// another dtype and a ValueError for another shape or order, which say what was found.
+cv::Mat PixelsOf(const pybind11::array& image);
+
+// Sets an option from a keyword argument.  Throws cairn.Error for an unknown name or a value out of range.
+void SetFromPython(const OptionTable& table, const std::string& name, const pybind11::handle& value);
+
+// Throws a ValueError for what is no rotation or no number.
+PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
+                    double sigma_m, double sigma_deg);
+
+// Of a fix, as arrays of their own; None without one.
+pybind11::object RotationOf(const Localization& found);
+pybind11::object VectorOf(const Localization& found, const Eigen::Vector3d& vector);
+pybind11::object MatrixOf(const Localization& found);
+pybind11::object CovarianceOf(const Localization& found);
+
+}  // namespace cairn

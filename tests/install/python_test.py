@@ -1,0 +1,203 @@
+"""The Python module: what it answers, what it refuses and how it says so.
+
+python_test.py POSTER PROGRAM: the folder of make_poster_map, the program `cairn`.
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import threading
+import unittest
+
+import numpy
+
+import cairn
+
+POSTER = pathlib.Path(sys.argv[1])
+PROGRAM = sys.argv[2]
+
+
+def read_pgm(path):
+    contents = pathlib.Path(path).read_bytes()
+    size, rest = contents.split(b"\n255\n", 1)
+    width, height = (int(number) for number in size.split()[-2:])
+    return numpy.frombuffer(rest, numpy.uint8).reshape(height, width)
+
+
+class Poster(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.map = cairn.Map.open(POSTER / "poster.cairn")
+        cls.image = read_pgm(POSTER / "poster.pgm")
+
+    def setUp(self):
+        self.localizer = cairn.Localizer(self.map)
+
+
+class Localizing(Poster):
+    def test_gives_the_programs_pose_bit_for_bit(self):
+        printed = subprocess.run([PROGRAM, "localize", POSTER / "poster.cairn", POSTER / "poster.pgm"],
+                                 capture_output=True, check=True, text=True).stdout
+        expected = json.loads(printed)
+        fix = self.localizer.localize(self.image)
+        self.assertTrue(fix)
+        self.assertEqual(fix.rotation_wxyz.tolist(), expected["rotation_wxyz"])
+        self.assertEqual(fix.translation.tolist(), expected["translation_m"])
+        self.assertEqual(fix.center.tolist(), expected["center_m"])
+        self.assertEqual(fix.covariance.T.ravel().tolist(), expected["covariance"])
+        self.assertEqual(fix.num_inliers, expected["num_inliers"])
+        self.assertEqual(fix.candidates, expected["candidates"])
+        self.assertEqual(fix.scope, expected["scope"])
+
+    def test_pose_is_where_the_picture_was_taken(self):
+        fix = self.localizer.localize(self.image)
+        numpy.testing.assert_allclose(fix.center, [0.4, 0.1, 1.6], atol=0.05)
+        self.assertEqual(fix.reason, "none")
+        self.assertEqual(fix.covariance.shape, (6, 6))
+        matrix = fix.cam_from_world
+        numpy.testing.assert_allclose(matrix @ [*fix.center, 1], [0, 0, 0, 1], atol=1e-12)
+        self.assertIn("inliers", repr(fix))
+
+    def test_rows_may_have_gaps_and_arrays_may_be_read_only(self):
+        wide = numpy.zeros((240, 512), numpy.uint8)
+        wide[:, 100:420] = self.image
+        view = wide[:, 100:420]
+        view.flags.writeable = False
+        expected = self.localizer.localize(self.image)
+        self.assertEqual(self.localizer.localize(view).translation.tolist(), expected.translation.tolist())
+        upper = self.localizer.localize(self.image, camera=self.map.camera_for_size(320, 240))
+        self.assertEqual(upper.translation.tolist(), expected.translation.tolist())
+
+    def test_image_of_nothing_has_a_reason_and_no_pose(self):
+        fix = self.localizer.localize(numpy.full((240, 320), 90, numpy.uint8))
+        self.assertFalse(fix)
+        self.assertEqual(fix.reason, "too_few_features")
+        self.assertIsNone(fix.center)
+        self.assertIsNone(fix.covariance)
+        self.assertIn("30", fix.message)
+
+    def test_prior_and_options_reach_the_localizer(self):
+        fix = self.localizer.localize(self.image)
+        prior = cairn.Prior(fix.rotation_wxyz, fix.translation, sigma_m=0.5)
+        self.assertTrue(self.localizer.localize(self.image, prior=prior))
+        self.assertFalse(cairn.Localizer(self.map, min_num_inliers=100000).localize(self.image))
+        self.assertTrue(cairn.Localizer(self.map, exclude_look_alikes=False).localize(self.image))
+
+    def test_threads_run_side_by_side_and_one_localizer_is_for_one(self):
+        # Another thread runs Python while this one localizes: the interpreter's lock is free.
+        ticks, done = [0], threading.Event()
+
+        def tick():
+            while not done.is_set():
+                ticks[0] += 1
+        ticker = threading.Thread(target=tick)
+        ticker.start()
+        before = ticks[0]
+        self.localizer.localize(self.image)
+        during = ticks[0] - before
+        done.set()
+        ticker.join()
+        self.assertGreater(during, 100)
+
+        codes = []
+
+        def localize():
+            for _ in range(10):
+                try:
+                    codes.append(0 if self.localizer.localize(self.image) else -1)
+                except cairn.Error as error:
+                    codes.append(error.code)
+        threads = [threading.Thread(target=localize) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(set(codes), {0, 9})  # fixes, and busy
+
+
+class Refusing(Poster):
+    def refused(self, image, kind, *words):
+        with self.assertRaises(kind) as caught:
+            self.localizer.localize(image)
+        for word in words:
+            self.assertIn(word, str(caught.exception))
+
+    def test_arrays_of_the_wrong_dtype_shape_or_order(self):
+        self.refused(self.image.astype(numpy.float32), TypeError, "float32", "uint8")
+        self.refused(self.image.astype(numpy.int8), TypeError, "int8")
+        self.refused(numpy.dstack([self.image] * 3), ValueError, "(240, 320, 3)", "one channel")
+        self.refused(self.image.ravel(), ValueError, "(76800,)", "(height, width)")
+        self.refused(self.image[:0], ValueError, "(0, 320)")
+        self.refused(numpy.asfortranarray(self.image), ValueError, "strides (1, 240)", "ascontiguousarray")
+        self.refused(self.image[::-1], ValueError, "strides (-320, 1)")
+        self.refused(self.image[:, ::-1], ValueError, "strides (320, -1)")
+        self.refused(self.image[:, ::2], ValueError, "strides (320, 2)")
+        self.refused(numpy.broadcast_to(self.image[0], (240, 320)), ValueError, "strides (0, 1)")
+        self.refused([[1, 2], [3, 4]], TypeError)
+        self.refused(None, TypeError)
+
+    def test_image_of_a_size_that_the_map_lacks(self):
+        with self.assertRaises(cairn.Error) as caught:
+            self.localizer.localize(self.image[:100])
+        self.assertEqual((caught.exception.code, caught.exception.name), (3, "not_found"))
+        self.assertIn("320", str(caught.exception))
+
+    def test_files_that_are_no_maps_have_codes(self):
+        with self.assertRaises(cairn.Error) as caught:
+            cairn.Map.open("/nowhere/a.cairn")
+        self.assertEqual(caught.exception.code, 3)
+        self.assertIn("/nowhere/a.cairn", str(caught.exception))
+        with self.assertRaises(cairn.Error) as caught:
+            cairn.Map.open(POSTER / "poster.pgm")
+        self.assertEqual(caught.exception.name, "not_sqlite")
+        with self.assertRaises(cairn.Error) as caught:
+            cairn.Map.open(POSTER / "poster.cairn", public_key=bytes(31) + b"\1")
+        self.assertEqual(caught.exception.name, "not_signed")
+        with self.assertRaisesRegex(ValueError, "5 bytes, expected 32"):
+            cairn.Map.open(POSTER / "poster.cairn", public_key=b"abcde")
+        with self.assertRaises(TypeError):
+            cairn.Map.open(7)
+
+    def test_bad_cameras_priors_and_options(self):
+        with self.assertRaisesRegex(cairn.Error, "takes 4 parameters, found 1"):
+            cairn.Camera("PINHOLE", 320, 240, [280])
+        with self.assertRaisesRegex(cairn.Error, "PINHOL"):
+            cairn.Camera("PINHOL", 320, 240, [280, 160, 120])
+        with self.assertRaisesRegex(ValueError, "unit quaternion"):
+            cairn.Prior([0, 0, 0, 0], [0, 0, 0])
+        with self.assertRaisesRegex(ValueError, "expected 4 and 3"):
+            cairn.Prior([1, 0, 0, 0], [0, 0])
+        with self.assertRaisesRegex(cairn.Error, "did you mean 'min_num_inliers'"):
+            cairn.Localizer(self.map, min_num_inlier=3)
+        with self.assertRaisesRegex(cairn.Error, "min_num_inliers"):
+            cairn.Localizer(self.map, min_num_inliers="many")
+        with self.assertRaises(TypeError):
+            cairn.Localizer("poster.cairn")
+
+
+class Facts(Poster):
+    def test_map_and_camera_say_what_they_are(self):
+        self.assertEqual(self.map.name, "poster")
+        self.assertEqual(self.map.num_images, 3)
+        self.assertGreater(self.map.num_landmarks, 50)
+        self.assertTrue(self.map.is_metric)
+        camera = self.map.camera_for_size(320, 240)
+        self.assertEqual(repr(camera), "cairn.Camera('SIMPLE_PINHOLE', 320, 240, [280, 160, 120])")
+        self.assertEqual(eval(repr(camera)).params, [280, 160, 120])
+
+    def test_type_hints_name_what_there_is(self):
+        folder = pathlib.Path(cairn.__file__).parent
+        self.assertTrue((folder / "py.typed").exists())
+        hints = (folder / "__init__.pyi").read_text()
+        for name in cairn.__all__:
+            self.assertIn(name, hints)
+            kind = getattr(cairn, name)
+            if not isinstance(kind, type) or kind is cairn.Error:
+                continue
+            for member in vars(kind):
+                if not member.startswith("_"):
+                    self.assertIn(f"def {member}(", hints)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
