@@ -11,7 +11,7 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev libsodium-dev libzstd-dev \
     coinor-libcbc-dev libgeos++-dev libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap slurmctld slurmd slurm-client munge procps jq \
-    pybind11-dev python3-dev python3-numpy \
+    pybind11-dev python3-dev python3-numpy debhelper dh-python lintian debootstrap \
     python3 time man-db clang libclang-rt-14-dev clang-format clang-tidy
 # Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
 # instructions emulated, an ARM compiler and emulator.
@@ -24,7 +24,7 @@ export CCACHE_NOHASHDIR := true
 SOURCES = $(shell git ls-files '*.h' '*.cc' '*.c')
 
 .DEFAULT_GOAL := all
-.PHONY: all help deps demo test bench maps compile install format format-check tidy docs clean
+.PHONY: all help deps demo test bench maps compile install deb format format-check tidy docs clean
 # Verbs run one after the other, whatever MAKEFLAGS says; the steps inside of them run in parallel.
 .NOTPARALLEL:
 
@@ -60,8 +60,11 @@ compile: deps all  ## Compile MAP=RECIPE.toml or MAP=maps/NAME; in SHARDS=N part
 	@$(CAIRN) compile $(if $(filter %.toml,$(MAP)),$(MAP),$(MAP)/recipe.toml) -o $(MAP:.toml=).cairn \
 	    $(addprefix --shards ,$(SHARDS)) $(if $(LAUNCH),--launch '$(LAUNCH)')
 
-install: all  ## Install the program and its rules under PREFIX [/usr/local]
+install: all  ## Install program, library, headers, Python module and manual under PREFIX [/usr/local], in DESTDIR
 	@cmake --install build/$(PRESET) --prefix $(PREFIX)
+
+deb: deps  ## Build the Debian packages into build/deb
+	@scripts/build_packages build/deb
 
 format: deps  ## Format all sources in place
 	@clang-format -i $(SOURCES)

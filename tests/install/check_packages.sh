@@ -1,0 +1,58 @@
+#!/bin/sh
+# Builds the Debian packages, lets lintian judge them, installs them in a fresh system, uses and removes them:
+#   check_packages.sh SOURCES FOLDER POSTER
+# MIRROR=http://... names another mirror than Debian's own.
+set -eu
+sources=$1 folder=$2 poster=$3
+export LC_ALL=C DEBIAN_FRONTEND=noninteractive
+if [ "$(id -u)" != 0 ]; then
+  echo "skipped: only root can make a fresh Debian system with debootstrap; run this test as root"
+  exit 77
+fi
+
+"$sources/scripts/build_packages" "$folder"
+lintian --allow-root --fail-on warning "$folder"/*.changes
+
+system=$(mktemp -d)
+trap 'rm -rf --one-file-system "$system"' EXIT
+debootstrap --variant=minbase bookworm "$system" "${MIRROR:-http://deb.debian.org/debian}" > "$folder/debootstrap.log" 2>&1 ||
+  { tail -5 "$folder/debootstrap.log" >&2; echo "debootstrap failed; is the mirror in reach?" >&2; exit 1; }
+inside() { chroot "$system" "$@"; }
+
+# Nothing of this outlives the test: no need to wait for the disk.
+echo force-unsafe-io > "$system/etc/dpkg/dpkg.cfg.d/unsafe"
+mkdir "$system/packages"
+cp "$folder"/*.deb "$poster/poster.cairn" "$poster/poster.pgm" "$sources/runtime/examples/robot/where.py" "$system/packages"
+inside find / -xdev -path /packages -prune -o -path '*cairn*' -print > "$folder/before"
+
+install() {  # names of packages
+  for name; do set -- "$@" "/packages/$(basename "$folder/${name}"_*.deb)"; shift; done
+  inside apt-get install -y -q --no-install-recommends "$@" > "$folder/install.log" 2>&1 ||
+    { tail -20 "$folder/install.log" >&2; exit 1; }
+}
+
+# A robot: the library and Python, without the compiler.
+install libcairn-runtime0 python3-cairn
+answer=$(inside python3 /packages/where.py /packages/poster.cairn /packages/poster.pgm)
+echo "python3-cairn in a fresh system: $answer"
+echo "$answer" | grep -q '^0\.[0-9]* 0\.[0-9]* 1\.[0-9]* m, [0-9]* inliers' || exit 1
+inside dpkg-query -W -f '${Package}\n' > "$folder/robot_packages"
+echo "$(wc -l < "$folder/robot_packages") packages on the robot"
+if grep -E 'imgcodecs|colmap|ceres|geos|cbc|spdlog|toml' "$folder/robot_packages"; then
+  echo "the runtime brought these, which no robot needs" >&2
+  exit 1
+fi
+
+# Who makes maps.
+install cairn libcairn-runtime-dev
+inside cairn --version
+inside cairn localize /packages/poster.cairn /packages/poster.pgm --log-level off | grep -q '"fix":true'
+inside test -e /usr/share/man/man1/cairn-localize.1.gz -o -e /usr/share/man/man1/cairn-localize.1
+
+inside apt-get purge -y -q cairn libcairn-runtime0 libcairn-runtime-dev python3-cairn > "$folder/purge.log" 2>&1 ||
+  { tail -20 "$folder/purge.log" >&2; exit 1; }
+inside find / -xdev -path /packages -prune -o -path /proc -prune -o -path '*cairn*' -print > "$folder/after"
+if ! diff "$folder/before" "$folder/after"; then
+  echo "these files stayed when the packages were removed" >&2
+  exit 1
+fi
