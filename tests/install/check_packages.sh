@@ -4,13 +4,13 @@
 # MIRROR=http://... names another mirror than Debian's own.
 set -eu
 sources=$1 folder=$2 poster=$3
-export LC_ALL=C DEBIAN_FRONTEND=noninteractive
 if [ "$(id -u)" != 0 ]; then
   echo "skipped: only root can make a fresh Debian system with debootstrap; run this test as root"
   exit 77
 fi
 
 "$sources/scripts/build_packages" "$folder"
+export LC_ALL=C DEBIAN_FRONTEND=noninteractive  # only now: what is compiled depends on the locale, and so ccache's keys
 lintian --allow-root --fail-on warning "$folder"/*.changes
 
 system=$(mktemp -d)

@@ -1,0 +1,126 @@
+#include "ros/map_localizer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "ros/grey_pixels.h"
+#include "ros/robot_pose.h"
+#include "runtime/region_tracker.h"
+
+namespace cairn_ros {
+namespace {
+
+using namespace cairn;  // NOLINT: this file is the bridge
+
+Result<Pose> MountingOf(const std::vector<double>& numbers) {
+  if (numbers.empty()) return Pose();
+  if (numbers.size() != 7)
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "~camera_in_robot has {} numbers, expected 7: x y z (metres), qx qy qz qw",
+                     numbers.size());
+  const Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (!(std::abs(q.norm() - 1) < 1e-3))
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "~camera_in_robot: the quaternion's length is {}, expected 1", q.norm());
+  return Pose{q.normalized(), {numbers[0], numbers[1], numbers[2]}};
+}
+
+Result<std::shared_ptr<const Map>> OpenMap(const Parameters& parameters) {
+  if (parameters.map.empty())
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "~map is not set; give the path of a map: _map:=kitchen.cairn");
+  if (parameters.memory_budget_mib <= 0)
+    return MakeError(ErrorCode::kInvalidArgument, "~memory_budget_mib is {}; must be positive",
+                     parameters.memory_budget_mib);
+  MapOptions options = {.memory_budget_bytes = int64_t{parameters.memory_budget_mib} << 20};
+  if (!parameters.public_key.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(parameters.public_key));
+  }
+  return Map::Open(parameters.map, options);
+}
+
+}  // namespace
+
+struct MapLocalizer::State {
+  State(Parameters given, std::shared_ptr<const Map> opened, const Pose& mounting)
+      : parameters(std::move(given)),
+        map(std::move(opened)),
+        robot_from_camera(mounting),
+        localizer(map),
+        tracker(map) {}
+
+  Parameters parameters;
+  std::shared_ptr<const Map> map;
+  Pose robot_from_camera;
+  Localizer localizer;
+  RegionTracker tracker;
+
+  Result<Camera> CameraFor(const cv::Mat& grey) const {
+    if (parameters.camera_model.empty()) return map->CameraForSize(grey.cols, grey.rows);
+    Camera camera;
+    CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromName(parameters.camera_model));
+    camera.width = grey.cols;
+    camera.height = grey.rows;
+    camera.params = parameters.camera_params;
+    return camera;
+  }
+
+  Result<Localization> Locate(const Image& image, double* library_ms) {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixels({image.encoding, image.width, image.height,
+                                                           image.step, image.bytes, image.num_bytes}));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
+    const auto begin = std::chrono::steady_clock::now();
+    Result<Localization> found =
+        parameters.follow ? tracker.Track(grey, camera) : localizer.Localize(grey, camera);
+    *library_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    return found;
+  }
+};
+
+MapLocalizer::MapLocalizer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+MapLocalizer::~MapLocalizer() = default;
+
+std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, int* code,
+                                                 std::string* message) {
+  const auto fail = [&](const Error& error) {
+    *code = static_cast<int>(error.code);
+    *message = error.message;
+    return nullptr;
+  };
+  const Result<Pose> mounting = MountingOf(parameters.camera_in_robot);
+  if (!mounting.ok()) return fail(mounting.error());
+  const auto map = OpenMap(parameters);
+  if (!map.ok()) return fail(map.error());
+  return std::unique_ptr<MapLocalizer>(
+      new MapLocalizer(std::make_unique<State>(parameters, *map, *mounting)));
+}
+
+Answer MapLocalizer::Locate(const Image& image) {
+  Answer answer;
+  const Result<Localization> found = state_->Locate(image, &answer.library_ms);
+  if (!found.ok()) {
+    answer.is_error = true;
+    answer.reason = ErrorCodeName(found.error().code);
+    answer.message = found.error().message;
+    return answer;
+  }
+  answer.has_fix = found->has_fix();
+  answer.reason = NoFixName(found->reason);
+  answer.message = found->message;
+  answer.num_features = found->num_features;
+  answer.num_inliers = found->num_inliers;
+  answer.region = found->region;
+  if (!answer.has_fix) return answer;
+  const RobotPose pose = RobotPoseOf(*found, state_->robot_from_camera);
+  std::copy_n(pose.position.data(), 3, answer.position);
+  std::copy_n(pose.orientation.coeffs().data(), 4, answer.orientation_xyzw);  // Eigen's order too
+  for (int i = 0; i < 36; ++i) answer.covariance[i] = pose.covariance(i / 6, i % 6);
+  return answer;
+}
+
+std::string MapLocalizer::map_name() const { return state_->map->head().name; }
+int64_t MapLocalizer::num_landmarks() const { return state_->map->num_landmarks(); }
+int64_t MapLocalizer::num_kept_bytes() const { return state_->map->cache().num_bytes(); }
+
+}  // namespace cairn_ros

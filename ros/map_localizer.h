@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+// The runtime as the node sees it, in C++17: ROS 1's messages do not compile as C++20, the runtime's headers
+// as nothing less.
+namespace cairn_ros {
+
+// The node's parameters, by their names.
+struct Parameters {
+  std::string map;              // path
+  int memory_budget_mib = 256;  // what is loaded of the map and kept, at most
+  std::string public_key;       // file of `cairn keygen`; maps that this key has not signed are refused
+  bool follow = true;           // from frame to frame; false: every image as if it were the first
+  // Where the camera's optical frame is mounted on the robot: x y z (m), qx qy qz qw; empty: the pose is the
+  // camera's.
+  std::vector<double> camera_in_robot;
+  std::string camera_model;  // COLMAP's name; empty: the map's camera of the image's size
+  std::vector<double> camera_params;
+};
+
+struct Image {
+  std::string encoding;
+  uint32_t width = 0, height = 0, step = 0;
+  const uint8_t* bytes = nullptr;
+  size_t num_bytes = 0;
+};
+
+struct Answer {
+  bool is_error = false;  // the image could not be tried
+  bool has_fix = false;
+  std::string reason;   // "none" with a fix, why there is none, or the error's name
+  std::string message;  // empty with a fix
+  double position[3] = {0, 0, 0};
+  double orientation_xyzw[4] = {0, 0, 0, 1};
+  double covariance[36] = {0};  // x, y, z, rotation about the map's x, y, z
+  int num_features = 0, num_inliers = 0, region = -1;
+  double library_ms = 0;  // in the runtime: the rest is the node's
+};
+
+class MapLocalizer {
+ public:
+  // Null on a failure: then `code` and `message` say why.
+  static std::unique_ptr<MapLocalizer> Open(const Parameters& parameters, int* code, std::string* message);
+  ~MapLocalizer();
+
+  Answer Locate(const Image& image);
+  std::string map_name() const;
+  int64_t num_landmarks() const;
+  int64_t num_kept_bytes() const;  // of the map, in memory
+
+ private:
+  struct State;
+  explicit MapLocalizer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace cairn_ros

@@ -1,0 +1,106 @@
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "ros/grey_pixels.h"
+#include "ros/robot_pose.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+// Views on bytes that all are `value`.
+class Bytes {
+ public:
+  Bytes(size_t num_bytes, uint8_t value) : bytes_(num_bytes, value) {}
+  ImageView View(const std::string& encoding, uint32_t width, uint32_t height, uint32_t step) const {
+    return {encoding, width, height, step, bytes_.data(), bytes_.size()};
+  }
+  std::vector<uint8_t> bytes_;
+};
+
+TEST(GreyPixels, AreThoseOfTheMessageWhereTheyAreGrey) {
+  const Bytes bytes(8, 10);
+  const cv::Mat grey = *GreyPixels(bytes.View("mono8", 3, 2, 4));
+  EXPECT_EQ(grey.data, bytes.bytes_.data());
+  EXPECT_EQ(grey.step, 4u);
+  EXPECT_EQ(grey.size(), cv::Size(3, 2));
+}
+
+TEST(GreyPixels, TellRedFromBlue) {
+  Bytes bytes(3, 0);
+  bytes.bytes_[0] = 200;
+  EXPECT_EQ(GreyPixels(bytes.View("rgb8", 1, 1, 3))->at<uint8_t>(0, 0), 60);  // 0.299 * 200
+  EXPECT_EQ(GreyPixels(bytes.View("bgr8", 1, 1, 3))->at<uint8_t>(0, 0), 23);  // 0.114 * 200
+}
+
+TEST(GreyPixels, RefuseWhatDoesNotFit) {
+  const Bytes bytes(12, 10);
+  EXPECT_EQ(GreyPixels(bytes.View("bayer_rggb8", 3, 2, 3)).error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(GreyPixels(bytes.View("16UC1", 3, 2, 6)).error().message, HasSubstr("'16UC1'"));
+  for (const ImageView& view :
+       {bytes.View("rgb8", 3, 2, 8), bytes.View("mono8", 3, 5, 3), bytes.View("mono8", 0, 2, 3),
+        bytes.View("mono8", 3, 2, 1u << 31), bytes.View("rgb8", 1u << 31, 1, 3)}) {
+    EXPECT_EQ(GreyPixels(view).error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+// A camera at (1, 2, 3) that looks along the map's +x: its z is the map's x, its x the map's -y, its y the
+// map's -z.
+Localization FixLookingAlongX() {
+  Localization fix;
+  fix.reason = NoFix::kNone;
+  Eigen::Matrix3d cam_from_world;
+  cam_from_world << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  fix.cam_from_world.rotation = Eigen::Quaterniond(cam_from_world);
+  fix.cam_from_world.translation = -(cam_from_world * Eigen::Vector3d(1, 2, 3));
+  return fix;
+}
+
+TEST(RobotPose, VariancesGoToTheAxesOfTheMap) {
+  Localization fix = FixLookingAlongX();
+  fix.covariance =
+      Eigen::Vector<double, 6>(1, 2, 3, 4, 5, 6).asDiagonal();  // about and along the camera's x, y, z
+  const RobotPose found = RobotPoseOf(fix, Pose());
+  EXPECT_LT((found.position - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
+  const double expected[] = {6, 4, 5, 3, 1, 2};  // the map's x is the camera's z, y its -x, z its -y
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) EXPECT_NEAR(found.covariance(i, j), i == j ? expected[i] : 0, 1e-12);
+}
+
+TEST(RobotPose, CovarianceIsThatOfPerturbedPosesWithAMountedCamera) {
+  Localization fix = FixLookingAlongX();
+  const Pose robot_from_camera = {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.3, -0.1, 0.8}};
+  // The Jacobian by differences: perturbed fixes, seen as poses of the robot.
+  const auto robot_of = [&](const Eigen::Vector<double, 6>& d) {
+    const Eigen::Vector3d r = d.head<3>();
+    const double angle = r.norm();
+    const Pose perturbation = {
+        angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, r / angle)) : Eigen::Quaterniond::Identity(),
+        d.tail<3>()};
+    return (robot_from_camera * (perturbation * fix.cam_from_world)).Inverse();
+  };
+  const Pose robot = robot_of(Eigen::Vector<double, 6>::Zero());
+  Matrix6d jacobian;
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 6; ++i) {
+    const Pose moved = robot_of(kStep * Eigen::Vector<double, 6>::Unit(i));
+    const Eigen::AngleAxisd turn(moved.rotation * robot.rotation.conjugate());  // in the map's fixed axes
+    jacobian.col(i) << (moved.translation - robot.translation) / kStep, turn.angle() * turn.axis() / kStep;
+  }
+  Matrix6d root = Matrix6d::Identity();
+  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) += 0.1 * std::sin(i);
+  fix.covariance = root * root.transpose();
+  const RobotPose found = RobotPoseOf(fix, robot_from_camera);
+  EXPECT_LT((found.position - robot.translation).norm(), 1e-12);
+  EXPECT_LT(found.orientation.angularDistance(robot.rotation), 1e-7);
+  const Matrix6d expected = jacobian * fix.covariance * jacobian.transpose();
+  EXPECT_LT((found.covariance - expected).norm(), 1e-4);
+}
+
+}  // namespace
+}  // namespace cairn
