@@ -1,8 +1,11 @@
 // A ROS node that says where a camera is in a cairn map: image in, pose out.  docs/ros.md tells its topics
 // and parameters.
+#include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
@@ -22,19 +25,54 @@ struct NodeParameters : Parameters {
   double diagnostics_period_s = 1;  // 0: with every image
 };
 
-NodeParameters ReadParameters() {
-  const ros::NodeHandle node("~");
-  NodeParameters p;
-  node.getParam("map", p.map);
-  node.getParam("memory_budget_mib", p.memory_budget_mib);
-  node.getParam("public_key", p.public_key);
-  node.getParam("map_frame", p.map_frame);
-  node.getParam("follow", p.follow);
-  node.getParam("camera_in_robot", p.camera_in_robot);
-  node.getParam("camera_model", p.camera_model);
-  node.getParam("camera_params", p.camera_params);
-  node.getParam("diagnostics_period_s", p.diagnostics_period_s);
-  return p;
+// Numbers separated by blanks, commas and brackets, as "[0.1, 0, 0.8]": roscpp takes lists from rosparam and
+// launch files, but on its command line only texts.
+bool ParseNumbers(const std::string& text, std::vector<double>* numbers) {
+  static const char* const kBetween = " ,[]";
+  for (size_t begin = text.find_first_not_of(kBetween); begin != std::string::npos;) {
+    const size_t end = std::min(text.find_first_of(kBetween, begin), text.size());
+    char* parsed = nullptr;
+    const std::string word = text.substr(begin, end - begin);
+    numbers->push_back(std::strtod(word.c_str(), &parsed));
+    if (*parsed != 0) return false;
+    begin = text.find_first_not_of(kBetween, end);
+  }
+  return true;
+}
+
+// Reads the node's parameters; what is set, but to another type, is not passed over in silence.
+class ParameterReader {
+ public:
+  template <typename Value>
+  void Read(const std::string& name, Value* value) {
+    if (node_.hasParam(name) && !node_.getParam(name, *value)) wrong_ = name;
+  }
+  void Read(const std::string& name, std::vector<double>* numbers) {
+    std::string text;
+    if (!node_.hasParam(name) || node_.getParam(name, *numbers)) return;
+    if (!node_.getParam(name, text) || !ParseNumbers(text, numbers)) wrong_ = name;
+  }
+  const std::string& wrong() const { return wrong_; }
+
+ private:
+  ros::NodeHandle node_{"~"};
+  std::string wrong_;
+};
+
+// False: `wrong` is the name of one of another type.
+bool ReadParameters(NodeParameters* p, std::string* wrong) {
+  ParameterReader reader;
+  reader.Read("map", &p->map);
+  reader.Read("memory_budget_mib", &p->memory_budget_mib);
+  reader.Read("public_key", &p->public_key);
+  reader.Read("map_frame", &p->map_frame);
+  reader.Read("follow", &p->follow);
+  reader.Read("camera_in_robot", &p->camera_in_robot);
+  reader.Read("camera_model", &p->camera_model);
+  reader.Read("camera_params", &p->camera_params);
+  reader.Read("diagnostics_period_s", &p->diagnostics_period_s);
+  *wrong = reader.wrong();
+  return wrong->empty();
 }
 
 template <typename Number>
@@ -137,9 +175,13 @@ class LocalizerNode {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cairn_localizer");
   const ros::NodeHandle alive;  // connects, so that what follows can be logged and parameters read
-  const cairn_ros::NodeParameters parameters = cairn_ros::ReadParameters();
+  cairn_ros::NodeParameters parameters;
   int code = 0;
   std::string message;
+  if (!cairn_ros::ReadParameters(&parameters, &message)) {
+    ROS_FATAL("~%s is of the wrong type; docs/ros.md has the parameters", message.c_str());
+    return 2;
+  }
   const auto localizer = cairn_ros::MapLocalizer::Open(parameters, &code, &message);
   if (!localizer) {
     ROS_FATAL("%s", message.c_str());

@@ -162,9 +162,14 @@ class Node(unittest.TestCase):
     def test_bad_parameters_end_the_node_with_a_sentence(self):
         for arguments, words, code in ((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),
-                                       ((f"_map:={MAP}", "_memory_budget_mib:=-5"), "memory_budget_mib is -5", 2)):
+                                       ((f"_map:={MAP}", "_memory_budget_mib:=-5"), "memory_budget_mib is -5", 2),
+                                       ((f"_map:={MAP}", "_memory_budget_mib:=many"), "memory_budget_mib is of the wrong", 2),
+                                       ((f"_map:={MAP}", "_camera_in_robot:=[0, zero]"), "camera_in_robot is of the", 2)):
             node = self.start(f"__name:=bad{code}{len(words)}", *arguments)  # the master keeps parameters by name
-            output, _ = node.communicate(timeout=20)
+            try:
+                output, _ = node.communicate(timeout=20)
+            finally:
+                node.kill()
             self.assertEqual(node.returncode, code, output)
             self.assertIn(words, output)
 
