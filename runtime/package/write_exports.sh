@@ -15,9 +15,8 @@ echo "  global:"
 {
   # Lines of "=word", one per identifier of the public headers.
   xargs cat < "$headers" | grep -v '^ *//' | grep -oE '[A-Za-z_][A-Za-z_0-9]*' | LC_ALL=C sort -u | sed 's/^/=/'
-  # Lines of "mangled demangled".  Inline functions and templates (W) are in whatever uses them.
-  symbols=$(nm --defined-only --extern-only "$@" | awk 'NF == 3 && $2 ~ /^[TDRBV]$/ && $3 ~ /^_Z/ {print $3}' | LC_ALL=C sort -u)
-  echo "$symbols" | c++filt | awk -v symbols="$symbols" 'BEGIN {split(symbols, mangled, "\n")} {print mangled[NR] " " $0}'
+  # Lines of "asMANGLED demangled" (c++filt leaves words alone that do not begin as its own do).  Inline functions and templates (W) are in whatever uses them.
+  nm --defined-only --extern-only "$@" | awk 'NF == 3 && $2 ~ /^[TDRBV]$/ && $3 ~ /^_Z/ {print "as" $3, $3}' | LC_ALL=C sort -u | c++filt
 } | awk '
   /^=/ {named[substr($0, 2)] = 1; next}
   {
@@ -33,7 +32,7 @@ echo "  global:"
       sub(/^operator[^A-Za-z_].*/, "operator", part)
       if (!(part in named)) next
     }
-    print "    " $1 ";"
+    print "    " substr($1, 3) ";"
   }'
 echo "  local:"
 echo "    *;"

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/capture.h"
+#include "core/image_file.h"
+#include "runtime/cairn.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {
@@ -59,6 +61,42 @@ TEST_F(VisualMapRun, TwoEstimatorsThatShareNothingAgree) {
     ++num_agreeing;
   }
   EXPECT_GE(num_agreeing, 2);
+}
+
+TEST_F(VisualMapRun, CApiGivesTheProgramsPlaceOnTheFloor) {
+  const ProgramRun run = Localize("visual.cairn" + images_ + " --estimator visual-map");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  cairn_map* map = nullptr;
+  cairn_localizer* localizer = nullptr;
+  ASSERT_EQ(cairn_map_open((*folder_ / "visual.cairn").c_str(), nullptr, &map), CAIRN_OK)
+      << cairn_last_error();
+  ASSERT_EQ(cairn_localizer_create(map, &localizer), CAIRN_OK);
+  int num_fixes = 0;
+  for (const json& answer : JsonLines(run.out)) {
+    const Result<cv::Mat> grey = ReadGreyImage(answer["image"]);
+    ASSERT_TRUE(grey.ok());
+    cairn_image image = CAIRN_IMAGE_INIT;
+    image.pixels = grey->data;
+    image.width = grey->cols;
+    image.height = grey->rows;
+    image.stride = grey->step;
+    cairn_floor_fix fix = CAIRN_FLOOR_FIX_INIT;
+    ASSERT_EQ(cairn_localize_on_floor(localizer, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+    EXPECT_EQ(fix.num_matches, answer["num_matches"]);
+    EXPECT_EQ(fix.num_agreeing, answer["num_agreeing"]);
+    ASSERT_EQ(fix.has_fix == 1, answer["fix"].get<bool>());
+    if (fix.has_fix == 0) {
+      EXPECT_EQ(fix.message, answer["message"]);
+      continue;
+    }
+    ++num_fixes;
+    EXPECT_EQ(json({fix.position_m[0], fix.position_m[1]}), answer["floor_m"]);
+    EXPECT_EQ(json(fix.heading_deg), answer["heading_deg"]);
+    EXPECT_EQ(json(std::vector<double>(fix.covariance, fix.covariance + 9)), answer["covariance"]);
+  }
+  EXPECT_GE(num_fixes, 2);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+  EXPECT_EQ(cairn_map_close(map), CAIRN_OK);
 }
 
 TEST_F(VisualMapRun, EachEstimatorAnswersInItsOwnWay) {

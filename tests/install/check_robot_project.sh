@@ -10,7 +10,6 @@ export LC_ALL=C
 DESTDIR=$folder/root cmake --install "$build" --prefix /opt/cairn > "$folder/log"
 root=$folder/root/opt/cairn
 lib=$(dirname "$(find "$root" -name 'libcairn-runtime.so.0')")
-export LD_LIBRARY_PATH="$lib"
 test -x "$root/bin/cairn" -a -e "$root/share/man/man1/cairn-localize.1" -a -e "$root/share/doc/cairn/licences.md"
 "$root/bin/cairn" --version
 
@@ -27,14 +26,12 @@ cmake --build "$folder/robot/build" >> "$folder/log" || { cat "$folder/log"; exi
 expect "$folder/robot/build/where_c"
 expect "$folder/robot/build/where_cc"
 
-export PKG_CONFIG_PATH="$lib/pkgconfig"
+# Python and what CMake builds find the library by themselves; what pkg-config builds, where the system looks.
+module=$(find "$root" -type d -name cairn -path '*-packages/cairn')
+PYTHONPATH=$(dirname "$module") expect "$folder/robot/where.py"
+export PKG_CONFIG_PATH="$lib/pkgconfig" LD_LIBRARY_PATH="$lib"
 cd "$folder/robot"
 cc -std=c11 -Wall -Wextra -Werror -pedantic where.c -o where_c $(pkg-config --cflags --libs cairn-runtime)
 expect ./where_c
 c++ -std=c++20 where.cc -o where_cc $(pkg-config --cflags --libs cairn-runtime)
 expect ./where_cc
-
-module=$(find "$root" -type d -name cairn -path '*-packages/cairn')
-if [ -n "$module" ]; then
-  PYTHONPATH=$(dirname "$module") expect /usr/bin/python3 where.py
-fi
