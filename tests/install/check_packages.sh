@@ -13,6 +13,21 @@ fi
 export LC_ALL=C DEBIAN_FRONTEND=noninteractive  # only now: what is compiled depends on the locale, and so ccache's keys
 lintian --allow-root --fail-on warning "$folder"/*.changes
 
+# What the -dev package says about itself, where Debian puts it: a C program by pkg-config, C and C++ by CMake.
+root=$folder/root
+for name in libcairn-runtime0 libcairn-runtime-dev; do dpkg-deb -x "$folder/${name}"_*.deb "$root"; done
+lib=$(dirname "$root"/usr/lib/*/libcairn-runtime.so)
+example=$sources/runtime/examples/robot
+PKG_CONFIG_PATH=$lib/pkgconfig
+export PKG_CONFIG_PATH
+cc -std=c11 "$example/where.c" -o "$folder/where_c" $(pkg-config --cflags --libs cairn-runtime)
+cmake -S "$example" -B "$folder/robot" -DCMAKE_PREFIX_PATH="$root/usr" -DCMAKE_BUILD_TYPE=Release > "$folder/robot.log"
+cmake --build "$folder/robot" >> "$folder/robot.log" || { cat "$folder/robot.log" >&2; exit 1; }
+for program in "$folder/where_c" "$folder/robot/where_c" "$folder/robot/where_cc"; do
+  LD_LIBRARY_PATH=$lib "$program" "$poster/poster.cairn" "$poster/poster.pgm" | grep -q 'm, [0-9]* inliers' ||
+    { echo "$program gives no fix" >&2; exit 1; }
+done
+
 system=$(mktemp -d)
 trap 'rm -rf --one-file-system "$system"' EXIT
 debootstrap --variant=minbase bookworm "$system" "${MIRROR:-http://deb.debian.org/debian}" > "$folder/debootstrap.log" 2>&1 ||
