@@ -74,7 +74,7 @@ class Node(unittest.TestCase):
         cls.poses, cls.diagnostics = {}, {}
         rospy.Subscriber("pose", PoseWithCovarianceStamped, lambda m: cls.poses.update({m.header.stamp.to_nsec(): (time.time(), m)}),
                          tcp_nodelay=True)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.update({m.header.stamp.to_nsec(): m.status[0]}),
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: cls.diagnostics.update({m.header.stamp.to_nsec(): (time.time(), m.status[0])}),
                          tcp_nodelay=True)
         for _ in range(100):
             if cls.images.get_num_connections() > 0:
@@ -101,7 +101,7 @@ class Node(unittest.TestCase):
                 break
             time.sleep(0.02)
         time.sleep(0.05)
-        return self.diagnostics[stamp.to_nsec()], self.poses.get(stamp.to_nsec(), (0, None))[1]
+        return self.diagnostics[stamp.to_nsec()][1], self.poses.get(stamp.to_nsec(), (0, None))[1]
 
     def test_poses_at_10_hz_without_growth(self):
         pictures = [read_pgm(path) for path in PICTURES]
@@ -117,11 +117,14 @@ class Node(unittest.TestCase):
             time.sleep(max(0, begin + len(sent) / RATE_HZ - time.time()))
         time.sleep(1)
 
-        added_ms, in_node_ms = [], []
-        for stamp in sent.keys() & self.poses.keys() & self.diagnostics.keys():
+        added_ms, in_node_ms, is_free = [], [], 0
+        for stamp in sorted(sent.keys() & self.poses.keys() & self.diagnostics.keys()):
             received, message = self.poses[stamp]
-            status = {pair.key: pair.value for pair in self.diagnostics[stamp].values}
-            added_ms.append(1e3 * (received - sent[stamp]) - float(status["library_ms"]))
+            answered, diagnostic = self.diagnostics[stamp]
+            status = {pair.key: pair.value for pair in diagnostic.values}
+            # Where the library takes longer than the camera, an image waits for the one before: that is the library's time too.
+            added_ms.append(1e3 * (received - max(sent[stamp], is_free)) - float(status["library_ms"]))
+            is_free = answered
             in_node_ms.append(float(status["node_ms"]) - float(status["library_ms"]))
             self.assertEqual(message.header.frame_id, "kitchen")
             if IS_POSTER:
