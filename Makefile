@@ -6,12 +6,13 @@ CAIRN := build/$(PRESET)/cairn
 DATA ?= ../shared/data
 PREFIX ?= /usr/local
 
-# Debian 12 packages: what the build needs, what the tests and benchmarks run beside it (ROS for its node, what builds and checks
-# Debian packages), what checks the style.
+# Debian 12 packages: what the build needs, what the tests and benchmarks run beside it (a browser for reports, ROS for its node, what
+# builds and checks Debian packages), what checks the style.
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libjpeg-dev libsodium-dev libzstd-dev \
     coinor-libcbc-dev libgeos++-dev libgtest-dev libgmock-dev libbenchmark-dev sqlite3 colmap slurmctld slurmd slurm-client munge procps jq \
+    libjs-leaflet libjs-chart.js chromium chromium-driver python3-selenium \
     pybind11-dev python3-dev python3-numpy debhelper dh-python lintian debootstrap \
     libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev rosout python3-roslaunch python3-rosmaster \
     python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \

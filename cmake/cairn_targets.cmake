@@ -55,3 +55,25 @@ inline constexpr char @SYMBOL@Sql[] = R\"sql(@SQL@)sql\";
   endforeach()
   target_include_directories(${target} PRIVATE ${CMAKE_BINARY_DIR}/embedded)
 endfunction()
+
+# cairn_embed_text(TARGET NAME FILE): a text file as a constant: NAME leaflet_css becomes the header "report/leaflet_css.h" with
+# `cairn::kLeafletCssText`.
+function(cairn_embed_text target name file)
+  file(READ ${file} TEXT)
+  set(SYMBOL "k")
+  string(REPLACE "_" ";" words ${name})
+  foreach(word ${words})
+    string(SUBSTRING ${word} 0 1 initial)
+    string(TOUPPER ${initial} initial)
+    string(SUBSTRING ${word} 1 -1 rest)
+    string(APPEND SYMBOL ${initial} ${rest})
+  endforeach()
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/embedded/report/${name}.h @ONLY CONTENT
+"#pragma once
+namespace cairn {
+inline constexpr char @SYMBOL@Text[] = R\"embedded(@TEXT@)embedded\";
+}  // namespace cairn
+")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  target_include_directories(${target} PRIVATE ${CMAKE_BINARY_DIR}/embedded)
+endfunction()

@@ -15,6 +15,7 @@
 #include "pipeline/manual_command.h"
 #include "pipeline/pareto_command.h"
 #include "pipeline/plan_path_command.h"
+#include "pipeline/report_command.h"
 #include "pipeline/route_command.h"
 #include "pipeline/seal_commands.h"
 #include "stages/build_vocabulary/command.h"
@@ -74,6 +75,7 @@ std::vector<Command> AllCommands() {
       ApplyCommand(),
       RollbackCommand(),
       ParetoCommand(),
+      ReportCommand(),
       ManualCommand(),
   };
 }

@@ -41,6 +41,7 @@ HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage
                        const LocalizerOptions& options) {
   HeldOutResult result;
   result.name = image.name;
+  result.true_cam_from_world = image.cam_from_world;
   Result<Localization> localization = LocalizeTimed(map, image, options, &result);
   if (!localization.ok()) {
     result.rejected = localization.error().message;

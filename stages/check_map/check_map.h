@@ -58,6 +58,7 @@ struct HeldOutImage {
 
 struct HeldOutResult {
   std::string name;
+  std::optional<Pose> true_cam_from_world;
   std::string rejected;  // why the image could not be tried (unreadable, wrong size); empty otherwise
   Localization localization;
   // Fixes of images with a true pose: distance of the camera centres, angle, normalised estimation error

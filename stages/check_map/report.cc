@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/decomposition.h"
+#include "core/floor_pose.h"
 
 namespace cairn {
 namespace {
@@ -22,10 +23,17 @@ std::string Text(const std::optional<double>& value, double unit, int digits) {
   return value ? fmt::format("{:.{}f}", *value / unit, digits) : "-";
 }
 
-nlohmann::json ImagesJson(const CheckMapReport& report, bool with_errors) {
+// x, y (floor frame), heading in degrees.
+nlohmann::json FloorJson(const Pose& cam_from_world, const MapRows& rows) {
+  const FloorPose floor = FloorPoseOf(cam_from_world, rows.floor_from_world);
+  return {floor.position.x(), floor.position.y(), floor.heading_deg};
+}
+
+nlohmann::json ImagesJson(const CheckMapReport& report, const MapRows& rows, bool with_errors) {
   nlohmann::json images = nlohmann::json::array();
   for (const HeldOutResult& result : report.images) {
     nlohmann::json image = {{"name", result.name}};
+    if (result.true_cam_from_world) image["true_floor"] = FloorJson(*result.true_cam_from_world, rows);
     if (!result.rejected.empty()) {
       image["rejected"] = result.rejected;
     } else {
@@ -39,7 +47,10 @@ nlohmann::json ImagesJson(const CheckMapReport& report, bool with_errors) {
       image["sift_ms"] = result.sift_ms;
       image["total_ms"] = result.total_ms;
       if (!localization.has_fix()) image["message"] = localization.message;
-      if (localization.has_fix()) image["region"] = localization.region;
+      if (localization.has_fix()) {
+        image["region"] = localization.region;
+        image["floor"] = FloorJson(localization.cam_from_world, rows);
+      }
       if (localization.has_fix() && with_errors) {
         image["error_m"] = result.error_m;
         image["error_deg"] = result.error_deg;
@@ -147,12 +158,12 @@ std::string ReportJson(const PrintedReport& report) {
     json["mean_total_ms"] = report.held_out->mean_total_ms;
     json["mean_sift_ms"] = report.held_out->mean_sift_ms;
     json["regions"] = SelfTestRegionsJson(report.held_out->regions);
-    json["images"] = ImagesJson(*report.held_out, true);
+    json["images"] = ImagesJson(*report.held_out, *report.rows, true);
   }
   if (report.foreign != nullptr) {
     json["num_foreign"] = report.foreign->images.size();
     json["num_false_fixes"] = NumFixes(*report.foreign);
-    json["foreign_images"] = ImagesJson(*report.foreign, false);
+    json["foreign_images"] = ImagesJson(*report.foreign, *report.rows, false);
   }
   return json.dump(2) + "\n";
 }

@@ -1,0 +1,295 @@
+#include "pipeline/report/report_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "core/floor_pose.h"
+#include "pipeline/explain/advise.h"
+#include "pipeline/explain/compare_maps.h"
+#include "pipeline/explain/station_losses.h"
+
+namespace cairn {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Floor coordinates in the page: hundredths of a metre.
+int64_t Centi(double metres) { return std::llround(100 * metres); }
+double Rounded(double value, double unit) { return std::round(value / unit) * unit; }
+
+// Entropies of the appearance nodes at every station, the largest; negative: not known.
+std::vector<double> StationEntropies(const MapRows& rows) {
+  std::vector<double> entropies(rows.stations.size(), -1);
+  for (const MapAppearanceNode& node : rows.appearance) {
+    for (const int32_t image : node.images) {
+      const StationIdx station = rows.images[image].station;
+      if (station >= 0 && node.entropy) entropies[station] = std::max(entropies[station], *node.entropy);
+    }
+  }
+  return entropies;
+}
+
+Json StationsJson(const MapRows& rows) {
+  Json json = {{"x", Json::array()},       {"y", Json::array()},       {"heading", Json::array()},
+               {"covered", Json::array()}, {"seen", Json::array()},    {"visible", Json::array()},
+               {"why", Json::array()},     {"entropy", Json::array()}, {"images", Json::array()}};
+  const StationLosses losses(rows);
+  const std::vector<double> entropies = StationEntropies(rows);
+  std::vector<Json> images(rows.stations.size(), Json::array());
+  for (size_t image = 0; image < rows.images.size(); ++image) {
+    if (rows.images[image].station >= 0) images[rows.images[image].station].push_back(image);
+  }
+  for (size_t i = 0; i < rows.stations.size(); ++i) {
+    const auto station = static_cast<StationIdx>(i);
+    const MapStation& row = rows.stations[i];
+    json["x"].push_back(Centi(row.position.x()));
+    json["y"].push_back(Centi(row.position.y()));
+    json["heading"].push_back(row.heading_deg ? Json(std::llround(*row.heading_deg)) : Json());
+    json["covered"].push_back(row.is_covered ? 1 : 0);
+    json["seen"].push_back(losses.NumLandmarks(station));
+    json["visible"].push_back(losses.NumVisible(station));
+    const auto why = losses.WhyUncovered(station);
+    json["why"].push_back(why ? Json(DescribeDropReason(*why).name) : Json());
+    json["entropy"].push_back(entropies[i] >= 0 ? Json(Rounded(entropies[i], 1e-3)) : Json());
+    json["images"].push_back(images[i]);
+  }
+  return json;
+}
+
+Json RegionsJson(const MapRows& rows) {
+  std::vector<std::vector<RegionIdx>> regions_at(rows.stations.size());
+  for (size_t region = 0; region < rows.regions.size(); ++region) {
+    for (const StationIdx station : rows.regions[region].stations)
+      regions_at[station].push_back(static_cast<RegionIdx>(region));
+  }
+  std::vector<std::set<RegionIdx>> adjacent(rows.regions.size());
+  const auto join = [&](StationIdx u, StationIdx v) {
+    for (const RegionIdx a : regions_at[u]) {
+      for (const RegionIdx b : regions_at[v]) {
+        if (a == b) continue;
+        adjacent[a].insert(b);
+        adjacent[b].insert(a);
+      }
+    }
+  };
+  for (size_t i = 0; i < rows.stations.size(); ++i)
+    join(static_cast<StationIdx>(i), static_cast<StationIdx>(i));
+  for (const auto& [u, v] : rows.station_edges) join(u, v);
+  Json list = Json::array();
+  for (size_t region = 0; region < rows.regions.size(); ++region) {
+    list.push_back({{"stations", rows.regions[region].stations},
+                    {"num_landmarks", rows.regions[region].landmarks.size()},
+                    {"adjacent", adjacent[region]}});
+  }
+  for (const RegionSelfTest& test : rows.findings.self_test_regions) {
+    Json entry = {
+        {"held_out", test.num_held_out}, {"localized", test.num_localized}, {"wrong", test.num_gross_errors}};
+    if (test.errors) {
+      entry["median_m"] = Rounded(test.errors->median_m, 1e-4);
+      entry["median_deg"] = Rounded(test.errors->median_deg, 1e-3);
+      entry["p90_m"] = Rounded(test.errors->p90_m, 1e-4);
+    }
+    if (test.region >= 0) list[test.region]["test"] = std::move(entry);
+  }
+  for (const RegionEntropy& entropy : rows.findings.region_entropies)
+    list[entropy.region]["entropy"] = Rounded(entropy.entropy, 1e-3);
+  return list;
+}
+
+Json LandmarksJson(const MapRows& rows) {
+  std::vector<RegionIdx> first_region(rows.landmarks.size(), -1);
+  for (RegionIdx region = static_cast<RegionIdx>(rows.regions.size()) - 1; region >= 0; --region) {
+    for (const LandmarkIdx landmark : rows.regions[region].landmarks) first_region[landmark] = region;
+  }
+  Json json = {{"x", Json::array()},
+               {"y", Json::array()},
+               {"z", Json::array()},
+               {"observations", Json::array()},
+               {"region", first_region}};
+  for (const MapLandmark& landmark : rows.landmarks) {
+    const Eigen::Vector3d place = rows.floor_from_world * landmark.position;
+    json["x"].push_back(Centi(place.x()));
+    json["y"].push_back(Centi(place.y()));
+    json["z"].push_back(Centi(place.z()));
+    json["observations"].push_back(landmark.num_observations);
+  }
+  return json;
+}
+
+// Images, and the appearance graph over them: a node stands where its first image was taken.
+Json ImagesJson(const MapRows& rows) {
+  Json json = {{"name", Json::array()},
+               {"x", Json::array()},
+               {"y", Json::array()},
+               {"heading", Json::array()},
+               {"num_landmarks", Json::array()}};
+  for (const MapImage& image : rows.images) {
+    const FloorPose pose = FloorPoseOf(image.cam_from_world, rows.floor_from_world);
+    json["name"].push_back(image.name);
+    json["x"].push_back(Centi(pose.position.x()));
+    json["y"].push_back(Centi(pose.position.y()));
+    json["heading"].push_back(std::llround(pose.heading_deg));
+    json["num_landmarks"].push_back(image.landmarks.size());
+  }
+  json["kept"] = Json::array();
+  json["links"] = Json::array();
+  json["look_alikes"] = Json::array();
+  for (const MapAppearanceNode& node : rows.appearance) {
+    const int32_t image = node.images[0];
+    if (node.is_kept) json["kept"].push_back(image);
+    for (const auto& link : node.links)
+      json["links"].push_back({image, rows.appearance[link.node].images[0], link.num_inliers});
+    for (const auto& other : node.look_alikes)
+      json["look_alikes"].push_back(
+          {image, rows.appearance[other.node].images[0], Rounded(other.score, 1e-3)});
+  }
+  return json;
+}
+
+Json ViewsJson(const Views& views) {
+  Json json = {{"walls", Json::array()}, {"faces", Json::array()}};
+  for (const auto& wall : views.plan.walls)
+    json["walls"].push_back(
+        {Centi(wall.start.x()), Centi(wall.start.y()), Centi(wall.end.x()), Centi(wall.end.y())});
+  for (FaceIdx face = 0; face < views.num_faces(); ++face) {
+    Json corners = Json::array();
+    for (int64_t i = views.face_offsets[face]; i < views.face_offsets[face + 1]; ++i) {
+      const Eigen::Vector2d place = views.plan.Metres(views.vertices[views.face_vertices[i]]);
+      corners.push_back(Centi(place.x()));
+      corners.push_back(Centi(place.y()));
+    }
+    json["faces"].push_back(std::move(corners));
+  }
+  return json;
+}
+
+Json DropsJson(const MapFindings& findings) {
+  Json list = Json::array();
+  for (const DropCount& drop : findings.drops) {
+    list.push_back({{"stage", drop.stage},
+                    {"kind", drop.kind},
+                    {"name", drop.name},
+                    {"text", drop.text},
+                    {"num", drop.num_dropped},
+                    {"at", drop.at_stations}});
+  }
+  return list;
+}
+
+Json AdviceJson(const std::vector<Advice>& advice) {
+  Json list = Json::array();
+  for (const Advice& entry : advice) {
+    Json views = Json::array();
+    for (const Advice::View& view : entry.images_to_take) {
+      views.push_back({Centi(view.position.x()), Centi(view.position.y()),
+                       view.heading_deg ? Json(std::llround(*view.heading_deg)) : Json()});
+    }
+    list.push_back({{"text", entry.text}, {"stations", entry.stations}, {"views", views}});
+  }
+  return list;
+}
+
+// What changed from the compared map (A) to this one (B).
+Json ChangesJson(const ReportInputs& inputs) {
+  const MapRows &a = *inputs.compared, &b = *inputs.rows;
+  const MapComparison comparison = CompareMaps(a, b);
+  Json json = ComparisonJson(a, b, inputs.compared_bytes, inputs.num_bytes, comparison);
+  json["file"] = inputs.compared_name;
+  json["gone"] = Json::array();
+  std::vector<char> is_shared(b.landmarks.size(), 0);
+  for (size_t i = 0; i < a.landmarks.size(); ++i) {
+    if (comparison.landmark_in_b[i] >= 0) {
+      is_shared[comparison.landmark_in_b[i]] = 1;
+      continue;
+    }
+    const Eigen::Vector3d place = b.floor_from_world * a.landmarks[i].position;
+    json["gone"].push_back({Centi(place.x()), Centi(place.y())});
+  }
+  json["added"] = Json::array();
+  for (size_t i = 0; i < b.landmarks.size(); ++i) {
+    if (is_shared[i] == 0) json["added"].push_back(i);
+  }
+  return json;
+}
+
+// Per held-out image: where it was taken and where the map put it.
+Json SelfTestImagesJson(const Json& check) {
+  Json list = Json::array();
+  if (!check.contains("images") || !check["images"].is_array()) return list;
+  for (const Json& image : check["images"]) {
+    if (!image.contains("true_floor")) continue;
+    Json entry = {{"name", image.value("name", "")}, {"true", image["true_floor"]}};
+    if (image.contains("floor")) entry["found"] = image["floor"];
+    if (image.contains("error_m")) entry["error_m"] = image["error_m"];
+    if (image.contains("error_deg")) entry["error_deg"] = image["error_deg"];
+    if (image.contains("message")) entry["message"] = image["message"];
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+// Of a recorded drive (cairn drive -o): where the robot was, in order.
+Json DriveJson(const Json& drive) {
+  Json places = Json::array();
+  const auto add = [&](const Json& pose, const std::string& kind) {
+    if (!pose.is_object() || !pose.contains("x_m") || !pose.contains("y_m")) return;
+    places.push_back({Centi(pose["x_m"].get<double>()), Centi(pose["y_m"].get<double>()),
+                      std::llround(pose.value("heading_deg", 0.0)), kind});
+  };
+  if (drive.contains("start")) add(drive["start"], "start");
+  if (drive.contains("legs") && drive["legs"].is_array()) {
+    for (const Json& leg : drive["legs"]) {
+      const std::string kind = leg.value("kind", "");
+      if (leg.contains("steps") && leg["steps"].is_array()) {
+        for (const Json& step : leg["steps"]) {
+          if (step.contains("pose")) add(step["pose"], kind);
+        }
+      }
+      if (leg.contains("pose")) add(leg["pose"], kind);
+    }
+  }
+  Json json = {{"places", std::move(places)}, {"reached", drive.value("reached", false)}};
+  return json;
+}
+
+}  // namespace
+
+nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
+  const MapRows& rows = *inputs.rows;
+  Json json = {{"name", rows.name},
+               {"writer", rows.writer},
+               {"unit", rows.frame.unit == "metre" ? "m" : "units"},
+               {"sealed", rows.sealed},
+               {"algorithm", rows.algorithm},
+               {"k", rows.k},
+               {"tau", rows.tau},
+               {"rho", rows.rho},
+               {"landmark_choice", rows.landmark_choice},
+               {"lower_bound", rows.lower_bound ? Json(*rows.lower_bound) : Json()},
+               {"bytes", inputs.num_bytes},
+               {"bytes_by_kind", inputs.block_bytes},
+               {"stations", StationsJson(rows)},
+               {"regions", RegionsJson(rows)},
+               {"landmarks", LandmarksJson(rows)},
+               {"images", ImagesJson(rows)},
+               {"views", ViewsJson(rows.views)},
+               {"drops", DropsJson(rows.findings)},
+               {"self_test", rows.self_test},
+               {"advice", AdviceJson(Advise(rows))},
+               {"options", rows.stage_options}};
+  std::map<int64_t, int> errors;  // tenths of a pixel
+  for (const double error : inputs.reprojection_errors_px) ++errors[std::llround(10 * error)];
+  json["reprojection_errors"] = Json::array();
+  for (const auto& [tenths, count] : errors) json["reprojection_errors"].push_back({tenths, count});
+  if (inputs.build_report != nullptr) json["build"] = *inputs.build_report;
+  if (inputs.check != nullptr) json["self_test_images"] = SelfTestImagesJson(*inputs.check);
+  if (inputs.drive != nullptr) json["drive"] = DriveJson(*inputs.drive);
+  if (inputs.compared != nullptr) json["changes"] = ChangesJson(inputs);
+  return json;
+}
+
+}  // namespace cairn

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/map_rows.h"
+
+namespace cairn {
+
+// Everything that the page of a report shows, as one JSON object; report.js draws it.  Lists are by column
+// and numbers rounded (places to 1 cm), so that a map of 100,000 landmarks makes a few megabytes.
+struct ReportInputs {
+  const MapRows* rows = nullptr;
+  int64_t num_bytes = 0;                                     // of the file
+  std::vector<std::pair<std::string, int64_t>> block_bytes;  // by kind of block, and the rest
+  std::vector<double> reprojection_errors_px;                // of the classes; none: not known
+  const nlohmann::ordered_json* build_report = nullptr;      // NAME.report.json; may be null
+  const nlohmann::ordered_json* check = nullptr;             // what check-map --json printed; may be null
+  const nlohmann::ordered_json* drive = nullptr;             // what drive -o wrote; may be null
+  const MapRows* compared = nullptr;                         // the map to compare with; may be null
+  int64_t compared_bytes = 0;
+  std::string compared_name;  // its file
+};
+
+nlohmann::ordered_json ReportData(const ReportInputs& inputs);
+
+}  // namespace cairn

@@ -1,0 +1,102 @@
+#include "pipeline/report/report_page.h"
+
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/svg.h"
+#include "pipeline/ambiguity_svg.h"
+#include "pipeline/explain/advise.h"
+#include "pipeline/floor_svg.h"
+#include "pipeline/inspect_drops.h"
+#include "report/chart_js.h"
+#include "report/chart_notice.h"
+#include "report/leaflet_css.h"
+#include "report/leaflet_js.h"
+#include "report/leaflet_notice.h"
+#include "report/page_css.h"
+#include "report/page_html.h"
+#include "report/page_js.h"
+#include "stages/check_map/report.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kMaxStationLines = 20;
+constexpr int kMaxRegionLines = 60;
+
+// `text` with every `from` replaced.
+std::string Replaced(std::string text, std::string_view from, std::string_view to) {
+  for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+// Inside of a script element nothing may look like its end; in JSON and in strings of scripts `<\/` is `</`.
+std::string InScript(std::string text) { return Replaced(std::move(text), "</", "<\\/"); }
+
+// A `<` only occurs in strings there, and can be written as its number.
+std::string JsonInPage(const nlohmann::ordered_json& data) {
+  return Replaced(data.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace), "<",
+                  "\\u003c");
+}
+
+std::string Notices() {
+  return fmt::format("Leaflet\n\n{}\n\nChart.js\n\n{}", kLeafletNoticeText, kChartNoticeText);
+}
+
+}  // namespace
+
+std::string ReportPage(const nlohmann::ordered_json& data) {
+  const std::vector<std::pair<std::string_view, std::string>> parts = {
+      {"@TITLE@", EscapeXml(data["name"].get<std::string>())},
+      {"@LEAFLET_CSS@", kLeafletCssText},
+      {"@CSS@", kPageCssText},
+      {"@WRITER@", EscapeXml(data["writer"].get<std::string>())},
+      {"@NOTICES@", EscapeXml(Notices())},
+      {"@DATA@", JsonInPage(data)},
+      {"@LEAFLET_JS@", InScript(kLeafletJsText)},
+      {"@CHART_JS@", InScript(kChartJsText)},
+      {"@JS@", InScript(kPageJsText)}};
+  // The template is read once, from front to back, so that no part is searched for the marks of another.
+  const std::string_view page = kPageHtmlText;
+  std::string html;
+  size_t done = 0;
+  for (const auto& [mark, text] : parts) {
+    const size_t at = page.find(mark, done);
+    html.append(page.substr(done, at - done)).append(text);
+    done = at + mark.size();
+  }
+  return html.append(page.substr(done));
+}
+
+std::string PrintedReportPage(const MapRows& rows, const nlohmann::ordered_json& data) {
+  const auto block = [](const std::string& title, const std::string& text) {
+    return text.empty() ? "" : fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", title, EscapeXml(text));
+  };
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>"
+      "body {{ font: 12px \"DejaVu Sans\", sans-serif; margin: 1cm; }} svg {{ max-width: 100%; height: auto; "
+      "}} "
+      "h2 {{ break-after: avoid; }} pre {{ white-space: pre-wrap; }} figure {{ margin: 0; break-inside: "
+      "avoid; }}"
+      "</style></head><body>\n<h1>{0}</h1>\n",
+      EscapeXml(rows.name));
+  html += fmt::format("<p>{} bytes, {} landmarks, {} regions, {} stations; made by {}.</p>\n",
+                      data["bytes"].get<int64_t>(), rows.landmarks.size(), rows.regions.size(),
+                      rows.stations.size(), EscapeXml(rows.writer));
+  html += "<figure>" + FloorSvg(rows) + "</figure>\n";
+  if (const Result<std::string> svg = AmbiguitySvg(rows); svg.ok()) html += "<figure>" + *svg + "</figure>\n";
+  html += block("What the next survey should add", AdviceText(Advise(rows)));
+  std::string self_test;
+  for (const auto& [name, value] : rows.self_test) self_test += fmt::format("{:<26} {:.4g}\n", name, value);
+  html += block("Self-test", self_test);
+  html += block("Self-test by region", SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
+  html += block("What the stages dropped", DropsText(rows, kMaxStationLines));
+  for (const auto& [stage, options] : rows.stage_options) html += block("Options of " + stage, options);
+  return html + "</body></html>\n";
+}
+
+}  // namespace cairn

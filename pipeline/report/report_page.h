@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/map_rows.h"
+
+namespace cairn {
+
+// A report as one HTML file that needs no network: the data, the page that draws it (report.html, .css, .js),
+// and the libraries that it draws with, which were embedded from the installed packages when cairn was built,
+// with their notices.  No name in the data can become markup.
+std::string ReportPage(const nlohmann::ordered_json& data);
+
+// The same for paper: pictures and tables, no scripts.
+std::string PrintedReportPage(const MapRows& rows, const nlohmann::ordered_json& data);
+
+}  // namespace cairn

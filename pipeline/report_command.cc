@@ -1,0 +1,185 @@
+#include "pipeline/report_command.h"
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "core/feature_class.h"
+#include "core/file.h"
+#include "core/map_file.h"
+#include "core/text.h"
+#include "pipeline/ambiguity_svg.h"
+#include "pipeline/floor_svg.h"
+#include "pipeline/report/report_data.h"
+#include "pipeline/report/report_page.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string map_path;
+  std::string output_path;
+  std::string build_report_path;
+  std::string build_dir;
+  std::string check_path;
+  std::string drive_path;
+  std::string compare_path;
+  std::string svg_dir;
+  bool print = false;
+};
+
+Result<Json> ReadJson(const std::string& path, const char* what) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded() || !json.is_object())
+    return MakeError(ErrorCode::kCorrupt, "{}: is no JSON object; expected {}", path, what);
+  return json;
+}
+
+// A map that every byte was checked of, as `cairn verify` does: what a report says must be what was made.
+Result<MapRows> ReadWholeMap(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
+  CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
+  return ReadMapRows(file);
+}
+
+Result<std::vector<std::pair<std::string, int64_t>>> BytesByKind(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
+  std::map<std::string, int64_t> bytes;
+  auto rest = static_cast<int64_t>(fs::file_size(path));
+  for (const BlockEntry& entry : file.directory().blocks()) {
+    bytes[BlockKindName(static_cast<BlockKind>(entry.kind))] += entry.num_bytes;
+    rest -= entry.num_bytes;
+  }
+  bytes["head, options, findings"] = rest;
+  return std::vector<std::pair<std::string, int64_t>>(bytes.begin(), bytes.end());
+}
+
+// The given file, or the one beside the map if it is there.
+std::string Beside(const Arguments& arguments, const std::string& given, const char* extension) {
+  if (!given.empty()) return given;
+  const fs::path path = fs::path(arguments.map_path).replace_extension(extension);
+  std::error_code error;
+  return fs::exists(path, error) ? path.string() : "";
+}
+
+Result<std::vector<double>> ReprojectionErrors(const std::string& build_dir) {
+  std::vector<double> errors;
+  std::error_code error;
+  if (build_dir.empty() || !fs::exists(build_dir + "/classes.db", error)) return errors;
+  CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(build_dir + "/classes.db"));
+  for (const FeatureClass& feature_class : classes.classes)
+    errors.push_back(feature_class.reprojection_error_px);
+  return errors;
+}
+
+// What was measured with maps of other sizes, if `cairn pareto` was run: bytes and part localized.
+Result<Json> ParetoJson(const std::string& path) {
+  Json list = Json::array();
+  if (path.empty()) return list;
+  CAIRN_ASSIGN_OR_RETURN(const std::string csv, ReadFile(path));
+  const std::vector<std::string_view> lines = SplitLines(csv);
+  for (size_t i = 1; i < lines.size(); ++i) {
+    const std::vector<std::string> fields = SplitFields(lines[i], ',');
+    double num_bytes = 0, localized_ratio = 0;
+    if (fields.size() < 8 || !ParseNumber(fields[1], &num_bytes) || !ParseNumber(fields[7], &localized_ratio))
+      return MakeError(ErrorCode::kCorrupt, "{}: line {} is none of cairn pareto's", path, i + 1);
+    list.push_back({num_bytes, localized_ratio});
+  }
+  return list;
+}
+
+Status WritePictures(const std::string& folder, const MapRows& rows) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/floor.svg", FloorSvg(rows)));
+  const Result<std::string> ambiguity = AmbiguitySvg(rows);
+  return ambiguity.ok() ? WriteFileAtomically(folder + "/ambiguity.svg", *ambiguity) : Ok();
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadWholeMap(arguments.map_path));
+  ReportInputs inputs{.rows = &rows, .num_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path))};
+  CAIRN_ASSIGN_OR_RETURN(inputs.block_bytes, BytesByKind(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.reprojection_errors_px,
+                         ReprojectionErrors(Beside(arguments, arguments.build_dir, ".build")));
+  std::optional<Json> build, check, drive;
+  const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
+  if (!build_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(build, ReadJson(build_path, "the report that cairn compile wrote"));
+    inputs.build_report = &*build;
+  }
+  if (!arguments.check_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(check, ReadJson(arguments.check_path, "what cairn check-map --json printed"));
+    inputs.check = &*check;
+  }
+  if (!arguments.drive_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(drive, ReadJson(arguments.drive_path, "what cairn drive -o wrote"));
+    inputs.drive = &*drive;
+  }
+  std::optional<MapRows> compared;
+  if (!arguments.compare_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(compared, ReadWholeMap(arguments.compare_path));
+    inputs.compared = &*compared;
+    inputs.compared_bytes = static_cast<int64_t>(fs::file_size(arguments.compare_path));
+    inputs.compared_name = fs::path(arguments.compare_path).filename().string();
+  }
+  Json data = ReportData(inputs);
+  CAIRN_ASSIGN_OR_RETURN(data["pareto"], ParetoJson(Beside(arguments, "", ".pareto.csv")));
+  const std::string page = arguments.print ? PrintedReportPage(rows, data) : ReportPage(data);
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, page));
+  if (!arguments.svg_dir.empty()) CAIRN_RETURN_IF_ERROR(WritePictures(arguments.svg_dir, rows));
+  *environment.out << fmt::format("{}: {} bytes; open it in a browser\n", arguments.output_path, page.size());
+  return Ok();
+}
+
+}  // namespace
+
+Command ReportCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "report",
+      .summary =
+          "Writes a page that shows what a map covers, how well, where a robot will be unsure, and what to "
+          "survey next",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_option("-o,--output", arguments->output_path, "Page to write; it needs no network")
+                ->required()
+                ->type_name("FILE.html");
+            app.add_option(
+                   "--build-report", arguments->build_report_path,
+                   "Seconds and memory of the stages [NAME.report.json beside the map, if it is there]")
+                ->type_name("FILE.json");
+            app.add_option(
+                   "--build-dir", arguments->build_dir,
+                   "Build folder, for reprojection errors [NAME.build beside the map, if it is there]")
+                ->type_name("DIR");
+            app.add_option("--check", arguments->check_path,
+                           "What cairn check-map --json printed: errors of held-out images as arrows")
+                ->type_name("FILE.json");
+            app.add_option("--drive", arguments->drive_path,
+                           "What cairn drive -o wrote: replayed on the floor")
+                ->type_name("RUN.json");
+            app.add_option("--compare", arguments->compare_path,
+                           "Another map of the place, in the same frame: what changed from it to MAP")
+                ->type_name("OLD");
+            app.add_flag("--print", arguments->print,
+                         "Write a page for paper: pictures and tables, no scripts");
+            app.add_option("--svg", arguments->svg_dir, "Write the pictures there too, as SVG")
+                ->type_name("DIR");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn

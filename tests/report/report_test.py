@@ -1,0 +1,303 @@
+#!/usr/bin/env python3
+"""Opens reports in a real browser: report_test.py CAIRN GOLDEN_MAPS MAP BUILD_CHECK SCREENSHOTS
+
+Headless Chromium through its driver; no network.  MAP is a compiled map with a self-test, BUILD_CHECK what
+check-map --json printed of it.  Screenshots of what was looked at land in SCREENSHOTS.
+"""
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+CAIRN, GOLDEN, MAP, CHECK, SCREENSHOTS = sys.argv[1:6]
+LAYERS_OF_EVERY_MAP = ['regions', 'landmarks', 'stations']
+
+
+def report(folder, map_path, *arguments):
+    page = pathlib.Path(folder) / 'report.html'
+    run = subprocess.run([CAIRN, 'report', map_path, '-o', str(page), *arguments], capture_output=True, text=True)
+    if run.returncode != 0:
+        raise AssertionError(run.stderr)
+    return page
+
+
+class Browser:
+    """One page in headless Chromium; fails on anything in the console and on any request but the page's own."""
+
+    def __init__(self, size='1400,1000'):
+        options = Options()
+        for argument in ['--headless=new', '--no-sandbox', '--disable-gpu', f'--window-size={size}']:
+            options.add_argument(argument)
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL', 'performance': 'ALL'})
+        self.driver = webdriver.Chrome(service=Service('/usr/bin/chromedriver'), options=options)
+
+    def open(self, page):
+        self.driver.get(pathlib.Path(page).resolve().as_uri())
+        for _ in range(300):
+            if self.script('return document.documentElement.dataset.ready') == 'yes':
+                return
+            time.sleep(0.1)
+        raise AssertionError(f'{page} is not ready: {self.driver.get_log("browser")}')
+
+    def script(self, text, *arguments):
+        return self.driver.execute_script(text, *arguments)
+
+    def shot(self, name):
+        os.makedirs(SCREENSHOTS, exist_ok=True)
+        self.driver.save_screenshot(os.path.join(SCREENSHOTS, name))
+
+    def text(self, css):
+        return self.driver.find_element(By.CSS_SELECTOR, css).text
+
+    def problems(self):
+        found = [entry['message'] for entry in self.driver.get_log('browser')]
+        for entry in self.driver.get_log('performance'):
+            message = json.loads(entry['message'])['message']
+            if message['method'] != 'Network.requestWillBeSent':
+                continue
+            url = message['params']['request']['url']
+            if not url.startswith(('file://', 'data:')):
+                found.append(f'asked the network for {url}')
+        return found
+
+    def canvas_sums(self):
+        """A number per drawn layer that changes when what is drawn does."""
+        return self.script('''return [...document.querySelectorAll('canvas.leaflet-layer')].map(canvas => {
+            const copy = new OffscreenCanvas(canvas.width, canvas.height);
+            const context = copy.getContext('2d', {willReadFrequently: true});
+            context.drawImage(canvas, 0, 0);
+            const data = context.getImageData(0, 0, canvas.width, canvas.height).data;
+            let sum = 0;
+            for (let i = 0; i < data.length; i += 4) sum += data[i] + 3 * data[i + 1] + 7 * data[i + 2] + data[i + 3];
+            return sum;})''')
+
+    def quit(self):
+        self.driver.quit()
+
+
+class ReportTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.browser = Browser()
+        cls.page = report(cls.folder.name, MAP, '--check', CHECK)
+        cls.browser.open(cls.page)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.quit()
+        cls.folder.cleanup()
+
+    def setUp(self):
+        self.addCleanup(lambda: self.assertEqual(self.browser.problems(), []))
+
+    def click_station(self, station):
+        """Clicks where the station is drawn."""
+        x, y = self.browser.script('''const p = map.latLngToContainerPoint(L_latlng(S.x[arguments[0]], S.y[arguments[0]]));
+            const box = document.getElementById('map').getBoundingClientRect();
+            document.getElementById('map').scrollIntoView({block: 'center'});
+            return [p.x, p.y];''', station)
+        element = self.browser.driver.find_element(By.ID, 'map')
+        size = element.size
+        ActionChains(self.browser.driver).move_to_element_with_offset(
+            element, x - size['width'] / 2, y - size['height'] / 2).click().perform()
+
+    def test_the_floor_is_drawn_within_a_second_or_so_and_the_head_tells_the_map(self):
+        self.assertLess(float(self.browser.script('return document.documentElement.dataset.floorDrawn')), 10000)
+        self.assertIn('held-out images localized', self.browser.text('#summary'))
+        self.assertGreater(self.browser.script('return document.querySelectorAll("canvas.leaflet-layer").length'), 2)
+        self.browser.shot('floor.png')
+
+    def test_every_layer_can_be_switched_and_draws_something(self):
+        boxes = self.browser.driver.find_elements(By.CSS_SELECTOR, '#layers input')
+        names = [box.get_attribute('data-layer') for box in boxes]
+        for name in LAYERS_OF_EVERY_MAP + ['self-test errors', 'appearance graph', 'entropy', 'region adjacency']:
+            self.assertIn(name, names)
+        for box in boxes:
+            was_on = box.is_selected()
+            if was_on:
+                box.click()
+            off = self.browser.canvas_sums()
+            box.click()
+            on = self.browser.canvas_sums()
+            self.assertEqual(len(on), len(off) + 1, box.get_attribute('data-layer'))
+            self.assertGreater(on[-1], 0, box.get_attribute('data-layer'))
+            if not was_on:
+                box.click()
+        for box in boxes:
+            if not box.is_selected():
+                box.click()
+        self.browser.shot('all_layers.png')
+        for box, name in zip(boxes, names):
+            if box.is_selected() and name not in LAYERS_OF_EVERY_MAP:
+                box.click()
+
+    def test_a_click_on_a_station_and_on_a_region_explains_them(self):
+        station = self.browser.script('return R[0].stations[0]')
+        self.click_station(station)
+        text = self.browser.text('#explanation')
+        self.assertRegex(text, r'Station \d+')
+        self.assertIn('Dropped here', text)
+        self.assertIn('features in view', text)
+        self.browser.shot('station.png')
+        self.browser.driver.find_element(By.CSS_SELECTOR, '#explanation button').click()
+        text = self.browser.text('#explanation')
+        self.assertRegex(text, r'Region \d+')
+        self.assertIn('common landmarks', text)
+        self.assertIn('Self-test', text)
+        self.browser.shot('region.png')
+
+    def test_the_keyboard_finds_switches_moves_and_zooms(self):
+        query = self.browser.driver.find_element(By.ID, 'query')
+        query.clear()
+        query.send_keys('station 1', Keys.ENTER)
+        self.assertIn('Station 1', self.browser.text('#explanation'))
+        query.clear()
+        query.send_keys('region 0', Keys.ENTER)
+        self.assertIn('Region 0', self.browser.text('#explanation'))
+        query.clear()
+        query.send_keys('<b>no such place</b>', Keys.ENTER)
+        self.assertIn('<b>no such place</b>', self.browser.text('#explanation'))
+        box = self.browser.driver.find_element(By.CSS_SELECTOR, '#layers input')
+        before = box.is_selected()
+        box.send_keys(Keys.SPACE)
+        self.assertNotEqual(box.is_selected(), before)
+        box.send_keys(Keys.SPACE)
+        floor = self.browser.driver.find_element(By.ID, 'map')
+        zoom = self.browser.script('return map.getZoom()')
+        center = self.browser.script('return map.getCenter().lng')
+        floor.send_keys('+')
+        floor.send_keys(Keys.ARROW_RIGHT)
+        time.sleep(1)
+        self.assertGreater(self.browser.script('return map.getZoom()'), zoom)
+        self.assertGreater(self.browser.script('return map.getCenter().lng'), center)
+        floor.send_keys('-')
+
+    def test_the_line_the_figures_and_the_advice_are_there(self):
+        self.assertIn('into group_classes', self.browser.text('#stages'))
+        self.assertRegex(self.browser.text('#stages'), r'few_observations')
+        self.assertIn('check_map', self.browser.text('#stages'))  # of the build report beside the map
+        self.assertGreaterEqual(self.browser.script('return charts.length'), 4)
+        self.assertIn('localized_ratio', self.browser.text('#tables'))
+        self.assertTrue(self.browser.text('#advice'))
+        self.assertTrue(self.browser.script('return [...document.querySelectorAll("dfn")].every(node => node.title)'))
+
+    def test_dark_and_light(self):
+        ground = 'return getComputedStyle(document.body).backgroundColor'
+        light = self.browser.script(ground)
+        self.browser.driver.find_element(By.ID, 'theme').click()
+        self.assertNotEqual(self.browser.script(ground), light)
+        self.browser.shot('dark.png')
+        self.browser.driver.find_element(By.ID, 'theme').click()
+        self.assertEqual(self.browser.script(ground), light)
+
+
+class OtherPagesTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def look(self, page, name, size='1400,1000'):
+        browser = Browser(size)
+        self.addCleanup(browser.quit)
+        browser.open(page)
+        browser.shot(name)
+        return browser
+
+    def test_a_phone_shows_it_in_one_column(self):
+        browser = self.look(report(self.folder.name, MAP), 'phone.png', '400,850')
+        self.assertLessEqual(browser.script('return document.documentElement.scrollWidth'),
+                             browser.script('return window.innerWidth') + 1)
+        self.assertEqual(browser.problems(), [])
+
+    def test_maps_of_only_some_stages(self):
+        for name in ['map_2.0.cairn', 'map_2.2.cairn', 'map_2.3.cairn']:
+            browser = self.look(report(self.folder.name, os.path.join(GOLDEN, name)), name + '.png')
+            self.assertEqual(browser.problems(), [], name)
+            self.assertIn('self-test', browser.text('#tables').lower())
+
+    def test_names_with_markup_stay_text(self):
+        copy = os.path.join(self.folder.name, 'evil.cairn')
+        evil = '</script><script>document.title="taken"</script><img src=x onerror=alert(1)>'
+        make = subprocess.run([CAIRN_TEST_MAP, copy, evil], capture_output=True, text=True)
+        self.assertEqual(make.returncode, 0, make.stderr)
+        browser = self.look(report(self.folder.name, copy), 'markup.png')
+        self.assertEqual(browser.driver.title, evil)
+        self.assertEqual(browser.text('#name'), evil)
+        self.assertEqual(browser.script('return document.querySelectorAll("img").length'), 0)
+        browser.script('explainStation(0)')
+        self.assertIn('onerror', browser.text('#explanation'))
+        self.assertEqual(browser.problems(), [])
+
+    def test_an_empty_map(self):
+        copy = os.path.join(self.folder.name, 'empty.cairn')
+        subprocess.run([CAIRN_TEST_MAP, copy], check=True)
+        browser = self.look(report(self.folder.name, copy), 'empty.png')
+        self.assertEqual(browser.problems(), [])
+        self.assertIn('0 landmarks', browser.text('#summary'))
+        self.assertIn('no self-test', browser.text('#tables'))
+
+    def test_two_maps_on_one_floor(self):
+        small = os.path.join(GOLDEN, 'map_2.2.cairn')
+        page = report(self.folder.name, os.path.join(GOLDEN, 'map_2.3.cairn'), '--compare', small)
+        browser = self.look(page, 'compare.png')
+        self.assertIn('map_2.2.cairn', browser.text('#changes'))
+        self.assertEqual(browser.problems(), [])
+
+    def test_a_drive_is_replayed(self):
+        run = {'reached': True, 'start': {'x_m': 1, 'y_m': 0, 'heading_deg': 0},
+               'legs': [{'kind': 'explore', 'pose': {'x_m': 3, 'y_m': 0, 'heading_deg': 0},
+                         'steps': [{'pose': {'x_m': 1.5, 'y_m': 0, 'heading_deg': 0}},
+                                   {'pose': {'x_m': 2, 'y_m': 0.2, 'heading_deg': 10}}]}]}
+        path = os.path.join(self.folder.name, 'run.json')
+        pathlib.Path(path).write_text(json.dumps(run))
+        browser = self.look(report(self.folder.name, os.path.join(GOLDEN, 'map_2.3.cairn'), '--drive', path), 'drive.png')
+        self.assertEqual(browser.script('return Number(document.getElementById("time").max)'), 3)
+        browser.driver.find_element(By.ID, 'play').click()
+        time.sleep(1)
+        self.assertIn('3 of 3: explore', browser.text('#moment'))
+        self.assertEqual(browser.problems(), [])
+
+    def test_paper_needs_no_script(self):
+        page = report(self.folder.name, MAP, '--print', '--svg', os.path.join(self.folder.name, 'pictures'))
+        text = page.read_text()
+        self.assertNotIn('<script', text)
+        self.assertIn('<svg', text)
+        self.assertTrue(os.path.exists(os.path.join(self.folder.name, 'pictures', 'floor.svg')))
+
+    def test_a_map_that_verify_refuses_gets_no_report(self):
+        data = bytearray(pathlib.Path(MAP).read_bytes())
+        data[len(data) // 2] ^= 1
+        broken = os.path.join(self.folder.name, 'broken.cairn')
+        pathlib.Path(broken).write_bytes(data)
+        page = os.path.join(self.folder.name, 'broken.html')
+        run = subprocess.run([CAIRN, 'report', broken, '-o', page], capture_output=True, text=True)
+        self.assertEqual(run.returncode, 4)
+        self.assertIn('broken.cairn', run.stderr)
+        self.assertFalse(os.path.exists(page))
+
+    def test_other_files_are_refused_with_their_names(self):
+        path = os.path.join(self.folder.name, 'junk.json')
+        pathlib.Path(path).write_text('[1, 2')
+        for option in ['--build-report', '--check', '--drive']:
+            run = subprocess.run([CAIRN, 'report', MAP, '-o', path + '.html', option, path], capture_output=True, text=True)
+            self.assertEqual(run.returncode, 4)
+            self.assertRegex(run.stderr, re.escape(path))
+
+
+CAIRN_TEST_MAP = sys.argv[6]
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Compiles a small map with its self-test and opens its report in headless Chromium:
+#   run_report_test.sh CAIRN MAKE_MAP SOURCE_DIR WORK_DIR
+set -euo pipefail
+cairn=$1 make_map=$2 source=$3 work=$4
+for program in chromium chromedriver; do
+  command -v "$program" > /dev/null || { echo "$program is not installed: make deps"; exit 1; }
+done
+mkdir -p "$work"
+cd "$work"
+cat > tiny.toml <<'RECIPE'
+name = "tiny"
+[simulate]
+width_m = 5.5
+depth_m = 6
+num_rooms = 2
+spacing_m = 0.7
+image_width_px = 320
+image_height_px = 240
+texel_m = 0.008
+num_queries = 6
+[extract_features]
+max_num_features = 300
+[filter_visibility]
+survey = "driven"
+cell_size_m = 0.7
+heading_bin_deg = 90
+min_num_stations_driven = 2
+[decompose_regions]
+k = 4
+tau = 0
+RECIPE
+"$cairn" compile tiny.toml -o tiny.cairn --progress none
+"$cairn" check-map tiny.cairn --queries tiny.build/capture/queries.txt --json --progress none > check.json
+# Debian's Python, which has Debian's selenium.
+/usr/bin/python3 "$source/tests/report/report_test.py" "$cairn" "$source/tests/emit_map/golden" "$work/tiny.cairn" \
+  "$work/check.json" "$work/screenshots" "$make_map"
