@@ -100,8 +100,10 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   try {
-    // nfeatures = 0: OpenCV's own cap keeps ties in an order that is not ours to rely on.
-    cv::SIFT::create(0, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
+    // OpenCV's own cap keeps all that are as strong as the weakest kept: ours follows, in an order to rely
+    // on, but the rest is spared its descriptors.  OpenCV caps before it masks, so not with a mask.
+    const int cap = mask.empty() ? options.max_num_features : 0;
+    cv::SIFT::create(cap, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
         ->detectAndCompute(grey, mask, keypoints, descriptors);
   } catch (const cv::Exception& exception) {
     if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 namespace cairn {
 namespace {
@@ -60,6 +61,27 @@ TEST(ExtractSift, LargeImagesAreMadeSmallerAndTheirKeypointsLargerAgain) {
   }
   EXPECT_LT(least, 0.15);
   EXPECT_NEAR(nearest.scale, 6.0, 1.2);
+}
+
+TEST(ExtractSift, CappedFeaturesAreTheStrongestOfAllWithTies) {
+  // Equal tiles: features of equal strength, of which the cap may take some and leave others.
+  cv::Mat image;
+  cv::repeat(Blob(50, 40, 5), 3, 3, image);
+  const auto all = ExtractSift(image, {});
+  // A mask that hides nothing: OpenCV's own cap is not used.
+  const cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255));
+  const size_t count = all->keypoints.size();
+  ASSERT_GT(count, 9u);
+  for (const size_t cap : {size_t{1}, size_t{4}, size_t{9}, count / 2, count - 1, count}) {
+    const SiftOptions options{.max_num_features = static_cast<int>(cap)};
+    const auto capped = ExtractSift(image, options), expected = ExtractSift(image, options, mask);
+    ASSERT_EQ(capped->keypoints.size(), cap);
+    EXPECT_EQ(capped->descriptors, expected->descriptors);
+    for (size_t i = 0; i < cap; ++i) {
+      EXPECT_EQ(capped->keypoints[i].x, expected->keypoints[i].x);
+      EXPECT_EQ(capped->keypoints[i].y, expected->keypoints[i].y);
+    }
+  }
 }
 
 TEST(ExtractSift, TinyImagesHaveNoFeatures) {
