@@ -1,5 +1,6 @@
 #include "core/camera_turn.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -21,6 +22,11 @@ Eigen::Matrix3d CameraTurn(double left_rad, double up_rad, double clockwise_rad)
           Eigen::AngleAxisd(-up_rad, Eigen::Vector3d::UnitX()) *
           Eigen::AngleAxisd(left_rad, Eigen::Vector3d::UnitY()))
       .toRotationMatrix();
+}
+
+double RiseOf(const Eigen::Matrix<double, 3, 2>& gradient, double heading_rad) {
+  const Eigen::Vector2d right(std::sin(heading_rad), -std::cos(heading_rad));
+  return std::max(0.0, -gradient.row(0).dot(right));
 }
 
 }  // namespace cairn

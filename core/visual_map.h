@@ -25,7 +25,7 @@ struct LandmarkSight {
 struct HeadingModel {
   int32_t heading = 0;  // index in VisualMapData::headings_deg
   KernelShape shape;
-  // Root mean square errors of left-out sights: x px, y px, octaves of scale.
+  // Standard deviations of errors of left-out sights: x px, y px, octaves of scale.
   Eigen::Vector3d sigma = Eigen::Vector3d::Zero();
   bool predicts_badly = false;        // counts less
   std::vector<LandmarkSight> sights;  // ascending image, at least kMinNumSights

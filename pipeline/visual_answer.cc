@@ -10,6 +10,7 @@ nlohmann::ordered_json VisualJson(const VisualPose& pose) {
   }
   json["floor_m"] = {pose.position.x(), pose.position.y()};
   json["heading_deg"] = pose.heading_deg;
+  json["higher_m"] = pose.higher_m;
   json["covariance"] = std::vector<double>(pose.covariance.data(), pose.covariance.data() + 9);
   json["mean_m"] = {pose.mean.x(), pose.mean.y()};
   json["entropy"] = pose.entropy;

@@ -10,25 +10,25 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "core/camera_turn.h"
 #include "core/document_scores.h"
 #include "core/pose.h"
 #include "runtime/no_throw.h"
+#include "runtime/visual_refine.h"
 #include "runtime/visual_search.h"
 
 namespace cairn {
 namespace {
 
-constexpr int kNumPoseSteps = 10;
-// Best poses between places that are refined.
+// Maxima that are refined, and how far around one its points lie.
 constexpr int kNumRefined = 3;
+constexpr double kReachSpacings = 1.5;
 // Points per three standard deviations around the maximum that share out its probability.
 constexpr int kSpreadSteps = 7;
+// A survey is unsure of its own images when their landmarks' shared errors are larger than this part of its
+// spacing.
+constexpr double kUnsureSpacings = 0.25;
 // How much of the uniform distribution a posterior with a flag gets.
 constexpr double kFlaggedUniform = 0.5;
-
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
-using Vector5d = Eigen::Matrix<double, 5, 1>;
 
 class Estimator {
  public:
@@ -54,8 +54,8 @@ class Estimator {
                      fmt::format("{} matched landmarks, at least 2 are needed", pose.num_matches));
     }
     search_.Run();
+    const auto refined = Best(RefineMaxima());
     Normalise(&pose);
-    const auto refined = BestRefined();
     if (!refined) {
       return Flagged(std::move(pose), VisualFlag::kDisagree, "no place explains two matches");
     }
@@ -65,15 +65,6 @@ class Estimator {
   }
 
  private:
-  struct Refined {
-    VisualHypothesis start;
-    Eigen::Vector2d position;
-    Turn turn;
-    double log_ratio = 0;
-    Eigen::Matrix3d covariance;  // x, y, heading
-    std::vector<int> agreeing;   // matches
-  };
-
   int NumLandmarks() const {
     std::vector<LandmarkIdx> landmarks;
     for (const SeenLandmark& match : seen_) landmarks.push_back(match.landmark);
@@ -110,75 +101,70 @@ class Estimator {
     return std::exp(hypothesis.log_mass - log_sum_);
   }
 
-  std::optional<Refined> BestRefined() const {
+  // The most likely maxima, each refined from the best point around it; their masses are those of the search,
+  // or what Laplace makes of the maximum itself where that is more: points lie too far apart for sharp ones.
+  std::vector<RefinedPose> RefineMaxima() {
     const std::vector<VisualHypothesis>& hypotheses = search_.hypotheses();
     std::vector<size_t> order(hypotheses.size() - search_.first_point());
     std::iota(order.begin(), order.end(), search_.first_point());
     std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
       return std::pair(-hypotheses[a].log_mass, a) < std::pair(-hypotheses[b].log_mass, b);
     });
-    std::optional<Refined> best;
+    std::vector<RefinedPose> maxima;
     std::vector<std::pair<int32_t, int32_t>> tried;
     for (const size_t i : order) {
       const std::pair place(hypotheses[i].place, hypotheses[i].heading);
+      const Eigen::Vector2d at = map_.places()[place.first] + hypotheses[i].offset;
       if (std::find(tried.begin(), tried.end(), place) != tried.end()) continue;
+      if (std::any_of(maxima.begin(), maxima.end(), [&](const RefinedPose& other) {
+            return other.start.heading == place.second && IsAround(other, at);
+          }))
+        continue;
       if (static_cast<int>(tried.size()) == kNumRefined) break;
       tried.push_back(place);
-      const auto refined = Refine(hypotheses[i]);
-      if (refined && (!best || refined->log_ratio > best->log_ratio)) best = refined;
+      if (auto refined = RefineFromNearest(hypotheses[i])) maxima.push_back(std::move(*refined));
     }
-    return best;
+    for (const RefinedPose& refined : maxima)
+      search_.AddMissingMass(PointAt(refined), kReachSpacings * map_.spacing_m());
+    return maxima;
   }
 
-  // Gauss-Newton over place and turn with the models themselves.
-  std::optional<Refined> Refine(const VisualHypothesis& start) const {
-    const std::vector<VisualTerm>& terms = search_.TermsOf(start);
-    const double tilt_weight = 1 / (search_.fit().tilt_sigma_rad * search_.fit().tilt_sigma_rad);
-    Refined refined{
-        .start = start, .position = map_.places()[start.place] + start.offset, .turn = start.turn};
-    for (int step = 0;; ++step) {
-      const bool is_last = step == kNumPoseSteps;
-      const Turn& turn = refined.turn;
-      const Eigen::Matrix3d rotation = CameraTurn(turn.left, turn.up, turn.clockwise);
-      Matrix5d normal = Vector5d(1e-4, 1e-4, 1, tilt_weight, tilt_weight).asDiagonal();
-      Vector5d gradient(0, 0, 0, tilt_weight * turn.up, tilt_weight * turn.clockwise);
-      refined.log_ratio = -0.5 * tilt_weight * (turn.up * turn.up + turn.clockwise * turn.clockwise);
-      refined.agreeing.clear();
-      for (const VisualTerm& term : terms) {
-        const LandmarkModel::Prediction prediction = term.model->interpolation.Predict(refined.position);
-        const FitItem item =
-            search_.MakeItem(term, prediction.seen, map_.Variance(*term.model, refined.position));
-        Eigen::Vector3d error;
-        Eigen::Matrix3d by_turn;
-        if (!ItemError(item, rotation, search_.fit().focal_px, &error, &by_turn)) continue;
-        const ItemScore score = ScoreItem(item, error);
-        refined.log_ratio += score.log_ratio;
-        if (score.weight > 0.5) refined.agreeing.push_back(term.match);
-        Eigen::Matrix<double, 3, 5> jacobian;
-        jacobian << TurnGradient(item.predicted, rotation, search_.fit().focal_px) * prediction.gradient,
-            by_turn;
-        const Eigen::Vector3d weight = score.weight * item.variance.cwiseInverse();
-        normal += jacobian.transpose() * weight.asDiagonal() * jacobian;
-        gradient += jacobian.transpose() * weight.asDiagonal() * error;
-      }
-      const Matrix5d inverse = normal.inverse();
-      if (!inverse.allFinite()) return std::nullopt;
-      if (is_last) {
-        const double shared_m = std::hypot(options_.shared_sigma_m, map_.errors().shared_m);
-        const double shared_rad = std::hypot(RadFromDeg(options_.shared_sigma_deg), map_.errors().shared_rad);
-        refined.covariance = inverse.topLeftCorner<3, 3>();
-        refined.covariance.diagonal() +=
-            Eigen::Vector3d(shared_m * shared_m, shared_m * shared_m, shared_rad * shared_rad);
-        return refined;
-      }
-      Vector5d change = -(inverse * gradient);
-      const double way_m = change.head<2>().norm();
-      if (way_m > map_.spacing_m()) change *= map_.spacing_m() / way_m;
-      refined.position += change.head<2>();
-      refined.turn.left += change[2];
-      refined.turn.up = std::clamp(refined.turn.up + change[3], -0.5, 0.5);
-      refined.turn.clockwise = std::clamp(refined.turn.clockwise + change[4], -0.5, 0.5);
-    }
+  VisualHypothesis PointAt(const RefinedPose& refined) const {
+    const int32_t place = NearestPlace(refined.position);
+    return {.place = place,
+            .heading = refined.start.heading,
+            .offset = refined.position - map_.places()[place],
+            .turn = refined.turn,
+            .log_mass = refined.log_mass};
+  }
+
+  // With the models that extend to where it ends: again where that is nearer to another place.
+  std::optional<RefinedPose> RefineFromNearest(const VisualHypothesis& start) const {
+    auto refined = RefinePose(map_, search_, start);
+    if (!refined) return refined;
+    const VisualHypothesis end = PointAt(*refined);
+    if (end.place == start.place) return refined;
+    auto again = RefinePose(map_, search_, end);
+    return again && again->log_density > refined->log_density ? again : refined;
+  }
+
+  bool IsAround(const RefinedPose& refined, const Eigen::Vector2d& at) const {
+    return (at - refined.position).norm() <= kReachSpacings * map_.spacing_m();
+  }
+
+  // The maximum with what landmarks' errors share.
+  std::optional<RefinedPose> Best(std::vector<RefinedPose> maxima) const {
+    const auto best = std::max_element(
+        maxima.begin(), maxima.end(),
+        [](const RefinedPose& a, const RefinedPose& b) { return a.log_density < b.log_density; });
+    if (best == maxima.end()) return std::nullopt;
+    const double growth = SharedGrowth(SpreadRatio(best->agreeing));
+    const double shared_m = std::hypot(options_.shared_sigma_m, growth * map_.errors().shared_m);
+    const double shared_rad =
+        std::hypot(RadFromDeg(options_.shared_sigma_deg), growth * map_.errors().shared_rad);
+    best->covariance.diagonal() +=
+        Eigen::Vector3d(shared_m * shared_m, shared_m * shared_m, shared_rad * shared_rad);
+    return *best;
   }
 
   int32_t NearestPlace(const Eigen::Vector2d& at) const {
@@ -192,11 +178,11 @@ class Estimator {
 
   // What the points around the maximum have of the posterior is shared out anew among the places, as the
   // normal distribution of the refined pose says: the points are too far apart to do so.
-  void SpreadAround(const Refined& refined, VisualPose* pose) const {
+  void SpreadAround(const RefinedPose& refined, VisualPose* pose) const {
     const int32_t heading = refined.start.heading;
     double mass = 0;
     for (int32_t place = 0; place < num_places_; ++place) {
-      if ((map_.places()[place] - refined.position).norm() > 1.5 * map_.spacing_m()) continue;
+      if (!IsAround(refined, map_.places()[place])) continue;
       mass += pose->at_heading[place][heading];
       pose->at_place[place] -= pose->at_heading[place][heading];
       pose->at_heading[place][heading] = 0;
@@ -224,8 +210,10 @@ class Estimator {
     for (double& share : pose->at_place) share = std::max(share, 0.0);
   }
 
-  void FillPose(const Refined& refined, VisualPose* pose) const {
+  void FillPose(const RefinedPose& refined, VisualPose* pose) const {
     pose->position = refined.position;
+    pose->higher_m = refined.turn.higher_m;
+    pose->spread_ratio = SpreadRatio(refined.agreeing);
     const double heading_deg = map_.headings_deg()[refined.start.heading] + DegFromRad(refined.turn.left);
     pose->heading_deg = heading_deg - 360 * std::floor(heading_deg / 360);
     std::vector<int> agreeing = refined.agreeing;
@@ -284,26 +272,27 @@ class Estimator {
     pose->position = pose->mean;
   }
 
-  VisualPose Judge(const Refined& refined, VisualPose pose) const {
+  VisualPose Judge(const RefinedPose& refined, VisualPose pose) const {
     // Matches that could agree with it.
     const VisualHypothesis found{.place = NearestPlace(pose.position), .heading = refined.start.heading};
-    const auto num_possible =
-        static_cast<double>(std::max(search_.TermsOf(found).size(), search_.TermsOf(refined.start).size()));
-    if (pose.num_agreeing < options_.min_num_agreeing || pose.elsewhere > 0.5 ||
-        pose.num_agreeing < options_.min_agreeing_ratio * num_possible) {
+    pose.num_possible =
+        static_cast<int>(std::max(search_.TermsOf(found).size(), search_.TermsOf(refined.start).size()));
+    const int num_needed = map_.errors().shared_m > kUnsureSpacings * map_.spacing_m()
+                               ? std::max(options_.min_num_agreeing, options_.min_num_agreeing_unsure)
+                               : options_.min_num_agreeing;
+    if (pose.num_agreeing < num_needed || pose.elsewhere > 0.5 ||
+        pose.num_agreeing < options_.min_agreeing_ratio * pose.num_possible) {
       return Flagged(std::move(pose), VisualFlag::kDisagree,
                      fmt::format("{} of {} matches that could agree with the best pose do, at least {} and "
                                  "{:.0f} % are needed; elsewhere with a probability of {:.2g}",
-                                 pose.num_agreeing, num_possible, options_.min_num_agreeing,
+                                 pose.num_agreeing, pose.num_possible, num_needed,
                                  100 * options_.min_agreeing_ratio, pose.elsewhere));
     }
-    const double spread_px = SpreadOf(refined.agreeing);
-    const double needed_px =
-        options_.min_spread_ratio * std::hypot(map_.image_width_px(), map_.image_height_px());
-    if (spread_px < needed_px) {
+    if (pose.spread_ratio < options_.min_spread_ratio) {
+      const double diagonal_px = DiagonalPx();
       return Flagged(std::move(pose), VisualFlag::kOneSpot,
                      fmt::format("the landmarks lie {:.0f} px apart, at least {:.0f} px are needed",
-                                 spread_px, needed_px));
+                                 pose.spread_ratio * diagonal_px, options_.min_spread_ratio * diagonal_px));
     }
     const double nearest_m = (map_.places()[found.place] - pose.position).norm();
     const double farthest_m = options_.max_distance_spacings * map_.spacing_m();
@@ -315,13 +304,15 @@ class Estimator {
     return pose;
   }
 
-  // Root mean square distance from the middle of these matches in the query.
-  double SpreadOf(const std::vector<int>& matches) const {
+  double DiagonalPx() const { return std::hypot(map_.image_width_px(), map_.image_height_px()); }
+
+  // Root mean square distance from the middle of these matches in the query, as part of the diagonal.
+  double SpreadRatio(const std::vector<int>& matches) const {
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for (const int match : matches) mean += seen_[match].seen.head<2>() / static_cast<double>(matches.size());
     double sum = 0;
     for (const int match : matches) sum += (seen_[match].seen.head<2>() - mean).squaredNorm();
-    return std::sqrt(sum / static_cast<double>(std::max<size_t>(matches.size(), 1)));
+    return std::sqrt(sum / static_cast<double>(std::max<size_t>(matches.size(), 1))) / DiagonalPx();
   }
 
   VisualPose Flagged(VisualPose pose, VisualFlag flag, std::string message) const {
@@ -377,6 +368,11 @@ Status CheckInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
 }
 
 }  // namespace
+
+double SharedGrowth(double spread_ratio) {
+  const double ratio = kFullSpreadRatio / std::max(spread_ratio, 1e-3);
+  return std::max(1.0, ratio * ratio);
+}
 
 Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                                       const VisualEstimateOptions& options,

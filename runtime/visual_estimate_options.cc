@@ -11,6 +11,8 @@ OptionTable DescribeOptions(VisualEstimateOptions* o) {
       {"tilt_sigma_deg", &o->tilt_sigma_deg,
        "visual map: standard deviation of the camera's pitch and roll against the survey's, degrees", 1e-3,
        45},
+      {"height_sigma_m", &o->height_sigma_m,
+       "visual map: standard deviation of the camera's height beside what the survey's have, metres", 1e-4},
       {"heading_margin_deg", &o->heading_margin_deg,
        "visual map: headings count this far beyond half way to the next of the survey, degrees", 0, 90},
       {"num_refined_places", &o->num_refined_places,
@@ -29,7 +31,11 @@ OptionTable DescribeOptions(VisualEstimateOptions* o) {
       {"min_spread_ratio", &o->min_spread_ratio,
        "visual map: least spread of them in the image, as part of its diagonal", 0, 1},
       {"max_distance_spacings", &o->max_distance_spacings,
-       "visual map: farthest from the survey without a flag, in its spacings", 0}};
+       "visual map: farthest from the survey without a flag, in its spacings", 0},
+      {"min_num_agreeing_unsure", &o->min_num_agreeing_unsure,
+       "visual map: least matches that agree where left-out images of the survey are off by more than a "
+       "quarter of its spacing",
+       0}};
 }
 
 const char* VisualFlagName(VisualFlag flag) {

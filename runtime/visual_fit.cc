@@ -28,14 +28,20 @@ ItemScore ScoreItem(const FitItem& item, const Eigen::Vector3d& error) {
   return {std::log1p(odds), odds / (1 + odds)};
 }
 
-bool ItemError(const FitItem& item, const Eigen::Matrix3d& turn, double focal_px, Eigen::Vector3d* error,
-               Eigen::Matrix3d* jacobian) {
-  const auto shown = TurnedSight(item.predicted, turn, focal_px);
+Eigen::Vector3d LiftedPrediction(const FitItem& item, double higher_m) {
+  return item.predicted + Eigen::Vector3d(0, item.rise * higher_m, 0);
+}
+
+bool ItemError(const FitItem& item, const Eigen::Matrix3d& turn, double higher_m, double focal_px,
+               Eigen::Vector3d* error, Eigen::Matrix<double, 3, 4>* jacobian) {
+  const Eigen::Vector3d lifted = LiftedPrediction(item, higher_m);
+  const auto shown = TurnedSight(lifted, turn, focal_px);
   if (!shown) return false;
   *error = *shown - item.seen;
   const double x = shown->x() / focal_px, y = shown->y() / focal_px;
-  *jacobian << 1 + x * x, x * y, y, x * y, 1 + y * y, -x, 0, 0, 0;
-  *jacobian *= focal_px;
+  jacobian->leftCols<3>() << 1 + x * x, x * y, y, x * y, 1 + y * y, -x, 0, 0, 0;
+  jacobian->leftCols<3>() *= focal_px;
+  jacobian->col(3) = item.rise * TurnGradient(lifted, turn, focal_px).col(1);
   return true;
 }
 
@@ -68,20 +74,28 @@ double VoteForLeft(const std::vector<FitItem>& items, const TurnFitOptions& opti
   return around(votes, best) > 0 ? around(sums, best) / around(votes, best) : 0;
 }
 
+double LogTurnPrior(const TurnFitOptions& options) {
+  return -2.5 * std::log(2 * std::numbers::pi) - 2 * std::log(options.tilt_sigma_rad) -
+         std::log(options.height_sigma_m);
+}
+
 double FitTurn(const std::vector<FitItem>& items, const TurnFitOptions& options, int num_steps, Turn* turn) {
   const double tilt_weight = 1 / (options.tilt_sigma_rad * options.tilt_sigma_rad);
-  const Eigen::Vector3d prior_weight(1 / (kWidestTurnRad * kWidestTurnRad), tilt_weight, tilt_weight);
+  const double height_weight = 1 / (options.height_sigma_m * options.height_sigma_m);
+  const Eigen::Vector4d weights(0, tilt_weight, tilt_weight, height_weight);
+  const Eigen::Vector4d least(1 / (kWidestTurnRad * kWidestTurnRad), 0, 0, 0);
   for (int step = 0;; ++step) {
     const Eigen::Matrix3d rotation = CameraTurn(turn->left, turn->up, turn->clockwise);
     const bool is_last = step == num_steps;
     const double scale = step == 0 && !is_last ? kFirstStepScale : 1;
-    Eigen::Matrix3d normal = prior_weight.asDiagonal();
-    Eigen::Vector3d gradient(0, tilt_weight * turn->up, tilt_weight * turn->clockwise);
-    double log_ratio = -0.5 * tilt_weight * (turn->up * turn->up + turn->clockwise * turn->clockwise);
+    const Eigen::Vector4d at(turn->left, turn->up, turn->clockwise, turn->higher_m);
+    Eigen::Matrix4d normal = (weights + least).asDiagonal();
+    Eigen::Vector4d gradient = weights.cwiseProduct(at);
+    double log_ratio = -0.5 * gradient.dot(at);
     Eigen::Vector3d error;
-    Eigen::Matrix3d jacobian;
+    Eigen::Matrix<double, 3, 4> jacobian;
     for (const FitItem& item : items) {
-      if (!ItemError(item, rotation, options.focal_px, &error, &jacobian)) continue;
+      if (!ItemError(item, rotation, turn->higher_m, options.focal_px, &error, &jacobian)) continue;
       const ItemScore score = ScoreItem(item, error / scale);
       log_ratio += score.log_ratio;
       if (score.weight < 1e-6) continue;
@@ -90,15 +104,14 @@ double FitTurn(const std::vector<FitItem>& items, const TurnFitOptions& options,
       gradient += jacobian.transpose() * weight.asDiagonal() * error;
     }
     if (is_last) {
-      const double log_prior =
-          -std::log(2 * std::numbers::pi) + std::log(tilt_weight / (2 * std::numbers::pi));
-      return log_ratio + log_prior + 1.5 * std::log(2 * std::numbers::pi) -
+      return log_ratio + LogTurnPrior(options) + 2 * std::log(2 * std::numbers::pi) -
              0.5 * std::log(normal.determinant());
     }
-    const Eigen::Vector3d change = -normal.ldlt().solve(gradient);
+    const Eigen::Vector4d change = -normal.ldlt().solve(gradient);
     turn->left = std::clamp(turn->left + change[0], -options.max_left_rad, options.max_left_rad);
     turn->up = std::clamp(turn->up + change[1], -0.5, 0.5);
     turn->clockwise = std::clamp(turn->clockwise + change[2], -0.5, 0.5);
+    turn->higher_m += change[3];
   }
 }
 

@@ -8,9 +8,11 @@
 
 namespace cairn {
 
-// How a camera at a place is turned against the survey's: to the left, up, and clockwise, radians.
+// How a camera at a place is held against the survey's: turned to the left, up, and clockwise, radians, and
+// held higher, metres.
 struct Turn {
   double left = 0, up = 0, clockwise = 0;
+  double higher_m = 0;
 };
 
 // A match as one place and heading of the survey sees it; positions relative to the image's middle, px.
@@ -18,6 +20,7 @@ struct FitItem {
   Eigen::Vector3d seen;       // in the query
   Eigen::Vector3d predicted;  // with the survey's heading
   Eigen::Vector3d variance;
+  double rise = 0;  // d predicted.y / d height of the camera, px / m
   // ln of the odds that it is right, before its error: ((1 - o) / o) * N(0) / U.
   double log_odds = 0;
   int match = -1;  // whose it is
@@ -26,6 +29,7 @@ struct FitItem {
 struct TurnFitOptions {
   double focal_px = 1;
   double tilt_sigma_rad = 0.03;
+  double height_sigma_m = 0.05;
   double max_left_rad = 1;  // either way
 };
 
@@ -36,9 +40,13 @@ struct ItemScore {
 };
 ItemScore ScoreItem(const FitItem& item, const Eigen::Vector3d& error);
 
-// The error of an item under a turn, and d error / d (left, up, clockwise).  False where it is out of sight.
-bool ItemError(const FitItem& item, const Eigen::Matrix3d& turn, double focal_px, Eigen::Vector3d* error,
-               Eigen::Matrix3d* jacobian);
+// What is predicted for a camera that is held higher.
+Eigen::Vector3d LiftedPrediction(const FitItem& item, double higher_m);
+
+// The error of an item seen by a camera that is held higher and turned, and d error / d (left, up, clockwise,
+// higher).  False where it is out of sight.
+bool ItemError(const FitItem& item, const Eigen::Matrix3d& turn, double higher_m, double focal_px,
+               Eigen::Vector3d* error, Eigen::Matrix<double, 3, 4>* jacobian);
 
 // d (as seen after the turn) / d predicted; the scale's own change is left out.
 Eigen::Matrix3d TurnGradient(const Eigen::Vector3d& predicted, const Eigen::Matrix3d& turn, double focal_px);
@@ -46,9 +54,12 @@ Eigen::Matrix3d TurnGradient(const Eigen::Vector3d& predicted, const Eigen::Matr
 // The turn to the left that most items ask for, by votes in bins of 2 degrees.  Nothing to find: 0.
 double VoteForLeft(const std::vector<FitItem>& items, const TurnFitOptions& options);
 
+// ln of the prior density of turns and heights without its exponents: headings are uniform over the circle,
+// tilt and height normal.
+double LogTurnPrior(const TurnFitOptions& options);
+
 // Improves a turn by `num_steps` of iteratively reweighted least squares, and returns ln of the integral over
-// turns of prior times the product of the items' ratios, by Laplace: headings uniform over the circle, tilt
-// normal.
+// turns and heights of prior times the product of the items' ratios, by Laplace.
 double FitTurn(const std::vector<FitItem>& items, const TurnFitOptions& options, int num_steps, Turn* turn);
 
 }  // namespace cairn

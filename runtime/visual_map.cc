@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
+#include "core/camera_turn.h"
 #include "core/deciles.h"
 #include "core/descriptor_matcher.h"
 #include "core/floor_pose.h"
@@ -45,6 +47,15 @@ double MedianSpacing(const std::vector<Eigen::Vector2d>& places) {
   return nearest.size() < 2 ? 1 : Median(nearest);
 }
 
+double Deviation(const std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto count = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / count;
+  double sum = 0;
+  for (const double value : values) sum += (value - mean) * (value - mean);
+  return std::sqrt(sum / count);
+}
+
 Result<VisualSurvey> SurveyOf(const Map& map, CameraId camera_id) {
   VisualSurvey survey;
   const auto camera = std::find_if(map.head().cameras.begin(), map.head().cameras.end(),
@@ -62,11 +73,14 @@ Result<VisualSurvey> SurveyOf(const Map& map, CameraId camera_id) {
   }
   survey.places = DistinctPlaces(stations);
   const Pose given_from_camera = map.head().camera_from_given.Inverse();
+  const Pose& floor_from_world = map.head().floor_from_world;
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
-    for (const MapImage& image : block->images)
-      survey.images.push_back(
-          FloorPoseOf(given_from_camera * image.cam_from_world, map.head().floor_from_world).position);
+    for (const MapImage& image : block->images) {
+      const Pose cam_from_world = given_from_camera * image.cam_from_world;
+      survey.images.push_back(FloorPoseOf(cam_from_world, floor_from_world).position);
+      survey.heights_m.push_back((floor_from_world * cam_from_world.Center()).z());
+    }
   }
   return survey;
 }
@@ -118,6 +132,7 @@ Result<std::shared_ptr<VisualMap>> VisualMap::MakeMutable(const VisualMapData& d
   visual->options_ = options;
   visual->survey_ = std::move(survey);
   visual->spacing_m_ = MedianSpacing(visual->places());
+  visual->height_sigma_m_ = Deviation(visual->survey_.heights_m);
   visual->has_learnt_focal_ = data.focal_px > 0;
   visual->focal_px_ = data.focal_px > 0
                           ? data.focal_px
@@ -174,7 +189,8 @@ void VisualMap::FillExtent(Model* model) const {
         [&](const Eigen::Vector2d& sight) { return (sight - places()[place]).norm() <= reach_m; });
     if (!is_near) continue;
     const LandmarkModel::Prediction prediction = model->interpolation.Predict(places()[place]);
-    model->extent.push_back({place, prediction.seen, prediction.gradient, Variance(*model, places()[place])});
+    model->extent.push_back({place, prediction.seen, prediction.gradient, Variance(*model, places()[place]),
+                             RiseOf(prediction.gradient, RadFromDeg(headings_deg_[model->heading]))});
   }
 }
 

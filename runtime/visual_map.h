@@ -39,6 +39,7 @@ struct SeenLandmark {
 struct VisualSurvey {
   std::vector<Eigen::Vector2d> places;  // the pose lattice, each place once; floor frame, metres
   std::vector<Eigen::Vector2d> images;  // where each image of the map was taken
+  std::vector<double> heights_m;        // and how high; empty: all as high as each other
   int width_px = 0, height_px = 0;      // of the images
 };
 
@@ -54,6 +55,7 @@ class VisualMap {
     Eigen::Vector3d seen;                  // from the image's middle
     Eigen::Matrix<double, 3, 2> gradient;  // d seen / d place, per metre
     Eigen::Vector3d variance;              // of seen
+    double rise = 0;                       // d seen.y / d height of the camera, px / m
   };
   struct Model {
     LandmarkIdx landmark = 0;
@@ -82,6 +84,8 @@ class VisualMap {
   double focal_px() const { return focal_px_; }
   bool has_learnt_focal() const { return has_learnt_focal_; }
   const VisualErrors& errors() const { return errors_; }
+  // Standard deviation of the survey's cameras' heights, m.
+  double height_sigma_m() const { return height_sigma_m_; }
   // Size of the images that it is for.
   int image_width_px() const { return survey_.width_px; }
   int image_height_px() const { return survey_.height_px; }
@@ -106,6 +110,7 @@ class VisualMap {
 
   VisualMapOptions options_;
   VisualSurvey survey_;
+  double height_sigma_m_ = 0;
   double spacing_m_ = 0;
   std::vector<double> headings_deg_;
   double focal_px_ = 0;

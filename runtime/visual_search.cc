@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/camera_turn.h"
 #include "core/pose.h"
 
 namespace cairn {
@@ -21,6 +22,7 @@ VisualSearch::VisualSearch(const VisualMap& map, const std::vector<SeenLandmark>
     : map_(map), seen_(seen), options_(options), log_prior_(log_prior) {
   fit_.focal_px = map.focal_px();
   fit_.tilt_sigma_rad = std::hypot(RadFromDeg(options.tilt_sigma_deg), map.errors().tilt_rad);
+  fit_.height_sigma_m = std::hypot(options.height_sigma_m, map.height_sigma_m());
   const double half_step_deg = 180.0 / static_cast<double>(map.headings_deg().size());
   fit_.max_left_rad = RadFromDeg(options.heading_margin_deg + (map.has_learnt_focal() ? half_step_deg : 0));
 }
@@ -41,6 +43,22 @@ void VisualSearch::Run() {
   Subdivide();
 }
 
+void VisualSearch::AddMissingMass(VisualHypothesis point, double reach_m) {
+  const auto position = [&](const VisualHypothesis& of) {
+    return Eigen::Vector2d(map_.places()[of.place] + of.offset);
+  };
+  // Of the point's mass.
+  double share = 0;
+  for (const VisualHypothesis& other : hypotheses_) {
+    if (other.heading == point.heading && (position(other) - position(point)).norm() <= reach_m)
+      share += std::exp(other.log_mass - point.log_mass);
+  }
+  // A maximum may end nearest to a place that the prior excludes.
+  if (!(share < 1) || !std::isfinite(log_prior_[point.place])) return;
+  point.log_mass += std::log1p(-share);
+  hypotheses_.push_back(point);
+}
+
 void VisualSearch::FindTerms() {
   terms_.assign(map_.places().size() * map_.headings_deg().size(), {});
   for (int match = 0; match < static_cast<int>(seen_.size()); ++match) {
@@ -58,19 +76,27 @@ const std::vector<VisualTerm>& VisualSearch::TermsOf(const VisualHypothesis& hyp
 }
 
 FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const {
-  return MakeItem(term, term.at->seen + term.at->gradient * offset, term.at->variance,
-                  spread_m * spread_m * term.at->gradient.rowwise().squaredNorm());
+  return MakeItem(term, term.at->seen + term.at->gradient * offset,
+                  term.at->variance + spread_m * spread_m * term.at->gradient.rowwise().squaredNorm(),
+                  term.at->rise);
+}
+
+FitItem VisualSearch::MakeItem(const VisualTerm& term, const LandmarkModel::Prediction& prediction,
+                               const Eigen::Vector2d& position) const {
+  return MakeItem(term, prediction.seen, map_.Variance(*term.model, position),
+                  RiseOf(prediction.gradient, RadFromDeg(map_.headings_deg()[term.model->heading])));
 }
 
 FitItem VisualSearch::MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted,
-                               const Eigen::Vector3d& variance, const Eigen::Vector3d& spread) const {
+                               const Eigen::Vector3d& variance, double rise) const {
   const double px = options_.visual_sigma_px, octaves = options_.visual_sigma_octaves;
   FitItem item;
   item.match = term.match;
   item.seen = seen_[term.match].seen;
   item.seen.head<2>() -= map_.middle_px();
   item.predicted = predicted;
-  item.variance = variance + Eigen::Vector3d(px * px, px * px, octaves * octaves) + spread;
+  item.rise = rise;
+  item.variance = variance + Eigen::Vector3d(px * px, px * px, octaves * octaves);
   item.log_odds = LogOdds(*term.model, item.variance);
   return item;
 }
@@ -88,9 +114,12 @@ void VisualSearch::Gather(const VisualHypothesis& hypothesis, double spread_m) {
     items_.push_back(MakeItem(term, hypothesis.offset, spread_m));
 }
 
+double VisualSearch::LogMassWithoutMatches(int32_t place) const {
+  return log_prior_[place] + std::log(options_.outlier_ratio) * static_cast<double>(seen_.size());
+}
+
 void VisualSearch::Fit(double log_share, VisualHypothesis* hypothesis) const {
-  const double log_no_match = std::log(options_.outlier_ratio) * static_cast<double>(seen_.size());
-  hypothesis->log_mass = log_prior_[hypothesis->place] + log_no_match + log_share +
+  hypothesis->log_mass = LogMassWithoutMatches(hypothesis->place) + log_share +
                          FitTurn(items_, fit_, kNumTurnSteps, &hypothesis->turn);
 }
 

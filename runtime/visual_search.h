@@ -36,21 +36,28 @@ class VisualSearch {
 
   // O(matches * places * headings).
   void Run();
+  // Adds a point with what the hypotheses of its heading up to `reach_m` around it lack of its mass together.
+  void AddMissingMass(VisualHypothesis point, double reach_m);
 
   // Places and headings, then, from first_point() on, points around the best of them, which these replace.
   const std::vector<VisualHypothesis>& hypotheses() const { return hypotheses_; }
   size_t first_point() const { return first_point_; }
+  // ln of a place's mass if no match were right.
+  double LogMassWithoutMatches(int32_t place) const;
   const TurnFitOptions& fit() const { return fit_; }
 
   const std::vector<VisualTerm>& TermsOf(const VisualHypothesis& hypothesis) const;
   // `offset`: from the term's place, metres; `spread_m`: the item stands for points this far around, standard
   // deviation per axis.
   FitItem MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const;
-  // Of what the term's model says anywhere; `spread`: variance for the points that the item stands for.
-  FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted, const Eigen::Vector3d& variance,
-                   const Eigen::Vector3d& spread = Eigen::Vector3d::Zero()) const;
+  // Of what the term's model says at a position.
+  FitItem MakeItem(const VisualTerm& term, const LandmarkModel::Prediction& prediction,
+                   const Eigen::Vector2d& position) const;
 
  private:
+  // `variance`: of the model and for the points that the item stands for.
+  FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted, const Eigen::Vector3d& variance,
+                   double rise) const;
   double LogOdds(const VisualMap::Model& model, const Eigen::Vector3d& variance) const;
   // Fills items_; `spread_m` as MakeItem's.
   void Gather(const VisualHypothesis& hypothesis, double spread_m);

@@ -13,10 +13,10 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "bench/visual_map/pictures.h"
 #include "core/capture.h"
+#include "core/command.h"
 #include "core/deciles.h"
 #include "core/file.h"
 #include "core/floor_pose.h"
@@ -32,11 +32,11 @@ struct Arguments {
   std::vector<std::string> maps;
   std::string queries;
   std::string pictures;
-  int max_num_features = 450;
+  SiftOptions sift{.max_num_features = 450};
   double uniform_weight = 0.1;
   VisualMapOptions map_options;
   VisualEstimateOptions estimate_options;
-  bool is_halved = false;
+  OptionArguments option_arguments;
   bool print_all = false;
 };
 
@@ -68,34 +68,23 @@ struct TestImage {
   Query query;
   FloorPose truth;
   Pose cam_from_world;
-  bool is_inside = false;  // of the survey's hull
+  double out_m = 0;  // of the hull of the survey's places
+  bool is_inside() const { return out_m <= 0; }
   double feature_seconds = 0;
 };
 
-// Whether a point lies in the convex hull of others: no direction has it beyond them all.
-bool IsInHull(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& at) {
+// How far a point lies out of the convex hull of others, metres; below zero within: the most that any
+// direction has it beyond them all.
+double MetresOutOfHull(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& at) {
+  double out_m = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < 720; ++i) {
     const Eigen::Vector2d direction(std::cos(i * 3.14159265358979 / 360),
                                     std::sin(i * 3.14159265358979 / 360));
     double farthest = -std::numeric_limits<double>::infinity();
     for (const Eigen::Vector2d& point : points) farthest = std::max(farthest, direction.dot(point));
-    if (direction.dot(at) > farthest) return false;
+    out_m = std::max(out_m, direction.dot(at) - farthest);
   }
-  return true;
-}
-
-Result<Features> ExtractFeatures(const cv::Mat& grey, const Arguments& arguments) {
-  if (!arguments.is_halved) return ExtractSift(grey, {.max_num_features = arguments.max_num_features});
-  cv::Mat half;
-  cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  CAIRN_ASSIGN_OR_RETURN(Features features,
-                         ExtractSift(half, {.max_num_features = arguments.max_num_features}));
-  for (Keypoint& keypoint : features.keypoints) {
-    keypoint.x *= 2;
-    keypoint.y *= 2;
-    keypoint.scale *= 2;
-  }
-  return features;
+  return out_m;
 }
 
 Result<std::vector<TestImage>> ReadTestImages(const Arguments& arguments, const Map& map,
@@ -113,12 +102,12 @@ Result<std::vector<TestImage>> ReadTestImages(const Arguments& arguments, const 
     TestImage& test = images.emplace_back();
     test.name = image.name;
     const double start = CpuSeconds();
-    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractFeatures(grey, arguments));
+    CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, arguments.sift));
     test.query = MakeQuery(std::move(features), capture.cameras.at(image.camera_id), {});
     test.feature_seconds = CpuSeconds() - start;
     test.truth = FloorPoseOf(*image.cam_from_world, map.head().floor_from_world);
     test.cam_from_world = *image.cam_from_world;
-    test.is_inside = IsInHull(visual.places(), test.truth.position);
+    test.out_m = MetresOutOfHull(visual.places(), test.truth.position);
   }
   return images;
 }
@@ -149,7 +138,7 @@ double SquaredMahalanobis(const TestImage& test, const VisualPose& pose) {
 
 void AddVisual(const TestImage& test, const VisualMap& map, const VisualPose& pose, Row* row) {
   const double error_cm = 100 * (pose.position - test.truth.position).norm();
-  if (!test.is_inside) {
+  if (!test.is_inside()) {
     ++row->num_outside;
     row->num_flagged_outside += pose.flag != VisualFlag::kNone ? 1 : 0;
     if (pose.flag == VisualFlag::kNone) row->num_wrong += error_cm > 100 ? 1 : 0;
@@ -175,7 +164,7 @@ Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
   CAIRN_ASSIGN_OR_RETURN(const Localization found,
                          localizer->LocalizeFeatures(test.query.features, test.query.camera));
   row->pnp_seconds.push_back(test.feature_seconds + CpuSeconds() - start);
-  if (!found.has_fix() || !test.is_inside) return Ok();
+  if (!found.has_fix() || !test.is_inside()) return Ok();
   ++row->num_pnp;
   row->pnp_cm.push_back(100 * CenterErrorM(found.cam_from_world, test.cam_from_world));
   row->num_pnp_wrong += row->pnp_cm.back() > 100 ? 1 : 0;
@@ -198,20 +187,59 @@ void PrintRow(const Row& row) {
       row.num_honest_outside, row.num_pnp, Mean(row.pnp_cm), MedianOrNan(row.pnp_cm), Mean(row.pnp_seconds));
 }
 
+// What the map says about how good it is.
+void PrintErrors(const std::string& name, const VisualMap& map) {
+  std::vector<double> px, octaves;
+  for (const VisualMap::Model& model : map.models()) {
+    px.push_back(model.sigma.head<2>().norm());
+    octaves.push_back(model.sigma.z());
+  }
+  fmt::print(
+      stderr,
+      "{}: {} models predict left-out sights to {:.2f} px and {:.3f} octaves (medians), {:.1f} times as "
+      "far off at a metre; shared {:.2f} cm, {:.2f} deg; cameras tilted by {:.1f} deg, heights {:.3f} m\n",
+      name, px.size(), MedianOrNan(px), MedianOrNan(octaves), std::hypot(1, map.errors().growth_per_m),
+      100 * map.errors().shared_m, DegFromRad(map.errors().shared_rad), DegFromRad(map.errors().tilt_rad),
+      map.height_sigma_m());
+}
+
+void PrintPose(const Row& row, const TestImage& test, const VisualMap& map, const VisualPose& pose) {
+  fmt::print(stderr,
+             "{} {} {}: {} of {} possible, {} matched; spread {:.2f}; {:.2f} m out, found "
+             "{:.2f}; {:.1f} cm "
+             "{:.2f} deg sd {:.1f} cm NEES "
+             "{:.1f}; higher "
+             "{:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}\n",
+             row.name, test.name, test.is_inside() ? "inside" : "outside", pose.num_agreeing,
+             pose.num_possible, pose.num_matches, pose.spread_ratio, test.out_m,
+             MetresOutOfHull(map.places(), pose.position), 100 * (pose.position - test.truth.position).norm(),
+             AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg),
+             100 * std::sqrt(pose.covariance.topLeftCorner<2, 2>().trace()), SquaredMahalanobis(test, pose),
+             pose.higher_m, pose.elsewhere, row.divergences.empty() ? 0 : row.divergences.back(),
+             VisualFlagName(pose.flag));
+}
+
 Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,
                     const std::vector<TestImage>& images, const std::vector<VisualPose>& poses) {
   std::vector<ErrorArrow> arrows;
   for (size_t i = 0; i < images.size(); ++i)
     arrows.push_back({images[i].truth.position, poses[i].position, poses[i].flag != VisualFlag::kNone});
-  CAIRN_RETURN_IF_ERROR(
-      WriteFileAtomically(arguments.pictures + "/errors_" + map_name + ".svg",
-                          ErrorSvg(map_name + ": from the true place to the one found", map, arrows)));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+      arguments.pictures + "/errors_" + map_name + ".svg",
+      ErrorSvg(fmt::format("{}: from where {} images were taken to where they were placed", map_name,
+                           arrows.size()),
+               map, arrows)));
   return WriteFileAtomically(
       arguments.pictures + "/posterior_" + map_name + ".svg",
-      PosteriorSvg(map_name + ", " + images[0].name, map, poses[0], images[0].truth.position));
+      PosteriorSvg(fmt::format("{}: where {} may have been taken{}", map_name, images[0].name,
+                               poses[0].flag == VisualFlag::kNone
+                                   ? ""
+                                   : fmt::format(" (flagged: {})", VisualFlagName(poses[0].flag))),
+                   map, poses[0], images[0].truth.position));
 }
 
 Status Run(const Arguments& arguments) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   cv::setNumThreads(1);
   fmt::print(
       "| map | landmarks | MB | bytes a model | fixes | > 1 m | mean error (cm) | median | mean, flagged too "
@@ -243,18 +271,11 @@ Status Run(const Arguments& arguments) {
                              EstimateVisualPose(*visual, seen, arguments.estimate_options));
       row.search_seconds.push_back(CpuSeconds() - start);
       row.seconds.push_back(test.feature_seconds + row.search_seconds.back());
-      if (arguments.print_all) {
-        fmt::print(stderr,
-                   "{} {} {} of {} {:.1f} cm {:.2f} deg sd {:.1f} cm NEES {:.1f} elsewhere {:.2g} {}\n",
-                   row.name, test.name, pose.num_agreeing, pose.num_matches,
-                   100 * (pose.position - test.truth.position).norm(),
-                   AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg),
-                   100 * std::sqrt(pose.covariance.topLeftCorner<2, 2>().trace()),
-                   SquaredMahalanobis(test, pose), pose.elsewhere, VisualFlagName(pose.flag));
-      }
-      if (!reference.empty() && test.is_inside)
+      if (!reference.empty() && test.is_inside()) {
         row.divergences.push_back(
             PosteriorDivergence(pose, reference[poses.size()], arguments.uniform_weight));
+      }
+      if (arguments.print_all) PrintPose(row, test, *visual, pose);
       AddVisual(test, *visual, pose, &row);
       poses.push_back(pose);
       CAIRN_RETURN_IF_ERROR(AddPnp(test, &localizer, &row));
@@ -268,6 +289,7 @@ Status Run(const Arguments& arguments) {
                  visual->places().size(), visual->spacing_m(), visual->focal_px(),
                  visual->has_learnt_focal() ? "learnt" : "guessed");
     }
+    PrintErrors(row.name, *visual);
     PrintRow(row);
   }
   return Ok();
@@ -283,16 +305,15 @@ int main(int argc, char** argv) {
   app.add_option("maps", arguments.maps, "Maps with a visual map; the first: of all features")->required();
   app.add_option("--queries", arguments.queries, "Held-out images [the capture's queries.txt]");
   app.add_option("--pictures", arguments.pictures, "Folder for pictures of posteriors and errors");
-  app.add_option("--max-num-features", arguments.max_num_features, "Features a query")->capture_default_str();
   app.add_option("--uniform-weight", arguments.uniform_weight, "Mixed into posteriors before KL")
       ->capture_default_str();
-  app.add_option("--min-agreeing-ratio", arguments.estimate_options.min_agreeing_ratio, "As cairn localize's")
-      ->capture_default_str();
-  app.add_option("--extent-spacings", arguments.map_options.extent_spacings, "As cairn localize's")
-      ->capture_default_str();
-  app.add_flag("--halve", arguments.is_halved,
-               "Features of the queries at half their size: without the octave of the doubled image");
   app.add_flag("--print-all", arguments.print_all, "A line per image and map on stderr");
+  cairn::OptionTable options = cairn::DescribeOptions(&arguments.sift);
+  for (const cairn::OptionTable& of_visual : {cairn::DescribeOptions(&arguments.map_options),
+                                              cairn::DescribeOptions(&arguments.estimate_options)}) {
+    options.insert(options.end(), of_visual.begin(), of_visual.end());
+  }
+  arguments.option_arguments.Add(app, options);
   CLI11_PARSE(app, argc, argv);
   const cairn::Status status = cairn::Run(arguments);
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());

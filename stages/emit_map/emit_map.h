@@ -50,7 +50,7 @@ struct EmitMapOptions {
   bool visual_map = false;
   // Most sights of a landmark that its models store: 5 bytes each.  REQUIRES: in [16, 512]
   int max_num_sights = 96;
-  // Models that predict left-out sights worse than this (root mean square) are marked and count less, px.
+  // Models whose errors of left-out sights have a larger standard deviation are marked and count less, px.
   // REQUIRES: >= 0
   double bad_model_px = 20;
 };

@@ -47,8 +47,10 @@ class Learner {
     for (const MapImage& image : rows.images) {
       if (image.camera_id == data.camera_id)
         image_of_id[image.image_id] = static_cast<int32_t>(poses_.size());
-      poses_.push_back(FloorPoseOf(given_from_camera * image.cam_from_world, rows.floor_from_world));
+      const Pose cam_from_world = given_from_camera * image.cam_from_world;
+      poses_.push_back(FloorPoseOf(cam_from_world, rows.floor_from_world));
       survey_.images.push_back(poses_.back().position);
+      survey_.heights_m.push_back((rows.floor_from_world * cam_from_world.Center()).z());
     }
     std::map<ClassId, const FeatureClass*> class_of_id;
     for (const FeatureClass& feature : classes.classes) class_of_id[feature.class_id] = &feature;
@@ -182,8 +184,10 @@ class Learner {
     const Result<VisualPose> pose = EstimateVisualPose(**map, seen);
     if (!pose.ok() || pose->flag != VisualFlag::kNone) return std::nullopt;
     const double turn_rad = RadFromDeg(AngleBetweenDeg(pose->heading_deg, truth.heading_deg));
-    return Try{(pose->position - truth.position).squaredNorm(), turn_rad * turn_rad,
-               0.5 * pose->covariance.topLeftCorner<2, 2>().trace(), pose->covariance(2, 2)};
+    const double growth = SharedGrowth(pose->spread_ratio);
+    return Try{(pose->position - truth.position).squaredNorm() / (growth * growth),
+               turn_rad * turn_rad / (growth * growth), 0.5 * pose->covariance.topLeftCorner<2, 2>().trace(),
+               pose->covariance(2, 2)};
   }
 
   const VisualMapData& data_;

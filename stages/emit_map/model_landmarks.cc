@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/camera_turn.h"
+#include "core/deciles.h"
 #include "core/floor_pose.h"
 #include "core/parallel.h"
 #include "stages/emit_map/learn_focal.h"
@@ -20,6 +21,12 @@ constexpr size_t kMaxNumOwnHeadings = 16;
 constexpr double kDrivenHeadingStepDeg = 45;
 // Sights on which kernels are compared, at most.
 constexpr size_t kNumSightsToCompare = 48;
+
+// Cameras nearer than this to their mean height stand as high as each other, metres.
+constexpr double kSameHeightM = 0.005;
+
+// Nine of ten squares of normal numbers lie below.
+constexpr double kNineOfTen = 2.706;
 
 // A turn may move a sight out of its image; farther off than this it is not stored, px.
 constexpr double kFarthestOutPx = 2000;
@@ -128,6 +135,7 @@ class Modeller {
       image_of_id_[image.image_id] = static_cast<int32_t>(i);
       const Pose cam_from_world = given_from_camera * image.cam_from_world;
       poses_.push_back(FloorPoseOf(cam_from_world, rows.floor_from_world));
+      heights_m_.push_back((rows.floor_from_world * cam_from_world.Center()).z());
       level_from_camera_.push_back(LevelFromCamera(cam_from_world, rows.floor_from_world));
       if (image.camera_id != result_.camera_id) continue;
       of_camera.push_back(poses_.back());
@@ -137,6 +145,8 @@ class Modeller {
     result_.errors.tilt_rad =
         static_cast<float>(std::sqrt(std::accumulate(squared_tilts.begin(), squared_tilts.end(), 0.0) /
                                      static_cast<double>(std::max<size_t>(squared_tilts.size(), 1))));
+    mean_height_m_ =
+        std::accumulate(heights_m_.begin(), heights_m_.end(), 0.0) / static_cast<double>(heights_m_.size());
     result_.headings_deg = FindHeadings(of_camera);
     LearnTurn();
   }
@@ -209,13 +219,39 @@ class Modeller {
     return models;
   }
 
-  std::optional<HeadingModel> ModelOf(int heading, const std::vector<PlacedSight>& placed) const {
+  // Moves sights to where a camera at the survey's mean height would have had them.  How far it says how
+  // things move to the side as the camera does, which heights leave alone.
+  void LevelHeights(int heading, std::vector<PlacedSight>* placed) const {
+    const auto is_level = [&](const PlacedSight& sight) {
+      return std::abs(heights_m_[sight.stored.image] - mean_height_m_) < kSameHeightM;
+    };
+    if (result_.focal_px == 0 || std::all_of(placed->begin(), placed->end(), is_level)) return;
+    const auto choice = ChooseKernel(SightsOf(Thin(*placed, kNumSightsToCompare)));
+    if (!choice) return;
+    const auto model = LandmarkModel::Make(SightsOf(*placed), choice->shape);
+    if (!model) return;
+    const double heading_rad = RadFromDeg(result_.headings_deg[heading]);
+    for (PlacedSight& sight : *placed) {
+      const double rise = RiseOf(model->Predict(sight.sight.place).gradient, heading_rad);
+      sight.sight.seen.y() -= rise * (heights_m_[sight.stored.image] - mean_height_m_);
+      sight.stored.seen = sight.sight.seen.cast<float>();
+    }
+    std::erase_if(*placed, [&](const PlacedSight& sight) {
+      return IsFarOut(sight.sight.seen - Eigen::Vector3d(middle_.x(), middle_.y(), 0), middle_);
+    });
+  }
+
+  std::optional<HeadingModel> ModelOf(int heading, std::vector<PlacedSight> placed) const {
+    LevelHeights(heading, &placed);
     const auto choice = ChooseKernel(SightsOf(Thin(placed, kNumSightsToCompare)));
     if (!choice) return std::nullopt;
     const auto errors = LandmarkModel::LeaveOneOutErrors(SightsOf(placed), choice->shape);
     if (!errors) return std::nullopt;
     HeadingModel model{.heading = heading, .shape = choice->shape};
-    model.sigma = (errors->rowwise().squaredNorm() / static_cast<double>(errors->cols())).cwiseSqrt();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::VectorXd squares = errors->row(axis).cwiseAbs2();
+      model.sigma[axis] = std::sqrt(Decile({squares.begin(), squares.end()}, 9) / kNineOfTen);
+    }
     model.predicts_badly = model.sigma.head<2>().norm() > options_.bad_model_px;
     for (const PlacedSight& sight : placed) model.sights.push_back(sight.stored);
     return model;
@@ -227,6 +263,8 @@ class Modeller {
   std::map<ClassId, const FeatureClass*> class_of_id_;
   std::map<ImageId, int32_t> image_of_id_;
   std::vector<FloorPose> poses_;
+  std::vector<double> heights_m_;
+  double mean_height_m_ = 0;
   std::vector<Eigen::Matrix3d> level_from_camera_;
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
   int width_px_ = 0;

@@ -4,6 +4,7 @@
 
 #include "core/deciles.h"
 #include "runtime/visual_estimate.h"
+#include "runtime/visual_search.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 #include "tests/runtime/visual_room.h"
@@ -84,6 +85,18 @@ TEST(ModelLandmarks, LevelsWhatTiltedCamerasSaw) {
   EXPECT_NEAR(Clean().room.rows.visual_map.errors.tilt_rad, 0, 1e-6);
 }
 
+TEST(ModelLandmarks, LevelsTheHeightsOfACarriedSurvey) {
+  // 0.1 m at 2 m are 16 px: without, no model would predict to less.
+  const Surveyed carried(0, {.height_m = 0.1});
+  std::vector<double> errors_px;
+  for (const std::vector<HeadingModel>& models : carried.room.rows.visual_map.landmarks) {
+    for (const HeadingModel& model : models) errors_px.push_back(model.sigma.head<2>().norm());
+  }
+  EXPECT_LT(Median(errors_px), 3);
+  EXPECT_NEAR(carried.visual->height_sigma_m(), 0.1, 0.02);
+  EXPECT_NEAR(Clean().visual->height_sigma_m(), 0, 1e-9);
+}
+
 TEST(LearnVisualErrors, SmallOnALatticeAndTheSameForAnyNumberOfThreads) {
   const VisualRoom& room = Clean().room;
   const VisualErrors& errors = room.rows.visual_map.errors;
@@ -130,6 +143,101 @@ TEST(EstimateVisualPose, FindsHeadingsBetweenAndACameraThatLooksUp) {
     EXPECT_LT(ErrorM(*pose, truth), 0.06) << DegFromRad(heading);
     EXPECT_LT(AngleBetweenDeg(pose->heading_deg, DegFromRad(heading)), 1.5);
   }
+}
+
+TEST(EstimateVisualPose, FindsACameraThatIsHeldHigherOrLower) {
+  Random random(6);
+  for (const double higher_m : {-0.12, -0.05, 0.05, 0.12}) {
+    const Eigen::Vector2d truth(random.Uniform(1.5, 3.5), random.Uniform(1.25, 2.75));
+    const auto pose = EstimateVisualPose(
+        *Clean().visual, Clean().room.SeenLandmarks(VisualRoom::PoseAt(truth, 0, 0, 1 + higher_m)));
+    ASSERT_TRUE(pose.ok());
+    EXPECT_EQ(pose->flag, VisualFlag::kNone) << pose->message;
+    EXPECT_LT(ErrorM(*pose, truth), 0.02) << higher_m;
+    EXPECT_NEAR(pose->higher_m, higher_m, 0.02);
+  }
+}
+
+TEST(VisualSearch, AMaximumSharperThanThePointsKeepsItsMass) {
+  const VisualEstimateOptions options;
+  const size_t num_places = Clean().visual->places().size();
+  std::vector<double> log_prior(num_places, -std::log(static_cast<double>(num_places)));
+  const auto seen = Clean().room.SeenLandmarks(VisualRoom::PoseAt({2.3, 2.1}, 0));
+  VisualSearch search(*Clean().visual, seen, options, log_prior);
+  search.Run();
+  const auto log_mass = [&](int32_t heading) {
+    double largest = -std::numeric_limits<double>::infinity(), sum = 0;
+    for (const VisualHypothesis& each : search.hypotheses())
+      if (each.heading == heading) largest = std::max(largest, each.log_mass);
+    for (const VisualHypothesis& each : search.hypotheses())
+      if (each.heading == heading) sum += std::exp(each.log_mass - largest);
+    return largest + std::log(sum);
+  };
+  const double before = log_mass(0);
+  const size_t num_points = search.hypotheses().size();
+  VisualHypothesis point{.place = 0, .heading = 0, .log_mass = before - 1};
+  search.AddMissingMass(point, 100);
+  EXPECT_EQ(search.hypotheses().size(), num_points);  // the points have more
+  point.log_mass = before + 3;
+  search.AddMissingMass(point, 100);
+  EXPECT_NEAR(log_mass(0), before + 3, 1e-9);
+  search.AddMissingMass(point, 100);  // found again
+  EXPECT_NEAR(log_mass(0), before + 3, 1e-9);
+  log_prior[0] = -std::numeric_limits<double>::infinity();
+  point.log_mass = before + 9;
+  search.AddMissingMass(point, 100);
+  EXPECT_NEAR(log_mass(0), before + 3, 1e-9);  // the prior excludes its place
+}
+
+// A map whose own images, left out, were off by this much.
+std::shared_ptr<const VisualMap> WithSharedErrors(float shared_m, float shared_rad) {
+  VisualMapData data = Clean().room.rows.visual_map;
+  data.errors.shared_m = shared_m;
+  data.errors.shared_rad = shared_rad;
+  VisualSurvey survey{.places = Clean().visual->places(),
+                      .width_px = VisualRoom::kWidthPx,
+                      .height_px = VisualRoom::kHeightPx};
+  for (const MapImage& image : Clean().room.rows.images)
+    survey.images.push_back(image.cam_from_world.Center().head<2>());
+  return *VisualMap::Make(data, survey);
+}
+
+TEST(EstimateVisualPose, SharedErrorsGrowWithTheSquareOfHowCloseLandmarksLie) {
+  EXPECT_DOUBLE_EQ(SharedGrowth(0.3), 1);
+  EXPECT_DOUBLE_EQ(SharedGrowth(kFullSpreadRatio), 1);
+  EXPECT_DOUBLE_EQ(SharedGrowth(kFullSpreadRatio / 2), 4);
+  EXPECT_TRUE(std::isfinite(SharedGrowth(0)));
+  const auto visual = WithSharedErrors(0.02F, 0.01F);
+  auto seen = Clean().room.SeenLandmarks(VisualRoom::PoseAt({2.3, 2.1}, 0));
+  const auto all = EstimateVisualPose(*visual, seen);
+  ASSERT_TRUE(all.ok());
+  ASSERT_GT(all->spread_ratio, kFullSpreadRatio);
+  // Those of the image's middle: a seventh of its diagonal apart.
+  std::erase_if(seen, [](const SeenLandmark& match) {
+    return (match.seen.head<2>() - Eigen::Vector2d(320, 240)).norm() > 150;
+  });
+  const auto spot = EstimateVisualPose(*visual, seen);
+  ASSERT_TRUE(spot.ok());
+  ASSERT_EQ(spot->flag, VisualFlag::kNone) << spot->message;
+  ASSERT_LT(spot->spread_ratio, 0.15);
+  const double growth = SharedGrowth(spot->spread_ratio);
+  EXPECT_GE(std::sqrt(spot->covariance(0, 0)), growth * 0.02);
+  EXPECT_GE(std::sqrt(spot->covariance(2, 2)), growth * 0.01);
+  EXPECT_LT(std::sqrt(all->covariance(0, 0)), 0.03);
+}
+
+TEST(EstimateVisualPose, SurveysUnsureOfTheirOwnImagesNeedMoreAgreeingLandmarks) {
+  auto seen = Clean().room.SeenLandmarks(VisualRoom::PoseAt({2.3, 2.1}, 0));
+  ASSERT_GT(seen.size(), 20u);
+  std::vector<SeenLandmark> few;
+  for (size_t i = 0; i < seen.size(); i += seen.size() / 6) few.push_back(seen[i]);
+  const auto flag = [&](float shared_m, const std::vector<SeenLandmark>& matches) {
+    return EstimateVisualPose(*WithSharedErrors(shared_m, 0), matches)->flag;
+  };
+  ASSERT_LT(few.size(), 8u);
+  EXPECT_EQ(flag(0.2F * VisualRoom::kSpacingM, few), VisualFlag::kNone);
+  EXPECT_EQ(flag(0.3F * VisualRoom::kSpacingM, few), VisualFlag::kDisagree);
+  EXPECT_EQ(flag(0.3F * VisualRoom::kSpacingM, seen), VisualFlag::kNone);
 }
 
 TEST(EstimateVisualPose, HalfOfTheMatchesMayBeWrong) {

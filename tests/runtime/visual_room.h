@@ -13,9 +13,10 @@
 
 namespace cairn {
 
-// How much a survey's cameras pitch, standard deviation.
+// How much a survey's cameras pitch, and differ in height, standard deviations.
 struct CarriedSurvey {
   double tilt_rad = 0;
+  double height_m = 0;
 };
 
 // A room of 5 x 4 m with points on its walls, surveyed in its middle on 9 x 7 places 25 cm apart with four
@@ -50,13 +51,14 @@ struct VisualRoom {
   }
 
   // x right, y down, z forward; pitched up.
-  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0) {
+  static Pose PoseAt(const Eigen::Vector2d& place, double heading_rad, double up_rad = 0,
+                     double height_m = 1) {
     const double c = std::cos(heading_rad), s = std::sin(heading_rad);
     Eigen::Matrix3d level;
     level << s, -c, 0, 0, 0, -1, c, s, 0;
     Pose pose;
     pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(-up_rad, Eigen::Vector3d::UnitX()) * level);
-    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), 1));
+    pose.translation = -(pose.rotation * Eigen::Vector3d(place.x(), place.y(), height_m));
     return pose;
   }
 
@@ -84,7 +86,7 @@ struct VisualRoom {
 
  private:
   void AddSurvey(double noise_px, const CarriedSurvey& carried) {
-    Random random(6);
+    Random random(6), heights(7);
     Camera camera;
     camera.width = kWidthPx;
     camera.height = kHeightPx;
@@ -103,7 +105,8 @@ struct VisualRoom {
           image.camera_id = camera.camera_id;
           image.station = station;
           image.cam_from_world =
-              PoseAt(Place(column, row), heading * std::numbers::pi / 2, random.Normal(0, carried.tilt_rad));
+              PoseAt(Place(column, row), heading * std::numbers::pi / 2, random.Normal(0, carried.tilt_rad),
+                     heights.Normal(1, carried.height_m));
           for (auto [point, keypoint] : See(image.cam_from_world)) {
             keypoint.x += static_cast<float>(random.Normal(0, noise_px));
             keypoint.y += static_cast<float>(random.Normal(0, noise_px));
