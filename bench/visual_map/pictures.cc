@@ -21,8 +21,8 @@ constexpr int kFontPx = 15;
 constexpr int kNumShades = 8;
 // How much longer than the floor's scale error arrows may be drawn.
 constexpr std::array<double, 7> kEnlargements = {100, 50, 20, 10, 5, 2, 1};
-// What nine in ten arrows are at most as long as, drawn.
-constexpr double kLongestArrowM = 0.4;
+// What nine in ten arrows, and all, are at most as long as, drawn.
+constexpr double kLongArrowM = 0.4, kLongestArrowM = 1.5;
 constexpr double kArrowHeadPx = 7;
 
 std::string Text(double x, double y, const std::string& text, const char* anchor = "start") {
@@ -150,16 +150,18 @@ std::string Arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const 
   return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\"/>\n", path, colour);
 }
 
-// The largest enlargement at which most arrows stay short.
+// The largest enlargement at which most arrows stay short, and all in the picture.
 double EnlargementFor(const std::vector<ErrorArrow>& arrows) {
   std::vector<double> lengths_m;
   for (const ErrorArrow& arrow : arrows) {
     if (!arrow.is_flagged) lengths_m.push_back((arrow.found - arrow.truth).norm());
   }
   if (lengths_m.empty()) return 1;
-  const double length_m = Decile(lengths_m, 9);
+  const double length_m =
+      std::max(Decile(lengths_m, 9),
+               kLongArrowM / kLongestArrowM * *std::max_element(lengths_m.begin(), lengths_m.end()));
   for (const double enlargement : kEnlargements) {
-    if (enlargement * length_m <= kLongestArrowM) return enlargement;
+    if (enlargement * length_m <= kLongArrowM) return enlargement;
   }
   return 1;
 }
