@@ -138,6 +138,11 @@ function drawStations(colourOf) {
       outline(context, x, y, S.heading[i], size);
       context.fillStyle = colour;
       context.fill();
+      if (size > 5) {  // seen against dark ground too
+        context.lineWidth = 0.6;
+        context.strokeStyle = '#999999';
+        context.stroke();
+      }
       if (i === selected.station) {
         context.lineWidth = 3;
         context.strokeStyle = '#000';
@@ -709,6 +714,8 @@ if (data.drive && data.drive.places.length) {
     $('play').textContent = timer ? 'stop' : 'play';
   });
   moment = last;
+  $('time').value = last;
+  $('moment').textContent = `${last} of ${last}`;
 }
 
 // ---- light and dark
