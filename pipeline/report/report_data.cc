@@ -82,7 +82,7 @@ Json RegionsJson(const MapRows& rows) {
   Json list = Json::array();
   for (size_t region = 0; region < rows.regions.size(); ++region) {
     list.push_back({{"stations", rows.regions[region].stations},
-                    {"num_landmarks", rows.regions[region].landmarks.size()},
+                    {"landmarks", rows.regions[region].landmarks},
                     {"adjacent", adjacent[region]}});
   }
   for (const RegionSelfTest& test : rows.findings.self_test_regions) {

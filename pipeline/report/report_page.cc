@@ -13,6 +13,9 @@
 #include "pipeline/inspect_drops.h"
 #include "report/chart_js.h"
 #include "report/chart_notice.h"
+#include "report/explain_js.h"
+#include "report/figures_js.h"
+#include "report/floor_js.h"
 #include "report/leaflet_css.h"
 #include "report/leaflet_js.h"
 #include "report/leaflet_notice.h"
@@ -47,6 +50,11 @@ std::string Notices() {
   return fmt::format("Leaflet\n\n{}\n\nChart.js\n\n{}", kLeafletNoticeText, kChartNoticeText);
 }
 
+// One script: its parts share their names.
+std::string Script() {
+  return fmt::format("{}{}{}{}", kPageJsText, kFloorJsText, kExplainJsText, kFiguresJsText);
+}
+
 }  // namespace
 
 std::string ReportPage(const nlohmann::ordered_json& data) {
@@ -59,7 +67,7 @@ std::string ReportPage(const nlohmann::ordered_json& data) {
       {"@DATA@", JsonInPage(data)},
       {"@LEAFLET_JS@", InScript(kLeafletJsText)},
       {"@CHART_JS@", InScript(kChartJsText)},
-      {"@JS@", InScript(kPageJsText)}};
+      {"@JS@", InScript(Script())}};
   // The template is read once, from front to back, so that no part is searched for the marks of another.
   const std::string_view page = kPageHtmlText;
   std::string html;

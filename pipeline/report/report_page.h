@@ -8,9 +8,9 @@
 
 namespace cairn {
 
-// A report as one HTML file that needs no network: the data, the page that draws it (report.html, .css, .js),
-// and the libraries that it draws with, which were embedded from the installed packages when cairn was built,
-// with their notices.  No name in the data can become markup.
+// A report as one HTML file that needs no network: the data, the page that draws it (page.html, page.css and
+// the scripts), and the libraries that it draws with, which were embedded from the installed packages when
+// cairn was built, with their notices.  No name in the data can become markup.
 std::string ReportPage(const nlohmann::ordered_json& data);
 
 // The same for paper: pictures and tables, no scripts.
