@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/map_delta.h"
 #include "core/map_file.h"
+#include "core/output_path.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/update_map.h"
 
@@ -32,6 +33,8 @@ size_t NumSharedBlocks(const MapFile& map, const MapFile& other) {
 }
 
 Status MakeDelta(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.delta_path,
+                                             {arguments.old_path, arguments.new_path, arguments.key_path}));
   std::optional<SecretKey> key;
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(key, ReadSecretKey(arguments.key_path));

@@ -22,10 +22,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Farther from the origin nothing was surveyed: a slip of the keyboard.
+constexpr double kFarthestM = 1e7;
+
 struct Arguments {
   std::string map_path;
-  std::string place;
-  std::string image;
+  std::optional<std::string> place;
+  std::optional<std::string> image;
   std::string build_dir;
   bool json = false;
 };
@@ -38,7 +41,7 @@ Result<AskedPlace> ParsePlace(const std::string& text) {
                                    &heading_deg, &rest);
   const bool ends_there = num_read == 3 || (num_read == 2 && std::count(text.begin(), text.end(), ',') == 1 &&
                                             text.find_last_not_of("0123456789.eE+-, ") == std::string::npos);
-  if (!ends_there || !place.position.allFinite() || !std::isfinite(heading_deg)) {
+  if (!ends_there || !(place.position.cwiseAbs().maxCoeff() < kFarthestM) || !std::isfinite(heading_deg)) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "--at {}: expected X,Y or X,Y,HEADING in metres and degrees (floor frame), as in 1.5,0.8,90", text);
@@ -80,12 +83,12 @@ Result<std::string> WhyRejected(const Arguments& arguments) {
   return WithDatabaseErrors(path, [&]() -> Result<std::string> {
     if (HasTable(database, "cairn_rejects")) {
       SQLite::Statement query(database, "SELECT reason FROM cairn_rejects WHERE name = ?");
-      query.bind(1, arguments.image);
+      query.bind(1, *arguments.image);
       if (query.executeStep())
         return fmt::format("extract_features rejected it: {}", query.getColumn(0).getString());
     }
     SQLite::Statement query(database, "SELECT count(*) FROM images WHERE name = ?");
-    query.bind(1, arguments.image);
+    query.bind(1, *arguments.image);
     query.executeStep();
     if (query.getColumn(0).getInt() > 0)
       return std::string(
@@ -96,11 +99,11 @@ Result<std::string> WhyRejected(const Arguments& arguments) {
 
 Status ExplainImage(const Arguments& arguments, const MapRows& rows, const CommandEnvironment& environment) {
   const auto image = std::find_if(rows.images.begin(), rows.images.end(),
-                                  [&](const MapImage& row) { return row.name == arguments.image; });
+                                  [&](const MapImage& row) { return row.name == *arguments.image; });
   if (image == rows.images.end()) {
     CAIRN_ASSIGN_OR_RETURN(const std::string why, WhyRejected(arguments));
     return MakeError(ErrorCode::kNotFound, "{}: map '{}' has no survey image '{}' among its {}; {}",
-                     arguments.map_path, rows.name, arguments.image, rows.images.size(), why);
+                     arguments.map_path, rows.name, *arguments.image, rows.images.size(), why);
   }
   const auto index = static_cast<int32_t>(image - rows.images.begin());
   if (arguments.json) {
@@ -115,7 +118,7 @@ Status ExplainImage(const Arguments& arguments, const MapRows& rows, const Comma
 }
 
 Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const AskedPlace place, ParsePlace(arguments.place));
+  CAIRN_ASSIGN_OR_RETURN(const AskedPlace place, ParsePlace(*arguments.place));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<StationIdx> stations, StationsAt(rows, place));
   const std::vector<Advice> advice = Advise(rows, stations);
   if (arguments.json) {
@@ -142,8 +145,8 @@ Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const Comma
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
-  if (!arguments.image.empty()) return ExplainImage(arguments, rows, environment);
-  if (!arguments.place.empty()) return ExplainPlace(arguments, rows, environment);
+  if (arguments.image) return ExplainImage(arguments, rows, environment);
+  if (arguments.place) return ExplainPlace(arguments, rows, environment);
   const std::vector<Advice> advice = Advise(rows);
   if (arguments.json) {
     *environment.out << nlohmann::ordered_json({{"advice", AdviceJson(advice)}}).dump(2) << "\n";

@@ -38,8 +38,8 @@ struct Arguments {
   std::string recipe;
   std::string output;
   std::string build_dir;
-  std::string sizes;  // "100000,50000"; empty: halves
-  std::string peer;   // "NAME,BYTES,LOCALIZED_RATIO,MEDIAN_ERROR_M"
+  std::optional<std::string> sizes;  // "100000,50000"; none: halves
+  std::string peer;                  // "NAME,BYTES,LOCALIZED_RATIO,MEDIAN_ERROR_M"
 };
 
 struct Places {
@@ -83,15 +83,15 @@ Result<std::optional<ParetoPeer>> ParsePeer(const std::string& text) {
   return std::optional<ParetoPeer>(std::move(peer));
 }
 
-// Runs this program or make; false where it failed.
-Result<bool> Succeeds(const std::vector<std::string>& words, const std::string& session,
-                      const CommandEnvironment& environment) {
+// Runs this program or make; its exit code.
+Result<int> ExitCode(const std::vector<std::string>& words, const std::string& session,
+                     const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(
       const int wait_status,
       RunProgramAndWait(words, std::string(kBuildSessionVariable) + "=" + session, *environment.progress));
   if (environment.progress->Cancelled())
     return MakeError(ErrorCode::kCancelled, "stopped; the same command goes on where it was");
-  return WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == 0;
+  return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : static_cast<int>(ErrorCode::kFailed);
 }
 
 Status CompileMap(const Arguments& arguments, const Places& places, const CommandEnvironment& environment) {
@@ -108,10 +108,9 @@ Status CompileMap(const Arguments& arguments, const Places& places, const Comman
                                     environment.progress_style,
                                     "--log-level",
                                     environment.log_level};
-  CAIRN_ASSIGN_OR_RETURN(const bool compiled, Succeeds(words, "", environment));
-  if (compiled) return Ok();
-  const std::optional<StageFailure> failure = ReadErrorFile(places.build_dir);
-  return MakeError(failure ? failure->code : ErrorCode::kFailed, "{}: the map itself was not compiled",
+  CAIRN_ASSIGN_OR_RETURN(const int exit_code, ExitCode(words, "", environment));
+  if (exit_code == 0) return Ok();
+  return MakeError(static_cast<ErrorCode>(exit_code), "{}: the map itself was not compiled",
                    arguments.recipe);
 }
 
@@ -160,10 +159,10 @@ Result<std::optional<ParetoPoint>> MakePoint(const Places& places, int64_t size,
                                           "LOG_LEVEL=" + environment.log_level,
                                           places.Pareto(size, ".json")};
   fs::remove(places.build_dir + "/pareto" + kErrorFile);
-  CAIRN_ASSIGN_OR_RETURN(const bool made, Succeeds(words, NewBuildSession(), environment));
-  if (!made) {
+  CAIRN_ASSIGN_OR_RETURN(const int exit_code, ExitCode(words, NewBuildSession(), environment));
+  if (exit_code != 0) {
     const std::optional<StageFailure> failure = ReadErrorFile(places.build_dir + "/pareto");
-    if (failure && failure->code == ErrorCode::kInvalidArgument && failure->stage == "emit-map")
+    if (failure && failure->stage == "emit-map" && failure->message.find(kLeastPossible) != std::string::npos)
       return std::optional<ParetoPoint>();
     return MakeError(failure ? failure->code : ErrorCode::kFailed, "the map of at most {} bytes was not made",
                      size);
@@ -201,7 +200,7 @@ Status AddHalves(int64_t num_bytes, const std::function<Result<bool>(int64_t)>& 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int64_t> asked,
-                         arguments.sizes.empty() ? std::vector<int64_t>() : ParseSizes(arguments.sizes));
+                         !arguments.sizes ? std::vector<int64_t>() : ParseSizes(*arguments.sizes));
   CAIRN_ASSIGN_OR_RETURN(const std::optional<ParetoPeer> peer, ParsePeer(arguments.peer));
   Places places;
   places.map = fs::absolute(arguments.output).lexically_normal().string();
@@ -221,7 +220,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   };
   CAIRN_RETURN_IF_ERROR(add(0));
   for (const int64_t size : asked) CAIRN_RETURN_IF_ERROR(add(size));
-  if (asked.empty()) CAIRN_RETURN_IF_ERROR(AddHalves(points[0].num_bytes, add));
+  if (!arguments.sizes) CAIRN_RETURN_IF_ERROR(AddHalves(points[0].num_bytes, add));
   const std::string csv = fs::path(places.map).replace_extension(".pareto.csv").string();
   const std::string svg = fs::path(places.map).replace_extension(".pareto.svg").string();
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(csv, ParetoCsv(points)));

@@ -11,6 +11,7 @@
 #include "core/feature_class.h"
 #include "core/file.h"
 #include "core/map_file.h"
+#include "core/output_path.h"
 #include "core/text.h"
 #include "pipeline/ambiguity_svg.h"
 #include "pipeline/floor_svg.h"
@@ -22,6 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kCheckWords = "what cairn check-map --json printed";
+constexpr const char* kDriveWords = "what cairn drive -o wrote";
 
 struct Arguments {
   std::string map_path;
@@ -41,6 +45,10 @@ Result<Json> ReadJson(const std::string& path, const char* what) {
   if (json.is_discarded() || !json.is_object())
     return MakeError(ErrorCode::kCorrupt, "{}: is no JSON object; expected {}", path, what);
   return json;
+}
+
+Error NotWhatWasExpected(const std::string& path, const char* what) {
+  return MakeError(ErrorCode::kCorrupt, "{}: its keys or their types are not those of {}", path, what);
 }
 
 // A map that every byte was checked of, as `cairn verify` does: what a report says must be what was made.
@@ -106,6 +114,9 @@ Status WritePictures(const std::string& folder, const MapRows& rows) {
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(
+      arguments.output_path, {arguments.map_path, arguments.compare_path, arguments.check_path,
+                              arguments.drive_path, arguments.build_report_path}));
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadWholeMap(arguments.map_path));
   ReportInputs inputs{.rows = &rows, .num_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path))};
   CAIRN_ASSIGN_OR_RETURN(inputs.block_bytes, BytesByKind(arguments.map_path));
@@ -118,11 +129,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     inputs.build_report = &*build;
   }
   if (!arguments.check_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(check, ReadJson(arguments.check_path, "what cairn check-map --json printed"));
+    CAIRN_ASSIGN_OR_RETURN(check, ReadJson(arguments.check_path, kCheckWords));
+    if (!IsCheckReport(*check)) return NotWhatWasExpected(arguments.check_path, kCheckWords);
     inputs.check = &*check;
   }
   if (!arguments.drive_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(drive, ReadJson(arguments.drive_path, "what cairn drive -o wrote"));
+    CAIRN_ASSIGN_OR_RETURN(drive, ReadJson(arguments.drive_path, kDriveWords));
+    if (!IsDrive(*drive)) return NotWhatWasExpected(arguments.drive_path, kDriveWords);
     inputs.drive = &*drive;
   }
   std::optional<MapRows> compared;

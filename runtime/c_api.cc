@@ -119,6 +119,9 @@ class Use {
   std::shared_ptr<OpenLocalizer> localizer_;
 };
 
+// Longer, no row of an image lies behind another: a sum that overflowed.
+constexpr size_t kMaxStrideBytes = size_t{1} << 31;
+
 // The caller's pixels, not copied.
 Result<cv::Mat> PixelsOf(const cairn_image* image) {
   CAIRN_RETURN_IF_ERROR(CheckStruct(image, "image"));
@@ -129,6 +132,8 @@ Result<cv::Mat> PixelsOf(const cairn_image* image) {
   const size_t stride = image->stride == 0 ? width : image->stride;
   if (stride < width)
     return Misuse("image->stride is {} bytes, but a row has {}; grey pixels take a byte each", stride, width);
+  if (stride > kMaxStrideBytes)
+    return Misuse("image->stride is {} bytes; at most {} from one row to the next", stride, kMaxStrideBytes);
   return cv::Mat(image->height, image->width, CV_8UC1, const_cast<uint8_t*>(image->pixels), stride);
 }
 
@@ -326,6 +331,7 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
                        const cairn_prior* prior, cairn_fix* fix) {
   return Call("cairn_localize", [&]() -> Status {
     CAIRN_RETURN_IF_ERROR(CheckStruct(fix, "fix"));
+    Return(FixOf({}), fix);  // who looks at it after an error must not find the fix before
     CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
@@ -340,6 +346,7 @@ int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* i
                                 const cairn_camera* camera, cairn_floor_fix* fix) {
   return Call("cairn_localize_on_floor", [&]() -> Status {
     CAIRN_RETURN_IF_ERROR(CheckStruct(fix, "fix"));
+    Return(cairn_floor_fix CAIRN_FLOOR_FIX_INIT, fix);
     CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));

@@ -201,7 +201,7 @@ CAIRN_API int32_t cairn_localizer_set_option(cairn_localizer* localizer, const c
 CAIRN_API int32_t cairn_localizer_destroy(cairn_localizer* localizer);
 
 /* `camera` NULL: the survey's of the image's size; `prior` may be NULL.  An image without a fix is no error:
- * see fix->has_fix. */
+ * see fix->has_fix.  After an error *fix says that there is none. */
 CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image,
                                  const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix);
 /* The same by the visual map, on the floor.  CAIRN_NOT_FOUND where the map has none; the first call loads it.

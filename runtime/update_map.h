@@ -22,7 +22,9 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
                   const UpdateOptions& options = {});
 
 // The same in place: at any instant `map_path` is the whole old or the whole new map, and the old one stays
-// beside it as PreviousMapPath.  False, and nothing is done, where the map is the new one already.
+// beside it as PreviousMapPath.  Of a link, the file that it leads to is updated, and the previous map lies
+// there. Errors: also Busy (another update or rollback in the map's folder).  False, and nothing is done,
+// where the map is the new one already.
 Result<bool> UpdateMap(const std::string& map_path, const std::string& delta_path,
                        const UpdateOptions& options = {});
 
@@ -30,7 +32,7 @@ Result<bool> UpdateMap(const std::string& map_path, const std::string& delta_pat
 std::string PreviousMapPath(const std::string& map_path);
 
 // Exchanges a map and the one that it replaced, in one step; a second time exchanges them back.
-// Errors: NotFound (either); those of MapFile::Open for the previous map; Io.
+// Errors: NotFound (either); Busy; those of MapFile::Open for the previous map; Io.
 Status RollBackMap(const std::string& map_path, const UpdateOptions& options = {});
 
 }  // namespace cairn

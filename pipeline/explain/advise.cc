@@ -88,10 +88,10 @@ std::string WhereText(const MapRows& rows, const std::vector<StationIdx>& statio
   return fmt::format("{} stations around {}", stations.size(), StationText(rows, center));
 }
 
-int MeanOf(const std::vector<StationIdx>& stations, const auto& number) {
-  int64_t sum = 0;
-  for (const StationIdx station : stations) sum += number(station);
-  return static_cast<int>(sum / static_cast<int64_t>(stations.size()));
+int LeastOf(const std::vector<StationIdx>& stations, const auto& number) {
+  int least = number(stations[0]);
+  for (const StationIdx station : stations) least = std::min(least, number(station));
+  return least;
 }
 
 Advice AboutUncovered(const MapRows& rows, const StationLosses& losses, std::vector<StationIdx> stations,
@@ -99,9 +99,9 @@ Advice AboutUncovered(const MapRows& rows, const StationLosses& losses, std::vec
   Advice advice;
   const std::string where = WhereText(rows, stations);
   const char* verb = stations.size() == 1 ? "is" : "are";
-  const int num_visible = MeanOf(stations, [&](StationIdx i) { return losses.NumVisible(i); });
-  const int num_seldom = MeanOf(stations, [&](StationIdx i) { return losses.NumSeenTooSeldom(i); });
-  const int num_alike = MeanOf(stations, [&](StationIdx i) { return losses.NumAlike(i); });
+  const int num_visible = LeastOf(stations, [&](StationIdx i) { return losses.NumVisible(i); });
+  const int num_seldom = LeastOf(stations, [&](StationIdx i) { return losses.NumSeenTooSeldom(i); });
+  const int num_alike = LeastOf(stations, [&](StationIdx i) { return losses.NumAlike(i); });
   const std::optional<DropReason> reason = losses.WhyUncovered(stations[0]);
   if (!reason) {
     advice.text = fmt::format("{} {} not covered.", where, verb);
@@ -116,7 +116,7 @@ Advice AboutUncovered(const MapRows& rows, const StationLosses& losses, std::vec
         "within tau = {} hops. Images between them, or a smaller tau, would help.",
         where, verb, num_visible, rows.k, rows.tau);
     advice.images_to_take = ViewsBetween(rows, stations, neighbours);
-  } else if (num_seldom >= rows.k - num_visible && num_seldom >= num_alike) {
+  } else if (num_seldom >= std::max(1, rows.k - num_visible) && num_seldom >= num_alike) {
     advice.text = fmt::format(
         "{} {} not covered: only {} features are in view, k = {} are needed, but {} more were seen from too "
         "few "
@@ -206,10 +206,20 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
       rows.landmark_choice == "regions") {
     advice->push_back(
         {.text = fmt::format(
-             "{:.0f} % of the held-out images are localized, and {} features that regions could keep "
+             "{:.1f} % of the held-out images are localized, and {} features that regions could keep "
              "were not chosen: [decompose_regions] k above {} keeps more of them, about in proportion "
              "in bytes; [emit_map] landmarks = \"all\" keeps every one.",
              100 * localized->second, num_not_chosen, rows.k)});
+  }
+  const auto nees = rows.self_test.find("mean_nees"), nees_high = rows.self_test.find("nees_high");
+  if (nees != rows.self_test.end() && nees_high != rows.self_test.end() && nees->second > nees_high->second) {
+    advice->push_back(
+        {.text = fmt::format(
+             "Poses are less exact than the map says: their errors are {:.1f} times what the covariances "
+             "state (mean normalised error squared {:.1f}, at most {:.1f} where they are right). Check the "
+             "survey's poses against those of the held-out images; [check_map] covariance_scale widens "
+             "what is stated.",
+             std::sqrt(nees->second / 6), nees->second, nees_high->second)});
   }
   if (rows.self_test.empty()) {
     advice->push_back({.text =

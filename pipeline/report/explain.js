@@ -14,7 +14,17 @@ function button(text, action) {
   node.addEventListener('click', action);
   return node;
 }
-function say(...nodes) { $('explanation').replaceChildren(...nodes); }
+function say(...nodes) {
+  $('explanation').replaceChildren(...nodes);
+  if (window.innerWidth <= 800) $('explanation').scrollIntoView({block: 'nearest'});  // below the floor there
+}
+// The floor around stations, at least six metres of it.
+function goTo(stations) {
+  const bounds = leaflet.latLngBounds(stations.map(i => L_latlng(S.x[i], S.y[i])));
+  const center = bounds.getCenter();
+  bounds.extend([center.lat - 3, center.lng - 3]).extend([center.lat + 3, center.lng + 3]);
+  map.fitBounds(bounds.pad(0.2));
+}
 function testText(test) {
   if (!test) return 'no held-out image';
   let text = `${test.localized} of ${test.held_out} held-out images localized`;
@@ -89,16 +99,23 @@ map.on('mousemove', event => {
   tip.setLatLng(L_latlng(S.x[station], S.y[station])).setContent(`station ${station}: ${S.visible[station]} features, ${S.seen[station]} landmarks`);
   map.openTooltip(tip);
 });
+$('map').addEventListener('keydown', event => {
+  if (event.key !== 'Enter' || event.target !== $('map')) return;
+  const station = stationNear(map.getCenter());
+  const region = regionAt(map.getCenter());
+  if (station >= 0) explainStation(station);
+  else if (region >= 0) explainRegion(region);
+});
 $('find').addEventListener('submit', event => {
   event.preventDefault();
   const text = $('query').value.trim(), number = Number(text.replace(/[^0-9]/g, ''));
   if (/^region\s*\d+$/i.test(text) && number < R.length) {
     explainRegion(number);
-    return void map.panTo(L_latlng(S.x[R[number].stations[0]], S.y[R[number].stations[0]]));
+    return void goTo(R[number].stations);
   }
-  const image = I.name.indexOf(text);
-  const station = image >= 0 ? S.images.findIndex(images => images.includes(image)) : /^(station\s*)?\d+$/i.test(text) ? number : -1;
+  const exact = I.name.indexOf(text), image = exact >= 0 ? exact : text ? I.name.findIndex(name => name.startsWith(text)) : -1;
+  const station = /^(station\s*)?\d+$/i.test(text) ? number : image >= 0 ? S.images.findIndex(images => images.includes(image)) : -1;
   if (station < 0 || station >= numStations) return say(element('p', {class: 'bad'}, `Nothing here is called \u201C${text}\u201D.`));
   explainStation(station);
-  map.panTo(L_latlng(S.x[station], S.y[station]));
+  goTo([station]);
 });

@@ -12,10 +12,11 @@ for (const entry of data.advice) {
   const item = element('li', {}, entry.text);
   if (entry.stations.length) {
     item.append(' ', button('show', () => {
-      explainStation(entry.stations[0]);
+      const region = /^Region (\d+) /.exec(entry.text);
+      if (region) explainRegion(Number(region[1])); else explainStation(entry.stations[0]);
       const box = document.querySelector('[data-layer="images to take"]');
       if (box && entry.views.length && !box.checked) box.click();
-      map.fitBounds(leaflet.latLngBounds(entry.stations.map(i => L_latlng(S.x[i], S.y[i]))).pad(1), {maxZoom: 7});
+      goTo(entry.stations);
       $('floor').scrollIntoView();
     }));
   }
@@ -24,7 +25,17 @@ for (const entry of data.advice) {
   }
   $('advice-list').append(item);
 }
-if (!data.advice.length) $('advice-list').replaceWith(element('p', {}, 'Nothing to say against this map.'));
+if (!data.advice.length) $('advice-list').replaceWith(element('p', {}, 'Every station is covered, and no region stands out.'));
+// Of many, the most important first.
+const hidden = [...$('advice-list').children].slice(10);
+if (hidden.length) {
+  hidden.forEach(item => { item.hidden = true; });
+  const all = button(`show ${hidden.length} more`, () => {
+    hidden.forEach(item => { item.hidden = false; });
+    all.remove();
+  });
+  $('advice-list').after(all);
+}
 
 // What comes into every stage, what goes on, and what is dropped: a step per stage.
 function drawStages() {
@@ -43,7 +54,7 @@ function drawStages() {
     list.unshift([stage, num, stage]);
   }
   const before = [['images', I.name.length], ['keypoints', out('extract_features', 'keypoints')], ['matches', out('match_features', 'matches')]].filter(([, value]) => value !== undefined);
-  const tallest = list[0][1] || 1, width = 180, height = 170;
+  const tallest = list[0][1] || 1, width = 200, height = 170;
   const svgSpace = 'http://www.w3.org/2000/svg';
   const make = (tag, attributes, text) => {
     const node = document.createElementNS(svgSpace, tag);
@@ -121,7 +132,7 @@ function drawCharts() {
 const figures = Object.entries(data.self_test);
 if (figures.length) $('tables').append(element('h3', {}, 'Self-test'), table(figures.map(([name, value]) => [figureTerms[name] ? element('dfn', {title: figureTerms[name]}, name) : name, Math.round(value * 1e4) / 1e4])));
 else $('tables').append(element('p', {}, 'No held-out images were tried: the map has no self-test.'));
-for (const [stage, text] of Object.entries(data.options)) $('options-text').append(element('h3', {}, stage), element('pre', {}, text));
+for (const [stage, text] of Object.entries(data.options)) $('options-text').append(element('details', {}, element('summary', {}, stage), element('pre', {}, text)));
 if (data.changes) {
   $('changes').hidden = $('changes-link').hidden = false;
   const changes = data.changes, row = (name, values) => [name, values[0], values[1], values[1] - values[0]];
@@ -182,12 +193,13 @@ let chartsDrawn = false;
 $('theme').addEventListener('click', () => setTheme(!document.documentElement.classList.contains('dark')));
 
 // ---- first the floor, then the rest
-const xs = S.x.concat(L.x.length <= 20000 ? L.x : []), ys = S.y.concat(L.x.length <= 20000 ? L.y : []);
-function extent(values) {
-  const sorted = values.slice().sort((a, b) => a - b), cut = Math.floor(sorted.length / 100);
-  return sorted.length ? [sorted[cut], sorted[sorted.length - 1 - cut]] : [0, 100];
+// All stations, and all but the outermost landmarks.
+function extent(places, landmarks) {
+  const sorted = landmarks.slice().sort((a, b) => a - b), cut = Math.floor(sorted.length / 25);
+  const shown = sorted.length ? [sorted[cut], sorted[sorted.length - 1 - cut]] : places.length ? [] : [0, 100];
+  return [places.reduce((a, b) => Math.min(a, b), shown[0] ?? Infinity), places.reduce((a, b) => Math.max(a, b), shown[1] ?? -Infinity)];
 }
-const [west, east] = extent(xs), [south, north] = extent(ys);
+const [west, east] = extent(S.x, L.x), [south, north] = extent(S.y, L.y);
 map.fitBounds(leaflet.latLngBounds(L_latlng(west, south), L_latlng(east, north)).pad(0.05));
 axes.addTo(map);
 for (const [name, , isOn] of layers) if (isOn && drawings[name]) map.addLayer(drawings[name]);

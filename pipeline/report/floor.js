@@ -320,7 +320,7 @@ function drawDrive(context, place) {
 }
 
 const most = values => values.reduce((a, b) => Math.max(a, b), 0);
-const mostSeen = most(S.visible), hasEntropy = S.entropy.some(value => value !== null);
+const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy)), hasEntropy = S.entropy.some(value => value !== null);
 const scaleLegend = (text, low, high) => () => {
   const bar = element('div', {class: 'bar'});
   bar.style.background = `linear-gradient(to right, ${[0, 0.2, 0.4, 0.6, 0.8, 1].map(shade).join(',')})`;
@@ -338,7 +338,7 @@ const layers = [
   ['region adjacency', drawAdjacency, false, swatch('regions with common or neighbouring stations', '#CC79A7'), R.length > 1],
   ['landmarks', drawLandmarks, true, null, L.x.length > 0],
   ['stations', drawStations(i => shade(S.visible[i] / (mostSeen || 1))), true, scaleLegend('stations: features in view', '0', String(mostSeen)), numStations > 0],
-  ['entropy', drawStations(i => S.entropy[i] === null ? null : shade(S.entropy[i] / 2.3)), false, scaleLegend('entropy: places alike', '0 nats: none', '2.3 nats: ten'), hasEntropy],
+  ['entropy', drawStations(i => S.entropy[i] === null ? null : shade(S.entropy[i] / mostEntropy)), false, scaleLegend('entropy: places alike', '0 nats: none', `${mostEntropy.toFixed(1)} nats: ${(Math.exp(mostEntropy) - 1).toFixed(1)} others`), hasEntropy],
   ['appearance graph', drawKept, false, swatch('kept images and their links', '#009E73'), I.links.length > 0],
   ['look-alikes', drawLines(I.look_alikes, '#D55E00', 0.25), false, swatch('places that look alike', '#D55E00'), I.look_alikes.length > 0],
   ['uncovered', drawUncovered, true, swatch('\u00D7 stations not covered', '#D55E00'), S.covered.some((covered, i) => !covered || S.why[i] !== null)],

@@ -256,7 +256,54 @@ Json DriveJson(const Json& drive) {
   return json;
 }
 
+bool IsText(const Json& object, const char* key) { return !object.contains(key) || object[key].is_string(); }
+bool IsNumber(const Json& object, const char* key) {
+  return !object.contains(key) || object[key].is_number();
+}
+
+// x, y and a heading, where there is one.
+bool IsPlace(const Json& object, const char* key) {
+  if (!object.contains(key)) return true;
+  const Json& place = object[key];
+  return place.is_array() && place.size() >= 2 &&
+         std::all_of(place.begin(), place.end(), [](const Json& number) { return number.is_number(); });
+}
+
+bool IsPose(const Json& object, const char* key) {
+  if (!object.contains(key)) return true;
+  const Json& pose = object[key];
+  return pose.is_object() && pose.contains("x_m") && pose.contains("y_m") && IsNumber(pose, "x_m") &&
+         IsNumber(pose, "y_m") && IsNumber(pose, "heading_deg");
+}
+
+// The list of that name, if there is one, holds objects that are right.
+template <typename IsRight>
+bool AreAll(const Json& object, const char* key, const IsRight& is_right) {
+  if (!object.contains(key)) return true;
+  const Json& list = object[key];
+  return list.is_array() && std::all_of(list.begin(), list.end(), [&](const Json& entry) {
+           return entry.is_object() && is_right(entry);
+         });
+}
+
 }  // namespace
+
+bool IsCheckReport(const Json& check) {
+  return check.contains("images") && AreAll(check, "images", [](const Json& image) {
+           return IsText(image, "name") && IsText(image, "message") && IsPlace(image, "true_floor") &&
+                  IsPlace(image, "floor") && IsNumber(image, "error_m") && IsNumber(image, "error_deg") &&
+                  (!image.contains("floor") || image.contains("error_m"));
+         });
+}
+
+bool IsDrive(const Json& drive) {
+  const auto is_step = [](const Json& step) { return IsPose(step, "pose"); };
+  return drive.contains("start") && IsPose(drive, "start") &&
+         (!drive.contains("reached") || drive["reached"].is_boolean()) &&
+         AreAll(drive, "legs", [&](const Json& leg) {
+           return IsText(leg, "kind") && IsPose(leg, "pose") && AreAll(leg, "steps", is_step);
+         });
+}
 
 nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   const MapRows& rows = *inputs.rows;

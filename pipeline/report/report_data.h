@@ -27,6 +27,11 @@ struct ReportInputs {
   std::string compared_name;  // its file
 };
 
+// Whether they have what a page shows of them, of the right types.
+bool IsCheckReport(const nlohmann::ordered_json& check);
+bool IsDrive(const nlohmann::ordered_json& drive);
+
+// REQUIRES: IsCheckReport, IsDrive
 nlohmann::ordered_json ReportData(const ReportInputs& inputs);
 
 }  // namespace cairn

@@ -23,7 +23,10 @@ struct PyMap {
 
 PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes,
               const std::optional<py::bytes>& public_key) {
-  const std::string name = py::cast<std::string>(py::module_::import("os").attr("fspath")(path));
+  // As bytes: names of files need not be text.
+  const std::string name = py::cast<py::bytes>(py::module_::import("os").attr("fsencode")(path));
+  if (name.empty()) throw py::value_error("path is empty; expected the name of a map");
+  if (name.find('\0') != std::string::npos) throw py::value_error("embedded null byte in path");
   if (memory_budget_bytes < 0)
     throw py::value_error(
         fmt::format("memory_budget_bytes is {}; must not be negative", memory_budget_bytes));

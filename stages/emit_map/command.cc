@@ -13,6 +13,7 @@
 #include "core/database.h"
 #include "core/dropped_items.h"
 #include "core/file.h"
+#include "core/output_path.h"
 #include "core/sessions.h"
 #include "core/sift.h"
 #include "core/temporary.h"
@@ -179,14 +180,18 @@ Result<MapRows> MakeRows(const Arguments& arguments, const Inputs& inputs, const
 
 std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, int max_bytes) {
   const SizeGuarantee guarantee = GuaranteeOf(rows);
+  const std::string recall =
+      fitted.trial.num_tried == 0
+          ? std::string("everything fits")
+          : fmt::format("recall {:.1f} % of {} left-out survey images, {:.1f} % with everything",
+                        100 * fitted.trial.RightRatio(), fitted.trial.num_tried,
+                        100 * fitted.trial_of_all.RightRatio());
   return fmt::format(
       "emit_map: at most {} bytes: {} bits a descriptor value; at least {} common landmarks in every region; "
       "{} of "
-      "{} stations see fewer than k = {}; recall {:.1f} % of {} left-out survey images, {:.1f} % with "
-      "everything\n",
+      "{} stations see fewer than k = {}; {}\n",
       max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks, guarantee.num_stations_below_k,
-      rows.stations.size(), rows.k, 100 * fitted.trial.RightRatio(), fitted.trial.num_tried,
-      100 * fitted.trial_of_all.RightRatio());
+      rows.stations.size(), rows.k, recall);
 }
 
 // The rows of the best map within max_bytes, and what it promises.
@@ -227,6 +232,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   EmitMapOptions checked = arguments.options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(
+      arguments.output_path,
+      {arguments.matches_path, arguments.classes_path, arguments.world_path, arguments.regions_path,
+       arguments.vocabulary_path, arguments.appearance_path, arguments.views_path}));
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments));
   MapRows rows;
   std::string guarantee;

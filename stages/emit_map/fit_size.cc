@@ -156,11 +156,18 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
     if (n == pool.size()) break;  // all fit: no reason for fewer bits
   }
   if (*std::max_element(num_that_fit.begin(), num_that_fit.end()) == 0) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "emit_map: max_bytes = {}, but the least possible is {} with a single landmark: the rest are "
-        "{} images and their appearance graph, stations, options and findings",
-        options.max_bytes, fitter.least_bytes(), classes.images.size());
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "emit_map: max_bytes = {}, but {} {} with a single landmark: the rest are "
+                     "{} images and their appearance graph, stations, options and findings",
+                     options.max_bytes, kLeastPossible, fitter.least_bytes(), classes.images.size());
+  }
+
+  FittedSize fitted;
+  fitted.descriptor_bits = bits_tried[0];
+  if (num_that_fit[0] == pool.size()) {  // nothing has to be chosen
+    fitted.keep = may_keep;
+    fitted.num_bytes = num_bytes;
+    return fitted;
   }
 
   CAIRN_ASSIGN_OR_RETURN(const LeftOutSurvey survey,
@@ -172,35 +179,28 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
         emit(survey.classes, SizeFitter::FirstOf(order, n, survey.classes.classes.size()), bits));
     return TryLeftOutImages(std::move(rows), survey.images, options.limits, num_threads);
   };
-  FittedSize fitted;
   CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all,
                          try_first(survey_pool, survey_pool.size(), options.descriptor_bits));
   double best_enough = kEnough[0];
-  fitted.descriptor_bits = bits_tried[0];
-  if (num_that_fit[0] == pool.size()) {
-    fitted.trial = fitted.trial_of_all;
-  } else {
-    progress.Begin("trying what to keep", static_cast<int64_t>(kEnough.size() * num_that_fit.size()), "maps");
-    bool is_first = true;
-    std::vector<std::vector<size_t>> orders;
-    for (const double enough : kEnough)
-      orders.push_back(OrderByUse(survey.classes, survey_pool, enough, num_threads));
-    for (size_t i = 0; i < num_that_fit.size(); ++i) {
-      for (size_t k = 0; k < kEnough.size(); ++k) {
-        if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
-        progress.Advance();
-        if (num_that_fit[i] == 0) continue;
-        CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial,
-                               try_first(orders[k], num_that_fit[i], bits_tried[i]));
-        if (!is_first && !IsBetter(trial, fitted.trial)) continue;
-        is_first = false;
-        fitted.trial = trial;
-        fitted.descriptor_bits = bits_tried[i];
-        best_enough = kEnough[k];
-      }
+  progress.Begin("trying what to keep", static_cast<int64_t>(kEnough.size() * num_that_fit.size()), "maps");
+  bool is_first = true;
+  std::vector<std::vector<size_t>> orders;
+  for (const double enough : kEnough)
+    orders.push_back(OrderByUse(survey.classes, survey_pool, enough, num_threads));
+  for (size_t i = 0; i < num_that_fit.size(); ++i) {
+    for (size_t k = 0; k < kEnough.size(); ++k) {
+      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
+      progress.Advance();
+      if (num_that_fit[i] == 0) continue;
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, try_first(orders[k], num_that_fit[i], bits_tried[i]));
+      if (!is_first && !IsBetter(trial, fitted.trial)) continue;
+      is_first = false;
+      fitted.trial = trial;
+      fitted.descriptor_bits = bits_tried[i];
+      best_enough = kEnough[k];
     }
-    progress.End();
   }
+  progress.End();
   const std::vector<size_t> order =
       best_enough == kEnough[0] ? usual_order : OrderByUse(classes, pool, best_enough, num_threads);
   CAIRN_ASSIGN_OR_RETURN(const size_t n,

@@ -31,11 +31,15 @@ struct FitSizeOptions {
 using EmitKept = std::function<Result<MapRows>(const Classes& classes, const std::vector<char>& keep,
                                                int descriptor_bits)>;
 
+// In the message of the error that no map of so few bytes is possible.
+inline constexpr const char* kLeastPossible = "the least possible is";
+
 struct FittedSize {
   std::vector<char> keep;  // per class
   int descriptor_bits = 0;
   int64_t num_bytes = 0;  // with room for the self-test
-  // On the left-out images: this choice, and the map of everything that may be kept.
+  // On the left-out images: this choice, and the map of everything that may be kept.  None are tried where
+  // everything fits.
   LeftOutTrial trial, trial_of_all;
 };
 

@@ -14,7 +14,7 @@
 namespace cairn {
 namespace {
 
-constexpr size_t kMinNumImages = 8;
+constexpr size_t kMinNumImages = 12;  // of which a run of four is left out
 constexpr size_t kRunLength = 4;
 constexpr size_t kMinStep = 4;
 constexpr int kPlentyOfInliers = 50;

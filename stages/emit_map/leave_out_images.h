@@ -28,7 +28,7 @@ struct LeftOutSurvey {
 // images taken one after the other see the same, and a robot stands somewhere between places, not beside an
 // image.  The descriptors of classes that they saw are those of the others alone; places stay (one ray of
 // many).  `matches_path`: matches.db, for the features.  Errors: those of OpenColmapDatabase; NoData (fewer
-// than eight survey images).
+// than twelve survey images).
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
                                      int max_num_images);
 

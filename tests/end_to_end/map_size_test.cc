@@ -93,7 +93,9 @@ TEST_F(MapSize, ParetoWritesTableAndPictureAndStopsWhereNothingFits) {
   EXPECT_EQ(again.out.substr(again.out.rfind("at most      bytes")),
             run.out.substr(run.out.rfind("at most      bytes")));
   EXPECT_EQ(Run("cairn pareto tiny.toml -o tiny.cairn --sizes 60000,x").exit_code, 2);
+  EXPECT_EQ(Run("cairn pareto tiny.toml -o tiny.cairn --sizes ''").exit_code, 2);
   EXPECT_EQ(Run("cairn pareto tiny.toml -o tiny.cairn --peer a,b").exit_code, 2);
+  EXPECT_EQ(Run("cairn pareto none.here -o none.cairn").exit_code, static_cast<int>(ErrorCode::kNotFound));
 }
 
 TEST_F(MapSize, DeltaMakesTheSmallMapFromTheWholeOneAndRollsBack) {
@@ -110,6 +112,8 @@ TEST_F(MapSize, DeltaMakesTheSmallMapFromTheWholeOneAndRollsBack) {
   EXPECT_EQ(Run("head -c 1000 d > half; cairn apply tiny.cairn half -o x.cairn").exit_code,
             static_cast<int>(ErrorCode::kCorrupt));
   EXPECT_EQ(Run("cairn apply tiny.cairn d").exit_code, 2);
+  EXPECT_EQ(Run("cairn delta tiny.cairn s.cairn -o s.cairn").exit_code, 2);
+  EXPECT_EQ(Run("cairn verify s.cairn").exit_code, 0);
   EXPECT_FALSE(fs::exists(Path("x.cairn")));
   // The map before is not signed: a robot that requires it does not go back.
   EXPECT_EQ(Run("cairn rollback robot.cairn --public-key k.pub").exit_code,
@@ -129,7 +133,9 @@ TEST_F(MapSize, DiffNamesTheOptionAndExplainTheLosses) {
   for (const json& drop : stations[0]["dropped"]) lost |= drop["name"] == "over_budget";
   EXPECT_TRUE(lost) << stations.dump(1);
   EXPECT_EQ(Run("cairn explain small.cairn --at 100,100").exit_code, static_cast<int>(ErrorCode::kNotFound));
-  EXPECT_EQ(Run("cairn explain small.cairn --at nowhere").exit_code, 2);
+  for (const char* place : {"nowhere", "''", "1", "1,2,3,4", "nan,1", "1e300,0"})
+    EXPECT_EQ(Run(std::string("cairn explain small.cairn --at ") + place).exit_code, 2) << place;
+  EXPECT_EQ(Run("cairn explain small.cairn --image ''").exit_code, static_cast<int>(ErrorCode::kNotFound));
   EXPECT_EQ(Run("cairn explain small.cairn --image none.jpg").exit_code,
             static_cast<int>(ErrorCode::kNotFound));
   const std::string image = stations[0]["images"][0];

@@ -118,7 +118,9 @@ TEST_F(VisualMapRun, EachEstimatorAnswersInItsOwnWay) {
     EXPECT_FALSE(of_visual[i].contains("center_m"));
     EXPECT_EQ(of_pnp[i].value("center_m", json()), of_both[i].value("center_m", json()));
     EXPECT_FALSE(of_pnp[i].contains("visual_map"));
-    if (!of_visual[i]["fix"].get<bool>()) EXPECT_FALSE(of_visual[i]["message"].get<std::string>().empty());
+    if (!of_visual[i]["fix"].get<bool>()) {
+      EXPECT_FALSE(of_visual[i]["message"].get<std::string>().empty());
+    }
   }
 }
 

@@ -75,6 +75,12 @@ static void CheckBadImages(cairn_localizer* localizer, const cairn_image* good) 
   image = *good;
   image.stride = 319;
   CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "319");
+  image.stride = (size_t)1 << 62; /* times the rows, the sum overflows */
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "stride");
+  fix.has_fix = 1; /* a fix before is not there after an error */
+  fix.num_inliers = 77;
+  CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "stride");
+  CHECK(fix.has_fix == 0 && fix.num_inliers == 0);
   image = *good;
   image.height = -240;
   CHECK_ERROR(cairn_localize(localizer, &image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "-240");

@@ -157,6 +157,9 @@ class Refusing(Poster):
             cairn.Map.open(POSTER / "poster.cairn", public_key=b"abcde")
         with self.assertRaises(TypeError):
             cairn.Map.open(7)
+        for path in ["", str(POSTER / "poster.cairn") + "\0zzz"]:
+            with self.assertRaises(ValueError):
+                cairn.Map.open(path)
 
     def test_bad_cameras_priors_and_options(self):
         with self.assertRaisesRegex(cairn.Error, "takes 4 parameters, found 1"):

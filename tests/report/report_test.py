@@ -297,6 +297,35 @@ class OtherPagesTest(unittest.TestCase):
             self.assertRegex(run.stderr, re.escape(path))
 
 
+    def test_what_is_right_json_but_no_check_or_drive_is_refused(self):
+        path = os.path.join(self.folder.name, 'wrong.json')
+        wrong = {'--check': ['{}', '{"images": {}}', '{"images": [null]}', '{"images": [{"name": 5}]}',
+                             '{"images": [{"true_floor": null}]}', '{"images": [{"true_floor": ["a", 1]}]}',
+                             '{"images": [{"true_floor": [1, 2], "floor": [1, 2]}]}'],
+                 '--drive': ['{}', '{"start": {"x_m": "a", "y_m": 1}}', '{"start": null}',
+                             '{"start": {"x_m": 1, "y_m": 1}, "legs": [null]}',
+                             '{"start": {"x_m": 1, "y_m": 1}, "legs": [{"kind": 5}]}',
+                             '{"start": {"x_m": 1, "y_m": 1}, "reached": "yes"}',
+                             '{"start": {"x_m": 1, "y_m": 1}, "legs": [{"steps": [null]}]}']}
+        for option, texts in wrong.items():
+            for text in texts:
+                pathlib.Path(path).write_text(text)
+                run = subprocess.run([CAIRN, 'report', MAP, '-o', path + '.html', option, path], capture_output=True, text=True)
+                self.assertEqual(run.returncode, 4, text)
+                self.assertIn(path, run.stderr)
+
+    def test_no_input_is_written_over(self):
+        for name in ['map.cairn', 'check.json']:
+            path = os.path.join(self.folder.name, name)
+            pathlib.Path(path).write_bytes(pathlib.Path(MAP if name == 'map.cairn' else CHECK).read_bytes())
+            before = pathlib.Path(path).read_bytes()
+            run = subprocess.run([CAIRN, 'report', os.path.join(self.folder.name, 'map.cairn'), '-o', path, '--check',
+                                  os.path.join(self.folder.name, 'check.json') if name == 'check.json' else CHECK],
+                                 capture_output=True, text=True)
+            self.assertEqual(run.returncode, 2, run.stderr)
+            self.assertEqual(pathlib.Path(path).read_bytes(), before)
+
+
 CAIRN_TEST_MAP = sys.argv[6]
 
 if __name__ == '__main__':

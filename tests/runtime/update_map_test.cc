@@ -1,5 +1,9 @@
 #include "runtime/update_map.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <filesystem>
 #include <functional>
 
@@ -202,6 +206,48 @@ TEST_F(UpdateMapTest, DamagedPreviousMapIsNotRolledBackTo) {
   ASSERT_TRUE(WriteFileAtomically(PreviousMapPath(map), bytes).ok());
   EXPECT_EQ(RollBackMap(map).error().code, ErrorCode::kCorrupt);
   EXPECT_EQ(*ReadFile(map), *ReadFile(Path("new.cairn")));
+}
+
+// Two at once would both keep what the first one made as the map before.
+TEST_F(UpdateMapTest, OneUpdateAtATime) {
+  const std::string map = Copy("old.cairn", "robot.cairn"), delta = WriteDelta("delta");
+  const int folder = open(testing::TempDir().c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(folder, LOCK_EX | LOCK_NB), 0);
+  EXPECT_EQ(UpdateMap(map, delta).error().code, ErrorCode::kBusy);
+  EXPECT_EQ(RollBackMap(map).error().code, ErrorCode::kBusy);
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
+  close(folder);
+  EXPECT_TRUE(UpdateMap(map, delta).ok());
+}
+
+TEST_F(UpdateMapTest, LinksLeadToTheMapAndNeverReplaceIt) {
+  const std::string map = Copy("old.cairn", "robot.cairn"), delta = WriteDelta("delta");
+  fs::create_symlink(map, PreviousMapPath(map));  // would keep the new map as the one before
+  fs::remove(Path("link.cairn"));
+  fs::create_symlink(map, Path("link.cairn"));
+  ASSERT_TRUE(UpdateMap(Path("link.cairn"), delta).ok());
+  EXPECT_TRUE(fs::is_symlink(Path("link.cairn")));
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("new.cairn")));
+  EXPECT_FALSE(fs::is_symlink(PreviousMapPath(map)));
+  EXPECT_EQ(*ReadFile(PreviousMapPath(map)), *ReadFile(Path("old.cairn")));
+  ASSERT_TRUE(RollBackMap(Path("link.cairn")).ok());
+  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
+}
+
+TEST_F(UpdateMapTest, WhatKilledUpdatesLeftIsRemoved) {
+  const std::string map = Copy("old.cairn", "robot.cairn");
+  for (const std::string& stale :
+       std::vector<std::string>{map + ".tmp-99999", PreviousMapPath(map) + ".tmp-99999"})
+    ASSERT_TRUE(WriteFileAtomically(stale, "half a map").ok());
+  ASSERT_TRUE(UpdateMap(map, WriteDelta("delta")).ok());
+  EXPECT_FALSE(fs::exists(map + ".tmp-99999"));
+  EXPECT_FALSE(fs::exists(PreviousMapPath(map) + ".tmp-99999"));
+}
+
+TEST_F(UpdateMapTest, DeltaIsNotWrittenOver) {
+  const std::string delta = WriteDelta("delta");
+  EXPECT_EQ(ApplyDelta(Path("old.cairn"), delta, delta).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(*ReadFile(delta), *ReadFile(WriteDelta("delta")));
 }
 
 TEST_F(UpdateMapTest, OldMapIsNotWrittenOver) {
