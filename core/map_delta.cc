@@ -13,6 +13,7 @@
 #include "core/database.h"
 #include "core/file.h"
 #include "core/map_file.h"
+#include "core/signature.h"
 
 namespace cairn {
 namespace {
@@ -140,28 +141,6 @@ std::string SignedHead(const MapDelta& delta) {
   return writer.Take();
 }
 
-Status CheckDeltaSignature(const MapDelta& delta, const std::string& path,
-                           const std::optional<PublicKey>& required) {
-  if (!delta.is_signed()) {
-    if (!required) return Ok();
-    return MakeError(
-        ErrorCode::kNotSigned,
-        "{}: is not signed, and a signature of key {} is required; make it with `cairn delta --key`", path,
-        HexOf(*required));
-  }
-  if (required && delta.public_key != *required) {
-    return MakeError(ErrorCode::kWrongKey, "{}: is signed with key {}, but {} is required", path,
-                     HexOf(delta.public_key), HexOf(*required));
-  }
-  const std::string head = SignedHead(delta);
-  if (crypto_sign_verify_detached(delta.signature.data(), reinterpret_cast<const uint8_t*>(head.data()),
-                                  head.size(), delta.public_key.data()) == 0) {
-    return Ok();
-  }
-  return MakeError(ErrorCode::kWrongKey, "{}: its signature is not that of key {}: it was changed since",
-                   path, HexOf(delta.public_key));
-}
-
 }  // namespace
 
 Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& new_path,
@@ -239,7 +218,8 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
                      "changed; copy it again",
                      path);
   }
-  CAIRN_RETURN_IF_ERROR(CheckDeltaSignature(delta, path, required));
+  CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(delta), delta.public_key, delta.signature, path, required,
+                                         "make it with `cairn delta --key`"));
   for (const auto& [num_bytes, page_size] : {std::pair(delta.old_num_bytes, delta.old_page_size),
                                              std::pair(delta.new_num_bytes, delta.new_page_size)}) {
     if (!IsPageSize(page_size) || num_bytes % page_size != 0 || num_bytes == 0 ||
@@ -251,9 +231,8 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
   return delta;
 }
 
-Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_path,
-                                  const std::string& delta_path) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
+Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_bytes,
+                                  const std::string& old_path, const std::string& delta_path) {
   const Hash found = HashOf(old_bytes);
   if (found != delta.old_hash || old_bytes.size() != delta.old_num_bytes) {
     const Result<MapFile> map = MapFile::Open(old_path, {});

@@ -51,10 +51,9 @@ std::string EncodeMapDelta(const MapDelta& delta);
 // later format), NotSigned (required only), WrongKey.
 Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required);
 
-// The bytes of the new map, from the file of the old one.  Takes memory for both, twice.
-// Errors: InvalidArgument (the file is not the map that the delta leads from: names both), NotFound, Io,
-// Corrupt.
-Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_path,
-                                  const std::string& delta_path);
+// The bytes of the new map, from those of the old one; the paths are for messages.  Takes memory for both,
+// twice. Errors: InvalidArgument (it is not the map that the delta leads from: names both), Corrupt.
+Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_bytes,
+                                  const std::string& old_path, const std::string& delta_path);
 
 }  // namespace cairn

@@ -14,6 +14,7 @@
 #include "core/database.h"
 #include "core/file.h"
 #include "core/map_file.h"
+#include "core/signature.h"
 #include "core/write_error.h"
 
 namespace cairn {
@@ -203,23 +204,8 @@ Status CheckFileHash(const std::string& path) {
 }
 
 Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required) {
-  if (!seal.is_signed()) {
-    if (!required) return Ok();
-    return MakeError(ErrorCode::kNotSigned,
-                     "{}: is not signed, and a signature of key {} is required; sign it with `cairn sign`",
-                     path, HexOf(*required));
-  }
-  if (required && seal.public_key != *required) {
-    return MakeError(ErrorCode::kWrongKey, "{}: is signed with key {}, but {} is required", path,
-                     HexOf(seal.public_key), HexOf(*required));
-  }
-  const std::string bytes = EncodeSeal(seal);
-  if (crypto_sign_verify_detached(seal.signature.data(), reinterpret_cast<const uint8_t*>(bytes.data()),
-                                  kSignedBytes, seal.public_key.data()) == 0) {
-    return Ok();
-  }
-  return MakeError(ErrorCode::kWrongKey, "{}: its signature is not that of key {}: it was changed since",
-                   path, HexOf(seal.public_key));
+  return CheckSignatureOf(EncodeSeal(seal).substr(0, kSignedBytes), seal.public_key, seal.signature, path,
+                          required, "sign it with `cairn sign`");
 }
 
 KeyPair MakeKeyPair() {

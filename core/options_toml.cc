@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "core/file.h"
+#include "core/find_option.h"
 #include "core/options.h"
 #include "core/toml_options.h"
 
@@ -49,18 +50,13 @@ std::string TomlPlace(const std::string& path, const toml::node& node) {
 Status SetOptionsFromToml(const toml::table& keys, const std::string& path, const OptionTable& table) {
   std::vector<std::string> names;
   for (const Option& option : table) names.push_back(option.name);
+  const std::string valid = fmt::format("valid are {}", fmt::join(names, ", "));
   for (const auto& [key, node] : keys) {
     const std::string name(key.str());
     const std::string place = fmt::format("{}:{}", path, key.source().begin.line);
-    const auto option =
-        std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
-    if (option == table.end()) {
-      const std::string nearest = NearestWord(name, names);
-      return MakeError(ErrorCode::kInvalidArgument, "{}: unknown option '{}'{}", place, name,
-                       nearest.empty() ? "; valid are " + fmt::format("{}", fmt::join(names, ", "))
-                                       : "; did you mean '" + nearest + "'?");
-    }
-    if (Status status = SetOption(*option, TextFromToml(node)); !status.ok()) {
+    const Result<const Option*> option = FindOption(table, name, valid);
+    if (!option.ok()) return MakeError(option.error().code, "{}: {}", place, option.error().message);
+    if (Status status = SetOption(**option, TextFromToml(node)); !status.ok()) {
       return MakeError(status.error().code, "{}: {}", place, status.error().message);
     }
   }

@@ -1,16 +1,8 @@
 #include "core/reuse_arguments.h"
 
-#include <filesystem>
+#include "core/output_path.h"
 
 namespace cairn {
-namespace {
-
-bool IsSameFile(const std::string& path1, const std::string& path2) {
-  std::error_code error;
-  return path1 == path2 || std::filesystem::equivalent(path1, path2, error);
-}
-
-}  // namespace
 
 void ReuseArguments::Add(CLI::App& app, const std::string& results) {
   CLI::Option* const reuse =

@@ -158,22 +158,15 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
   const int num_jobs = arguments.num_jobs > 0 ? arguments.num_jobs : arguments.num_shards;
   // Bars of stages that run side by side would overwrite each other.
   const bool collides = num_jobs > 1 && environment.progress_style == "auto";
-  std::vector<std::string> words = {
-      "make",
-      "--silent",
-      "--no-print-directory",
-      "--no-builtin-rules",
-      "--jobs=" + std::to_string(num_jobs),
-      "--file=" + rules,
-      "BUILD=" + paths.build_dir,
-      "CAIRN=" + paths.program,
-      "THREADS=" + std::to_string(environment.num_threads),
-      "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
-      std::string("SPACE_CHECK=") + (arguments.no_space_check ? "no" : ""),
-      "PROGRESS=" + (collides ? "lines" : environment.progress_style),
-      "LOG_LEVEL=" + environment.log_level,
-      "SHARDS=" + std::to_string(arguments.num_shards),
-      goal};
+  std::vector<std::string> words = MakeWords(rules, paths.build_dir, paths.program, environment,
+                                             collides ? "lines" : environment.progress_style);
+  for (const std::string& word :
+       {"--jobs=" + std::to_string(num_jobs),
+        "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
+        std::string("SPACE_CHECK=") + (arguments.no_space_check ? "no" : ""),
+        "SHARDS=" + std::to_string(arguments.num_shards), goal}) {
+    words.push_back(word);
+  }
   if (!arguments.launcher.empty()) words.push_back("LAUNCH=" + arguments.launcher);
   CAIRN_ASSIGN_OR_RETURN(
       const int wait_status,

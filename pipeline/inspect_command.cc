@@ -18,6 +18,7 @@
 #include "core/map_rows.h"
 #include "core/sessions.h"
 #include "pipeline/ambiguity_svg.h"
+#include "pipeline/explain/block_bytes.h"
 #include "pipeline/floor_svg.h"
 #include "pipeline/inspect_ambiguity.h"
 #include "pipeline/inspect_drops.h"
@@ -36,15 +37,6 @@ struct Arguments {
   std::string svg_path;
   std::string ambiguity_svg_path;
 };
-
-// Bytes of the blocks of each kind.
-nlohmann::ordered_json BytesPerBlockKind(const MapDirectory& directory) {
-  std::map<std::string, int64_t> bytes;
-  for (const BlockEntry& entry : directory.blocks()) {
-    bytes[BlockKindName(static_cast<BlockKind>(entry.kind))] += entry.num_bytes;
-  }
-  return bytes;
-}
 
 // Bytes of the pages of each table (its indices included), largest first; the file's remainder is SQLite's
 // own.

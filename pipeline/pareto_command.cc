@@ -147,17 +147,9 @@ Result<ParetoPoint> ReadPoint(const Places& places, int64_t size) {
 // Nothing where no map of so few bytes is possible; the stage has said so.
 Result<std::optional<ParetoPoint>> MakePoint(const Places& places, int64_t size,
                                              const CommandEnvironment& environment) {
-  const std::vector<std::string> words = {"make",
-                                          "--silent",
-                                          "--no-print-directory",
-                                          "--no-builtin-rules",
-                                          "--file=" + places.rules,
-                                          "BUILD=" + places.build_dir,
-                                          "CAIRN=" + places.program,
-                                          "THREADS=" + std::to_string(environment.num_threads),
-                                          "PROGRESS=" + environment.progress_style,
-                                          "LOG_LEVEL=" + environment.log_level,
-                                          places.Pareto(size, ".json")};
+  std::vector<std::string> words =
+      MakeWords(places.rules, places.build_dir, places.program, environment, environment.progress_style);
+  words.push_back(places.Pareto(size, ".json"));
   fs::remove(places.build_dir + "/pareto" + kErrorFile);
   CAIRN_ASSIGN_OR_RETURN(const int exit_code, ExitCode(words, NewBuildSession(), environment));
   if (exit_code != 0) {

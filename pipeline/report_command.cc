@@ -14,6 +14,7 @@
 #include "core/output_path.h"
 #include "core/text.h"
 #include "pipeline/ambiguity_svg.h"
+#include "pipeline/explain/block_bytes.h"
 #include "pipeline/floor_svg.h"
 #include "pipeline/report/report_data.h"
 #include "pipeline/report/report_page.h"
@@ -52,22 +53,18 @@ Error NotWhatWasExpected(const std::string& path, const char* what) {
 }
 
 // A map that every byte was checked of, as `cairn verify` does: what a report says must be what was made.
-Result<MapRows> ReadWholeMap(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
+Result<MapFile> OpenWholeMap(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {}));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
-  return ReadMapRows(file);
+  return file;
 }
 
-Result<std::vector<std::pair<std::string, int64_t>>> BytesByKind(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
-  std::map<std::string, int64_t> bytes;
-  auto rest = static_cast<int64_t>(fs::file_size(path));
-  for (const BlockEntry& entry : file.directory().blocks()) {
-    bytes[BlockKindName(static_cast<BlockKind>(entry.kind))] += entry.num_bytes;
-    rest -= entry.num_bytes;
-  }
-  bytes["head, options, findings"] = rest;
-  return std::vector<std::pair<std::string, int64_t>>(bytes.begin(), bytes.end());
+std::vector<std::pair<std::string, int64_t>> BytesByKind(const MapFile& file, int64_t num_bytes) {
+  const std::map<std::string, int64_t> of_blocks = BytesPerBlockKind(file.directory());
+  std::vector<std::pair<std::string, int64_t>> bytes(of_blocks.begin(), of_blocks.end());
+  for (const auto& [kind, of_kind] : of_blocks) num_bytes -= of_kind;
+  bytes.emplace_back("head, options, findings", num_bytes);
+  return bytes;
 }
 
 // The given file, or the one beside the map if it is there.
@@ -117,9 +114,10 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(
       arguments.output_path, {arguments.map_path, arguments.compare_path, arguments.check_path,
                               arguments.drive_path, arguments.build_report_path}));
-  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadWholeMap(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, OpenWholeMap(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(file));
   ReportInputs inputs{.rows = &rows, .num_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path))};
-  CAIRN_ASSIGN_OR_RETURN(inputs.block_bytes, BytesByKind(arguments.map_path));
+  inputs.block_bytes = BytesByKind(file, inputs.num_bytes);
   CAIRN_ASSIGN_OR_RETURN(inputs.reprojection_errors_px,
                          ReprojectionErrors(Beside(arguments, arguments.build_dir, ".build")));
   std::optional<Json> build, check, drive;
@@ -140,7 +138,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   }
   std::optional<MapRows> compared;
   if (!arguments.compare_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(compared, ReadWholeMap(arguments.compare_path));
+    CAIRN_ASSIGN_OR_RETURN(const MapFile compared_file, OpenWholeMap(arguments.compare_path));
+    CAIRN_ASSIGN_OR_RETURN(compared, ReadMapRows(compared_file));
     inputs.compared = &*compared;
     inputs.compared_bytes = static_cast<int64_t>(fs::file_size(arguments.compare_path));
     inputs.compared_name = fs::path(arguments.compare_path).filename().string();

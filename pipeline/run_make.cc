@@ -36,6 +36,21 @@ Result<std::string> RulesPath(const std::string& program) {
                    program);
 }
 
+std::vector<std::string> MakeWords(const std::string& rules, const std::string& build_dir,
+                                   const std::string& program, const CommandEnvironment& environment,
+                                   const std::string& progress_style) {
+  return {"make",
+          "--silent",
+          "--no-print-directory",
+          "--no-builtin-rules",
+          "--file=" + rules,
+          "BUILD=" + build_dir,
+          "CAIRN=" + program,
+          "THREADS=" + std::to_string(environment.num_threads),
+          "PROGRESS=" + progress_style,
+          "LOG_LEVEL=" + environment.log_level};
+}
+
 Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
                               const Progress& progress) {
   std::vector<char*> argv, envp;

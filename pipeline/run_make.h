@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/command.h"
 #include "core/error.h"
 #include "core/progress.h"
 
@@ -14,6 +15,12 @@ Result<std::string> ProgramPath();
 // map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
 // Errors: NotFound.
 Result<std::string> RulesPath(const std::string& program);
+
+// A command line of make for these rules and this build folder, without goals; `progress_style`: of the
+// stages.
+std::vector<std::string> MakeWords(const std::string& rules, const std::string& build_dir,
+                                   const std::string& program, const CommandEnvironment& environment,
+                                   const std::string& progress_style);
 
 // Runs a program with this one's terminal and `variable` added to its environment; returns its wait status.
 // Asked to stop, it asks the program to stop and waits for it.  Errors: NotFound, Failed.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "core/find_option.h"
 #include "runtime/cairn.h"
 #include "runtime/handles.h"
 #include "runtime/localizer.h"
@@ -304,16 +305,8 @@ int32_t cairn_localizer_set_option(cairn_localizer* localizer, const char* name,
     CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
     LocalizerOptions options = used->localizer->options();
     const OptionTable table = DescribeOptions(&options);
-    const auto option =
-        std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
-    if (option == table.end()) {
-      std::vector<std::string> names;
-      for (const Option& known : table) names.push_back(known.name);
-      const std::string nearest = NearestWord(name, names);
-      return Misuse(
-          "unknown option '{}'{}", name,
-          nearest.empty() ? "; `cairn localize --help` lists them" : "; did you mean '" + nearest + "'?");
-    }
+    CAIRN_ASSIGN_OR_RETURN(const Option* const option,
+                           FindOption(table, name, "`cairn localize --help` lists them"));
     CAIRN_RETURN_IF_ERROR(SetOption(*option, value));
     used->localizer = std::make_unique<Localizer>(used->map, options);
     return Ok();

@@ -108,8 +108,7 @@ Status KeepPrevious(const std::string& map_path) {
 Status ApplyDelta(const std::string& old_path, const std::string& delta_path, const std::string& new_path,
                   const UpdateOptions& options) {
   return WithoutExceptions("ApplyDelta", [&]() -> Status {
-    std::error_code error;
-    if (fs::equivalent(old_path, new_path, error)) {
+    if (IsSameFile(old_path, new_path)) {
       return MakeError(
           ErrorCode::kInvalidArgument,
           "{}: is the map to start from and cannot be the one to write; --in-place replaces it and "
@@ -118,7 +117,8 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
     }
     CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(new_path, {delta_path}));
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
-    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_path, delta_path));
+    CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
     return WriteMap(bytes, new_path, delta_path, options, [] { return Ok(); });
   });
 }
@@ -133,7 +133,7 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
     if (HashOf(old_bytes) == delta.new_hash) return false;
-    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, map_path, delta_path));
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, map_path, delta_path));
     CAIRN_RETURN_IF_ERROR(
         WriteMap(bytes, map_path, delta_path, options, [&] { return KeepPrevious(map_path); }));
     return true;

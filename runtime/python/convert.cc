@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include "core/find_option.h"
+
 namespace py = pybind11;
 
 namespace cairn {
@@ -58,16 +60,7 @@ cv::Mat PixelsOf(const py::array& image) {
 }
 
 void SetFromPython(const OptionTable& table, const std::string& name, const py::handle& value) {
-  const auto option =
-      std::find_if(table.begin(), table.end(), [&](const Option& o) { return o.name == name; });
-  if (option == table.end()) {
-    std::vector<std::string> names;
-    for (const Option& known : table) names.push_back(known.name);
-    const std::string nearest = NearestWord(name, names);
-    throw PythonError(MakeError(
-        ErrorCode::kInvalidArgument, "unknown option '{}'{}", name,
-        nearest.empty() ? "; `cairn localize --help` lists them" : "; did you mean '" + nearest + "'?"));
-  }
+  const Option* const option = ValueOrThrow(FindOption(table, name, "`cairn localize --help` lists them"));
   const std::string text = py::isinstance<py::bool_>(value) ? (py::cast<bool>(value) ? "true" : "false")
                                                             : py::cast<std::string>(py::str(value));
   ThrowIfError(SetOption(*option, text));

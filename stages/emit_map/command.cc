@@ -53,33 +53,39 @@ Result<int64_t> CountRejects(const std::string& path) {
   });
 }
 
-// `options`: those that the map was made with.
-Status AddProvenance(const Arguments& arguments, EmitMapOptions options, uint64_t seed, MapRows* rows) {
-  rows->name = arguments.name;
-  rows->writer = "cairn " CAIRN_VERSION;
-  rows->instruction_set = SiftInstructionSet();
-  rows->seed = seed;
+// What a map says of where it comes from, and in which frame, whatever landmarks it keeps.
+Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
+  MapHead head;
+  head.name = arguments.name;
+  head.writer = "cairn " CAIRN_VERSION;
+  head.instruction_set = SiftInstructionSet();
+  head.seed = seed;
   for (const auto& [name, path] :
        {std::pair("classes.db", arguments.classes_path), std::pair("world.db", arguments.world_path),
         std::pair("regions.db", arguments.regions_path),
         std::pair("vocabulary.db", arguments.vocabulary_path)}) {
-    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes[name], HashFile(path));
+    CAIRN_ASSIGN_OR_RETURN(head.input_hashes[name], HashFile(path));
   }
   if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes["appearance.db"], HashFile(arguments.appearance_path));
+    CAIRN_ASSIGN_OR_RETURN(head.input_hashes["appearance.db"], HashFile(arguments.appearance_path));
   }
   if (!arguments.views_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(rows->input_hashes["views.db"], HashFile(arguments.views_path));
+    CAIRN_ASSIGN_OR_RETURN(head.input_hashes["views.db"], HashFile(arguments.views_path));
   }
   for (const std::string& text : arguments.stage_options) {
     const size_t equals = text.find('=');
     if (equals == 0 || equals == std::string::npos) {
       return MakeError(ErrorCode::kInvalidArgument, "--stage-options {}: expected STAGE=FILE.toml", text);
     }
-    CAIRN_ASSIGN_OR_RETURN(rows->stage_options[text.substr(0, equals)], ReadFile(text.substr(equals + 1)));
+    CAIRN_ASSIGN_OR_RETURN(head.stage_options[text.substr(0, equals)], ReadFile(text.substr(equals + 1)));
   }
-  rows->stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
-  return Ok();
+  if (!arguments.frame_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(head.frame, ReadCaptureFrame(arguments.frame_path));
+  }
+  if (!arguments.sessions_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(head.sessions, ReadSessionsText(arguments.sessions_path));
+  }
+  return head;
 }
 
 // What all stages before have dropped.  Images that were not read have no image_id: the total says it all.
@@ -107,10 +113,12 @@ struct Inputs {
   Decomposition decomposition;
   Vocabulary vocabulary;
   std::optional<Appearance> appearance;
+  std::optional<Views> views;
+  MapHead provenance;
   std::vector<DroppedItem> dropped;
 };
 
-Result<Inputs> ReadInputs(const Arguments& arguments) {
+Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
   Inputs inputs;
   CAIRN_ASSIGN_OR_RETURN(inputs.classes, ReadClasses(arguments.classes_path));
   CAIRN_ASSIGN_OR_RETURN(inputs.world, ReadWorld(arguments.world_path));
@@ -119,6 +127,10 @@ Result<Inputs> ReadInputs(const Arguments& arguments) {
   if (!arguments.appearance_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(inputs.appearance, ReadAppearance(arguments.appearance_path));
   }
+  if (!arguments.views_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(inputs.views, ReadViews(arguments.views_path));
+  }
+  CAIRN_ASSIGN_OR_RETURN(inputs.provenance, ReadProvenance(arguments, seed));
   CAIRN_ASSIGN_OR_RETURN(inputs.dropped, ReadAllDropped(arguments));
   return inputs;
 }
@@ -153,28 +165,26 @@ World WorldOf(const Classes& classes, World world) {
 }
 
 // The whole map but for its self-test.  `classes` and `world` may be those of a part of the survey.
-Result<MapRows> MakeRows(const Arguments& arguments, const Inputs& inputs, const Classes& classes,
-                         const World& world, const EmitMapOptions& options, const std::vector<char>* keep,
-                         uint64_t seed, int num_threads) {
+Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const World& world,
+                         EmitMapOptions options, const std::vector<char>* keep, int num_threads) {
   CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                          EmitMap(classes, world, inputs.decomposition, inputs.vocabulary, options,
                                  inputs.appearance ? &*inputs.appearance : nullptr, keep));
-  if (!arguments.frame_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(rows.frame, ReadCaptureFrame(arguments.frame_path));
-  }
-  if (!arguments.sessions_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(rows.sessions, ReadSessionsText(arguments.sessions_path));
-  }
+  rows.name = inputs.provenance.name;
+  rows.writer = inputs.provenance.writer;
+  rows.instruction_set = inputs.provenance.instruction_set;
+  rows.seed = inputs.provenance.seed;
+  rows.input_hashes = inputs.provenance.input_hashes;
+  rows.stage_options = inputs.provenance.stage_options;
+  rows.stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
+  rows.frame = inputs.provenance.frame;
+  rows.sessions = inputs.provenance.sessions;
   if (options.visual_map) {
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map, ModelLandmarks(classes, rows, options, num_threads));
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map.errors,
                            LearnVisualErrors(classes, rows, rows.visual_map, num_threads));
   }
-  CAIRN_RETURN_IF_ERROR(AddProvenance(arguments, options, seed, &rows));
-  if (!arguments.views_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(Views views, ReadViews(arguments.views_path));
-    CAIRN_RETURN_IF_ERROR(AddViews(std::move(views), &rows));
-  }
+  if (inputs.views) CAIRN_RETURN_IF_ERROR(AddViews(*inputs.views, &rows));
   return rows;
 }
 
@@ -210,9 +220,9 @@ Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& argument
     options.descriptor_bits = descriptor_bits;
     const bool is_whole = classes.images.size() == inputs.classes.images.size();
     options.visual_map = arguments.options.visual_map && is_whole;
-    CAIRN_ASSIGN_OR_RETURN(MapRows rows, MakeRows(arguments, inputs, classes,
-                                                  is_whole ? inputs.world : WorldOf(classes, inputs.world),
-                                                  options, &keep, environment.seed, environment.num_threads));
+    CAIRN_ASSIGN_OR_RETURN(MapRows rows,
+                           MakeRows(inputs, classes, is_whole ? inputs.world : WorldOf(classes, inputs.world),
+                                    options, &keep, environment.num_threads));
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep), inputs, &rows));
     return rows;
   };
@@ -236,14 +246,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       arguments.output_path,
       {arguments.matches_path, arguments.classes_path, arguments.world_path, arguments.regions_path,
        arguments.vocabulary_path, arguments.appearance_path, arguments.views_path}));
-  CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments));
+  CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
   MapRows rows;
   std::string guarantee;
   if (arguments.options.max_bytes > 0) {
     CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsWithin(arguments, inputs, environment));
   } else {
-    CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(arguments, inputs, inputs.classes, inputs.world, arguments.options,
-                                          nullptr, environment.seed, environment.num_threads));
+    CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.world, arguments.options, nullptr,
+                                          environment.num_threads));
     CAIRN_RETURN_IF_ERROR(AddDrops(inputs.dropped, inputs, &rows));
   }
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "core/map_blocks.h"
+
+namespace cairn {
+
+// Bytes of the blocks of each kind, by its name.
+std::map<std::string, int64_t> BytesPerBlockKind(const MapDirectory& directory);
+
+}  // namespace cairn
