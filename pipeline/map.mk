@@ -301,7 +301,7 @@ $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(BUILD)/options/check_map.toml $(BU
     $(BUILD)/options/seed $(PROGRAM_HASH) $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check-map $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
-	    --options $(@D)/options/check_map.toml -o $(MAP) $(CAIRN_FLAGS)
+	    --options $(@D)/options/check_map.toml --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)
 
 # The map in other sizes, for `cairn pareto`: pareto/N.cairn has at most N bytes (0: every class) and pareto/N.json what
 # the held-out images say of it; no gate.

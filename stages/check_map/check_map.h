@@ -7,6 +7,7 @@
 
 #include "core/camera.h"
 #include "core/error.h"
+#include "core/ids.h"
 #include "core/map_findings.h"
 #include "core/options.h"
 #include "core/pose.h"
@@ -59,6 +60,7 @@ struct HeldOutImage {
 struct HeldOutResult {
   std::string name;
   std::optional<Pose> true_cam_from_world;
+  std::optional<StationIdx> station;  // where it was taken: for FindStations (region_figures.h) to fill
   std::string rejected;  // why the image could not be tried (unreadable, wrong size); empty otherwise
   Localization localization;
   // Fixes of images with a true pose: distance of the camera centres, angle, normalised estimation error

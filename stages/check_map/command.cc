@@ -10,7 +10,9 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/capture.h"
+#include "core/file.h"
 #include "core/map_documents.h"
+#include "core/output_path.h"
 #include "runtime/read_scans.h"
 #include "stages/check_map/check_map.h"
 #include "stages/check_map/plan_agreement.h"
@@ -29,6 +31,7 @@ struct Arguments {
   std::vector<std::string> foreign_paths;
   std::string scans_path;
   std::string output_path;
+  std::string details_path;
   bool json = false;
   CheckMapOptions options;
   OptionArguments option_arguments;
@@ -142,6 +145,10 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  for (const std::string& path : {arguments.output_path, arguments.details_path}) {
+    CAIRN_RETURN_IF_ERROR(
+        CheckOutputIsNoInput(path, {arguments.map_path, arguments.queries_path, arguments.scans_path}));
+  }
   cv::setNumThreads(1);  // images in parallel, each on one thread: times mean one core
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(arguments.map_path));
@@ -161,7 +168,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
           CheckMap(full, images, arguments.options, environment.num_threads, *environment.progress));
       AddFullFigures(all_images, &held_out);
     }
-    held_out.regions = SummarizeRegions(rows, images, held_out.images, arguments.options);
+    FindStations(rows, arguments.options, &held_out.images);
+    held_out.regions = SummarizeRegions(rows, held_out.images, arguments.options);
     WarnOfRejects(held_out);
   }
   CAIRN_RETURN_IF_ERROR(CheckPlan(rows, arguments, environment, &held_out));
@@ -176,8 +184,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const PrintedReport report{.rows = &rows,
                              .map_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path)),
                              .held_out = &held_out,
-                             .foreign = foreign ? &*foreign : nullptr};
+                             .foreign = foreign ? &*foreign : nullptr,
+                             .options = &arguments.options};
   *environment.out << (arguments.json ? ReportJson(report) : ReportText(report));
+  // Also where the gate refuses the map: then people want to see why.
+  if (!arguments.details_path.empty())
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.details_path, ReportJson(report)));
   ReportHeldOut(held_out, environment.report);
   if (!held_out.images.empty() || !arguments.output_path.empty())
     CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
@@ -207,6 +219,9 @@ Command CheckMapCommand() {
             app.add_option("-o,--output", arguments->output_path,
                            "sealed map to write, with the figures inside");
             app.add_flag("--json", arguments->json, "print JSON, every image included");
+            app.add_option("--details", arguments->details_path,
+                           "file to write the same JSON to, for cairn report --check")
+                ->type_name("FILE.json");
             arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },

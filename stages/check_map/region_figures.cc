@@ -75,22 +75,27 @@ std::optional<StationIdx> StationOf(const Pose& cam_from_world, double spacing_m
   return std::get<2>(*best);
 }
 
-std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutImage>& images,
-                                             const std::vector<HeldOutResult>& results,
-                                             const CheckMapOptions& options) {
+void FindStations(const MapRows& rows, const CheckMapOptions& options, std::vector<HeldOutResult>* results) {
   const double spacing_m = StationSpacingM(rows.stations);
+  for (HeldOutResult& result : *results) {
+    if (result.true_cam_from_world)
+      result.station = StationOf(*result.true_cam_from_world, spacing_m, rows, options);
+  }
+}
+
+std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutResult>& results,
+                                             const CheckMapOptions& options) {
   std::map<RegionIdx, std::vector<const HeldOutResult*>> of_region;
-  for (size_t i = 0; i < images.size(); ++i) {
-    if (!images[i].cam_from_world) continue;
-    const std::optional<StationIdx> station = StationOf(*images[i].cam_from_world, spacing_m, rows, options);
+  for (const HeldOutResult& result : results) {
+    if (!result.true_cam_from_world) continue;
     bool is_inside = false;
-    for (size_t region = 0; station && region < rows.regions.size(); ++region) {
+    for (size_t region = 0; result.station && region < rows.regions.size(); ++region) {
       const std::vector<StationIdx>& stations = rows.regions[region].stations;
-      if (!std::binary_search(stations.begin(), stations.end(), *station)) continue;
-      of_region[static_cast<RegionIdx>(region)].push_back(&results[i]);
+      if (!std::binary_search(stations.begin(), stations.end(), *result.station)) continue;
+      of_region[static_cast<RegionIdx>(region)].push_back(&result);
       is_inside = true;
     }
-    if (!is_inside) of_region[kOutsideRegions].push_back(&results[i]);
+    if (!is_inside) of_region[kOutsideRegions].push_back(&result);
   }
   std::vector<RegionSelfTest> summary;
   for (const auto& [region, of_it] : of_region) summary.push_back(Summarize(region, of_it, options));

@@ -20,10 +20,12 @@ double StationSpacingM(const std::vector<MapStation>& stations);
 std::optional<StationIdx> StationOf(const Pose& cam_from_world, double spacing_m, const MapRows& rows,
                                     const CheckMapOptions& options);
 
-// How the images with a true pose fared, by the regions that have their station; results[i] is that of
-// images[i].  Ascending region; images at no station of any region count in kOutsideRegions.
-std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutImage>& images,
-                                             const std::vector<HeldOutResult>& results,
+// Fills in StationOf of every image with a true pose.
+void FindStations(const MapRows& rows, const CheckMapOptions& options, std::vector<HeldOutResult>* results);
+
+// How the images with a true pose fared, by the regions that have their station.  Ascending region; images at
+// no station of any region count in kOutsideRegions.
+std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutResult>& results,
                                              const CheckMapOptions& options);
 
 }  // namespace cairn

@@ -29,11 +29,16 @@ nlohmann::json FloorJson(const Pose& cam_from_world, const MapRows& rows) {
   return {floor.position.x(), floor.position.y(), floor.heading_deg};
 }
 
-nlohmann::json ImagesJson(const CheckMapReport& report, const MapRows& rows, bool with_errors) {
+nlohmann::json ImagesJson(const CheckMapReport& report, const PrintedReport& printed, bool with_errors) {
+  const MapRows& rows = *printed.rows;
   nlohmann::json images = nlohmann::json::array();
   for (const HeldOutResult& result : report.images) {
     nlohmann::json image = {{"name", result.name}};
-    if (result.true_cam_from_world) image["true_floor"] = FloorJson(*result.true_cam_from_world, rows);
+    if (result.true_cam_from_world) {
+      image["true_floor"] = FloorJson(*result.true_cam_from_world, rows);
+      image["station"] = nullptr;
+      if (result.station) image["station"] = *result.station;
+    }
     if (!result.rejected.empty()) {
       image["rejected"] = result.rejected;
     } else {
@@ -55,6 +60,7 @@ nlohmann::json ImagesJson(const CheckMapReport& report, const MapRows& rows, boo
         image["error_m"] = result.error_m;
         image["error_deg"] = result.error_deg;
         image["nees"] = result.nees;
+        image["is_gross_error"] = IsGrossError(result, *printed.options);
       }
     }
     images.push_back(std::move(image));
@@ -158,12 +164,12 @@ std::string ReportJson(const PrintedReport& report) {
     json["mean_total_ms"] = report.held_out->mean_total_ms;
     json["mean_sift_ms"] = report.held_out->mean_sift_ms;
     json["regions"] = SelfTestRegionsJson(report.held_out->regions);
-    json["images"] = ImagesJson(*report.held_out, *report.rows, true);
+    json["images"] = ImagesJson(*report.held_out, report, true);
   }
   if (report.foreign != nullptr) {
     json["num_foreign"] = report.foreign->images.size();
     json["num_false_fixes"] = NumFixes(*report.foreign);
-    json["foreign_images"] = ImagesJson(*report.foreign, *report.rows, false);
+    json["foreign_images"] = ImagesJson(*report.foreign, report, false);
   }
   return json.dump(2) + "\n";
 }

@@ -19,6 +19,7 @@ struct PrintedReport {
   int64_t map_bytes = 0;
   const CheckMapReport* held_out = nullptr;
   const CheckMapReport* foreign = nullptr;  // may be null
+  const CheckMapOptions* options = nullptr;
 };
 
 // For people, a figure per line.

@@ -57,7 +57,8 @@ TEST(CheckMap, GateNamesTheFigureThatFails) {
 TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
   const auto report = Check({BlankImage("quote\".png")});
   const MapRows rows = MakeSyntheticRoom(1).rows;
-  const PrintedReport printed{&rows, 1000000, &*report, nullptr};
+  const CheckMapOptions options;
+  const PrintedReport printed{&rows, 1000000, &*report, nullptr, &options};
   EXPECT_THAT(ReportText(printed), HasSubstr("held-out images        1"));
   EXPECT_THAT(ReportJson(printed), HasSubstr("quote\\\".png"));
 }

@@ -93,23 +93,25 @@ TEST(RegionFigures, StatedPosesAreTakenIntoTheMapsFrame) {
 
 TEST(RegionFigures, ImageCountsInEveryRegionOfItsStationOrOutside) {
   const MapRows rows = FourStations();
-  std::vector<HeldOutImage> images;
   std::vector<HeldOutResult> results;
   const auto add = [&](double x, std::optional<double> error_m) {
-    images.push_back({.name = "image", .cam_from_world = At(x)});
     results.push_back(Outcome(error_m));
+    results.back().true_cam_from_world = At(x);
   };
   add(0, 0.01);
   add(0.1, 0.04);
   add(1, 0.02);  // in both
   add(2, 0.8);   // gross
   add(2.1, std::nullopt);
-  add(3, 0.03);           // a station of no region
-  add(50, std::nullopt);  // no station
-  images.push_back({.name = "of another place"});
-  results.push_back(Outcome(0.5));
+  add(3, 0.03);                     // a station of no region
+  add(50, std::nullopt);            // no station
+  results.push_back(Outcome(0.5));  // of another place
 
-  const std::vector<RegionSelfTest> regions = SummarizeRegions(rows, images, results, {});
+  FindStations(rows, {}, &results);
+  EXPECT_EQ(results[2].station, 1);
+  EXPECT_EQ(results[6].station, std::nullopt);
+  EXPECT_EQ(results[7].station, std::nullopt);
+  const std::vector<RegionSelfTest> regions = SummarizeRegions(rows, results, {});
   EXPECT_THAT(regions, ElementsAre(RegionSelfTest{-1, 2, 1, 0, RegionSelfTest::Errors{0.03, 0.3, 0.03, 0.3}},
                                    RegionSelfTest{0, 3, 3, 0, RegionSelfTest::Errors{0.02, 0.2, 0.04, 0.4}},
                                    RegionSelfTest{1, 3, 2, 1, RegionSelfTest::Errors{0.02, 0.2, 0.8, 8}}));
