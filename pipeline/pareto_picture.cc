@@ -129,44 +129,7 @@ std::string DrawKey(double y, const std::vector<std::tuple<const char*, const ch
   return svg;
 }
 
-std::string Cell(const std::optional<double>& value, double unit, int digits) {
-  return value ? fmt::format("{:.{}f}", *value / unit, digits) : "-";
-}
-
 }  // namespace
-
-std::string ParetoCsv(const std::vector<ParetoPoint>& points) {
-  std::string csv =
-      "max_bytes,bytes,landmarks,descriptor_bits,min_common_landmarks,stations_below_k,held_out,localized_"
-      "ratio,"
-      "within_10cm_5deg_ratio,precision_ratio,median_error_m,median_error_deg\n";
-  for (const ParetoPoint& point : points) {
-    const auto number = [](const std::optional<double>& value) {
-      return value ? fmt::format("{}", *value) : "";
-    };
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", point.max_bytes, point.num_bytes,
-                       point.num_landmarks, point.descriptor_bits, point.min_common_landmarks,
-                       point.num_stations_below_k, point.num_held_out, point.localized_ratio,
-                       point.within_10cm_5deg_ratio, point.precision_ratio, number(point.median_error_m),
-                       number(point.median_error_deg));
-  }
-  return csv;
-}
-
-std::string ParetoText(const std::vector<ParetoPoint>& points) {
-  std::string text = fmt::format("{:>10} {:>10} {:>9} {:>5} {:>7} {:>8} {:>10} {:>12} {:>10} {:>8} {:>7}\n",
-                                 "at most", "bytes", "landmarks", "bits", "common", "below k", "localized",
-                                 "10 cm, 5 deg", "precision", "cm", "deg");
-  for (const ParetoPoint& point : points) {
-    text += fmt::format(
-        "{:>10} {:>10} {:>9} {:>5} {:>7} {:>8} {:>8.1f} % {:>10.1f} % {:>8.1f} % {:>8} {:>7}\n",
-        point.max_bytes > 0 ? std::to_string(point.max_bytes) : "-", point.num_bytes, point.num_landmarks,
-        point.descriptor_bits, point.min_common_landmarks, point.num_stations_below_k,
-        100 * point.localized_ratio, 100 * point.within_10cm_5deg_ratio, 100 * point.precision_ratio,
-        Cell(point.median_error_m, 0.01, 2), Cell(point.median_error_deg, 1, 2));
-  }
-  return text;
-}
 
 std::string ParetoSvg(const std::string& map_name, const std::vector<ParetoPoint>& points,
                       const std::optional<ParetoPeer>& peer) {

@@ -6,13 +6,13 @@
 #include <optional>
 #include <string>
 
+#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "core/feature_class.h"
 #include "core/file.h"
 #include "core/map_file.h"
 #include "core/output_path.h"
-#include "core/text.h"
 #include "pipeline/ambiguity_svg.h"
 #include "pipeline/explain/block_bytes.h"
 #include "pipeline/floor_svg.h"
@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kCheckWords = "what cairn check-map --json printed";
+constexpr const char* kCheckWords = "what cairn check-map --details wrote";
 constexpr const char* kDriveWords = "what cairn drive -o wrote";
 
 struct Arguments {
@@ -85,20 +85,32 @@ Result<std::vector<double>> ReprojectionErrors(const std::string& build_dir) {
   return errors;
 }
 
-// What was measured with maps of other sizes, if `cairn pareto` was run: bytes and part localized.
-Result<Json> ParetoJson(const std::string& path) {
-  Json list = Json::array();
-  if (path.empty()) return list;
+// What was measured with maps of other sizes, if `cairn pareto` was run.
+Result<std::vector<ParetoPoint>> ReadPareto(const std::string& path) {
+  if (path.empty()) return std::vector<ParetoPoint>();
   CAIRN_ASSIGN_OR_RETURN(const std::string csv, ReadFile(path));
-  const std::vector<std::string_view> lines = SplitLines(csv);
-  for (size_t i = 1; i < lines.size(); ++i) {
-    const std::vector<std::string> fields = SplitFields(lines[i], ',');
-    double num_bytes = 0, localized_ratio = 0;
-    if (fields.size() < 8 || !ParseNumber(fields[1], &num_bytes) || !ParseNumber(fields[7], &localized_ratio))
-      return MakeError(ErrorCode::kCorrupt, "{}: line {} is none of cairn pareto's", path, i + 1);
-    list.push_back({num_bytes, localized_ratio});
+  return ParseParetoCsv(csv, path);
+}
+
+// The given one, or that of the map's compilation if it is still that of this map.
+Result<std::optional<Json>> ReadCheck(const Arguments& arguments, const std::string& build_dir,
+                                      const MapRows& rows) {
+  std::error_code error;
+  const bool is_given = !arguments.check_path.empty();
+  const std::string path = is_given ? arguments.check_path : build_dir + "/check.json";
+  if (!is_given && (build_dir.empty() || !fs::exists(path, error))) return std::optional<Json>();
+  CAIRN_ASSIGN_OR_RETURN(std::optional<Json> check, ReadJson(path, kCheckWords));
+  if (!is_given && !check->contains("images")) return std::optional<Json>();  // nothing was held out
+  if (!IsCheckReport(*check)) return NotWhatWasExpected(path, kCheckWords);
+  if (IsCheckOf(*check, rows)) return check;
+  if (is_given) {
+    // Other images of the same map may be asked for.
+    spdlog::warn("{}: its figures are not those of the self-test in {}", path, arguments.map_path);
+    return check;
   }
-  return list;
+  spdlog::warn("{}: is of another compilation than {}; its held-out images are not shown", path,
+               arguments.map_path);
+  return std::optional<Json>();
 }
 
 Status WritePictures(const std::string& folder, const MapRows& rows) {
@@ -118,19 +130,17 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(file));
   ReportInputs inputs{.rows = &rows, .num_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path))};
   inputs.block_bytes = BytesByKind(file, inputs.num_bytes);
-  CAIRN_ASSIGN_OR_RETURN(inputs.reprojection_errors_px,
-                         ReprojectionErrors(Beside(arguments, arguments.build_dir, ".build")));
-  std::optional<Json> build, check, drive;
+  const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
+  CAIRN_ASSIGN_OR_RETURN(inputs.reprojection_errors_px, ReprojectionErrors(build_dir));
+  CAIRN_ASSIGN_OR_RETURN(inputs.pareto, ReadPareto(Beside(arguments, "", ".pareto.csv")));
+  std::optional<Json> build, drive;
   const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
   if (!build_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(build, ReadJson(build_path, "the report that cairn compile wrote"));
     inputs.build_report = &*build;
   }
-  if (!arguments.check_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(check, ReadJson(arguments.check_path, kCheckWords));
-    if (!IsCheckReport(*check)) return NotWhatWasExpected(arguments.check_path, kCheckWords);
-    inputs.check = &*check;
-  }
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<Json> check, ReadCheck(arguments, build_dir, rows));
+  if (check) inputs.check = &*check;
   if (!arguments.drive_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(drive, ReadJson(arguments.drive_path, kDriveWords));
     if (!IsDrive(*drive)) return NotWhatWasExpected(arguments.drive_path, kDriveWords);
@@ -144,8 +154,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     inputs.compared_bytes = static_cast<int64_t>(fs::file_size(arguments.compare_path));
     inputs.compared_name = fs::path(arguments.compare_path).filename().string();
   }
-  Json data = ReportData(inputs);
-  CAIRN_ASSIGN_OR_RETURN(data["pareto"], ParetoJson(Beside(arguments, "", ".pareto.csv")));
+  const Json data = ReportData(inputs);
   const std::string page = arguments.print ? PrintedReportPage(rows, data) : ReportPage(data);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, page));
   if (!arguments.svg_dir.empty()) CAIRN_RETURN_IF_ERROR(WritePictures(arguments.svg_dir, rows));
@@ -177,7 +186,9 @@ Command ReportCommand() {
                    "Build folder, for reprojection errors [NAME.build beside the map, if it is there]")
                 ->type_name("DIR");
             app.add_option("--check", arguments->check_path,
-                           "What cairn check-map --json printed: errors of held-out images as arrows")
+                           "What cairn check-map --details wrote: held-out images on the floor, with their "
+                           "errors or why they were not localized [check.json in the build folder, if it is "
+                           "of this map]")
                 ->type_name("FILE.json");
             app.add_option("--drive", arguments->drive_path,
                            "What cairn drive -o wrote: replayed on the floor")

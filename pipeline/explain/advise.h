@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "core/map_rows.h"
+#include "pipeline/pareto_points.h"
 
 namespace cairn {
 
@@ -20,13 +22,22 @@ struct Advice {
   };
   std::string text;                  // one or two sentences
   std::vector<StationIdx> stations;  // that it is about, ascending; none: the map as a whole
+  std::optional<RegionIdx> region;   // that it is about
   std::vector<View> images_to_take;  // at most kMaxViews
   static constexpr size_t kMaxViews = 8;
 };
 
+// A region that localizes a smaller part of its held-out images is a poor one.
+inline constexpr double kPoorLocalizedRatio = 0.8;
+
 // About these stations (ascending) and what concerns the map as a whole; empty: about all stations.
 // Needs what the compilation found out (MapFindings): without it, says so.
 std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& about = {});
+
+// What the same place's maps of other sizes say: whether a smaller one would do, whether a larger one
+// localizes more.  `num_bytes` is the map's.
+void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPoint>& sizes,
+              std::vector<Advice>* advice);
 
 // A numbered line per advice, with the places of images to take under it.
 std::string AdviceText(const std::vector<Advice>& advice);

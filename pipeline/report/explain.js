@@ -1,121 +1,205 @@
-// What is said of a station or a region.
-function table(rows, head) {
-  const node = element('table');
-  const isNumber = cell => typeof cell === 'number' || (typeof cell === 'string' && /^[-\d.,]+( [kM]B)?$/.test(cell));
-  const style = cell => isNumber(cell) ? {class: 'num'} : {};
-  if (head) node.append(element('tr', {}, ...head.map((text, i) => element('th', rows.length ? style(rows[0][i]) : {}, text))));
-  for (const row of rows) node.append(element('tr', {}, ...row.map(cell => element('td', style(cell), typeof cell === 'number' ? String(cell) : cell))));
-  return node;
-}
-const metres = (value, digits = 2) => `${value.toFixed(digits)} ${unit}`;
-const placeText = i => `${metres(S.x[i] / 100)}, ${metres(S.y[i] / 100)}${S.heading[i] === null ? '' : `, looking towards ${S.heading[i]}\u00B0`}`;
-function button(text, action) {
-  const node = element('button', {type: 'button'}, text);
-  node.addEventListener('click', action);
-  return node;
-}
+// What is said of a station, a region or a held-out image, and how one of them is chosen: click, search, keyboard.
+const stationPlace = i => `${metres(S.x[i] / 100)}, ${metres(S.y[i] / 100)}${S.heading[i] === null ? '' : `, looking towards ${S.heading[i]}\u00B0`}`;
 function say(...nodes) {
+  const close = button('\u00D7', () => { choose({}); sayFirst(); });
+  close.className = 'close';
+  close.setAttribute('aria-label', 'close');
+  $('explanation').replaceChildren(close, ...nodes);
+  $('explanation').classList.add('open');
+  $('explanation').scrollTop = 0;
+  if (isSmallScreen()) $('map').scrollIntoView();  // it is explained below the floor
+}
+// Before anything is chosen: where to look first.
+function sayFirst() {
+  const nodes = [element('p', {}, 'Click a station, a region or a held-out image, or find one by its number or name: what is seen there, what the stages dropped and why.')];
+  const first = data.advice.filter(entry => entry.stations.length).slice(0, 3);
+  if (first.length) {
+    nodes.push(element('h3', {}, 'Weakest places'), ...first.map(entry => {
+      const test = entry.region !== null && R[entry.region].test;
+      const open = button(test && isPoor(test) ? `Region ${entry.region}: ${testText(test).split(';')[0]}` : entry.text.split(/[:.] /)[0].replace(/ \([^)]*\)+/, ''), () => showAdvice(entry));
+      open.className = 'wide';
+      return open;
+    }));
+  }
   $('explanation').replaceChildren(...nodes);
-  if (window.innerWidth <= 800) $('explanation').scrollIntoView({block: 'nearest'});  // below the floor there
+  $('explanation').classList.remove('open');
 }
 // The floor around stations, at least six metres of it.
-function goTo(stations) {
-  const bounds = leaflet.latLngBounds(stations.map(i => L_latlng(S.x[i], S.y[i])));
+function goTo(places) {
+  const bounds = leaflet.latLngBounds(places.map(([x, y]) => at(x, y)));
   const center = bounds.getCenter();
   bounds.extend([center.lat - 3, center.lng - 3]).extend([center.lat + 3, center.lng + 3]);
   map.fitBounds(bounds.pad(0.2));
 }
+const placesOf = stations => stations.map(i => [S.x[i], S.y[i]]);
+function showAdvice(entry) {
+  if (entry.views.length) show('images to take');
+  if (entry.region !== null) explainRegion(entry.region); else explainStation(entry.stations[0]);
+  goTo(placesOf(entry.stations));
+  $('floor').scrollIntoView();
+}
+function choose({station = -1, region = -1, image = -1}) {
+  Object.assign(selected, {station, region, image});
+  redrawAll();
+}
 function testText(test) {
-  if (!test) return 'no held-out image';
-  let text = `${test.localized} of ${test.held_out} held-out images localized`;
+  if (!test) return 'no held-out image was taken there';
+  let text = `${test.localized} of ${counted(test.held_out, 'held-out image')} localized`;
   if (test.wrong) text += `, ${test.wrong} of them wrong`;
-  if (test.median_m !== undefined) text += `; median error ${(100 * test.median_m).toFixed(1)} cm, ${test.median_deg.toFixed(2)}\u00B0`;
+  if (test.median_m !== undefined) text += `; median error ${lengthText(test.median_m)}, ${degrees(test.median_deg)}`;
   return text;
 }
+const outcome = image => image.found ? `${image.wrong ? 'wrong, ' : ''}${lengthText(image.error_m)}, ${degrees(image.error_deg)} off` : `not localized: ${image.message || 'no reason is known'}`;
+// Those that failed first, each a button.
+function heldOutNodes(images) {
+  if (!images.length) return [];
+  const order = images.slice().sort((a, b) => isBad(heldOut[b]) - isBad(heldOut[a]) || a - b);
+  const line = i => element('li', isBad(heldOut[i]) ? {class: 'bad'} : {}, button(heldOut[i].name, () => { explainImage(i); }), ' ', outcome(heldOut[i]));
+  const nodes = [element('h3', {}, term('held-out', 'Held-out images'), ' taken here'), element('ul', {class: 'plain'}, ...order.slice(0, 12).map(line))];
+  if (order.length > 12) nodes.push(element('p', {class: 'soft'}, `and ${order.length - 12} more`));
+  return nodes;
+}
+const adviceNodes = entries => entries.length ? [element('h3', {}, 'What would help'), ...entries.map(entry => element('p', {}, entry.text))] : [];
 function explainStation(i) {
-  selected.station = i;
-  selected.region = -1;
-  redrawAll();
+  choose({station: i});
   const why = data.drops.find(drop => drop.name === S.why[i]);
-  const covered = S.covered[i] && !why ? element('p', {}, term('covered'), ': yes')
-    : element('p', {class: 'bad'}, term('covered'), ': no', why ? `: ${why.text}` : '');
-  const losses = data.drops.filter(drop => drop.at.length && drop.at[i] > 0).map(drop => [drop.at[i], `${drop.kind}${drop.at[i] === 1 ? '' : 's'}`, element('dfn', {title: `${drop.stage}: ${drop.text}`}, drop.name)]);
-  const nodes = [element('h3', {}, `Station ${i}`), element('p', {class: 'soft'}, placeText(i)), covered,
-    table([['features in view', S.visible[i]], ['landmarks seen', S.seen[i]], ['k', data.k], ['survey images', S.images[i].length]])];
+  const covered = isUncovered(i) ? element('p', {class: 'bad'}, term('covered'), ': no', why ? `: ${why.text}` : '') : element('p', {}, term('covered'), ': yes');
+  const losses = data.drops.filter(drop => drop.at.length && drop.at[i] > 0)
+    .map(drop => [drop.at[i], `${drop.kind}${drop.at[i] === 1 ? '' : 's'}`, defined(drop.text, `${drop.name}, ${drop.stage}`)]);
+  const nodes = [element('h3', {}, `Station ${i}`), element('p', {class: 'soft'}, stationPlace(i)), covered,
+    table([[term('features in view'), S.visible[i]], [term('landmarks seen'), S.seen[i]], [term('k'), data.k], [term('survey images'), S.images[i].length]])];
   if (S.entropy[i] !== null) nodes.push(element('p', {}, term('entropy'), `: ${S.entropy[i].toFixed(2)} nats, as ${Math.exp(S.entropy[i]).toFixed(1)} places alike`));
-  if (regionsAt[i].length) nodes.push(element('p', {}, 'Regions: ', ...regionsAt[i].map(region => button(String(region), () => explainRegion(region)))));
+  if (regionsAt[i].length) nodes.push(element('p', {class: 'buttons'}, 'Regions: ', ...regionsAt[i].map(region => button(String(region), () => explainRegion(region)))));
+  nodes.push(...adviceNodes(data.advice.filter(entry => entry.stations.includes(i))), ...heldOutNodes(heldOutAt[i]));
   if (losses.length) nodes.push(element('h3', {}, 'Dropped here'), table(losses));
-  const helpful = data.advice.filter(entry => entry.stations.includes(i));
-  if (helpful.length) nodes.push(element('h3', {}, 'What would help'), ...helpful.map(entry => element('p', {}, entry.text)));
   nodes.push(element('p', {class: 'soft'}, S.images[i].slice(0, 8).map(image => I.name[image]).join(', ') + (S.images[i].length > 8 ? ' \u2026' : '')));
   say(...nodes);
 }
-function explainRegion(i) {
-  selected.station = -1;
-  selected.region = i;
-  redrawAll();
+// `others`: regions at the same place.
+function explainRegion(i, others = []) {
+  choose({region: i});
   const region = R[i];
   const nodes = [element('h3', {}, `Region ${i}`),
-    table([['stations', region.stations.length], ['common landmarks', region.landmarks.length], ['neighbouring regions', region.adjacent.length]]),
-    element('p', {}, 'Self-test: ' + testText(region.test))];
+    table([['stations', region.stations.length], [term('common landmarks'), region.landmarks.length], ['neighbouring regions', region.adjacent.length]])];
+  if (others.length) nodes.splice(1, 0, element('p', {class: 'buttons'}, 'Also here (click again): ', ...others.map(other => button(String(other), () => explainRegion(other, others.map(one => one === other ? i : one))))));
+  nodes.push(element('p', region.test && isPoor(region.test) ? {class: 'bad'} : {}, testText(region.test)));
   if (region.entropy !== undefined) nodes.push(element('p', {}, term('entropy'), `: ${region.entropy.toFixed(2)} nats on the mean`));
-  const helpful = data.advice.filter(entry => entry.text.startsWith(`Region ${i} `));
-  nodes.push(...helpful.map(entry => element('p', {}, entry.text)));
-  nodes.push(element('p', {}, 'Stations: ', ...region.stations.slice(0, 40).map(station => button(String(station), () => explainStation(station)))));
+  nodes.push(...adviceNodes(data.advice.filter(entry => entry.region === i)), ...heldOutNodes(heldOutOf(i)));
+  nodes.push(element('h3', {}, 'Stations'), element('p', {class: 'buttons'}, ...region.stations.slice(0, 40).map(station => button(String(station), () => explainStation(station))),
+    region.stations.length > 40 ? `and ${region.stations.length - 40} more` : ''));
   say(...nodes);
 }
-function stationNear(latlng) {
+function explainImage(i) {
+  choose({image: i});
+  show('held-out images');
+  const image = heldOut[i], place = ([x, y, heading]) => `${metres(x / 100)}, ${metres(y / 100)}${heading === undefined ? '' : `, ${Math.round(heading)}\u00B0`}`;
+  const rows = [['taken at', place(image.at)]];
+  if (image.found) rows.push(['localized at', place(image.found)], ['error', `${lengthText(image.error_m)}, ${degrees(image.error_deg)}`]);
+  if (image.inliers !== undefined) rows.push([term('inliers'), image.inliers]);
+  const nodes = [element('h3', {}, image.name), element('p', {class: 'soft'}, 'held-out image'),
+    element('p', isBad(image) ? {class: 'bad'} : {}, image.found ? (image.wrong ? 'localized at a wrong place' : 'localized') : outcome(image)), table(rows)];
+  if (image.station === null) nodes.push(element('p', {class: 'bad'}, 'No station is near it: the survey was not there, or did not look this way.'));
+  else {
+    nodes.push(element('p', {class: 'buttons'}, 'Nearest station: ', button(String(image.station), () => explainStation(image.station)),
+      regionsAt[image.station].length ? ' Regions: ' : ' In no region.', ...regionsAt[image.station].map(region => button(String(region), () => explainRegion(region)))));
+    if (isBad(image)) nodes.push(...adviceNodes(data.advice.filter(entry => regionsAt[image.station].includes(entry.region) || entry.stations.includes(image.station))));
+  }
+  say(...nodes);
+}
+
+// ---- what is under the pointer
+// The nearest within some pixels, of places in hundredths.
+function nearest(latlng, num, placeOf, pixels) {
   const x = 100 * latlng.lng, y = 100 * latlng.lat;
-  const scale = map.getZoomScale(map.getZoom(), 0), mark = markSize(scale) / scale * 100;
-  let nearest = -1, least = Math.max(1.3 * mark, 900 / scale);
-  for (let i = 0; i < numStations; ++i) {
-    // A station with a heading is drawn ahead of its place.
-    const turn = (S.heading[i] || 0) * Math.PI / 180, ahead = S.heading[i] === null ? 0 : 0.6 * mark;
-    const distance = Math.hypot(S.x[i] + ahead * Math.cos(turn) - x, S.y[i] + ahead * Math.sin(turn) - y);
+  let found = -1, least = 100 * pixels / scaleNow();
+  for (let i = 0; i < num; ++i) {
+    const [px, py] = placeOf(i), distance = Math.hypot(px - x, py - y);
     if (distance < least) {
       least = distance;
-      nearest = i;
+      found = i;
     }
   }
-  return nearest;
+  return found;
 }
-function regionAt(latlng) {
+// A station with a heading is drawn ahead of its place.
+function markPlace(i) {
+  if (S.heading[i] === null) return [S.x[i], S.y[i]];
+  const turn = S.heading[i] * Math.PI / 180, ahead = 60 * markSize(scaleNow()) / scaleNow();
+  return [S.x[i] + ahead * Math.cos(turn), S.y[i] + ahead * Math.sin(turn)];
+}
+const stationNear = latlng => isShown('stations') || isShown('uncovered') ? nearest(latlng, numStations, markPlace, Math.max(1.3 * markSize(scaleNow()), 9)) : -1;
+const imageNear = latlng => isShown('held-out images') ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
+const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => [viewsToTake[i].x, viewsToTake[i].y], 9) : -1;
+const isSmallScreen = () => window.innerWidth <= 800;
+// Smaller ones first.
+function regionsUnder(latlng) {
   const x = 100 * latlng.lng, y = 100 * latlng.lat;
-  return hulls.findIndex(corners => corners.length && corners.every(([x1, y1], k) => {
-    const [x2, y2] = corners[(k + 1) % corners.length];
-    return (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) >= 0;
-  }));
+  return hulls.map((corners, i) => i).filter(i => isInHull(hulls[i], x, y)).sort((a, b) => R[a].stations.length - R[b].stations.length || a - b);
 }
-map.on('click', event => {
-  const station = stationNear(event.latlng);
+function explainAt(latlng) {
+  const image = imageNear(latlng);
+  if (image >= 0) return explainImage(image);
+  const view = viewNear(latlng), advice = view >= 0 && data.advice[viewsToTake[view].advice];
+  if (advice && advice.region !== null) return explainRegion(advice.region);
+  if (advice) return explainStation(advice.stations[0]);
+  const station = stationNear(latlng);
   if (station >= 0) return explainStation(station);
-  const region = regionAt(event.latlng);
-  if (region >= 0) explainRegion(region);
-});
+  const regions = regionsUnder(latlng);
+  if (!regions.length) return;
+  const next = regions[(regions.indexOf(selected.region) + 1) % regions.length];
+  explainRegion(next, regions.filter(region => region !== next));
+}
+map.on('click', event => explainAt(event.latlng));
 const tip = leaflet.tooltip({direction: 'top', offset: [0, -8]});
 map.on('mousemove', event => {
-  const station = stationNear(event.latlng);
-  if (station < 0) return void map.closeTooltip(tip);
-  tip.setLatLng(L_latlng(S.x[station], S.y[station])).setContent(`station ${station}: ${S.visible[station]} features, ${S.seen[station]} landmarks`);
+  const image = imageNear(event.latlng), view = viewNear(event.latlng), station = stationNear(event.latlng);
+  const regions = image < 0 && view < 0 && station < 0 && isShown('regions') ? regionsUnder(event.latlng) : [];
+  $('map').style.cursor = image >= 0 || view >= 0 || station >= 0 || regions.length ? 'pointer' : '';
+  let text = '', place = event.latlng;
+  if (image >= 0) {
+    text = `${heldOut[image].name}: ${outcome(heldOut[image])}`;
+    place = at(...heldOut[image].at);
+  } else if (view >= 0) {
+    const {x, y, heading} = viewsToTake[view];
+    text = `take an image here, ${heading === null ? 'in all directions' : `towards ${heading}\u00B0`}: ${metres(x / 100)}, ${metres(y / 100)}`;
+    place = at(x, y);
+  } else if (station >= 0) {
+    text = `station ${station}: ${counted(S.visible[station], 'feature')}, ${counted(S.seen[station], 'landmark')}`;
+    place = at(S.x[station], S.y[station]);
+  } else if (regions.length) {
+    text = regions.slice(0, 4).map(i => `region ${i}: ${counted(R[i].landmarks.length, 'landmark')}${R[i].test ? `, ${R[i].test.localized} of ${R[i].test.held_out} localized` : ''}`).join('\n');
+  }
+  if (!text) return void map.closeTooltip(tip);
+  const content = element('span');
+  text.split('\n').forEach((line, i) => content.append(...(i ? [element('br'), line] : [line])));
+  tip.setLatLng(place).setContent(content);
   map.openTooltip(tip);
 });
+map.on('mouseout', () => map.closeTooltip(tip));
 $('map').addEventListener('keydown', event => {
-  if (event.key !== 'Enter' || event.target !== $('map')) return;
-  const station = stationNear(map.getCenter());
-  const region = regionAt(map.getCenter());
-  if (station >= 0) explainStation(station);
-  else if (region >= 0) explainRegion(region);
+  if (event.key === 'Enter' && event.target === $('map')) explainAt(map.getCenter());
+  if (event.key === 'Escape') { choose({}); sayFirst(); }
 });
 $('find').addEventListener('submit', event => {
   event.preventDefault();
   const text = $('query').value.trim(), number = Number(text.replace(/[^0-9]/g, ''));
-  if (/^region\s*\d+$/i.test(text) && number < R.length) {
+  const named = names => {
+    const exact = names.indexOf(text);
+    return exact >= 0 || !text ? exact : names.findIndex(name => name.startsWith(text));
+  };
+  if (/^(region|r)\s*\d+$/i.test(text) && number < R.length) {
     explainRegion(number);
-    return void goTo(R[number].stations);
+    return void goTo(placesOf(R[number].stations));
   }
-  const exact = I.name.indexOf(text), image = exact >= 0 ? exact : text ? I.name.findIndex(name => name.startsWith(text)) : -1;
-  const station = /^(station\s*)?\d+$/i.test(text) ? number : image >= 0 ? S.images.findIndex(images => images.includes(image)) : -1;
-  if (station < 0 || station >= numStations) return say(element('p', {class: 'bad'}, `Nothing here is called \u201C${text}\u201D.`));
+  const isStation = /^(station\s*)?\d+$/i.test(text) && number < numStations;
+  const held = isStation ? -1 : named(heldOut.map(image => image.name));
+  if (held >= 0) {
+    explainImage(held);
+    return void goTo([heldOut[held].at]);
+  }
+  const image = isStation ? -1 : named(I.name);
+  const station = isStation ? number : image >= 0 ? S.images.findIndex(images => images.includes(image)) : -1;
+  if (station < 0) return say(element('p', {class: 'bad'}, `Nothing here is called \u201C${text}\u201D.`));
   explainStation(station);
-  goTo([station]);
+  goTo(placesOf([station]));
 });

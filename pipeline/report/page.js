@@ -1,9 +1,11 @@
-// What the parts of a report share: the object that report_data.cc writes, terms, colours.  Places are in hundredths of the map's unit.
+// What the parts of a report share: the object that report_data.cc writes, terms, colours, numbers.  Places are in hundredths of the
+// map's unit.
 'use strict';
 const data = JSON.parse(document.getElementById('data').textContent);
 const $ = id => document.getElementById(id);
 const unit = data.unit;
 const S = data.stations, R = data.regions, L = data.landmarks, I = data.images;
+const heldOut = data.held_out || [];
 const numStations = S.x.length;
 
 // Text goes into the page as text, never as markup: names may hold anything.
@@ -15,37 +17,87 @@ function element(tag, attributes = {}, ...children) {
   for (const child of children) node.append(child);
   return node;
 }
+function button(text, action) {
+  const node = element('button', {type: 'button'}, text);
+  node.addEventListener('click', action);
+  return node;
+}
+// Rows of cells; numbers stand right.
+function table(rows, head) {
+  const node = element('table');
+  const isNumber = cell => typeof cell === 'number' || (typeof cell === 'string' && /^[-\u2212\d.,]+( [kM]B)?$/.test(cell));
+  const style = cell => isNumber(cell) ? {class: 'num'} : {};
+  if (head) node.append(element('tr', {}, ...head.map((text, i) => element('th', rows.length ? style(rows[0][i]) : {}, text))));
+  for (const row of rows) node.append(element('tr', {}, ...row.map(cell => element('td', style(cell), typeof cell === 'number' ? count(cell) : cell))));
+  return element('div', {class: 'scroll'}, node);
+}
 
+// ---- numbers
+const count = value => value.toLocaleString('en');
+const counted = (num, noun, nouns = noun + 's') => `${count(num)} ${num === 1 ? noun : nouns}`;
+const bytes = value => value >= 1e6 ? `${(value / 1e6).toFixed(2)} MB` : `${(value / 1e3).toFixed(1)} kB`;
+const percent = (value, digits = 1) => `${(100 * value).toFixed(digits)} %`;
+const metres = (value, digits = 2) => `${value.toFixed(digits)} ${unit}`;
+// Short lengths in centimetres, where the unit is the metre.
+const lengthText = value => unit !== 'm' || value >= 1 ? metres(value) : `${(100 * value).toFixed(value < 0.01 ? 2 : 1)} cm`;
+const degrees = value => `${value.toFixed(value < 1 ? 2 : 1)}\u00B0`;
+const most = values => values.reduce((a, b) => Math.max(a, b), 0);
+const quantile = (values, part) => values.slice().sort((a, b) => a - b)[Math.ceil(part * values.length) - 1];
+
+// ---- terms
 const terms = {
   station: 'a place where the survey stood, with the direction it looked in if the camera sees only forward',
   landmark: 'a feature of the place that the map keeps: robots find where they are by landmarks',
+  'features in view': 'features of the place that a robot at the station can expect to see, kept by the map or not',
+  'landmarks seen': 'landmarks that the survey images taken at the station see',
+  'common landmarks': 'landmarks that are seen from every station of the region: by them a robot there is localized',
   region: 'neighbouring stations that all see the same k landmarks or more',
+  k: 'the least number of common landmarks of a region, [decompose_regions] k',
+  tau: 'stations within so many hops of a covered one are of its region too: room for a robot to move, [decompose_regions] tau',
   class: 'one feature of the place, seen in several images',
-  recall: 'part of the held-out images that the map localizes',
   'held-out': 'images that the map was not made from; they test it',
+  recall: 'part of the held-out images that the map localizes',
   entropy: 'how many places look like this one: 0 nats none, 0.69 one other, 1.1 two others',
   kept: 'images that suffice to find the way: every other one is linked to one of them',
   covered: 'some region has this station, and all stations within tau hops of it',
+  inliers: 'landmarks that agree with the pose that was found',
+  'survey images': 'images taken at the station, of which the map is made',
 };
-const figureTerms = {
-  num_held_out: terms['held-out'], num_localized: 'of them, those that got a pose', localized_ratio: 'part of them that got a pose',
-  within_5cm_5deg_ratio: 'part of them placed within 5 cm and 5 degrees', within_10cm_2deg_ratio: 'part of them placed within 10 cm and 2 degrees',
-  within_10cm_5deg_ratio: 'part of them placed within 10 cm and 5 degrees', num_gross_errors: 'poses that are wrong by more than the self-test allows',
-  precision_ratio: 'part of the poses that are not wrong', median_error_m: 'half of the poses are nearer than this, m', median_error_deg: 'half of the poses are turned by less than this, degrees',
-  p90_error_m: 'nine of ten poses are nearer than this, m', p90_error_deg: 'nine of ten poses are turned by less than this, degrees',
-  mean_nees: 'squared errors over the covariances that the map states; 6 where these are right', median_nees: 'the same, its middle value; 5.35 where they are right',
-  nees_low: 'least mean that right covariances would give', nees_high: 'largest mean that right covariances would give',
-};
-const term = (word, shown = word) => element('dfn', {title: terms[word]}, shown);
+const term = (word, shown = word) => element('dfn', {title: terms[word], tabindex: '0'}, shown);
+const defined = (text, definition) => element('dfn', {title: definition, tabindex: '0'}, text);
+// On a touch screen, and by keyboard, a definition is shown below its term.
+function showDefinition(event) {
+  const dfn = event.target.closest && event.target.closest('dfn');
+  $('definition').hidden = !dfn;
+  if (!dfn) return;
+  $('definition').textContent = dfn.title;
+  const box = dfn.getBoundingClientRect();
+  $('definition').style.top = `${box.bottom + window.scrollY + 4}px`;
+  $('definition').style.left = `${Math.max(8, Math.min(box.left, document.documentElement.clientWidth - 300))}px`;
+}
+document.addEventListener('click', showDefinition);
+document.addEventListener('focusin', showDefinition);
+document.addEventListener('keydown', event => {
+  if (event.key === 'Escape') $('definition').hidden = true;
+});
 
 // ---- colours that colour-blind readers tell apart: Okabe and Ito's; cividis for amounts
-const palette = ['#0072B2', '#E69F00', '#009E73', '#D55E00', '#CC79A7', '#56B4E9', '#B8A800'];
+const blue = '#0072B2', orange = '#D55E00', green = '#009E73', pink = '#CC79A7', sky = '#56B4E9';
+const palette = [blue, '#E69F00', green, orange, pink, sky, '#B8A800'];
+const onDark = {[blue]: '#4FA8E8', [green]: '#2FC79B', [orange]: '#FF8A3D'};
+const isDark = () => document.documentElement.classList.contains('dark');
+// The same colour, light enough for the dark ground.
+const inked = colour => isDark() && onDark[colour] || colour;
+const styled = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const cividis = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
-function shade(part) {
-  const at = Math.min(Math.max(part, 0), 1) * (cividis.length - 1), low = Math.floor(at), rest = at - low;
-  const high = Math.min(low + 1, cividis.length - 1);
-  return `rgb(${cividis[low].map((value, i) => Math.round(value + rest * (cividis[high][i] - value))).join(',')})`;
+const shades = [];
+for (let i = 0; i < 64; ++i) {
+  const at = i / 63 * (cividis.length - 1), low = Math.min(Math.floor(at), cividis.length - 2);
+  shades.push(`rgb(${cividis[low].map((value, k) => Math.round(value + (at - low) * (cividis[low + 1][k] - value))).join(',')})`);
 }
+const shade = part => shades[Math.round(63 * Math.min(Math.max(part, 0), 1))];
+
+// ---- regions and held-out images, by station
 // Neighbouring regions get different colours while there are any.
 const regionColour = [];
 R.forEach((region, i) => {
@@ -55,5 +107,21 @@ R.forEach((region, i) => {
 });
 const regionsAt = Array.from({length: numStations}, () => []);
 R.forEach((region, i) => region.stations.forEach(station => regionsAt[station].push(i)));
-const at = (xs, ys, i) => L_latlng(xs[i], ys[i]);
-function L_latlng(x, y) { return window.L.latLng(y / 100, x / 100); }
+const heldOutAt = Array.from({length: numStations}, () => []);
+heldOut.forEach((image, i) => image.station !== null && heldOutAt[image.station].push(i));
+const isLocalized = image => Boolean(image.found);
+const isBad = image => !image.found || image.wrong;
+const heldOutOf = region => [...new Set(R[region].stations.flatMap(station => heldOutAt[station]))].sort((a, b) => a - b);
+// A map that is not sealed, or was checked with other images, says of its regions what these images say.
+if (heldOut.length && !data.held_out_is_self_test) {
+  R.forEach((region, i) => {
+    const images = heldOutOf(i).map(image => heldOut[image]), placed = images.filter(isLocalized);
+    region.test = images.length ? {held_out: images.length, localized: placed.length, wrong: placed.filter(isBad).length} : undefined;
+    if (placed.length) {
+      Object.assign(region.test, {median_m: quantile(placed.map(image => image.error_m), 0.5),
+                                  median_deg: quantile(placed.map(image => image.error_deg), 0.5),
+                                  p90_m: quantile(placed.map(image => image.error_m), 0.9)});
+    }
+  });
+}
+const isPoor = test => test.localized - test.wrong < data.poor_localized_ratio * test.held_out;

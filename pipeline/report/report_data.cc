@@ -188,9 +188,18 @@ Json AdviceJson(const std::vector<Advice>& advice) {
       views.push_back({Centi(view.position.x()), Centi(view.position.y()),
                        view.heading_deg ? Json(std::llround(*view.heading_deg)) : Json()});
     }
-    list.push_back({{"text", entry.text}, {"stations", entry.stations}, {"views", views}});
+    list.push_back({{"text", entry.text},
+                    {"stations", entry.stations},
+                    {"region", entry.region ? Json(*entry.region) : Json()},
+                    {"views", views}});
   }
   return list;
+}
+
+std::vector<Advice> AdviceOf(const ReportInputs& inputs) {
+  std::vector<Advice> advice = Advise(*inputs.rows);
+  AddSizes(*inputs.rows, inputs.num_bytes, inputs.pareto, &advice);
+  return advice;
 }
 
 // What changed from the compared map (A) to this one (B).
@@ -216,18 +225,50 @@ Json ChangesJson(const ReportInputs& inputs) {
   return json;
 }
 
-// Per held-out image: where it was taken and where the map put it.
-Json SelfTestImagesJson(const Json& check) {
+// x, y, heading of a check's image, of millimetres and tenths of a degree.
+Json PlaceJson(const Json& floor) {
+  Json place = {Rounded(100 * floor[0].get<double>(), 0.1), Rounded(100 * floor[1].get<double>(), 0.1)};
+  if (floor.size() > 2) place.push_back(Rounded(floor[2].get<double>(), 0.1));
+  return place;
+}
+
+// Per held-out image: where it was taken and where the map put it, or why it did not.
+Json HeldOutJson(const Json& check, const MapRows& rows) {
   Json list = Json::array();
-  if (!check.contains("images") || !check["images"].is_array()) return list;
   for (const Json& image : check["images"]) {
     if (!image.contains("true_floor")) continue;
-    Json entry = {{"name", image.value("name", "")}, {"true", image["true_floor"]}};
-    if (image.contains("floor")) entry["found"] = image["floor"];
-    if (image.contains("error_m")) entry["error_m"] = image["error_m"];
-    if (image.contains("error_deg")) entry["error_deg"] = image["error_deg"];
-    if (image.contains("message")) entry["message"] = image["message"];
+    Json entry = {
+        {"name", image.value("name", "")}, {"at", PlaceJson(image["true_floor"])}, {"station", nullptr}};
+    if (image.contains("station") && image["station"].is_number_integer()) {
+      const auto station = image["station"].get<int64_t>();
+      if (station >= 0 && station < static_cast<int64_t>(rows.stations.size())) entry["station"] = station;
+    }
+    if (image.contains("floor")) {
+      entry["found"] = PlaceJson(image["floor"]);
+      entry["error_m"] = Rounded(image["error_m"].get<double>(), 1e-5);
+      entry["error_deg"] = Rounded(image.value("error_deg", 0.0), 1e-4);
+      entry["wrong"] = image.value("is_gross_error", false);
+    }
+    if (image.contains("num_inliers")) entry["inliers"] = image["num_inliers"];
+    for (const char* key : {"message", "rejected"}) {
+      if (image.contains(key)) entry["message"] = image[key];
+    }
     list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+// The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees, median
+// error.
+Json ParetoJson(std::vector<ParetoPoint> points) {
+  std::sort(points.begin(), points.end(),
+            [](const ParetoPoint& a, const ParetoPoint& b) { return a.num_bytes < b.num_bytes; });
+  Json list = Json::array();
+  for (const ParetoPoint& point : points) {
+    list.push_back({{"bytes", point.num_bytes},
+                    {"localized", point.localized_ratio},
+                    {"within", point.within_10cm_5deg_ratio},
+                    {"median_m", point.median_error_m ? Json(*point.median_error_m) : Json()}});
   }
   return list;
 }
@@ -290,10 +331,22 @@ bool AreAll(const Json& object, const char* key, const IsRight& is_right) {
 
 bool IsCheckReport(const Json& check) {
   return check.contains("images") && AreAll(check, "images", [](const Json& image) {
-           return IsText(image, "name") && IsText(image, "message") && IsPlace(image, "true_floor") &&
-                  IsPlace(image, "floor") && IsNumber(image, "error_m") && IsNumber(image, "error_deg") &&
+           return IsText(image, "name") && IsText(image, "message") && IsText(image, "rejected") &&
+                  IsPlace(image, "true_floor") && IsPlace(image, "floor") && IsNumber(image, "error_m") &&
+                  IsNumber(image, "error_deg") && IsNumber(image, "num_inliers") &&
+                  (!image.contains("is_gross_error") || image["is_gross_error"].is_boolean()) &&
                   (!image.contains("floor") || image.contains("error_m"));
          });
+}
+
+bool IsCheckOf(const Json& check, const MapRows& rows) {
+  const auto is_number = [&](const std::string& key, double value) {
+    return check.contains(key) && check[key].is_number() && check[key].get<double>() == value;
+  };
+  return is_number("num_landmarks", static_cast<double>(rows.landmarks.size())) &&
+         is_number("num_regions", static_cast<double>(rows.regions.size())) &&
+         std::all_of(rows.self_test.begin(), rows.self_test.end(),
+                     [&](const auto& figure) { return is_number(figure.first, figure.second); });
 }
 
 bool IsDrive(const Json& drive) {
@@ -326,14 +379,19 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
                {"views", ViewsJson(rows.views)},
                {"drops", DropsJson(rows.findings)},
                {"self_test", rows.self_test},
-               {"advice", AdviceJson(Advise(rows))},
+               {"advice", AdviceJson(AdviceOf(inputs))},
+               {"poor_localized_ratio", kPoorLocalizedRatio},
+               {"pareto", ParetoJson(inputs.pareto)},
                {"options", rows.stage_options}};
   std::map<int64_t, int> errors;  // tenths of a pixel
   for (const double error : inputs.reprojection_errors_px) ++errors[std::llround(10 * error)];
   json["reprojection_errors"] = Json::array();
   for (const auto& [tenths, count] : errors) json["reprojection_errors"].push_back({tenths, count});
   if (inputs.build_report != nullptr) json["build"] = *inputs.build_report;
-  if (inputs.check != nullptr) json["self_test_images"] = SelfTestImagesJson(*inputs.check);
+  if (inputs.check != nullptr) {
+    json["held_out"] = HeldOutJson(*inputs.check, rows);
+    json["held_out_is_self_test"] = !rows.self_test.empty() && IsCheckOf(*inputs.check, rows);
+  }
   if (inputs.drive != nullptr) json["drive"] = DriveJson(*inputs.drive);
   if (inputs.compared != nullptr) json["changes"] = ChangesJson(inputs);
   return json;

@@ -8,6 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/map_rows.h"
+#include "pipeline/pareto_points.h"
 
 namespace cairn {
 
@@ -20,15 +21,19 @@ struct ReportInputs {
   std::vector<std::pair<std::string, int64_t>> block_bytes;  // by kind of block, and the rest
   std::vector<double> reprojection_errors_px;                // of the classes; none: not known
   const nlohmann::ordered_json* build_report = nullptr;      // NAME.report.json; may be null
-  const nlohmann::ordered_json* check = nullptr;             // what check-map --json printed; may be null
+  const nlohmann::ordered_json* check = nullptr;             // what check-map --details wrote; may be null
   const nlohmann::ordered_json* drive = nullptr;             // what drive -o wrote; may be null
   const MapRows* compared = nullptr;                         // the map to compare with; may be null
   int64_t compared_bytes = 0;
-  std::string compared_name;  // its file
+  std::string compared_name;        // its file
+  std::vector<ParetoPoint> pareto;  // the place's maps of other sizes; none: not known
 };
 
 // Whether they have what a page shows of them, of the right types.
 bool IsCheckReport(const nlohmann::ordered_json& check);
+// Whether a check was of this map: of as many landmarks and regions; of a sealed map, with its figures.
+// REQUIRES: IsCheckReport
+bool IsCheckOf(const nlohmann::ordered_json& check, const MapRows& rows);
 bool IsDrive(const nlohmann::ordered_json& drive);
 
 // REQUIRES: IsCheckReport, IsDrive

@@ -13,15 +13,21 @@
 #include "pipeline/inspect_drops.h"
 #include "report/chart_js.h"
 #include "report/chart_notice.h"
+#include "report/charts_js.h"
+#include "report/compare_js.h"
+#include "report/drive_js.h"
 #include "report/explain_js.h"
-#include "report/figures_js.h"
 #include "report/floor_js.h"
+#include "report/layers_js.h"
 #include "report/leaflet_css.h"
 #include "report/leaflet_js.h"
 #include "report/leaflet_notice.h"
 #include "report/page_css.h"
 #include "report/page_html.h"
 #include "report/page_js.h"
+#include "report/stages_js.h"
+#include "report/start_js.h"
+#include "report/summary_js.h"
 #include "stages/check_map/report.h"
 
 namespace cairn {
@@ -52,7 +58,12 @@ std::string Notices() {
 
 // One script: its parts share their names.
 std::string Script() {
-  return fmt::format("{}{}{}{}", kPageJsText, kFloorJsText, kExplainJsText, kFiguresJsText);
+  std::string script;
+  for (const char* part : {kPageJsText, kFloorJsText, kLayersJsText, kExplainJsText, kSummaryJsText,
+                           kStagesJsText, kChartsJsText, kCompareJsText, kDriveJsText, kStartJsText}) {
+    script += part;
+  }
+  return script;
 }
 
 }  // namespace

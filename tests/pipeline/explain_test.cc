@@ -190,6 +190,65 @@ TEST(Advise, NamesRegionsThatFailAndThatLookAlike) {
   EXPECT_THAT(text, HasSubstr("image at 0.50, 0.00 looking towards 90 deg"));
 }
 
+TEST(Advise, SaysThatPosesAreOffThoughImagesAreLocalized) {
+  MapRows rows = FiveStations();
+  for (MapStation& station : rows.stations) station.is_covered = true;
+  rows.self_test = {{"localized_ratio", 1.0}, {"within_10cm_5deg_ratio", 0.9}};
+  EXPECT_THAT(Advise(rows), IsEmpty());
+  rows.self_test["within_10cm_5deg_ratio"] = 0.6;
+  EXPECT_THAT(AdviceText(Advise(rows)), HasSubstr("only 60 % lie within 10 cm"));
+  rows.frame.unit = "unknown";  // ten centimetres mean nothing there
+  EXPECT_THAT(Advise(rows), IsEmpty());
+}
+
+// Bytes, part localized and within 10 cm of a map of 100 kB that localizes 0.9 of the images.
+std::string SizesText(const std::vector<ParetoPoint>& sizes) {
+  MapRows rows;
+  rows.self_test = {{"localized_ratio", 0.9}, {"within_10cm_5deg_ratio", 0.8}};
+  std::vector<Advice> advice;
+  AddSizes(rows, 100000, sizes, &advice);
+  return AdviceText(advice);
+}
+ParetoPoint Size(int64_t num_bytes, double localized_ratio, double within_ratio) {
+  return {.max_bytes = num_bytes + 1,
+          .num_bytes = num_bytes,
+          .localized_ratio = localized_ratio,
+          .within_10cm_5deg_ratio = within_ratio};
+}
+
+TEST(Advise, NamesTheSmallestMapThatDoesAsMuchOrTheSmallestThatDoesMore) {
+  EXPECT_EQ(SizesText({}), "");
+  EXPECT_EQ(SizesText({Size(90000, 0.9, 0.8)}), "");                         // hardly smaller
+  EXPECT_EQ(SizesText({Size(40000, 0.8, 0.8), Size(40000, 0.9, 0.7)}), "");  // does less
+  EXPECT_THAT(
+      SizesText({Size(60000, 0.9, 0.8), Size(40000, 0.9, 0.8), Size(20000, 0.5, 0.5)}),
+      HasSubstr("Smaller will do: a map of 40 kB ([emit_map] landmarks = \"all\", max_bytes = 40001)"));
+  EXPECT_THAT(SizesText({Size(900000, 1, 0.9), Size(300000, 0.95, 0.9), Size(40000, 0.9, 0.8)}),
+              HasSubstr("More can be had: a map of 300 kB"));
+  ParetoPoint every_class = Size(900000, 1, 0.9);
+  every_class.max_bytes = 0;
+  EXPECT_THAT(SizesText({every_class}), HasSubstr("([emit_map] landmarks = \"all\") localizes"));
+}
+
+TEST(ParetoCsv, IsReadAsItWasWritten) {
+  ParetoPoint point = Size(40000, 0.9, 0.8);
+  point.num_held_out = 10;
+  point.median_error_m = 0.0123;
+  const std::string csv = ParetoCsv({point, Size(1, 0, 0)});
+  const auto read = ParseParetoCsv(csv, "map.pareto.csv");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_THAT(*read, SizeIs(2));
+  EXPECT_EQ((*read)[0].median_error_m, 0.0123);
+  EXPECT_EQ((*read)[1].median_error_m, std::nullopt);
+  EXPECT_EQ(ParetoCsv(*read), csv);
+  for (const char* line : {"1,2,3", "0,inf,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,nan,1,1,,",
+                           "0,0,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,2,1,1,,", "a,9,0,0,0,0,0,1,1,1,,"}) {
+    const auto refused = ParseParetoCsv(std::string("head\n") + line + "\n", "map.pareto.csv");
+    ASSERT_FALSE(refused.ok()) << line;
+    EXPECT_THAT(refused.error().message, HasSubstr("map.pareto.csv: line 2"));
+  }
+}
+
 TEST(StationsAt, FindsTheNearestPlaceAndRefusesWhatIsFar) {
   MapRows rows = FiveStations();
   rows.stations.push_back({.position = {2, 0}, .heading_deg = 270});

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Opens reports in a real browser: report_test.py CAIRN GOLDEN_MAPS MAP BUILD_CHECK SCREENSHOTS
+"""Opens reports in a real browser: report_test.py CAIRN GOLDEN_MAPS MAP SCREENSHOTS MAKE_MAP
 
-Headless Chromium through its driver; no network.  MAP is a compiled map with a self-test, BUILD_CHECK what
-check-map --json printed of it.  Screenshots of what was looked at land in SCREENSHOTS.
+Headless Chromium through its driver; no network.  MAP is a compiled map with a self-test, its build folder beside
+it.  Screenshots of what was looked at land in SCREENSHOTS; MAKE_MAP makes maps that no survey makes.
 """
 import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,8 +22,10 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-CAIRN, GOLDEN, MAP, CHECK, SCREENSHOTS = sys.argv[1:6]
-LAYERS_OF_EVERY_MAP = ['regions', 'landmarks', 'stations']
+CAIRN, GOLDEN, MAP, SCREENSHOTS, MAKE_MAP = sys.argv[1:6]
+BUILD = MAP.replace('.cairn', '.build')
+CHECK = BUILD + '/check.json'
+LAYERS_OF_EVERY_MAP = ['regions', 'landmarks', 'stations', 'numbers']
 
 
 def report(folder, map_path, *arguments):
@@ -36,17 +39,22 @@ def report(folder, map_path, *arguments):
 class Browser:
     """One page in headless Chromium; fails on anything in the console and on any request but the page's own."""
 
-    def __init__(self, size='1400,1000'):
+    def __init__(self, size='1400,1000', phone=False):
         options = Options()
         for argument in ['--headless=new', '--no-sandbox', '--disable-gpu', f'--window-size={size}']:
             options.add_argument(argument)
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL', 'performance': 'ALL'})
         self.driver = webdriver.Chrome(service=Service('/usr/bin/chromedriver'), options=options)
+        if phone:
+            width, height = map(int, size.split(','))
+            self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
+                'width': width, 'height': height, 'deviceScaleFactor': 2, 'mobile': True})
 
     def open(self, page):
         self.driver.get(pathlib.Path(page).resolve().as_uri())
         for _ in range(300):
             if self.script('return document.documentElement.dataset.ready') == 'yes':
+                self.script('document.documentElement.style.scrollBehavior = "auto"')  # or clicks miss what moves
                 return
             time.sleep(0.1)
         raise AssertionError(f'{page} is not ready: {self.driver.get_log("browser")}')
@@ -92,7 +100,7 @@ class ReportTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.browser = Browser()
-        cls.page = report(cls.folder.name, MAP, '--check', CHECK)
+        cls.page = report(cls.folder.name, MAP)
         cls.browser.open(cls.page)
 
     @classmethod
@@ -103,27 +111,31 @@ class ReportTest(unittest.TestCase):
     def setUp(self):
         self.addCleanup(lambda: self.assertEqual(self.browser.problems(), []))
 
-    def click_station(self, station):
-        """Clicks where the station is drawn."""
-        x, y = self.browser.script('''const p = map.latLngToContainerPoint(L_latlng(S.x[arguments[0]], S.y[arguments[0]]));
-            const box = document.getElementById('map').getBoundingClientRect();
+    def click(self, x, y):
+        """Clicks at a place of the floor, brought into its middle, in hundredths of a metre."""
+        x, y = self.browser.script('''map.panTo(at(arguments[0], arguments[1]), {animate: false});
+            const p = map.latLngToContainerPoint(at(arguments[0], arguments[1]));
             document.getElementById('map').scrollIntoView({block: 'center'});
-            return [p.x, p.y];''', station)
+            return [p.x, p.y];''', x, y)
         element = self.browser.driver.find_element(By.ID, 'map')
         size = element.size
         ActionChains(self.browser.driver).move_to_element_with_offset(
-            element, x - size['width'] / 2, y - size['height'] / 2).click().perform()
+            element, round(x - size['width'] / 2), round(y - size['height'] / 2)).click().perform()
+
+    def switch(self, layer, is_on):
+        self.browser.script('show(arguments[0], arguments[1])', layer, is_on)
 
     def test_the_floor_is_drawn_within_a_second_or_so_and_the_head_tells_the_map(self):
         self.assertLess(float(self.browser.script('return document.documentElement.dataset.floorDrawn')), 10000)
-        self.assertIn('held-out images localized', self.browser.text('#summary'))
+        self.assertIn('held-out images localized', self.browser.text('#cards'))
+        self.assertRegex(self.browser.text('#cards'), r'\d+ of 6\n')
         self.assertGreater(self.browser.script('return document.querySelectorAll("canvas.leaflet-layer").length'), 2)
         self.browser.shot('floor.png')
 
     def test_every_layer_can_be_switched_and_draws_something(self):
         boxes = self.browser.driver.find_elements(By.CSS_SELECTOR, '#layers input')
         names = [box.get_attribute('data-layer') for box in boxes]
-        for name in LAYERS_OF_EVERY_MAP + ['self-test errors', 'appearance graph', 'entropy', 'region adjacency']:
+        for name in LAYERS_OF_EVERY_MAP + ['held-out images', 'self-test errors', 'recall', 'appearance graph', 'entropy', 'region adjacency']:
             self.assertIn(name, names)
         for box in boxes:
             was_on = box.is_selected()
@@ -141,23 +153,86 @@ class ReportTest(unittest.TestCase):
                 box.click()
         self.browser.shot('all_layers.png')
         for box, name in zip(boxes, names):
-            if box.is_selected() and name not in LAYERS_OF_EVERY_MAP:
+            if box.is_selected() and name not in LAYERS_OF_EVERY_MAP + ['held-out images']:
                 box.click()
 
     def test_a_click_on_a_station_and_on_a_region_explains_them(self):
+        self.switch('held-out images', False)
         station = self.browser.script('return R[0].stations[0]')
-        self.click_station(station)
+        self.click(*self.browser.script('return [S.x[arguments[0]], S.y[arguments[0]]]', station))
         text = self.browser.text('#explanation')
         self.assertRegex(text, r'Station \d+')
         self.assertIn('Dropped here', text)
         self.assertIn('features in view', text)
         self.browser.shot('station.png')
-        self.browser.driver.find_element(By.CSS_SELECTOR, '#explanation button').click()
+        self.browser.driver.find_element(By.CSS_SELECTOR, '#explanation .buttons button').click()
         text = self.browser.text('#explanation')
         self.assertRegex(text, r'Region \d+')
         self.assertIn('common landmarks', text)
-        self.assertIn('Self-test', text)
+        self.assertRegex(text, 'localized|no held-out image')
         self.browser.shot('region.png')
+        self.browser.driver.find_element(By.CSS_SELECTOR, '#explanation .close').click()
+        self.assertEqual(self.browser.script('return selected.region'), -1)
+        self.assertIn('Click a station', self.browser.text('#explanation'))
+        self.switch('held-out images', True)
+
+    def test_clicking_again_goes_through_regions_that_overlap(self):
+        for layer in ['stations', 'held-out images', 'uncovered']:
+            self.switch(layer, False)
+        place = self.browser.script('''for (let i = 0; i < numStations; ++i) {
+            if (regionsUnder(at(S.x[i], S.y[i])).length > 1) return [S.x[i], S.y[i]];
+          }
+          return null;''')
+        self.assertIsNotNone(place, 'no regions overlap in this map: choose another recipe')
+        number = self.browser.script('return regionsUnder(at(arguments[0], arguments[1])).length', *place)
+        found = set()
+        for _ in range(number):
+            self.click(*place)
+            found.add(self.browser.script('return selected.region'))
+            self.assertIn('Also here', self.browser.text('#explanation'))
+            time.sleep(0.5)  # two clicks, not a double click
+        self.assertEqual(len(found), number)
+        for layer in ['stations', 'held-out images', 'uncovered']:
+            self.switch(layer, True)
+
+    def test_a_held_out_image_says_where_it_was_taken_and_how_it_fared(self):
+        image = json.loads(pathlib.Path(CHECK).read_text())['images'][0]
+        self.assertEqual(self.browser.script('return heldOut.length'), 6)
+        self.click(100 * image['true_floor'][0], 100 * image['true_floor'][1])
+        text = self.browser.text('#explanation')
+        self.assertIn(image['name'], text)
+        self.assertIn('taken at', text)
+        self.assertIn('error' if 'floor' in image else image['message'], text)
+        self.browser.shot('held_out.png')
+        self.assertEqual(self.browser.script('return heldOut.filter(image => isBad(image)).length + document.querySelectorAll("#self-test-text > .scroll:nth-of-type(2) button").length'),
+                         2 * self.browser.script('return heldOut.filter(image => isBad(image)).length'))
+
+    def test_a_bar_of_the_recall_chart_opens_its_region(self):
+        region = self.browser.script('''const recall = charts.find(one => one.options.onClick);
+            const bar = recall.getDatasetMeta(0).data[0], box = recall.canvas.getBoundingClientRect();
+            recall.canvas.scrollIntoView({block: 'center'});
+            return [recall.data.labels[0], bar.x - box.width / 2, (bar.y + bar.base) / 2 - box.height / 2];''')
+        canvas = self.browser.script('return charts.find(one => one.options.onClick).canvas')
+        ActionChains(self.browser.driver).move_to_element_with_offset(canvas, round(region[1]), round(region[2])).pause(0.3).click().perform()
+        self.assertEqual(str(self.browser.script('return selected.region')), region[0])
+        self.assertIn(f'Region {region[0]}', self.browser.text('#explanation'))
+        self.browser.script('window.scrollTo(0, 0)')
+
+    def test_hovering_names_what_is_there(self):
+        self.switch('held-out images', False)
+        place = self.browser.script('return [S.x[0], S.y[0]]')
+        self.click(*place)
+        ActionChains(self.browser.driver).move_by_offset(2, 2).perform()
+        self.assertIn('station 0: ', self.browser.text('.leaflet-tooltip'))
+        self.switch('held-out images', True)
+
+    def test_terms_are_defined_for_fingers_and_the_keyboard_too(self):
+        term = self.browser.driver.find_element(By.CSS_SELECTOR, '#cards dfn')
+        term.click()
+        self.assertEqual(self.browser.text('#definition'), term.get_attribute('title'))
+        self.browser.shot('definition.png')
+        ActionChains(self.browser.driver).send_keys(Keys.ESCAPE).perform()
+        self.assertFalse(self.browser.driver.find_element(By.ID, 'definition').is_displayed())
 
     def test_the_keyboard_finds_switches_moves_and_zooms(self):
         query = self.browser.driver.find_element(By.ID, 'query')
@@ -186,11 +261,11 @@ class ReportTest(unittest.TestCase):
         floor.send_keys('-')
 
     def test_the_line_the_figures_and_the_advice_are_there(self):
-        self.assertIn('into group_classes', self.browser.text('#stages'))
-        self.assertRegex(self.browser.text('#stages'), r'few_observations')
+        self.assertIn('group_classes drops', self.browser.text('#stages'))
+        self.assertRegex(self.browser.text('#stages'), r'few observations')
         self.assertIn('check_map', self.browser.text('#stages'))  # of the build report beside the map
         self.assertGreaterEqual(self.browser.script('return charts.length'), 4)
-        self.assertIn('localized_ratio', self.browser.text('#tables'))
+        self.assertRegex(self.browser.text('#self-test-text'), r'localized \d of 6')
         self.assertTrue(self.browser.text('#advice'))
         self.assertTrue(self.browser.script('return [...document.querySelectorAll("dfn")].every(node => node.title)'))
 
@@ -209,29 +284,79 @@ class OtherPagesTest(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
 
-    def look(self, page, name, size='1400,1000'):
-        browser = Browser(size)
+    def look(self, page, name, size='1400,1000', phone=False):
+        browser = Browser(size, phone)
         self.addCleanup(browser.quit)
         browser.open(page)
         browser.shot(name)
         return browser
 
     def test_a_phone_shows_it_in_one_column(self):
-        browser = self.look(report(self.folder.name, MAP), 'phone.png', '400,850')
-        self.assertLessEqual(browser.script('return document.documentElement.scrollWidth'),
-                             browser.script('return window.innerWidth') + 1)
+        browser = self.look(report(self.folder.name, MAP), 'phone.png', '400,850', phone=True)
+        self.assertEqual(browser.script('return window.innerWidth'), 400)
+        self.assertLessEqual(browser.script('return document.documentElement.scrollWidth'), 401)
+        browser.script('explainRegion(0)')
+        time.sleep(1)
+        floor, panel = browser.script('''return ["map", "explanation"].map(id => {
+            const box = document.getElementById(id).getBoundingClientRect(); return [box.top, box.bottom]; })''')
+        self.assertAlmostEqual(floor[0], 0, delta=2)  # the floor is in view, what is said of it below
+        self.assertAlmostEqual(panel[1], 850, delta=2)
+        self.assertGreater(panel[0], floor[0] + 300)
+        browser.shot('phone_region.png')
+        browser.script('document.getElementById("line").scrollIntoView()')
+        browser.driver.find_element(By.CSS_SELECTOR, '#explanation .close').click()
+        browser.shot('phone_stages.png')
+        self.assertEqual(browser.problems(), [])
+
+    def test_another_map_size_is_advice_and_this_map_is_marked_among_them(self):
+        for suffix in ['.cairn', '.report.json']:
+            shutil.copy(MAP.replace('.cairn', suffix), os.path.join(self.folder.name, 'map' + suffix))
+        table = os.path.join(self.folder.name, 'map.pareto.csv')
+        pathlib.Path(table).write_text(
+            'max_bytes,bytes,landmarks,descriptor_bits,min_common_landmarks,stations_below_k,held_out,localized_ratio,'
+            'within_10cm_5deg_ratio,precision_ratio,median_error_m,median_error_deg\n'
+            '0,900000,9000,8,90,0,6,1,1,1,0.001,0.02\n20000,19000,90,4,9,0,6,1,1,1,0.002,0.03\n9000,8900,20,2,1,3,6,0,0,1,,\n')
+        browser = self.look(report(self.folder.name, os.path.join(self.folder.name, 'map.cairn')), 'sizes.png')
+        self.assertIn('max_bytes = 20000', browser.text('#advice'))
+        self.assertEqual(browser.script('''return charts.flatMap(one => one.data.datasets).find(set => set.label === 'this map').data[0].x'''),
+                         os.path.getsize(MAP))
+        self.assertEqual(browser.problems(), [])
+        pathlib.Path(table).write_text('max_bytes,bytes\n0,inf\n')
+        run = subprocess.run([CAIRN, 'report', os.path.join(self.folder.name, 'map.cairn'), '-o', table + '.html'], capture_output=True, text=True)
+        self.assertEqual(run.returncode, 4)
+        self.assertIn('map.pareto.csv: line 2', run.stderr)
+
+    def test_held_out_images_of_another_compilation_are_not_shown(self):
+        copy = os.path.join(self.folder.name, 'map.cairn')
+        shutil.copy(MAP, copy)
+        check = json.loads(pathlib.Path(CHECK).read_text())
+        check['num_landmarks'] += 1
+        build = pathlib.Path(self.folder.name) / 'map.build'
+        build.mkdir()
+        (build / 'check.json').write_text(json.dumps(check))
+        page = os.path.join(self.folder.name, 'map.html')
+        run = subprocess.run([CAIRN, 'report', copy, '-o', page], capture_output=True, text=True)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn('another compilation', run.stderr)
+        self.assertFalse('"held_out":[' in pathlib.Path(page).read_text())
+
+    def test_an_unsealed_map_is_judged_by_the_images_that_are_given(self):
+        browser = self.look(report(self.folder.name, BUILD + '/unsealed.cairn', '--check', CHECK), 'unsealed.png')
+        self.assertIn('not sealed', browser.text('#cards'))
+        self.assertRegex(browser.text('#cards'), r'\d of 6\n')
+        self.assertGreater(browser.script('return R.filter(region => region.test).length'), 0)
         self.assertEqual(browser.problems(), [])
 
     def test_maps_of_only_some_stages(self):
         for name in ['map_2.0.cairn', 'map_2.2.cairn', 'map_2.3.cairn']:
             browser = self.look(report(self.folder.name, os.path.join(GOLDEN, name)), name + '.png')
             self.assertEqual(browser.problems(), [], name)
-            self.assertIn('self-test', browser.text('#tables').lower())
+            self.assertIn('self-test', browser.text('#self-test-text').lower())
 
     def test_names_with_markup_stay_text(self):
         copy = os.path.join(self.folder.name, 'evil.cairn')
         evil = '</script><script>document.title="taken"</script><img src=x onerror=alert(1)>'
-        make = subprocess.run([CAIRN_TEST_MAP, copy, evil], capture_output=True, text=True)
+        make = subprocess.run([MAKE_MAP, copy, evil], capture_output=True, text=True)
         self.assertEqual(make.returncode, 0, make.stderr)
         browser = self.look(report(self.folder.name, copy), 'markup.png')
         self.assertEqual(browser.driver.title, evil)
@@ -243,11 +368,11 @@ class OtherPagesTest(unittest.TestCase):
 
     def test_an_empty_map(self):
         copy = os.path.join(self.folder.name, 'empty.cairn')
-        subprocess.run([CAIRN_TEST_MAP, copy], check=True)
+        subprocess.run([MAKE_MAP, copy], check=True)
         browser = self.look(report(self.folder.name, copy), 'empty.png')
         self.assertEqual(browser.problems(), [])
-        self.assertIn('0 landmarks', browser.text('#summary'))
-        self.assertIn('no self-test', browser.text('#tables'))
+        self.assertIn('0\nlandmarks', browser.text('#cards'))
+        self.assertIn('no self-test', browser.text('#self-test-text'))
 
     def test_two_maps_on_one_floor(self):
         small = os.path.join(GOLDEN, 'map_2.2.cairn')
@@ -296,12 +421,12 @@ class OtherPagesTest(unittest.TestCase):
             self.assertEqual(run.returncode, 4)
             self.assertRegex(run.stderr, re.escape(path))
 
-
     def test_what_is_right_json_but_no_check_or_drive_is_refused(self):
         path = os.path.join(self.folder.name, 'wrong.json')
         wrong = {'--check': ['{}', '{"images": {}}', '{"images": [null]}', '{"images": [{"name": 5}]}',
                              '{"images": [{"true_floor": null}]}', '{"images": [{"true_floor": ["a", 1]}]}',
-                             '{"images": [{"true_floor": [1, 2], "floor": [1, 2]}]}'],
+                             '{"images": [{"true_floor": [1, 2], "floor": [1, 2]}]}', '{"images": [{"is_gross_error": 1}]}',
+                             '{"images": [{"num_inliers": "7"}]}', '{"images": [{"rejected": 7}]}'],
                  '--drive': ['{}', '{"start": {"x_m": "a", "y_m": 1}}', '{"start": null}',
                              '{"start": {"x_m": 1, "y_m": 1}, "legs": [null]}',
                              '{"start": {"x_m": 1, "y_m": 1}, "legs": [{"kind": 5}]}',
@@ -324,9 +449,6 @@ class OtherPagesTest(unittest.TestCase):
                                  capture_output=True, text=True)
             self.assertEqual(run.returncode, 2, run.stderr)
             self.assertEqual(pathlib.Path(path).read_bytes(), before)
-
-
-CAIRN_TEST_MAP = sys.argv[6]
 
 if __name__ == '__main__':
     unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,45 @@
+// The stages: what comes into each, what goes on, and what is dropped and why.
+function stageSteps() {
+  const dropsOf = stage => data.drops.filter(drop => drop.stage === stage && drop.kind === 'feature').sort((a, b) => b.num - a.num);
+  // A map of all landmarks passes the filter and the regions by.
+  const stages = [['group_classes', 'tracks', 'matches of several images that are chained to one feature'],
+    ['filter_visibility', 'classes', terms.class], ['decompose_regions', 'visible', 'classes that a robot can expect to see again'],
+    ['emit_map', 'kept', 'classes that some region keeps']].filter(([stage]) => data.landmark_choice !== 'all' || !['filter_visibility', 'decompose_regions'].includes(stage));
+  let num = L.x.length;
+  const steps = [{noun: 'landmarks', definition: terms.landmark, num, out: num, drops: []}];
+  for (const [stage, noun, definition] of stages.reverse()) {
+    const drops = dropsOf(stage), out = num;
+    num += drops.reduce((sum, drop) => sum + drop.num, 0);
+    steps.unshift({stage, noun, definition, num, out, drops});
+  }
+  return steps;
+}
+function drawStages() {
+  const build = data.build && data.build.stages ? data.build.stages : [];
+  const made = (stage, noun) => (build.find(entry => entry.stage === stage && entry.out) || {out: {}}).out[noun];
+  const head = [['images', I.name.length], ['keypoints', made('extract_features', 'keypoints')], ['matches', made('match_features', 'matches')]].filter(([, value]) => value !== undefined);
+  $('stages').append(element('p', {class: 'before'}, ...head.flatMap(([noun, value]) => [element('strong', {}, count(value)), ` ${noun} \u2192 `])));
+  const flow = element('div', {class: 'flow'});
+  const steps = stageSteps(), largest = steps[0].num || 1;
+  for (const {stage, noun, definition, num, out, drops} of steps) {
+    const shape = element('div', {class: 'shape', role: 'img', 'aria-label': `${count(num)} ${noun}${stage ? `; ${stage} keeps ${count(out)}` : ''}`});
+    shape.style.setProperty('--in', Math.max(num / largest, 0.01));
+    shape.style.setProperty('--out', Math.max(out / largest, 0.01));
+    shape.append(element('i', {class: 'lost'}), element('i', {class: 'kept'}));
+    const list = drops.length ? element('ul', {class: 'plain'}, ...drops.map(drop => element('li', {}, `\u2212${count(drop.num)} `, defined(drop.name.replaceAll('_', ' '), drop.text)))) : '';
+    flow.append(element('div', {class: 'step'}, element('div', {}, element('strong', {}, count(num)), ' ', defined(noun, definition)), shape,
+      element('div', {class: 'soft'}, stage ? `${stage}${drops.length ? ' drops' : ' drops none'}` : ''), list));
+  }
+  $('stages').append(flow);
+  if (build.length) {
+    const rejects = stage => (stage.rejected || []).map(reject => `${count(reject.count)} ${reject.what}: ${reject.reason}`).join('; ');
+    const anyRejects = build.some(rejects);
+    $('stages').append(element('h3', {}, 'Time and memory'), table(build.map(stage => [stage.stage, `${(stage.seconds || 0).toFixed(1)}`, bytes(stage.peak_memory_bytes || 0),
+      Object.entries(stage.out || {}).map(([noun, value]) => noun === 'bytes' ? `${bytes(value)} before sealing` : `${count(value)} ${noun}`).join(', '),
+      ...(anyRejects ? [rejects(stage)] : [])]), ['stage', 'seconds', 'peak memory', 'made', ...(anyRejects ? ['left out'] : [])]));
+  }
+  const others = data.drops.filter(drop => drop.kind !== 'feature');
+  if (others.length) $('stages').append(element('h3', {}, 'Also dropped'), table(others.map(drop => [drop.num, drop.kind + (drop.num === 1 ? '' : 's'), drop.name.replaceAll('_', ' '), drop.stage, drop.text])));
+}
+drawStages();
+for (const [stage, text] of Object.entries(data.options)) $('options-text').append(element('details', {}, element('summary', {}, stage), element('pre', {}, text)));

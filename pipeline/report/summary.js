@@ -1,0 +1,124 @@
+// The head of the page, the advice, and what the self-test says.
+const numCovered = S.x.filter((x, i) => !isUncovered(i)).length;
+const placed = heldOut.filter(isLocalized);
+// Figures of the self-test: the map's own, or else those of the images that were given.
+const tested = (() => {
+  const figures = data.self_test;
+  if (figures.num_held_out) {
+    return {num: figures.num_held_out, localized: figures.num_localized, wrong: figures.num_gross_errors || 0, median_m: figures.median_error_m,
+            median_deg: figures.median_error_deg, p90_m: figures.p90_error_m, p90_deg: figures.p90_error_deg};
+  }
+  if (!heldOut.length) return null;
+  const part = (key, at) => placed.length ? quantile(placed.map(image => image[key]), at) : undefined;
+  return {num: heldOut.length, localized: placed.length, wrong: placed.filter(isBad).length, median_m: part('error_m', 0.5),
+          median_deg: part('error_deg', 0.5), p90_m: part('error_m', 0.9), p90_deg: part('error_deg', 0.9)};
+})();
+function card(value, caption, {bad = false, action = null} = {}) {
+  const content = [element('strong', bad ? {class: 'bad'} : {}, value), element('span', {}, ...[].concat(caption))];
+  const item = element('li');
+  if (action) {
+    const open = button('', action);
+    open.append(...content);
+    item.append(open);
+  } else item.append(...content);
+  $('cards').append(item);
+}
+$('name').textContent = data.name;
+card(bytes(data.bytes), data.sealed ? 'sealed map' : 'map, not sealed');
+card(count(L.x.length), term('landmark', L.x.length === 1 ? 'landmark' : 'landmarks'));
+card(count(R.length), [term('region', R.length === 1 ? 'region' : 'regions'), data.lower_bound ? `, at least ${data.lower_bound} are needed` : '']);
+card(`${count(numCovered)} of ${count(numStations)}`, [term('station', 'stations'), ' ', term('covered')], {bad: numCovered < numStations});
+if (tested) {
+  card(`${tested.localized} of ${tested.num}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.num});
+  if (tested.median_m !== undefined) {
+    card(`${lengthText(tested.median_m)}, ${degrees(tested.median_deg)}`, tested.p90_m === undefined ? 'median error' : `median error; nine of ten within ${lengthText(tested.p90_m)}, ${degrees(tested.p90_deg)}`);
+  }
+} else {
+  card('not tested', ['no ', term('held-out', 'held-out images'), ' were tried']);
+}
+const weakest = data.advice.find(entry => entry.stations.length);
+if (weakest) card(weakest.region === null ? `Station ${weakest.stations[0]}` : `Region ${weakest.region}`, 'weakest place: show it', {bad: true, action: () => showAdvice(weakest)});
+
+for (const entry of data.advice) {
+  const item = element('li', {}, entry.text);
+  if (entry.stations.length) item.append(' ', button('show', () => showAdvice(entry)));
+  if (entry.views.length) {
+    const allAround = entry.views.every(([, , heading]) => heading === null);
+    item.append(element('div', {class: 'soft'}, `images ${allAround ? 'in all directions ' : ''}at `,
+      entry.views.map(([x, y, heading]) => `${metres(x / 100)}, ${metres(y / 100)}${heading === null ? '' : ` towards ${heading}\u00B0`}`).join('; ')));
+  }
+  $('advice-list').append(item);
+}
+if (!data.advice.length) $('advice-list').replaceWith(element('p', {}, 'Every station is covered, and no region stands out.'));
+// Of many, the most important first.
+const hidden = [...$('advice-list') ? $('advice-list').children : []].slice(10);
+if (hidden.length) {
+  hidden.forEach(item => { item.hidden = true; });
+  const all = button(`show ${hidden.length} more`, () => {
+    hidden.forEach(item => { item.hidden = false; });
+    all.remove();
+  });
+  $('advice-list').after(all);
+}
+
+// ---- the self-test: what was found, what was asked for
+const asked = name => {
+  const found = new RegExp(`^${name} = ([-+.\\deE]+)$`, 'm').exec(data.options.check_map || '');
+  return found && Number(found[1]) > 0 ? Number(found[1]) : null;
+};
+function selfTestRows() {
+  const f = data.self_test, rows = [];
+  const add = (name, value, limit = '', isMissed = false) => {
+    const cell = element('span', isMissed ? {class: 'bad'} : {}, value);
+    rows.push([name, cell, limit]);
+  };
+  const atLeast = name => asked(name) === null ? '' : `at least ${percent(asked(name))}`;
+  const isBelow = (value, name) => asked(name) !== null && value < asked(name);
+  add('localized', `${f.num_localized} of ${f.num_held_out} (${percent(f.localized_ratio)})`, atLeast('min_localized_ratio'), isBelow(f.localized_ratio, 'min_localized_ratio'));
+  const gross = asked('gross_error_m') !== null ? `farther off than ${metres(asked('gross_error_m'))} or ${degrees(asked('gross_error_deg') || 0)}` : 'farther off than the self-test allows';
+  if (f.num_gross_errors !== undefined) {
+    add(defined('wrong poses', gross), `${f.num_gross_errors} of ${f.num_localized}`, asked('min_precision_ratio') === null ? 'none' : `at most ${percent(1 - asked('min_precision_ratio'))}`,
+        f.num_gross_errors > 0 && (asked('min_precision_ratio') === null || isBelow(f.precision_ratio, 'min_precision_ratio')));
+  }
+  if (f.median_error_m !== undefined) add('error of half of the poses', `within ${lengthText(f.median_error_m)}, ${degrees(f.median_error_deg)}`);
+  if (f.p90_error_m !== undefined) add('error of nine of ten', `within ${lengthText(f.p90_error_m)}, ${degrees(f.p90_error_deg)}`);
+  for (const [key, text] of [['within_5cm_5deg_ratio', '5 cm and 5\u00B0'], ['within_10cm_2deg_ratio', '10 cm and 2\u00B0'], ['within_10cm_5deg_ratio', '10 cm and 5\u00B0']]) {
+    if (f[key] !== undefined && unit === 'm') add(`of all images within ${text}`, percent(f[key]));
+  }
+  if (f.mean_nees !== undefined) {
+    const isLarge = f.mean_nees > f.nees_high, isSmall = f.mean_nees < f.nees_low;
+    add(defined('errors against stated covariances', 'mean normalised error squared (NEES): squared errors over the covariances that the map states; 6 where these are right'),
+        `${f.mean_nees.toFixed(1)}${isLarge ? ': poses are less exact than stated' : isSmall ? ': poses are more exact than stated' : ''}`, `${f.nees_low.toFixed(1)} to ${f.nees_high.toFixed(1)}`, isLarge);
+  }
+  if (f.num_by_retrieval !== undefined) {
+    add(defined('found by retrieval', 'images whose landmarks retrieval led to; of the others the whole map was searched'), count(f.num_by_retrieval), f.all_images_num_by_retrieval === undefined ? '' : `${count(f.all_images_num_by_retrieval)} with all images kept`);
+  }
+  if (f.all_images_localized_ratio !== undefined) add('localized if all images were kept', percent(f.all_images_localized_ratio));
+  if (f.plan_images_free_ratio !== undefined) add('survey images in rooms of the floor plan', percent(f.plan_images_free_ratio), percent(1));
+  if (f.plan_fixes_free_ratio !== undefined) add('poses in rooms of the floor plan', percent(f.plan_fixes_free_ratio), percent(1));
+  return rows;
+}
+function failedNodes() {
+  const failed = [...heldOut.keys()].filter(i => isBad(heldOut[i]));
+  if (!heldOut.length) return [];
+  const source = data.held_out_is_self_test ? '' : ' (of other images than the self-test\u2019s)';
+  if (!failed.length) return [element('p', {}, `All ${counted(heldOut.length, 'held-out image')} were localized right${source}.`)];
+  const rows = failed.slice(0, 30).map(i => {
+    const image = heldOut[i];
+    return [button(image.name, () => {
+      explainImage(i);
+      goTo([image.at]);
+      $('floor').scrollIntoView();
+    }), `${metres(image.at[0] / 100)}, ${metres(image.at[1] / 100)}`, image.station === null ? 'none near' : `${image.station}${regionsAt[image.station].length ? ` (region ${regionsAt[image.station].join(', ')})` : ' (no region)'}`,
+            image.found ? outcome(image) : image.message || 'no reason is known'];
+  });
+  return [element('h3', {}, `${counted(failed.length, 'image')} not localized, or wrong${source}`), table(rows, ['image', 'taken at', 'station', 'why']),
+          ...(failed.length > 30 ? [element('p', {class: 'soft'}, `and ${failed.length - 30} more: the layer \u201Cheld-out images\u201D shows all`)] : [])];
+}
+if (data.self_test.num_held_out) {
+  const figures = Object.entries(data.self_test);
+  $('self-test-text').append(table(selfTestRows(), ['', 'found', 'asked for']), ...failedNodes(),
+    element('details', {}, element('summary', {}, 'all figures, by the names that cairn check-map gives them'), table(figures.map(([name, value]) => [name, Math.round(value * 1e4) / 1e4]))));
+} else {
+  $('self-test-text').append(element('p', {}, data.sealed ? 'No held-out images were tried: the map has no self-test.' : 'The map is not sealed: it has no self-test.'), ...failedNodes());
+}
