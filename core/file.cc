@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "core/content_hash.h"
+#include "core/output_path.h"
 #include "core/temporary.h"
 #include "core/write_error.h"
 
@@ -65,18 +66,9 @@ Result<std::string> ReadFile(const std::string& path) {
 
 Status ReplaceFileAtomically(const std::string& path,
                              const std::function<Status(const std::string&)>& write) {
-  const fs::path target(path);
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(path));
+  const std::string folder = FolderOf(path);
   std::error_code error;
-  if (!fs::is_directory(folder, error)) {
-    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path,
-                     folder.string());
-  }
-  if (fs::is_directory(target, error))
-    return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
-  if (access(folder.c_str(), W_OK) != 0) {
-    return WriteError(path, fmt::format("the folder {} may not be written", folder.string()), errno);
-  }
   const std::string temporary = TemporaryPath(path);
   fs::remove(temporary, error);
   Status status = write(temporary);
@@ -92,7 +84,7 @@ Status ReplaceFileAtomically(const std::string& path,
     for (const char* suffix : {"", "-journal", "-wal", "-shm"}) fs::remove(temporary + suffix, error);
     return status;
   }
-  return SyncPath(folder.string(), O_RDONLY | O_DIRECTORY);
+  return SyncPath(folder, O_RDONLY | O_DIRECTORY);
 }
 
 Status WriteFileAtomically(const std::string& path, std::string_view contents) {

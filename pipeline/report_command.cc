@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kCheckWords = "what cairn check-map --details wrote";
+constexpr const char* kBuildWords = "the report that cairn compile wrote";
 constexpr const char* kDriveWords = "what cairn drive -o wrote";
 
 struct Arguments {
@@ -100,7 +101,11 @@ Result<std::optional<Json>> ReadCheck(const Arguments& arguments, const std::str
   const std::string path = is_given ? arguments.check_path : build_dir + "/check.json";
   if (!is_given && (build_dir.empty() || !fs::exists(path, error))) return std::optional<Json>();
   CAIRN_ASSIGN_OR_RETURN(std::optional<Json> check, ReadJson(path, kCheckWords));
-  if (!is_given && !check->contains("images")) return std::optional<Json>();  // nothing was held out
+  if (!check->contains("images")) {
+    if (!is_given) return std::optional<Json>();
+    return MakeError(ErrorCode::kNoData,
+                     "{}: has no held-out images; cairn check-map takes them with --queries", path);
+  }
   if (!IsCheckReport(*check)) return NotWhatWasExpected(path, kCheckWords);
   if (IsCheckOf(*check, rows)) return check;
   if (is_given) {
@@ -113,30 +118,53 @@ Result<std::optional<Json>> ReadCheck(const Arguments& arguments, const std::str
   return std::optional<Json>();
 }
 
+std::string FloorPicture(const std::string& folder) { return folder + "/floor.svg"; }
+std::string AmbiguityPicture(const std::string& folder) { return folder + "/ambiguity.svg"; }
+
+// The page and the pictures can be written, and none is a file that is read, given or found.
+Status CheckOutputs(const Arguments& arguments, std::vector<std::string> inputs) {
+  CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(arguments.output_path));
+  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.output_path, inputs));
+  if (arguments.svg_dir.empty()) return Ok();
+  inputs.push_back(arguments.output_path);
+  for (const std::string& picture : {FloorPicture(arguments.svg_dir), AmbiguityPicture(arguments.svg_dir)}) {
+    if (fs::path(picture).lexically_normal() == fs::path(arguments.output_path).lexically_normal())
+      return MakeError(ErrorCode::kInvalidArgument, "{}: is the page and a picture; choose another name",
+                       picture);
+    CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(picture, inputs));
+  }
+  return Ok();
+}
+
 Status WritePictures(const std::string& folder, const MapRows& rows) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/floor.svg", FloorSvg(rows)));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(FloorPicture(folder), FloorSvg(rows)));
   const Result<std::string> ambiguity = AmbiguitySvg(rows);
-  return ambiguity.ok() ? WriteFileAtomically(folder + "/ambiguity.svg", *ambiguity) : Ok();
+  return ambiguity.ok() ? WriteFileAtomically(AmbiguityPicture(folder), *ambiguity) : Ok();
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(
-      arguments.output_path, {arguments.map_path, arguments.compare_path, arguments.check_path,
-                              arguments.drive_path, arguments.build_report_path}));
+  const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
+  const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
+  const std::string pareto_path = Beside(arguments, "", ".pareto.csv");
+  CAIRN_RETURN_IF_ERROR(CheckOutputs(
+      arguments, {arguments.map_path, arguments.compare_path, arguments.check_path, arguments.drive_path,
+                  build_path, pareto_path, build_dir + "/check.json", build_dir + "/classes.db"}));
+  std::error_code error;
+  if (!arguments.build_dir.empty() && !fs::is_directory(build_dir, error))
+    return MakeError(ErrorCode::kNotFound, "--build-dir {}: no such folder", build_dir);
   CAIRN_ASSIGN_OR_RETURN(const MapFile file, OpenWholeMap(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(file));
   ReportInputs inputs{.rows = &rows, .num_bytes = static_cast<int64_t>(fs::file_size(arguments.map_path))};
   inputs.block_bytes = BytesByKind(file, inputs.num_bytes);
-  const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
   CAIRN_ASSIGN_OR_RETURN(inputs.reprojection_errors_px, ReprojectionErrors(build_dir));
-  CAIRN_ASSIGN_OR_RETURN(inputs.pareto, ReadPareto(Beside(arguments, "", ".pareto.csv")));
+  CAIRN_ASSIGN_OR_RETURN(inputs.pareto, ReadPareto(pareto_path));
   std::optional<Json> build, drive;
-  const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
   if (!build_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(build, ReadJson(build_path, "the report that cairn compile wrote"));
+    CAIRN_ASSIGN_OR_RETURN(build, ReadJson(build_path, kBuildWords));
+    if (!IsBuildReport(*build)) return NotWhatWasExpected(build_path, kBuildWords);
     inputs.build_report = &*build;
   }
   CAIRN_ASSIGN_OR_RETURN(const std::optional<Json> check, ReadCheck(arguments, build_dir, rows));
@@ -150,12 +178,16 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!arguments.compare_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const MapFile compared_file, OpenWholeMap(arguments.compare_path));
     CAIRN_ASSIGN_OR_RETURN(compared, ReadMapRows(compared_file));
+    if (compared->frame.unit != rows.frame.unit)
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{} is in units of '{}', {} of '{}': they have no common floor",
+                       arguments.compare_path, compared->frame.unit, arguments.map_path, rows.frame.unit);
     inputs.compared = &*compared;
     inputs.compared_bytes = static_cast<int64_t>(fs::file_size(arguments.compare_path));
     inputs.compared_name = fs::path(arguments.compare_path).filename().string();
   }
   const Json data = ReportData(inputs);
-  const std::string page = arguments.print ? PrintedReportPage(rows, data) : ReportPage(data);
+  const std::string page = arguments.print ? PrintedReportPage(inputs, data) : ReportPage(data);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, page));
   if (!arguments.svg_dir.empty()) CAIRN_RETURN_IF_ERROR(WritePictures(arguments.svg_dir, rows));
   *environment.out << fmt::format("{}: {} bytes; open it in a browser\n", arguments.output_path, page.size());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <map>
 #include <numbers>
 #include <set>
@@ -20,6 +21,9 @@ constexpr double kAmbiguousEntropy = std::numbers::ln2;
 // A map is smaller, or larger, if it has so many times the bytes; it localizes more if by this part.
 constexpr double kOtherSizeFactor = 1.5;
 constexpr double kMoreLocalized = 0.01;
+// Errors that one turn, scale and shift reduces to this part are those of a frame; fewer images cannot tell.
+constexpr double kAlignedErrors = 0.7;
+constexpr size_t kMinAligned = 10;
 // Part of the poses that lie within 10 cm and 5 degrees where there is nothing to mend.
 constexpr double kManyWithin = 0.8;
 
@@ -306,6 +310,44 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
   } else if (smaller != nullptr) {
     advice->push_back({.text = "Smaller will do: " + text(*smaller)});
   }
+}
+
+void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>* advice) {
+  if (images.size() < kMinAligned) return;
+  const auto num = static_cast<double>(images.size());
+  using Complex = std::complex<double>;
+  const auto complex = [](const Eigen::Vector2d& place) { return Complex(place.x(), place.y()); };
+  Complex middle = 0, found_middle = 0;
+  for (const PlacedImage& image : images) {
+    middle += complex(image.taken) / num;
+    found_middle += complex(image.found) / num;
+  }
+  // The turn and scale that bring `taken` to `found` with the least squares, about the middles.
+  Complex covariance = 0;
+  double spread = 0, squares = 0;
+  for (const PlacedImage& image : images) {
+    const Complex taken = complex(image.taken) - middle;
+    covariance += std::conj(taken) * (complex(image.found) - found_middle);
+    spread += std::norm(taken);
+    squares += (image.found - image.taken).squaredNorm();
+  }
+  // Of images at one place neither can be told.
+  if (spread < 100 * squares || spread <= 0) return;
+  const Complex turned = covariance / spread;
+  double squares_left = 0;
+  for (const PlacedImage& image : images)
+    squares_left += std::norm(turned * (complex(image.taken) - middle) + found_middle - complex(image.found));
+  // Four numbers of the 2 n went into the fit.
+  const double before = std::sqrt(squares / num), after = std::sqrt(squares_left / (num - 2));
+  if (after > kAlignedErrors * before) return;
+  advice->push_back(
+      {.text = fmt::format(
+           "Errors of the held-out images are not noise: shifted by {:.1f} cm, turned by {:.2f} degrees and "
+           "scaled by {:+.2f} %, the map's poses fit theirs to {:.1f} cm instead of {:.1f} cm (root mean "
+           "square). The survey and these images are probably not measured in quite the same frame or scale, "
+           "or a camera's focal length is off.",
+           100 * std::abs(found_middle - middle), std::abs(std::arg(turned)) * 180 / std::numbers::pi,
+           100 * (1 / std::abs(turned) - 1), 100 * after, 100 * before)});
 }
 
 std::string AdviceText(const std::vector<Advice>& advice) {

@@ -39,6 +39,14 @@ std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& a
 void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPoint>& sizes,
               std::vector<Advice>* advice);
 
+// Where held-out images were taken, and where the map puts them, floor frame, metres.
+struct PlacedImage {
+  Eigen::Vector2d taken = Eigen::Vector2d::Zero();
+  Eigen::Vector2d found = Eigen::Vector2d::Zero();
+};
+// Whether their errors are those of a frame: one turn, scale and shift that takes most of them away.
+void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>* advice);
+
 // A numbered line per advice, with the places of images to take under it.
 std::string AdviceText(const std::vector<Advice>& advice);
 

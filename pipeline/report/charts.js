@@ -2,21 +2,22 @@
 const charts = [];
 const mostBars = 40;
 function chart(caption, config, description) {
-  const canvas = element('canvas', {role: 'img', 'aria-label': `${caption}: ${description}`});
-  $('charts').append(element('figure', {}, element('figcaption', {}, ...[].concat(caption)), element('div', {class: 'canvas'}, canvas)));
+  const title = element('figcaption', {}, ...[].concat(caption));
+  const canvas = element('canvas', {role: 'img', 'aria-label': `${title.textContent}: ${description}`});
+  $('charts').append(element('figure', {}, title, element('div', {class: 'canvas'}, canvas)));
   config.options = {animation: false, maintainAspectRatio: false, ...config.options};
   charts.push(new Chart(canvas, config));
 }
 const axis = (title, rest = {}) => ({title: {display: Boolean(title), text: title, color: styled('--ink')}, ticks: {color: styled('--ink'), ...rest.ticks}, grid: {color: styled('--line')}, ...(rest.type ? {type: rest.type} : {}), ...(rest.scale || {})});
 // `colours`: one for all, or one per bar; `told`: the tooltip's line per bar; `onPick`: called with the bar that is clicked.
-function bars(caption, labels, values, xTitle, yTitle, {horizontal = false, colours = inked(blue), told = null, onPick = null, yScale = {}} = {}) {
+function bars(caption, labels, values, xTitle, yTitle, {horizontal = false, colours = inked(blue), told = null, onPick = null, yScale = {}, ticks = {}} = {}) {
   if (!values.some(value => value > 0) && !onPick) return;
   chart(caption, {type: 'bar', data: {labels, datasets: [{data: values, backgroundColor: colours, minBarLength: onPick ? 3 : 0}]}, options: {
     indexAxis: horizontal ? 'y' : 'x',
-    plugins: {legend: {display: false}, tooltip: told ? {callbacks: {label: item => told[item.dataIndex]}} : {}},
+    plugins: {legend: {display: false}, tooltip: told ? {callbacks: {title: () => '', label: item => told[item.dataIndex].split('; ')}} : {}},
     onClick: onPick ? (event, items) => items.length && onPick(items[0].index) : undefined,
     onHover: onPick ? (event, items) => { event.native.target.style.cursor = items.length ? 'pointer' : ''; } : undefined,
-    scales: {x: axis(xTitle), y: axis(yTitle, {scale: yScale})}}}, labels.map((text, i) => `${text} ${values[i]}`).slice(0, 30).join(', '));
+    scales: {x: axis(xTitle, {ticks: {...(onPick ? {autoSkip: false} : {}), ...ticks}}), y: axis(yTitle, {scale: yScale})}}}, labels.map((text, i) => `${text} ${Math.round(100 * values[i]) / 100}`).slice(0, 30).join(', '));
 }
 // About twenty bins of equal width.
 function histogram(caption, values, xTitle, yTitle) {
@@ -49,28 +50,38 @@ function drawRegionCharts() {
     bars(`Median error by region, largest first`, farthest.map(([i]) => String(i)), farthest.map(([, test]) => factor * test.median_m), 'region', unit === 'm' ? 'cm' : unit, {told: farthest.map(told), onPick: bar => pickRegion(farthest[bar][0])});
   }
 }
+// What the two charts above show, for the keyboard and for reading aloud.
+function regionTable() {
+  const rows = R.map((region, i) => [i, region.test]).filter(([, test]) => test);
+  if (!rows.length) return;
+  $('charts').append(element('details', {class: 'whole'}, element('summary', {}, 'recall and error by region, as a table'),
+    table(rows.slice(0, 500).map(([i, test]) => [button(String(i), () => pickRegion(i)), test.held_out, test.localized, test.wrong, test.median_m === undefined ? '' : lengthText(test.median_m), test.p90_m === undefined ? '' : lengthText(test.p90_m)]),
+          ['region', 'held-out images', 'localized', 'wrong', 'median error', 'nine of ten within'])));
+}
 // Maps of other sizes, and this one among them.
 function drawSizes() {
   if (!data.pareto.length) return;
-  const line = (text, key, colour, dash) => ({type: 'line', label: text, data: data.pareto.map(point => ({x: point.bytes, y: 100 * point[key], point})), borderColor: colour, backgroundColor: colour, borderDash: dash, pointRadius: 3, borderWidth: 2});
+  const line = (text, key, colour, dash) => ({type: 'line', clip: false, label: text, data: data.pareto.map(point => ({x: point.bytes, y: 100 * point[key], point})), borderColor: colour, backgroundColor: colour, borderDash: dash, pointRadius: 3, borderWidth: 2});
   const sets = [line('localized', 'localized', inked(blue), []), line('within 10 cm, 5\u00B0', 'within', inked(green), [5, 3])];
   if (data.self_test.localized_ratio !== undefined) {
-    sets.unshift({type: 'scatter', label: 'this map', data: [{x: data.bytes, y: 100 * data.self_test.localized_ratio, point: {median_m: data.self_test.median_error_m ?? null}}], pointStyle: 'triangle', pointRadius: 8, borderColor: inked(orange), backgroundColor: inked(orange)});
+    sets.unshift({type: 'scatter', clip: false, label: 'this map', data: [{x: data.bytes, y: 100 * data.self_test.localized_ratio, point: {median_m: data.self_test.median_error_m ?? null}}], pointStyle: 'triangle', pointRadius: 8, borderColor: inked(orange), backgroundColor: inked(orange)});
   }
   chart('Size against recall', {type: 'line', data: {datasets: sets}, options: {
     plugins: {legend: {labels: {color: styled('--ink'), usePointStyle: true}}, tooltip: {callbacks: {label: item => `${item.dataset.label}: ${bytes(item.raw.x)}, ${item.raw.y.toFixed(1)} %${item.raw.point.median_m === null ? '' : `, median error ${lengthText(item.raw.point.median_m)}`}`}}},
-    scales: {x: axis('bytes of the map', {type: 'logarithmic', ticks: {callback: value => /^[125]/.test(String(value)) ? bytes(value).replace('.00', '').replace('.0', '') : '', maxRotation: 0}}), y: axis('held-out images, %', {scale: {max: 100}})}}},
+    scales: {x: axis('bytes of the map', {type: 'logarithmic', ticks: {callback: value => /^[125]/.test(String(value)) ? roundBytes(value) : '', maxRotation: 0}}), y: axis('held-out images, %', {scale: {max: 100}})}}},
     data.pareto.map(point => `${bytes(point.bytes)} ${percent(point.localized)}`).join(', '));
 }
 function drawCharts() {
   drawRegionCharts();
+  regionTable();
   histogram('Landmarks seen from a station', S.seen, 'landmarks', 'stations');
   drawSizes();
-  if (data.lower_bound) bars('Regions against their proven lower bound', ['this map', 'least possible'], [R.length, data.lower_bound], 'regions', '', {horizontal: true});
+  if (data.lower_bound) bars('Regions against their proven lower bound', ['this map', 'least possible'], [R.length, data.lower_bound], 'regions', '', {horizontal: true, ticks: {precision: 0}});
   const kinds = data.bytes_by_kind.filter(([, value]) => value > 0).sort((a, b) => b[1] - a[1]);
-  bars('Bytes of the map', kinds.map(([kind]) => kind), kinds.map(([, value]) => value), 'bytes', '', {horizontal: true, told: kinds.map(([, value]) => `${bytes(value)}, ${percent(value / data.bytes)}`)});
+  bars('Bytes of the map', kinds.map(([kind]) => kind), kinds.map(([, value]) => value), '', '', {horizontal: true, ticks: {callback: value => roundBytes(value), maxRotation: 0}, told: kinds.map(([, value]) => `${bytes(value)}, ${percent(value / data.bytes)}`)});
   histogram('Survey images that see a landmark (track length)', L.observations, 'images', 'landmarks');
   if (data.reprojection_errors.length) {
-    bars('Reprojection errors of the classes', data.reprojection_errors.map(([tenths]) => (tenths / 10).toFixed(1)), data.reprojection_errors.map(([, num]) => num), 'px (root mean square)', 'classes');
+    const tenths = new Map(data.reprojection_errors), last = most([...tenths.keys()]), bins = Array.from({length: Math.min(last, 200) + 1}, (_, i) => i);
+    bars('Reprojection errors of the classes', bins.map(i => (i / 10).toFixed(1)), bins.map(i => tenths.get(i) || 0), 'px (root mean square)', 'classes');
   }
 }

@@ -24,11 +24,14 @@ function sayFirst() {
   $('explanation').replaceChildren(...nodes);
   $('explanation').classList.remove('open');
 }
-// The floor around stations, at least six metres of it.
+// The floor around places, at least six metres of it; where they can be seen well, it stays.
 function goTo(places) {
+  if (!places.length) return;
   const bounds = leaflet.latLngBounds(places.map(([x, y]) => at(x, y)));
   const center = bounds.getCenter();
   bounds.extend([center.lat - 3, center.lng - 3]).extend([center.lat + 3, center.lng + 3]);
+  const shown = map.getBounds();
+  if (shown.contains(bounds) && shown.getEast() - shown.getWest() < 4 * Math.max(6, bounds.getEast() - bounds.getWest())) return;
   map.fitBounds(bounds.pad(0.2));
 }
 const placesOf = stations => stations.map(i => [S.x[i], S.y[i]]);
@@ -41,6 +44,7 @@ function showAdvice(entry) {
 function choose({station = -1, region = -1, image = -1}) {
   Object.assign(selected, {station, region, image});
   redrawAll();
+  showLegend();
 }
 function testText(test) {
   if (!test) return 'no held-out image was taken there';
@@ -49,13 +53,27 @@ function testText(test) {
   if (test.median_m !== undefined) text += `; median error ${lengthText(test.median_m)}, ${degrees(test.median_deg)}`;
   return text;
 }
-const outcome = image => image.found ? `${image.wrong ? 'wrong, ' : ''}${lengthText(image.error_m)}, ${degrees(image.error_deg)} off` : `not localized: ${image.message || 'no reason is known'}`;
+// Why a held-out image was not localized, powers of ten written out.
+const reason = image => (image.message || 'no reason is known').replace(/10\^(-[\d.]+)/g, (text, power) => Number((10 ** power).toPrecision(1)).toLocaleString('en', {maximumFractionDigits: 20}));
+// What helps against it.
+const remedies = {
+  too_few_features: 'The image is blank, dark or blurred: no map helps.',
+  no_candidates: 'Nothing in the map looks like it: the survey needs images from there, looking this way.',
+  too_few_matches: 'Hardly any landmark was recognized: survey images from near there looking this way, or a larger k, would help.',
+  no_pose: 'Too few landmarks were recognized right: survey images from near there looking this way, or a larger k, would help.',
+  too_few_inliers: 'Too few landmarks agree: survey images from near there looking this way, or a larger k, would help.',
+  poor_spread: 'The landmarks that agree lie close together in the image: a larger k keeps more of the others.',
+  uncertain: 'The landmarks that agree leave the place open: a larger k keeps more of the others.',
+  far_from_survey: 'The pose that was found lies where the survey never was.',
+  ambiguous: 'Another place looks nearly the same: something unlike the rest on its walls would help.',
+};
+const outcome = image => image.found ? `${image.wrong ? 'wrong, ' : ''}${lengthText(image.error_m)}, ${degrees(image.error_deg)} off` : `not localized: ${reason(image)}`;
 // Those that failed first, each a button.
 function heldOutNodes(images) {
   if (!images.length) return [];
   const order = images.slice().sort((a, b) => isBad(heldOut[b]) - isBad(heldOut[a]) || a - b);
   const line = i => element('li', isBad(heldOut[i]) ? {class: 'bad'} : {}, button(heldOut[i].name, () => { explainImage(i); }), ' ', outcome(heldOut[i]));
-  const nodes = [element('h3', {}, term('held-out', 'Held-out images'), ' taken here'), element('ul', {class: 'plain'}, ...order.slice(0, 12).map(line))];
+  const nodes = [element('h3', {}, term('held-out', 'Held-out images'), ' nearest to here'), element('ul', {class: 'plain'}, ...order.slice(0, 12).map(line))];
   if (order.length > 12) nodes.push(element('p', {class: 'soft'}, `and ${order.length - 12} more`));
   return nodes;
 }
@@ -102,8 +120,10 @@ function explainImage(i) {
   else {
     nodes.push(element('p', {class: 'buttons'}, 'Nearest station: ', button(String(image.station), () => explainStation(image.station)),
       regionsAt[image.station].length ? ' Regions: ' : ' In no region.', ...regionsAt[image.station].map(region => button(String(region), () => explainRegion(region)))));
-    if (isBad(image)) nodes.push(...adviceNodes(data.advice.filter(entry => regionsAt[image.station].includes(entry.region) || entry.stations.includes(image.station))));
+    const away = Math.hypot(image.at[0] - S.x[image.station], image.at[1] - S.y[image.station]) / 100;
+    nodes.push(element('p', {class: 'soft'}, `It was taken ${metres(away)} from that station, and counts for its regions.`));
   }
+  if (remedies[image.reason]) nodes.push(element('h3', {}, 'What would help'), element('p', {}, remedies[image.reason]));
   say(...nodes);
 }
 
@@ -131,24 +151,37 @@ const stationNear = latlng => isShown('stations') || isShown('uncovered') ? near
 const imageNear = latlng => isShown('held-out images') ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
 const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => [viewsToTake[i].x, viewsToTake[i].y], 9) : -1;
 const isSmallScreen = () => window.innerWidth <= 800;
+// All stations whose marks are under the pointer, nearest first.
+function stationsUnder(latlng) {
+  const first = stationNear(latlng);
+  if (first < 0) return [];
+  const x = 100 * latlng.lng, y = 100 * latlng.lat, reach = 100 * Math.max(0.8 * markSize(scaleNow()), 5) / scaleNow();
+  const away = i => { const [px, py] = markPlace(i); return Math.hypot(px - x, py - y); };
+  const others = [...S.x.keys()].filter(i => i !== first && away(i) < reach).sort((a, b) => away(a) - away(b));
+  return [first, ...others];
+}
 // Smaller ones first.
 function regionsUnder(latlng) {
   const x = 100 * latlng.lng, y = 100 * latlng.lat;
   return hulls.map((corners, i) => i).filter(i => isInHull(hulls[i], x, y)).sort((a, b) => R[a].stations.length - R[b].stations.length || a - b);
 }
+// What is drawn on top first; clicking on the same place again goes on to what lies below.
+const clicked = {point: null, index: 0};
 function explainAt(latlng) {
-  const image = imageNear(latlng);
-  if (image >= 0) return explainImage(image);
-  const view = viewNear(latlng), advice = view >= 0 && data.advice[viewsToTake[view].advice];
-  if (advice && advice.region !== null) return explainRegion(advice.region);
-  if (advice) return explainStation(advice.stations[0]);
-  const station = stationNear(latlng);
-  if (station >= 0) return explainStation(station);
-  const regions = regionsUnder(latlng);
-  if (!regions.length) return;
-  const next = regions[(regions.indexOf(selected.region) + 1) % regions.length];
-  explainRegion(next, regions.filter(region => region !== next));
+  const image = imageNear(latlng), view = viewNear(latlng), advice = view >= 0 && data.advice[viewsToTake[view].advice];
+  const below = [];
+  if (image >= 0) below.push(() => explainImage(image));
+  if (advice) below.push(() => advice.region !== null ? explainRegion(advice.region) : explainStation(advice.stations[0]));
+  for (const station of stationsUnder(latlng)) below.push(() => explainStation(station));
+  const regions = isShown('regions') ? regionsUnder(latlng) : [];
+  for (const region of regions) below.push(() => explainRegion(region, regions.filter(other => other !== region)));
+  if (!below.length) return;
+  const point = map.latLngToContainerPoint(latlng);
+  clicked.index = clicked.point && clicked.point.distanceTo(point) < 6 ? (clicked.index + 1) % below.length : 0;
+  clicked.point = point;
+  below[clicked.index]();
 }
+map.on('zoomstart movestart', () => { clicked.point = null; });
 map.on('click', event => explainAt(event.latlng));
 const tip = leaflet.tooltip({direction: 'top', offset: [0, -8]});
 map.on('mousemove', event => {
@@ -164,7 +197,7 @@ map.on('mousemove', event => {
     text = `take an image here, ${heading === null ? 'in all directions' : `towards ${heading}\u00B0`}: ${metres(x / 100)}, ${metres(y / 100)}`;
     place = at(x, y);
   } else if (station >= 0) {
-    text = `station ${station}: ${counted(S.visible[station], 'feature')}, ${counted(S.seen[station], 'landmark')}`;
+    text = `station ${station}: ${counted(S.visible[station], 'feature')} in view, ${counted(S.seen[station], 'landmark')} seen`;
     place = at(S.x[station], S.y[station]);
   } else if (regions.length) {
     text = regions.slice(0, 4).map(i => `region ${i}: ${counted(R[i].landmarks.length, 'landmark')}${R[i].test ? `, ${R[i].test.localized} of ${R[i].test.held_out} localized` : ''}`).join('\n');
@@ -178,11 +211,17 @@ map.on('mousemove', event => {
 map.on('mouseout', () => map.closeTooltip(tip));
 $('map').addEventListener('keydown', event => {
   if (event.key === 'Enter' && event.target === $('map')) explainAt(map.getCenter());
-  if (event.key === 'Escape') { choose({}); sayFirst(); }
+});
+document.addEventListener('keydown', event => {
+  if (event.key !== 'Escape') return;
+  choose({});
+  sayFirst();
 });
 $('find').addEventListener('submit', event => {
   event.preventDefault();
-  const text = $('query').value.trim(), number = Number(text.replace(/[^0-9]/g, ''));
+  const text = $('query').value.trim();
+  if (!text) return;
+  const number = Number(text.replace(/[^0-9]/g, ''));
   const named = names => {
     const exact = names.indexOf(text);
     return exact >= 0 || !text ? exact : names.findIndex(name => name.startsWith(text));
@@ -199,6 +238,7 @@ $('find').addEventListener('submit', event => {
   }
   const image = isStation ? -1 : named(I.name);
   const station = isStation ? number : image >= 0 ? S.images.findIndex(images => images.includes(image)) : -1;
+  if (station < 0) choose({});
   if (station < 0) return say(element('p', {class: 'bad'}, `Nothing here is called \u201C${text}\u201D.`));
   explainStation(station);
   goTo(placesOf([station]));

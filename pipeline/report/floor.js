@@ -2,7 +2,7 @@
 const leaflet = window.L;
 const at = (x, y) => leaflet.latLng(y / 100, x / 100);
 const map = leaflet.map('map', {
-  crs: leaflet.CRS.Simple, minZoom: -4, maxZoom: 12, zoomSnap: 0.25, zoomAnimation: false, fadeAnimation: false,
+  crs: leaflet.CRS.Simple, minZoom: -20, maxZoom: 30, zoomSnap: 0.25, zoomAnimation: false, fadeAnimation: false,
   markerZoomAnimation: false, attributionControl: false, preferCanvas: true, wheelPxPerZoomLevel: 100});
 leaflet.control.scale({imperial: false, metric: false}).addTo(map);
 const scaleNow = () => map.getZoomScale(map.getZoom(), 0);

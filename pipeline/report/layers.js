@@ -26,16 +26,17 @@ function drawStations(context, place, inside, scale) {
     context.stroke();
   }
 }
-// Patches under the stations; of several headings at one place the highest.
-const heat = (() => {
+// Patches under the stations: x, y and the largest value of the headings at one place; null is none.
+function byPlace(values) {
   const places = new Map();
-  S.entropy.forEach((value, i) => {
+  values.forEach((value, i) => {
     if (value === null) return;
-    const key = `${S.x[i]} ${S.y[i]}`, so_far = places.get(key);
-    if (!so_far || so_far[2] < value) places.set(key, [S.x[i], S.y[i], value]);
+    const key = `${S.x[i]} ${S.y[i]}`, soFar = places.get(key);
+    if (!soFar || soFar[2] < value) places.set(key, [S.x[i], S.y[i], value]);
   });
-  return [...places.values()].sort((a, b) => a[2] - b[2]);
-})();
+  return [...places.values()];
+}
+const heat = byPlace(S.entropy);
 // A square around a place, to the next ones.
 function patch(context, place, scale, whole, cx, cy, colour) {
   const [x, y] = place(cx, cy), side = Math.max(2, spacing / 100 * scale);
@@ -82,13 +83,12 @@ function drawRegions(context, place, inside, scale, whole) {
 }
 // Of the regions of a station, the one that localizes the smallest part of its held-out images.
 const recallClasses = [[1, blue, 'all'], [data.poor_localized_ratio, sky, `${percent(data.poor_localized_ratio, 0)} or more`], [0.5, '#E69F00', 'half or more'], [0, orange, 'less']];
-const recallAt = regionsAt.map(regions => regions.map(region => R[region].test).filter(Boolean)
-  .reduce((least, test) => Math.min(least, (test.localized - test.wrong) / test.held_out), Infinity));
+const missed = byPlace(regionsAt.map(regions => regions.map(region => R[region].test).filter(Boolean)
+  .reduce((most, test) => Math.max(most, 1 - (test.localized - test.wrong) / test.held_out), null)));
+const patchAlpha = 0.6;
 function drawRecall(context, place, inside, scale, whole) {
-  context.globalAlpha = 0.6;
-  recallAt.forEach((recall, i) => {
-    if (recall < Infinity) patch(context, place, scale, whole, S.x[i], S.y[i], inked(recallClasses.find(([least]) => recall >= least)[1]));
-  });
+  context.globalAlpha = patchAlpha;
+  for (const [x, y, part] of missed) patch(context, place, scale, whole, x, y, inked(recallClasses.find(([least]) => 1 - part >= least)[1]));
 }
 const landmarkColours = [...palette, '#888888'];
 const landmarkColour = L.region.map(region => region >= 0 ? palette.indexOf(regionColour[region]) : palette.length);
@@ -131,21 +131,24 @@ function drawKept(context, place) {
     context.stroke();
   }
 }
-const mostAlike = most(I.look_alikes.map(([, , score]) => score)) || 1;
+const alike = I.look_alikes.map(([, , score]) => score), mostAlike = most(alike), leastAlike = alike.reduce((a, b) => Math.min(a, b), mostAlike);
 function drawLookAlikes(context, place) {
   context.strokeStyle = inked(orange);
   context.globalAlpha = I.look_alikes.length > 1000 ? 0.3 : 0.8;
-  lines(context, place, I.look_alikes, 0.25, ([, , score]) => 0.8 + 2.7 * score / mostAlike);
+  lines(context, place, I.look_alikes, 0.25, ([, , score]) => mostAlike > leastAlike ? 1 + 3 * (score - leastAlike) / (mostAlike - leastAlike) : 2);
 }
-function drawPlan(context, place) {
+function drawViews(context, place) {
   context.strokeStyle = sky;
   context.lineWidth = 0.7;
+  context.globalAlpha = 0.6;
   for (const face of data.views.faces) {
     context.beginPath();
     for (let i = 0; i < face.length; i += 2) context[i ? 'lineTo' : 'moveTo'](...place(face[i], face[i + 1]));
     context.closePath();
     context.stroke();
   }
+}
+function drawWalls(context, place) {
   context.strokeStyle = styled('--ink');
   context.lineWidth = 2.5;
   for (const [x1, y1, x2, y2] of data.views.walls) {
@@ -166,9 +169,14 @@ function drawUncovered(context, place, inside, scale) {
   }
 }
 function drawAdjacency(context, place) {
-  context.strokeStyle = pink;
-  context.lineWidth = 1;
-  context.globalAlpha = R.length > 200 ? 0.4 : 0.8;
+  context.strokeStyle = context.fillStyle = inked('#A0468A');
+  context.lineWidth = 1.3;
+  context.globalAlpha = R.length > 200 ? 0.4 : 1;
+  for (const middle of regionMiddle) {
+    if (!middle || R.length > 200) continue;
+    disc(context, ...place(...middle), 3);
+    context.fill();
+  }
   R.forEach((region, i) => region.adjacent.forEach(other => {
     if (other < i || !regionMiddle[i] || !regionMiddle[other]) return;
     context.beginPath();
@@ -284,7 +292,7 @@ function drawNumbers(context, place, inside, scale, whole) {
   context.textBaseline = 'middle';
   context.font = '600 13px sans-serif';
   const shown = [];
-  if (drawings.regions && map.hasLayer(drawings.regions)) eachRegion(place, whole, (i, corners, size, box) => shown.push([i, size, box]));
+  if (isShown('regions')) eachRegion(place, whole, (i, corners, size, box) => shown.push([i, size, box]));
   shown.sort((a, b) => (b[0] === selected.region) - (a[0] === selected.region) || b[1] - a[1]);
   for (const [i, size, [west, north, east, south]] of shown) {
     if ((size < 28 || shown.length > mostNumbers) && i !== selected.region) break;
@@ -293,7 +301,7 @@ function drawNumbers(context, place, inside, scale, whole) {
       .some(([px, py]) => put(`R${i}`, px, py, inked(regionColour[i])));
   }
   const size = markSize(scale);
-  if (size < 18 || !drawings.stations || !map.hasLayer(drawings.stations)) return;
+  if (0.4 * spacing / 100 * scale < 28 || !isShown('stations')) return;
   context.font = '11px sans-serif';
   for (let i = 0; i < numStations && taken.length < 2 * mostNumbers; ++i) {
     const [x, y] = place(S.x[i], S.y[i]), turn = (S.heading[i] || 0) * Math.PI / 180, ahead = S.heading[i] === null ? 0 : 0.75 * size;
@@ -311,6 +319,7 @@ function mark(kind, colour) {
   path.setAttribute('d', shapes[kind]);
   path.setAttribute('stroke', inked(colour));
   path.setAttribute('stroke-width', 2);
+  if (kind === 'block') path.setAttribute('opacity', patchAlpha);
   path.setAttribute('fill', ['disc', 'dot', 'block'].includes(kind) ? inked(colour) : 'none');
   svg.append(path);
   return svg;
@@ -320,40 +329,46 @@ const scaleOf = (colourOf, text, low, high) => {
   bar.style.background = `linear-gradient(to right, ${[0, 0.2, 0.4, 0.6, 0.8, 1].map(colourOf).join(',')})`;
   return element('div', {}, text, bar, element('div', {class: 'ends'}, element('span', {}, low), element('span', {}, high)));
 };
-const says = (...marks) => () => element('div', {}, ...marks.flatMap(([kind, colour, text]) => [mark(kind, colour), ` ${text}  `]));
+const says = (...marks) => () => element('div', {}, ...marks.map(([kind, colour, text]) => element('span', {class: 'key'}, mark(kind, colour), ` ${text} `)));
 
 const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy));
 const has = {held_out: heldOut.length > 0, wrong: heldOut.some(image => image.wrong)};
 // From the lowest to the highest; those that a map has nothing for are left out.
 const layers = [
-  {name: 'recall', group: 'how well', draw: drawRecall, exists: recallAt.some(recall => recall < Infinity),
-   legend: () => element('div', {}, 'held-out images of the region localized: ', ...recallClasses.flatMap(([, colour, text]) => [mark('block', colour), ` ${text} `]))},
+  {name: 'recall', group: 'how well', draw: drawRecall, exists: missed.length > 0,
+   legend: () => element('div', {}, 'of the regions there, the one that localizes the smallest part of its held-out images: ', ...recallClasses.map(([, colour, text]) => element('span', {class: 'key'}, mark('block', colour), ` ${text} `)))},
   {name: 'entropy', group: 'how well', draw: drawEntropy, exists: heat.length > 0,
-   legend: () => scaleOf(heatShade, 'entropy: places that look alike', '0 nats: none', `${mostEntropy.toFixed(1)} nats: ${(Math.exp(mostEntropy) - 1).toFixed(1)} others`)},
-  {name: 'regions', group: 'the map', draw: drawRegions, on: true, exists: R.length > 0},
-  {name: 'floor plan', group: 'the map', draw: drawPlan, on: true, exists: data.views.walls.length > 0,
-   legend: () => element('div', {}, mark('line', styled('--ink')), ' walls  ', mark('line', sky), ' regions of the same view')},
-  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: says(['line', pink, 'regions with common or neighbouring stations'])},
+   legend: () => scaleOf(heatShade, 'entropy: as so many places alike', '0 nats: 1 place', `${mostEntropy.toFixed(2)} nats: ${Math.exp(mostEntropy).toFixed(1)} places`)},
+  {name: 'regions', group: 'the map', draw: drawRegions, on: true, exists: R.length > 0,
+   legend: () => element('div', {}, mark('ring', palette[0]), ' regions; colours and dashes only tell neighbours apart')},
+  {name: 'views', group: 'the map', draw: drawViews, exists: data.views.faces.length > 0,
+   legend: says(['line', sky, 'view-invariant regions of the floor plan: inside of one the same walls are in sight'])},
+  {name: 'walls', group: 'the map', draw: drawWalls, on: true, exists: data.views.walls.length > 0,
+   legend: () => element('div', {}, mark('line', styled('--ink')), ' walls of the floor plan')},
+  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: says(['line', '#A0468A', 'regions with common or neighbouring stations'])},
   {name: 'appearance graph', group: 'images', draw: drawKept, exists: I.links.length > 0,
-   legend: says(['disc', green, 'kept images'], ['line', green, 'links'])},
+   legend: says(['disc', green, counted(I.kept.length, 'kept image')], ['line', green, counted(I.links.length, 'link') + ' of them'])},
   {name: 'look-alikes', group: 'images', draw: drawLookAlikes, exists: I.look_alikes.length > 0,
    legend: says(['bow', orange, 'images of different places that look alike; the wider, the more']) },
   {name: 'landmarks', group: 'the map', draw: drawLandmarks, isOfDots: L.x.length >= manyDots, on: true, exists: L.x.length > 0,
-   legend: () => element('div', {}, mark('dot', palette[0]), mark('dot', palette[1]), mark('dot', palette[2]), ' landmarks, in the colour of a region')},
+   legend: () => element('div', {}, ...(R.length ? [element('span', {class: 'key'}, ...[...new Set(regionColour)].slice(0, 3).map(colour => mark('dot', colour)), ' landmarks, in the colour of a region ')] : []),
+     ...(L.region.some(region => region < 0) ? [element('span', {class: 'key'}, mark('dot', '#888888'), R.length ? ' of no region ' : ' landmarks')] : []),
+     ...(selected.region >= 0 ? [element('span', {class: 'key'}, mark('disc', regionColour[selected.region]), ` of region ${selected.region}`)] : []))},
   {name: 'stations', group: 'the map', draw: drawStations, on: true, exists: numStations > 0,
    legend: () => scaleOf(shade, 'stations: features in view', '0', count(mostSeen))},
   {name: 'uncovered', group: 'how well', draw: drawUncovered, on: true, exists: S.x.some((x, i) => isUncovered(i)),
    legend: says(['cross', orange, 'stations not covered'])},
   {name: 'self-test errors', group: 'how well', draw: drawErrors, exists: heldOut.some(isLocalized),
-   legend: () => element('div', {}, mark('arrow', blue), ` from where an image was taken to where the map puts it, ${errorFactor} times as long`)},
-  {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: has.held_out,
-   legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(has.wrong ? [['diamond', pink, 'wrong']] : []))},
+   legend: () => element('div', {}, mark('arrow', blue), ` from where an image was taken to where the map puts it${errorFactor > 1 ? `, ${errorFactor} times as long` : ''}`)},
   {name: 'images to take', group: 'images', draw: drawViewsToTake, exists: viewsToTake.length > 0,
    legend: says(viewsToTake.some(view => view.heading !== null) ? ['wedge', green, 'images to take next'] : ['ring', green, 'images to take next, in all directions'])},
+  {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: has.held_out,
+   legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(has.wrong ? [['diamond', pink, 'wrong']] : []))},
   {name: 'changes', group: 'the map', draw: drawChanges, on: true, exists: Boolean(data.changes),
    legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'gone'], ['ring', orange, 'lost'])},
   {name: 'drive', group: 'images', draw: drawDrive, on: true, exists: Boolean(data.drive), legend: says(['wedge', pink, 'the robot and its way'])},
-  {name: 'numbers', group: 'the map', draw: drawNumbers, on: true, exists: numStations > 0},
+  {name: 'numbers', group: 'the map', draw: drawNumbers, on: true, exists: numStations > 0,
+   legend: () => element('div', {}, 'R3: region 3; stations have their numbers when zoomed in')},
 ].filter(layer => layer.exists);
 const drawings = {};
 const isShown = name => Boolean(drawings[name]) && map.hasLayer(drawings[name]);

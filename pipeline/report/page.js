@@ -36,6 +36,8 @@ function table(rows, head) {
 const count = value => value.toLocaleString('en');
 const counted = (num, noun, nouns = noun + 's') => `${count(num)} ${num === 1 ? noun : nouns}`;
 const bytes = value => value >= 1e6 ? `${(value / 1e6).toFixed(2)} MB` : `${(value / 1e3).toFixed(1)} kB`;
+// Without decimals that are zero, for axes.
+const roundBytes = value => bytes(value).replace(/\.0+ /, ' ');
 const percent = (value, digits = 1) => `${(100 * value).toFixed(digits)} %`;
 const metres = (value, digits = 2) => `${value.toFixed(digits)} ${unit}`;
 // Short lengths in centimetres, where the unit is the metre.
@@ -49,7 +51,7 @@ const terms = {
   station: 'a place where the survey stood, with the direction it looked in if the camera sees only forward',
   landmark: 'a feature of the place that the map keeps: robots find where they are by landmarks',
   'features in view': 'features of the place that a robot at the station can expect to see, kept by the map or not',
-  'landmarks seen': 'landmarks that the survey images taken at the station see',
+  'landmarks seen': 'landmarks that the survey images taken at the station see' + (data.landmark_choice === 'all' ? '; this map keeps every class, also those that a robot cannot expect to see again' : ''),
   'common landmarks': 'landmarks that are seen from every station of the region: by them a robot there is localized',
   region: 'neighbouring stations that all see the same k landmarks or more',
   k: 'the least number of common landmarks of a region, [decompose_regions] k',
@@ -57,9 +59,9 @@ const terms = {
   class: 'one feature of the place, seen in several images',
   'held-out': 'images that the map was not made from; they test it',
   recall: 'part of the held-out images that the map localizes',
-  entropy: 'how many places look like this one: 0 nats none, 0.69 one other, 1.1 two others',
+  entropy: 'how many places look like this one, itself counted: 0 nats one, 0.69 two, 1.1 three',
   kept: 'images that suffice to find the way: every other one is linked to one of them',
-  covered: 'some region has this station, and all stations within tau hops of it',
+  covered: data.tau > 0 ? `some region has this station, and all stations within tau = ${data.tau} hops of it` : 'some region has this station',
   inliers: 'landmarks that agree with the pose that was found',
   'survey images': 'images taken at the station, of which the map is made',
 };
@@ -84,7 +86,7 @@ document.addEventListener('keydown', event => {
 // ---- colours that colour-blind readers tell apart: Okabe and Ito's; cividis for amounts
 const blue = '#0072B2', orange = '#D55E00', green = '#009E73', pink = '#CC79A7', sky = '#56B4E9';
 const palette = [blue, '#E69F00', green, orange, pink, sky, '#B8A800'];
-const onDark = {[blue]: '#4FA8E8', [green]: '#2FC79B', [orange]: '#FF8A3D'};
+const onDark = {[blue]: '#4FA8E8', [green]: '#2FC79B', [orange]: '#FF8A3D', '#A0468A': '#E58BD0'};
 const isDark = () => document.documentElement.classList.contains('dark');
 // The same colour, light enough for the dark ground.
 const inked = colour => isDark() && onDark[colour] || colour;

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "core/floor_pose.h"
-#include "pipeline/explain/advise.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/station_losses.h"
 
@@ -196,12 +195,6 @@ Json AdviceJson(const std::vector<Advice>& advice) {
   return list;
 }
 
-std::vector<Advice> AdviceOf(const ReportInputs& inputs) {
-  std::vector<Advice> advice = Advise(*inputs.rows);
-  AddSizes(*inputs.rows, inputs.num_bytes, inputs.pareto, &advice);
-  return advice;
-}
-
 // What changed from the compared map (A) to this one (B).
 Json ChangesJson(const ReportInputs& inputs) {
   const MapRows &a = *inputs.compared, &b = *inputs.rows;
@@ -249,6 +242,7 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
       entry["error_deg"] = Rounded(image.value("error_deg", 0.0), 1e-4);
       entry["wrong"] = image.value("is_gross_error", false);
     }
+    if (image.contains("reason") && !image.contains("floor")) entry["reason"] = image["reason"];
     if (image.contains("num_inliers")) entry["inliers"] = image["num_inliers"];
     for (const char* key : {"message", "rejected"}) {
       if (image.contains(key)) entry["message"] = image[key];
@@ -256,6 +250,20 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
     list.push_back(std::move(entry));
   }
   return list;
+}
+
+// Of a check's images those that were localized, and not at a wrong place.
+std::vector<PlacedImage> PlacedImages(const Json& check) {
+  std::vector<PlacedImage> placed;
+  for (const Json& image : check["images"]) {
+    if (!image.contains("true_floor") || !image.contains("floor") || image.value("is_gross_error", false))
+      continue;
+    const auto place = [&](const char* key) {
+      return Eigen::Vector2d(image[key][0].get<double>(), image[key][1].get<double>());
+    };
+    placed.push_back({.taken = place("true_floor"), .found = place("floor")});
+  }
+  return placed;
 }
 
 // The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees, median
@@ -297,17 +305,46 @@ Json DriveJson(const Json& drive) {
   return json;
 }
 
+// The stages of a build: what each made and left out, seconds and bytes of memory.
+Json BuildJson(const Json& build) {
+  Json stages = Json::array();
+  for (const Json& stage : build["stages"]) {
+    Json entry = Json::object();
+    for (const char* key : {"stage", "seconds", "peak_memory_bytes", "out"}) {
+      if (stage.contains(key)) entry[key] = stage[key];
+    }
+    entry["rejected"] = Json::array();
+    if (stage.contains("rejected")) {
+      for (const Json& reject : stage["rejected"])
+        entry["rejected"].push_back(
+            {{"what", reject["what"]}, {"count", reject["count"]}, {"reason", reject["reason"]}});
+    }
+    stages.push_back(std::move(entry));
+  }
+  return stages;
+}
+
+// Beyond it nothing is drawn, metres: no map reaches so far.
+constexpr double kMaxPlace = 1e7;
+
 bool IsText(const Json& object, const char* key) { return !object.contains(key) || object[key].is_string(); }
+bool IsPlaceNumber(const Json& number) {
+  return number.is_number() && std::abs(number.get<double>()) <= kMaxPlace;
+}
 bool IsNumber(const Json& object, const char* key) {
-  return !object.contains(key) || object[key].is_number();
+  return !object.contains(key) || IsPlaceNumber(object[key]);
+}
+// At least zero.
+bool IsAmount(const Json& object, const char* key) {
+  return !object.contains(key) ||
+         (object[key].is_number() && object[key].get<double>() >= 0 && object[key].get<double>() < 1e15);
 }
 
 // x, y and a heading, where there is one.
 bool IsPlace(const Json& object, const char* key) {
   if (!object.contains(key)) return true;
   const Json& place = object[key];
-  return place.is_array() && place.size() >= 2 &&
-         std::all_of(place.begin(), place.end(), [](const Json& number) { return number.is_number(); });
+  return place.is_array() && place.size() >= 2 && std::all_of(place.begin(), place.end(), IsPlaceNumber);
 }
 
 bool IsPose(const Json& object, const char* key) {
@@ -329,11 +366,30 @@ bool AreAll(const Json& object, const char* key, const IsRight& is_right) {
 
 }  // namespace
 
+bool IsBuildReport(const Json& build) {
+  return build.contains("stages") && AreAll(build, "stages", [](const Json& stage) {
+           if (!stage.contains("stage") || !IsText(stage, "stage") || !IsAmount(stage, "seconds") ||
+               !IsAmount(stage, "peak_memory_bytes"))
+             return false;
+           if (stage.contains("out")) {
+             if (!stage["out"].is_object()) return false;
+             for (const auto& [noun, number] : stage["out"].items()) {
+               if (!IsAmount(stage["out"], noun.c_str())) return false;
+             }
+           }
+           return AreAll(stage, "rejected", [](const Json& reject) {
+             return reject.contains("what") && IsText(reject, "what") && reject.contains("count") &&
+                    IsAmount(reject, "count") && reject.contains("reason") && IsText(reject, "reason");
+           });
+         });
+}
+
 bool IsCheckReport(const Json& check) {
   return check.contains("images") && AreAll(check, "images", [](const Json& image) {
            return IsText(image, "name") && IsText(image, "message") && IsText(image, "rejected") &&
-                  IsPlace(image, "true_floor") && IsPlace(image, "floor") && IsNumber(image, "error_m") &&
-                  IsNumber(image, "error_deg") && IsNumber(image, "num_inliers") &&
+                  IsText(image, "reason") && IsPlace(image, "true_floor") && IsPlace(image, "floor") &&
+                  IsNumber(image, "error_m") && IsAmount(image, "error_m") && IsNumber(image, "error_deg") &&
+                  IsAmount(image, "error_deg") && IsAmount(image, "num_inliers") &&
                   (!image.contains("is_gross_error") || image["is_gross_error"].is_boolean()) &&
                   (!image.contains("floor") || image.contains("error_m"));
          });
@@ -358,6 +414,14 @@ bool IsDrive(const Json& drive) {
          });
 }
 
+std::vector<Advice> ReportAdvice(const ReportInputs& inputs) {
+  std::vector<Advice> advice = Advise(*inputs.rows);
+  if (inputs.check != nullptr && inputs.rows->frame.unit == "metre")
+    AddMisalignment(PlacedImages(*inputs.check), &advice);
+  AddSizes(*inputs.rows, inputs.num_bytes, inputs.pareto, &advice);
+  return advice;
+}
+
 nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   const MapRows& rows = *inputs.rows;
   Json json = {{"name", rows.name},
@@ -379,7 +443,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
                {"views", ViewsJson(rows.views)},
                {"drops", DropsJson(rows.findings)},
                {"self_test", rows.self_test},
-               {"advice", AdviceJson(AdviceOf(inputs))},
+               {"advice", AdviceJson(ReportAdvice(inputs))},
                {"poor_localized_ratio", kPoorLocalizedRatio},
                {"pareto", ParetoJson(inputs.pareto)},
                {"options", rows.stage_options}};
@@ -387,7 +451,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   for (const double error : inputs.reprojection_errors_px) ++errors[std::llround(10 * error)];
   json["reprojection_errors"] = Json::array();
   for (const auto& [tenths, count] : errors) json["reprojection_errors"].push_back({tenths, count});
-  if (inputs.build_report != nullptr) json["build"] = *inputs.build_report;
+  if (inputs.build_report != nullptr) json["stages"] = BuildJson(*inputs.build_report);
   if (inputs.check != nullptr) {
     json["held_out"] = HeldOutJson(*inputs.check, rows);
     json["held_out_is_self_test"] = !rows.self_test.empty() && IsCheckOf(*inputs.check, rows);

@@ -8,7 +8,6 @@
 
 #include "core/svg.h"
 #include "pipeline/ambiguity_svg.h"
-#include "pipeline/explain/advise.h"
 #include "pipeline/floor_svg.h"
 #include "pipeline/inspect_drops.h"
 #include "report/chart_js.h"
@@ -66,6 +65,23 @@ std::string Script() {
   return script;
 }
 
+// The held-out images that failed, a line each: name, place, reason.
+std::string FailedImagesText(const nlohmann::ordered_json& data) {
+  std::string text;
+  if (!data.contains("held_out")) return text;
+  for (const auto& image : data["held_out"]) {
+    const bool is_wrong = image.value("wrong", false);
+    if (image.contains("found") && !is_wrong) continue;
+    text +=
+        fmt::format("{:<24} {:>8.2f}, {:>8.2f}  {}\n", image["name"].get<std::string>(),
+                    image["at"][0].get<double>() / 100, image["at"][1].get<double>() / 100,
+                    is_wrong ? fmt::format("wrong by {:.2f} {}, {:.1f} deg", image["error_m"].get<double>(),
+                                           data["unit"].get<std::string>(), image["error_deg"].get<double>())
+                             : image.value("message", "not localized"));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string ReportPage(const nlohmann::ordered_json& data) {
@@ -91,7 +107,8 @@ std::string ReportPage(const nlohmann::ordered_json& data) {
   return html.append(page.substr(done));
 }
 
-std::string PrintedReportPage(const MapRows& rows, const nlohmann::ordered_json& data) {
+std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordered_json& data) {
+  const MapRows& rows = *inputs.rows;
   const auto block = [](const std::string& title, const std::string& text) {
     return text.empty() ? "" : fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", title, EscapeXml(text));
   };
@@ -108,11 +125,12 @@ std::string PrintedReportPage(const MapRows& rows, const nlohmann::ordered_json&
                       rows.stations.size(), EscapeXml(rows.writer));
   html += "<figure>" + FloorSvg(rows) + "</figure>\n";
   if (const Result<std::string> svg = AmbiguitySvg(rows); svg.ok()) html += "<figure>" + *svg + "</figure>\n";
-  html += block("What the next survey should add", AdviceText(Advise(rows)));
+  html += block("What would make it better", AdviceText(ReportAdvice(inputs)));
   std::string self_test;
   for (const auto& [name, value] : rows.self_test) self_test += fmt::format("{:<26} {:.4g}\n", name, value);
   html += block("Self-test", self_test);
   html += block("Self-test by region", SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
+  html += block("Held-out images not localized, or wrong", FailedImagesText(data));
   html += block("What the stages dropped", DropsText(rows, kMaxStationLines));
   for (const auto& [stage, options] : rows.stage_options) html += block("Options of " + stage, options);
   return html + "</body></html>\n";

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/map_rows.h"
+#include "pipeline/report/report_data.h"
 
 namespace cairn {
 
@@ -14,6 +14,6 @@ namespace cairn {
 std::string ReportPage(const nlohmann::ordered_json& data);
 
 // The same for paper: pictures and tables, no scripts.
-std::string PrintedReportPage(const MapRows& rows, const nlohmann::ordered_json& data);
+std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordered_json& data);
 
 }  // namespace cairn

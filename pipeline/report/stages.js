@@ -2,9 +2,10 @@
 function stageSteps() {
   const dropsOf = stage => data.drops.filter(drop => drop.stage === stage && drop.kind === 'feature').sort((a, b) => b.num - a.num);
   // A map of all landmarks passes the filter and the regions by.
+  const isOfRegions = data.landmark_choice !== 'all';
   const stages = [['group_classes', 'tracks', 'matches of several images that are chained to one feature'],
     ['filter_visibility', 'classes', terms.class], ['decompose_regions', 'visible', 'classes that a robot can expect to see again'],
-    ['emit_map', 'kept', 'classes that some region keeps']].filter(([stage]) => data.landmark_choice !== 'all' || !['filter_visibility', 'decompose_regions'].includes(stage));
+    ['emit_map', ...(isOfRegions ? ['kept', 'classes that some region keeps'] : ['classes', terms.class])]].filter(([stage]) => isOfRegions || !['filter_visibility', 'decompose_regions'].includes(stage));
   let num = L.x.length;
   const steps = [{noun: 'landmarks', definition: terms.landmark, num, out: num, drops: []}];
   for (const [stage, noun, definition] of stages.reverse()) {
@@ -15,7 +16,7 @@ function stageSteps() {
   return steps;
 }
 function drawStages() {
-  const build = data.build && data.build.stages ? data.build.stages : [];
+  const build = data.stages || [];
   const made = (stage, noun) => (build.find(entry => entry.stage === stage && entry.out) || {out: {}}).out[noun];
   const head = [['images', I.name.length], ['keypoints', made('extract_features', 'keypoints')], ['matches', made('match_features', 'matches')]].filter(([, value]) => value !== undefined);
   $('stages').append(element('p', {class: 'before'}, ...head.flatMap(([noun, value]) => [element('strong', {}, count(value)), ` ${noun} \u2192 `])));
@@ -31,8 +32,14 @@ function drawStages() {
       element('div', {class: 'soft'}, stage ? `${stage}${drops.length ? ' drops' : ' drops none'}` : ''), list));
   }
   $('stages').append(flow);
+  if (data.landmark_choice === 'all') {
+    const left = ['filter_visibility', 'decompose_regions'].map(stage => data.drops.filter(drop => drop.stage === stage && drop.kind === 'feature').reduce((sum, drop) => sum + drop.num, 0));
+    $('stages').append(element('p', {}, `This map keeps every class ([emit_map] landmarks = "all"), also the ${count(left[0])} that a robot cannot expect to see again and the ${count(left[1])} that no region needs.`));
+  }
   if (build.length) {
-    const rejects = stage => (stage.rejected || []).map(reject => `${count(reject.count)} ${reject.what}: ${reject.reason}`).join('; ');
+    // What the map tells of itself is told above and below.
+    const isTold = reject => data.drops.some(drop => drop.name === reject.reason);
+    const rejects = stage => (stage.rejected || []).filter(reject => !isTold(reject)).map(reject => `${reject.count === 1 ? reject.what.replace(/s$/, '') : reject.what}: ${reject.reason}`.replace(/^/, `${count(reject.count)} `)).join('; ');
     const anyRejects = build.some(rejects);
     $('stages').append(element('h3', {}, 'Time and memory'), table(build.map(stage => [stage.stage, `${(stage.seconds || 0).toFixed(1)}`, bytes(stage.peak_memory_bytes || 0),
       Object.entries(stage.out || {}).map(([noun, value]) => noun === 'bytes' ? `${bytes(value)} before sealing` : `${count(value)} ${noun}`).join(', '),

@@ -10,7 +10,14 @@ function setTheme(isNowDark) {
   $('charts').replaceChildren();
   if (chartsDrawn) drawCharts();
 }
-$('theme').addEventListener('click', () => setTheme(!isDark()));
+// What was chosen last, on this machine; where the browser does not keep it, what the system says.
+function keptTheme() {
+  try { return localStorage.getItem('cairn report theme'); } catch (error) { return null; }
+}
+$('theme').addEventListener('click', () => {
+  setTheme(!isDark());
+  try { localStorage.setItem('cairn report theme', isDark() ? 'dark' : 'light'); } catch (error) { /* it may keep nothing */ }
+});
 
 // All stations and held-out images, and all but the outermost landmarks.
 function extent(places, landmarks) {
@@ -19,9 +26,24 @@ function extent(places, landmarks) {
   return [places.reduce((a, b) => Math.min(a, b), shown[0] ?? Infinity), places.reduce((a, b) => Math.max(a, b), shown[1] ?? -Infinity)];
 }
 if (isSmallScreen()) $('layers-box').open = false;
-document.documentElement.classList.toggle('dark', window.matchMedia('(prefers-color-scheme: dark)').matches);
+document.documentElement.classList.toggle('dark', keptTheme() ? keptTheme() === 'dark' : window.matchMedia('(prefers-color-scheme: dark)').matches);
 const [west, east] = extent(S.x.concat(heldOut.map(image => image.at[0])), L.x), [south, north] = extent(S.y.concat(heldOut.map(image => image.at[1])), L.y);
-map.fitBounds(leaflet.latLngBounds(at(west, south), at(east, north)).pad(0.05));
+const everything = leaflet.latLngBounds(at(west, south), at(east, north)).pad(0.05);
+map.fitBounds(everything);
+map.setMinZoom(map.getZoom() - 3);
+map.setMaxZoom(Math.max(map.getZoom() + 2, Math.log2(22 / (0.4 * spacing / 100)) + 3));
+const fit = leaflet.control({position: 'topleft'});
+fit.onAdd = () => {
+  const bar = element('div', {class: 'leaflet-bar'}), link = element('a', {href: '#floor', role: 'button', title: 'all of the floor', 'aria-label': 'all of the floor'}, 'all');
+  link.style.fontSize = '12px';
+  leaflet.DomEvent.on(link, 'click', event => {
+    leaflet.DomEvent.stop(event);
+    map.fitBounds(everything);
+  });
+  bar.append(link);
+  return bar;
+};
+fit.addTo(map);
 axes.addTo(map);
 for (const {name, on} of layers) if (on) map.addLayer(drawings[name]);
 axisNumbers.addTo(map);

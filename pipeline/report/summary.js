@@ -1,10 +1,11 @@
 // The head of the page, the advice, and what the self-test says.
+const hasSelfTest = data.self_test.num_held_out > 0 && data.self_test.num_localized !== undefined;
 const numCovered = S.x.filter((x, i) => !isUncovered(i)).length;
 const placed = heldOut.filter(isLocalized);
 // Figures of the self-test: the map's own, or else those of the images that were given.
 const tested = (() => {
   const figures = data.self_test;
-  if (figures.num_held_out) {
+  if (hasSelfTest) {
     return {num: figures.num_held_out, localized: figures.num_localized, wrong: figures.num_gross_errors || 0, median_m: figures.median_error_m,
             median_deg: figures.median_error_deg, p90_m: figures.p90_error_m, p90_deg: figures.p90_error_deg};
   }
@@ -25,13 +26,13 @@ function card(value, caption, {bad = false, action = null} = {}) {
 }
 $('name').textContent = data.name;
 card(bytes(data.bytes), data.sealed ? 'sealed map' : 'map, not sealed');
-card(count(L.x.length), term('landmark', L.x.length === 1 ? 'landmark' : 'landmarks'));
+card(count(L.x.length), [term('landmark', L.x.length === 1 ? 'landmark' : 'landmarks'), data.landmark_choice === 'all' ? ': every class' : '']);
 card(count(R.length), [term('region', R.length === 1 ? 'region' : 'regions'), data.lower_bound ? `, at least ${data.lower_bound} are needed` : '']);
 card(`${count(numCovered)} of ${count(numStations)}`, [term('station', 'stations'), ' ', term('covered')], {bad: numCovered < numStations});
 if (tested) {
   card(`${tested.localized} of ${tested.num}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.num});
-  if (tested.median_m !== undefined) {
-    card(`${lengthText(tested.median_m)}, ${degrees(tested.median_deg)}`, tested.p90_m === undefined ? 'median error' : `median error; nine of ten within ${lengthText(tested.p90_m)}, ${degrees(tested.p90_deg)}`);
+  if (tested.median_m !== undefined && tested.median_deg !== undefined) {
+    card(`${lengthText(tested.median_m)}, ${degrees(tested.median_deg)}`, tested.p90_m === undefined || tested.p90_deg === undefined ? 'median error' : `median error; nine of ten within ${lengthText(tested.p90_m)}, ${degrees(tested.p90_deg)}`);
   }
 } else {
   card('not tested', ['no ', term('held-out', 'held-out images'), ' were tried']);
@@ -72,20 +73,21 @@ function selfTestRows() {
     const cell = element('span', isMissed ? {class: 'bad'} : {}, value);
     rows.push([name, cell, limit]);
   };
-  const atLeast = name => asked(name) === null ? '' : `at least ${percent(asked(name))}`;
+  const atLeast = name => asked(name) === null ? 'not asked' : `at least ${percent(asked(name))}`;
   const isBelow = (value, name) => asked(name) !== null && value < asked(name);
-  add('localized', `${f.num_localized} of ${f.num_held_out} (${percent(f.localized_ratio)})`, atLeast('min_localized_ratio'), isBelow(f.localized_ratio, 'min_localized_ratio'));
+  add('localized', `${f.num_localized} of ${f.num_held_out} (${percent(f.num_localized / f.num_held_out)})`, atLeast('min_localized_ratio'), isBelow(f.num_localized / f.num_held_out, 'min_localized_ratio'));
   const gross = asked('gross_error_m') !== null ? `farther off than ${metres(asked('gross_error_m'))} or ${degrees(asked('gross_error_deg') || 0)}` : 'farther off than the self-test allows';
   if (f.num_gross_errors !== undefined) {
-    add(defined('wrong poses', gross), `${f.num_gross_errors} of ${f.num_localized}`, asked('min_precision_ratio') === null ? 'none' : `at most ${percent(1 - asked('min_precision_ratio'))}`,
-        f.num_gross_errors > 0 && (asked('min_precision_ratio') === null || isBelow(f.precision_ratio, 'min_precision_ratio')));
+    add(defined('wrong poses', gross), `${f.num_gross_errors} of ${f.num_localized}`, asked('min_precision_ratio') === null ? 'not asked' : `at most ${percent(1 - asked('min_precision_ratio'))}`,
+        f.num_gross_errors > 0 && (asked('min_precision_ratio') === null || isBelow(1 - f.num_gross_errors / f.num_localized, 'min_precision_ratio')));
   }
-  if (f.median_error_m !== undefined) add('error of half of the poses', `within ${lengthText(f.median_error_m)}, ${degrees(f.median_error_deg)}`);
-  if (f.p90_error_m !== undefined) add('error of nine of ten', `within ${lengthText(f.p90_error_m)}, ${degrees(f.p90_error_deg)}`);
+  const all = (...keys) => keys.every(key => f[key] !== undefined);
+  if (all('median_error_m', 'median_error_deg')) add('error of half of the poses', `within ${lengthText(f.median_error_m)}, ${degrees(f.median_error_deg)}`);
+  if (all('p90_error_m', 'p90_error_deg')) add('error of nine of ten', `within ${lengthText(f.p90_error_m)}, ${degrees(f.p90_error_deg)}`);
   for (const [key, text] of [['within_5cm_5deg_ratio', '5 cm and 5\u00B0'], ['within_10cm_2deg_ratio', '10 cm and 2\u00B0'], ['within_10cm_5deg_ratio', '10 cm and 5\u00B0']]) {
     if (f[key] !== undefined && unit === 'm') add(`of all images within ${text}`, percent(f[key]));
   }
-  if (f.mean_nees !== undefined) {
+  if (all('mean_nees', 'nees_low', 'nees_high')) {
     const isLarge = f.mean_nees > f.nees_high, isSmall = f.mean_nees < f.nees_low;
     add(defined('errors against stated covariances', 'mean normalised error squared (NEES): squared errors over the covariances that the map states; 6 where these are right'),
         `${f.mean_nees.toFixed(1)}${isLarge ? ': poses are less exact than stated' : isSmall ? ': poses are more exact than stated' : ''}`, `${f.nees_low.toFixed(1)} to ${f.nees_high.toFixed(1)}`, isLarge);
@@ -110,15 +112,15 @@ function failedNodes() {
       goTo([image.at]);
       $('floor').scrollIntoView();
     }), `${metres(image.at[0] / 100)}, ${metres(image.at[1] / 100)}`, image.station === null ? 'none near' : `${image.station}${regionsAt[image.station].length ? ` (region ${regionsAt[image.station].join(', ')})` : ' (no region)'}`,
-            image.found ? outcome(image) : image.message || 'no reason is known'];
+            image.found ? outcome(image) : reason(image)];
   });
   return [element('h3', {}, `${counted(failed.length, 'image')} not localized, or wrong${source}`), table(rows, ['image', 'taken at', 'station', 'why']),
           ...(failed.length > 30 ? [element('p', {class: 'soft'}, `and ${failed.length - 30} more: the layer \u201Cheld-out images\u201D shows all`)] : [])];
 }
-if (data.self_test.num_held_out) {
+if (hasSelfTest) {
   const figures = Object.entries(data.self_test);
   $('self-test-text').append(table(selfTestRows(), ['', 'found', 'asked for']), ...failedNodes(),
-    element('details', {}, element('summary', {}, 'all figures, by the names that cairn check-map gives them'), table(figures.map(([name, value]) => [name, Math.round(value * 1e4) / 1e4]))));
+    element('details', {}, element('summary', {}, 'all figures, by the names that cairn check-map gives them'), table(figures.map(([name, value]) => [name, String(Number(value.toPrecision(6)))]))));
 } else {
   $('self-test-text').append(element('p', {}, data.sealed ? 'No held-out images were tried: the map has no self-test.' : 'The map is not sealed: it has no self-test.'), ...failedNodes());
 }

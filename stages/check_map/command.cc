@@ -146,6 +146,7 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   for (const std::string& path : {arguments.output_path, arguments.details_path}) {
+    if (!path.empty()) CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(path));
     CAIRN_RETURN_IF_ERROR(
         CheckOutputIsNoInput(path, {arguments.map_path, arguments.queries_path, arguments.scans_path}));
   }

@@ -171,7 +171,8 @@ std::string ReportJson(const PrintedReport& report) {
     json["num_false_fixes"] = NumFixes(*report.foreign);
     json["foreign_images"] = ImagesJson(*report.foreign, report, false);
   }
-  return json.dump(2) + "\n";
+  // A name need not be UTF-8.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines) {

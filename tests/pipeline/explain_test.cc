@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/drop_reason.h"
+#include "core/random.h"
 #include "pipeline/explain/advise.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/explain_place.h"
@@ -230,6 +231,26 @@ TEST(Advise, NamesTheSmallestMapThatDoesAsMuchOrTheSmallestThatDoesMore) {
   EXPECT_THAT(SizesText({every_class}), HasSubstr("([emit_map] landmarks = \"all\") localizes"));
 }
 
+TEST(Advise, TellsErrorsOfAFrameFromNoise) {
+  Random random(1);
+  std::vector<PlacedImage> noisy, scaled, at_one_place;
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Vector2d place(random.Uniform(-2, 2), random.Uniform(-2, 2));
+    const Eigen::Vector2d noise(random.Uniform(-0.02, 0.02), random.Uniform(-0.02, 0.02));
+    noisy.push_back({place, place + noise});
+    scaled.push_back({place, 1.04 * place + Eigen::Vector2d(0.1, 0) + 0.2 * noise});
+    at_one_place.push_back({noise, noise + Eigen::Vector2d(0.1, 0)});
+  }
+  std::vector<Advice> advice;
+  AddMisalignment(noisy, &advice);
+  AddMisalignment(at_one_place, &advice);
+  AddMisalignment({scaled.begin(), scaled.begin() + 9}, &advice);
+  EXPECT_THAT(advice, IsEmpty());
+  AddMisalignment(scaled, &advice);
+  ASSERT_THAT(advice, SizeIs(1));
+  EXPECT_THAT(advice[0].text, HasSubstr("scaled by -3.8"));  // 1 / 1.04: what would make the map's poses fit
+}
+
 TEST(ParetoCsv, IsReadAsItWasWritten) {
   ParetoPoint point = Size(40000, 0.9, 0.8);
   point.num_held_out = 10;
@@ -241,12 +262,19 @@ TEST(ParetoCsv, IsReadAsItWasWritten) {
   EXPECT_EQ((*read)[0].median_error_m, 0.0123);
   EXPECT_EQ((*read)[1].median_error_m, std::nullopt);
   EXPECT_EQ(ParetoCsv(*read), csv);
-  for (const char* line : {"1,2,3", "0,inf,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,nan,1,1,,",
-                           "0,0,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,2,1,1,,", "a,9,0,0,0,0,0,1,1,1,,"}) {
-    const auto refused = ParseParetoCsv(std::string("head\n") + line + "\n", "map.pareto.csv");
+  for (const char* line :
+       {"1,2,3", "0,inf,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,nan,1,1,,", "0,0,0,0,0,0,0,1,1,1,,",
+        "0,9,0,0,0,0,0,2,1,1,,", "a,9,0,0,0,0,0,1,1,1,,", "0,9,0,0,0,0,0,1,9,1,,", "0,9,0,0,0,0,0,1,1,1,-3,",
+        "0,9,0,0,0,0,0,1,1,1,1e999,"}) {
+    const auto refused = ParseParetoCsv(ParetoCsv({}) + line + "\n", "map.pareto.csv");
     ASSERT_FALSE(refused.ok()) << line;
     EXPECT_THAT(refused.error().message, HasSubstr("map.pareto.csv: line 2"));
   }
+}
+
+TEST(ParetoCsv, OtherTablesAreRefused) {
+  for (const char* csv : {"", "a,b\n", "0,9,0,0,0,0,0,1,1,1,,\n"})
+    EXPECT_FALSE(ParseParetoCsv(csv, "a.csv").ok()) << csv;
 }
 
 TEST(StationsAt, FindsTheNearestPlaceAndRefusesWhatIsFar) {
