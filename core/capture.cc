@@ -20,15 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool HasImageSuffix(const fs::path& path) {
-  static const std::set<std::string> kSuffixes = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
-                                                  ".bmp", ".pgm",  ".ppm", ".pnm", ".webp"};
-  std::string suffix = path.extension().string();
-  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return kSuffixes.count(suffix) > 0;
-}
-
 // Relative names of all image files below a folder, ascending.  Links to folders are followed where they are
 // a session's.
 std::vector<std::string> ListImages(const std::string& folder, const std::vector<std::string>& sessions) {
@@ -43,7 +34,7 @@ std::vector<std::string> ListImages(const std::string& folder, const std::vector
     fs::recursive_directory_iterator it(start, fs::directory_options::skip_permission_denied, error), end;
     for (; !error && it != end; it.increment(error)) {
       std::error_code type_error;  // a broken link does not end the list
-      if (it->is_regular_file(type_error) && HasImageSuffix(it->path())) {
+      if (it->is_regular_file(type_error) && HasImageSuffix(it->path().string())) {
         names.push_back(it->path().lexically_relative(folder).generic_string());
       }
     }

@@ -38,6 +38,9 @@ struct Command {
   std::function<void(CLI::App&)> add_arguments;
   // Runs after parsing.  An error's code is the program's exit code.
   std::function<Status(const CommandEnvironment&)> run;
+  // Arguments that may have the output's name, which the program refuses to all others: earlier results that
+  // are taken over, words that name no file, what the command checks itself.
+  std::vector<std::string> may_be_output = {};
 };
 
 // Gives a subcommand one `--name-with-dashes VALUE` per option of the table (help with default and range),

@@ -1,6 +1,10 @@
 #include "core/image_file.h"
 
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <limits>
+#include <set>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -77,6 +81,15 @@ std::string FindDefect(std::string_view bytes) {
 }
 
 }  // namespace
+
+bool HasImageSuffix(const std::string& path) {
+  static const std::set<std::string> kSuffixes = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
+                                                  ".bmp", ".pgm",  ".ppm", ".pnm", ".webp"};
+  std::string suffix = std::filesystem::path(path).extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return kSuffixes.count(suffix) > 0;
+}
 
 Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path) {
   if (const std::string defect = FindDefect(bytes); !defect.empty()) {

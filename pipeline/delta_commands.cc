@@ -9,7 +9,6 @@
 #include "core/file.h"
 #include "core/map_delta.h"
 #include "core/map_file.h"
-#include "core/output_path.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/update_map.h"
 
@@ -33,8 +32,6 @@ size_t NumSharedBlocks(const MapFile& map, const MapFile& other) {
 }
 
 Status MakeDelta(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.delta_path,
-                                             {arguments.old_path, arguments.new_path, arguments.key_path}));
   std::optional<SecretKey> key;
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(key, ReadSecretKey(arguments.key_path));
@@ -141,6 +138,7 @@ Command ApplyCommand() {
             AddPublicKey(app, arguments.get(), "Key whose signature the delta and the new map must have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Apply(*arguments, environment); },
+      .may_be_output = {"old"},  // it says what to do instead
   };
 }
 

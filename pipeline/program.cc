@@ -21,6 +21,7 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "pipeline/build_step.h"
+#include "pipeline/check_outputs.h"
 #include "pipeline/common_arguments.h"
 #include "pipeline/progress.h"
 #include "pipeline/stop_signal.h"
@@ -176,7 +177,8 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
       .progress = progress.get()};
   const auto command =
       std::find_if(commands.begin(), commands.end(), [&](const Command& c) { return c.name == name; });
-  Status status = RunCommand(*command, arguments, environment, out, err);
+  Status status = CheckOutputs(*app.get_subcommands().front(), command->may_be_output);
+  if (status.ok()) status = RunCommand(*command, arguments, environment, out, err);
   out.flush();
   if (status.ok() && !out)
     status = MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?");

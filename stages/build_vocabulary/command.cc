@@ -84,6 +84,7 @@ Command BuildVocabularyCommand() {
             arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .may_be_output = {"--tree-from"},
   };
 }
 

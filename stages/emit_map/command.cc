@@ -13,7 +13,6 @@
 #include "core/database.h"
 #include "core/dropped_items.h"
 #include "core/file.h"
-#include "core/output_path.h"
 #include "core/sessions.h"
 #include "core/sift.h"
 #include "core/temporary.h"
@@ -242,10 +241,6 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   EmitMapOptions checked = arguments.options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(
-      arguments.output_path,
-      {arguments.matches_path, arguments.classes_path, arguments.world_path, arguments.regions_path,
-       arguments.vocabulary_path, arguments.appearance_path, arguments.views_path}));
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
   MapRows rows;
   std::string guarantee;
@@ -301,6 +296,7 @@ Command EmitMapCommand() {
             arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .may_be_output = {"--name"},
   };
 }
 

@@ -95,7 +95,8 @@ Command ExtractFeaturesCommand() {
                              "Begin even if the disk seems too full for the result");
                 arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
               },
-          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+          .may_be_output = {"--reuse"}};
 }
 
 }  // namespace cairn

@@ -187,6 +187,59 @@ TEST_F(BadInput, DamagedStageFilesAreNamed) {
   }
 }
 
+TEST_F(BadInput, OutputThatIsAnInputIsRefusedByEveryCommand) {
+  for (const char* name : {"in", "other"}) ASSERT_TRUE(WriteFileAtomically(Path(name), "kept").ok());
+  for (const char* words :
+       {"extract-features capture -o capture/images.txt",
+        "extract-features capture -o f.db --depfile ./in --options in",
+        "match-features in -o in",
+        "match-features other --capture capture -o capture/images.txt",
+        "match-features other --pair-list in -o in",
+        "reconstruct other --capture capture -o capture",
+        "group-classes in --capture capture -o in",
+        "filter-visibility in -o in",
+        "decompose-regions in -o in",
+        "decompose-regions other --classes in -o in",
+        "decompose-regions in -o new --svg in",
+        "build-vocabulary in -o in",
+        "link-appearance in other -o in",
+        "link-appearance other in -o in",
+        "decompose-views in -o in",
+        "emit-map --name a --classes in --world other --regions other --vocabulary other --frame in -o in",
+        "check-map in -o in",
+        "check-map other --queries in -o in",
+        "check-map in --details in",
+        "compile in -o in",
+        "import capture --queries in -o capture",
+        "join-captures a=capture -o capture",
+        "export in -o .",
+        "inspect in --svg in",
+        "inspect in --ambiguity-svg in",
+        "localize other --list in -o in",
+        "locate-scan in other --svg in",
+        "plan-path in --from 0,0 --to 1,1 --svg in",
+        "tell-apart in --a 0,0,0 --b 1,1,0 --svg in",
+        "drive other --building in --start 0,0,0 --goal a -o in",
+        "sign in --key other -o in",
+        "sign other --key in -o in",
+        "migrate in -o in",
+        "delta in other -o in",
+        "apply other in -o in",
+        "apply in other -o in",
+        "pareto in -o in",
+        "report in -o in"}) {
+    const ProgramRun run = RunShell("cd " + folder_->string() + " && cairn " + words);
+    EXPECT_EQ(run.exit_code, 2) << words;
+    EXPECT_THAT(run.err, HasSubstr(" cannot be the ")) << words;
+    EXPECT_EQ(ReadFile(Path("in")).value(), "kept") << words;
+  }
+  const std::string extract = "cairn extract-features " + Path("capture") + " -o " + Path("f.db");
+  ASSERT_EQ(RunShell(extract).exit_code, 0);
+  const ProgramRun again = RunShell(extract + " --reuse " + Path("f.db"));
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr(" 12 taken over"));
+}
+
 TEST_F(BadInput, SpaceInAPathIsRefusedWithASentence) {
   fs::create_directories(Path("my maps"));
   const ProgramRun run =

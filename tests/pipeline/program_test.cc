@@ -35,18 +35,22 @@ struct Outcome {
   std::string out, err;
 };
 
-// Runs the program with one command, `stage`, that does `run`.
-Outcome RunStage(const std::vector<std::string>& words,
-                 std::function<Status(const CommandEnvironment&)> run) {
-  const std::vector<Command> commands = {{.name = "stage",
-                                          .summary = "Does what the test says",
-                                          .add_arguments = [](CLI::App&) {},
-                                          .run = std::move(run)}};
+Outcome RunWords(const std::vector<Command>& commands, const std::vector<std::string>& words) {
   std::vector<const char*> argv = {"cairn"};
   for (const std::string& word : words) argv.push_back(word.c_str());
   std::ostringstream out, err;
   const int exit_code = RunProgram(commands, static_cast<int>(argv.size()), argv.data(), out, err);
   return {exit_code, out.str(), err.str()};
+}
+
+// Runs the program with one command, `stage`, that does `run`.
+Outcome RunStage(const std::vector<std::string>& words,
+                 std::function<Status(const CommandEnvironment&)> run) {
+  return RunWords({{.name = "stage",
+                    .summary = "Does what the test says",
+                    .add_arguments = [](CLI::App&) {},
+                    .run = std::move(run)}},
+                  words);
 }
 
 Status Nothing(const CommandEnvironment&) { return Ok(); }
@@ -182,6 +186,66 @@ TEST_F(StampTest, ReportAlsoGoesToAGivenFileWithoutAnyStamp) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(Names(), ElementsAre("mine.json"));
   EXPECT_EQ(nlohmann::json::parse(ReadFile(Path("mine.json")).value())["stage"], "stage");
+}
+
+// A stage that reads IN and A=PATH, takes over --reuse, and writes -o and --svg.
+class OutputTest : public StampTest {
+ protected:
+  OutputTest() {
+    fs::create_directories(folder_ / "capture");
+    for (const char* name : {"in.db", "other.db", "capture/images.txt", "capture/a.PNG", "capture/old.db"})
+      EXPECT_TRUE(WriteFileAtomically(Path(name), name).ok());
+  }
+  Outcome Run(const std::vector<std::string>& words) const {
+    std::string in, out, svg;
+    std::vector<std::string> more, reuse;
+    const Command stage = {.name = "stage",
+                           .summary = "Does nothing",
+                           .add_arguments =
+                               [&](CLI::App& app) {
+                                 app.add_option("in", in);
+                                 app.add_option("--more", more);
+                                 app.add_option("--reuse", reuse);
+                                 app.add_option("-o,--output", out);
+                                 app.add_option("--svg", svg);
+                               },
+                           .run = Nothing,
+                           .may_be_output = {"--reuse"}};
+    return RunWords({stage}, words);
+  }
+  void ExpectRefused(const std::vector<std::string>& words) const {
+    const Outcome outcome = Run(words);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("cannot be the output"));
+  }
+};
+
+TEST_F(OutputTest, InputIsRefusedUnderWhicheverNameAndArgument) {
+  fs::create_symlink("in.db", Path("link.db"));
+  ExpectRefused({"stage", Path("in.db"), "-o", Path("in.db")});
+  ExpectRefused({"stage", Path("link.db"), "-o", Path("in.db")});
+  ExpectRefused({"stage", Path("in.db"), "-o", Path("capture/../in.db")});
+  ExpectRefused({"stage", Path("other.db"), "--more", "a=" + Path("in.db"), "--svg=" + Path("in.db")});
+  ExpectRefused({"stage", Path("in.db"), "-o", Path("new.db"), "--report", Path("in.db")});
+}
+
+TEST_F(OutputTest, FilesOfACaptureAndFoldersOfInputsAreRefused) {
+  ExpectRefused({"stage", Path("capture"), "-o", Path("capture/images.txt")});
+  ExpectRefused({"stage", Path("capture"), "-o", Path("capture/a.PNG")});
+  ExpectRefused({"stage", Path("capture"), "-o", Path("capture/")});
+  ExpectRefused({"stage", Path("capture/old.db"), "-o", Path("capture")});
+}
+
+TEST_F(OutputTest, EarlierAndOtherFilesMayBeReplaced) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"stage", Path("in.db"), "--reuse", Path("other.db"), "-o", Path("other.db")},
+        {"stage", Path("capture"), "-o", Path("capture/old.db")},
+        {"stage", Path("capture"), "-o", Path("capture/new.txt")},
+        {"stage", Path("in.db"), "--svg", folder_.string()},
+        {"stage", Path("nothing.db"), "-o", Path("nothing.db")}}) {
+    const Outcome outcome = Run(words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
 }
 
 TEST_F(StampTest, StageOfAnotherBuildIsRefusedWithTheOthersName) {
