@@ -73,6 +73,39 @@ class PyLocalizer {
   std::mutex is_in_use_;
 };
 
+}  // namespace
+}  // namespace cairn
+
+namespace pybind11::detail {
+
+// Hands out objects only after __init__: pybind11 itself gives those of CLASS.__new__(CLASS) memory that
+// nobody has filled.
+template <typename T>
+struct ConstructedCaster : type_caster_base<T> {
+  bool load(handle source, bool convert) {
+    if (isinstance<T>(source) &&
+        !reinterpret_cast<instance*>(source.ptr())->get_value_and_holder().holder_constructed()) {
+      throw type_error(fmt::format("{}: __init__ has not been called", Py_TYPE(source.ptr())->tp_name));
+    }
+    return type_caster_base<T>::load(source, convert);
+  }
+};
+template <>
+struct type_caster<cairn::PyMap> : ConstructedCaster<cairn::PyMap> {};
+template <>
+struct type_caster<cairn::Camera> : ConstructedCaster<cairn::Camera> {};
+template <>
+struct type_caster<cairn::PosePrior> : ConstructedCaster<cairn::PosePrior> {};
+template <>
+struct type_caster<cairn::Localization> : ConstructedCaster<cairn::Localization> {};
+template <>
+struct type_caster<cairn::PyLocalizer> : ConstructedCaster<cairn::PyLocalizer> {};
+
+}  // namespace pybind11::detail
+
+namespace cairn {
+namespace {
+
 Camera MakeCamera(const std::string& model, int width, int height, std::vector<double> params) {
   Camera camera;
   camera.model = ValueOrThrow(CameraModelFromName(model));

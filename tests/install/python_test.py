@@ -177,6 +177,25 @@ class Refusing(Poster):
         with self.assertRaises(TypeError):
             cairn.Localizer("poster.cairn")
 
+    def test_objects_that_no_constructor_has_made(self):
+        made = self.localizer.localize(self.image)
+        uses = [lambda: cairn.Localizer(cairn.Map.__new__(cairn.Map)),
+                lambda: cairn.Localizer.__new__(cairn.Localizer).localize(self.image),
+                lambda: cairn.Map.__new__(cairn.Map).camera_for_size(320, 240),
+                lambda: self.localizer.localize(self.image, camera=cairn.Camera.__new__(cairn.Camera)),
+                lambda: self.localizer.localize(self.image, prior=cairn.Prior.__new__(cairn.Prior)),
+                lambda: bool(cairn.Fix.__new__(cairn.Fix))]
+        for example in self.map, self.map.camera_for_size(320, 240), made:
+            kind = type(example)
+            uses.append(lambda kind=kind: repr(kind.__new__(kind)))
+            for name, value in vars(kind).items():
+                if isinstance(value, property):
+                    uses.append(lambda kind=kind, name=name: getattr(kind.__new__(kind), name))
+        self.assertGreater(len(uses), 20)
+        for use in uses:
+            with self.assertRaisesRegex(TypeError, "__init__ has not been called"):
+                use()
+
 
 class Facts(Poster):
     def test_map_and_camera_say_what_they_are(self):
