@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <unordered_map>
+#include <utility>
 
 #include "core/deciles.h"
 #include "core/parallel.h"
@@ -26,6 +29,10 @@ struct LookAlike {
 struct NodeScores {
   double entropy = 0;
   std::vector<LookAlike> apart;
+  // Over places: the best score at another image that shows the same, 0 where there is none; and the least
+  // that an image gets where any other one was taken: `again` changes nothing up to it.
+  double best_nearby = 0;
+  double least_best = std::numeric_limits<double>::infinity();
 };
 
 class AmbiguitySearch {
@@ -54,29 +61,21 @@ class AmbiguitySearch {
 
   bool OverPlaces() const { return options_.entropy_over == "places"; }
 
-  // The best score that a node's images get at another one that shows the same; 0 where there is none.
-  double BestNearby(NodeIdx node) const {
-    double best = 0;
-    for (const int32_t document : documents_[node]) {
-      const std::vector<double> scores = ScoresOf(document);
-      for (size_t i = 0; i < scores.size(); ++i) {
-        const NodeIdx other = node_of_document_[i];
-        if (static_cast<int32_t>(i) != document && other >= 0 && scores[i] > best && ShowTheSame(node, other))
-          best = scores[i];
-      }
-    }
-    return best;
-  }
-
   // `again`: what an image scores at least where it was taken, when it is taken another time.
   NodeScores Score(NodeIdx node, double again) const {
     const size_t num_nodes = appearance_.nodes.size();
+    NodeScores result;
     std::vector<double> probabilities(num_nodes, 0.0), best(num_nodes, 0.0);
     for (const int32_t document : documents_[node]) {
       std::vector<double> scores = ScoresOf(document);
-      if (OverPlaces() && scores[document] > 0) {
-        scores[document] = 0;
-        scores[document] = std::max(again, *std::max_element(scores.begin(), scores.end()));
+      if (OverPlaces()) {
+        const double own = std::exchange(scores[document], 0);
+        const double best_other = *std::max_element(scores.begin(), scores.end());
+        result.best_nearby = std::max(result.best_nearby, BestNearby(node, scores));
+        if (own > 0) {
+          result.least_best = std::min(result.least_best, best_other);
+          scores[document] = std::max(again, best_other);
+        }
       }
       const std::vector<double> p = ProbabilitiesOfScores(scores, options_.score_exponent);
       for (size_t i = 0; i < scores.size(); ++i) {
@@ -89,7 +88,7 @@ class AmbiguitySearch {
     double sum = 0;  // less than 1 where other documents share nothing either
     for (const double p : probabilities) sum += p;
     for (double& p : probabilities) p = sum > 0 ? p / sum : 1.0 / static_cast<double>(num_nodes);
-    NodeScores result{.entropy = Entropy(OverPlaces() ? OfPlaces(node, probabilities) : probabilities)};
+    result.entropy = Entropy(OverPlaces() ? OfPlaces(node, probabilities) : probabilities);
     best[node] = 0;
     const double best_other = *std::max_element(best.begin(), best.end());
     result.apart = LookAlikesApart(node, best, options_.confusable_score_ratio * best_other);
@@ -103,6 +102,15 @@ class AmbiguitySearch {
       if (node_of_document_[i] < 0) scores[i] = 0;  // of no node: no survey image
     }
     return scores;
+  }
+
+  // The best score at another image that shows the same as the node; 0 where there is none.
+  double BestNearby(NodeIdx node, const std::vector<double>& scores) const {
+    double best = 0;
+    for (size_t i = 0; i < scores.size(); ++i) {
+      if (scores[i] > best && ShowTheSame(node, node_of_document_[i])) best = scores[i];
+    }
+    return best;
   }
 
   // Of places instead of nodes: the first is the node's own, each other one that of the likeliest node that
@@ -204,21 +212,28 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
   const AmbiguitySearch search(vocabulary, places, options, *appearance);
   const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
   std::vector<NodeScores> scores(num_nodes);
-  std::vector<double> nearby(search.OverPlaces() ? num_nodes : 0);
-  const auto num_passes = static_cast<int64_t>(search.OverPlaces() ? 2 : 1);
-  if (progress) progress->Begin("tell places apart", num_passes * num_nodes, "nodes");
-  const auto for_all_nodes = [&](const auto& work) {
-    ParallelFor(num_nodes, num_threads, [&](int64_t node) {
+  std::vector<NodeIdx> nodes(num_nodes);
+  std::iota(nodes.begin(), nodes.end(), 0);
+  const auto score_nodes = [&](double again) {
+    const auto num = static_cast<int64_t>(nodes.size());
+    if (progress) progress->Begin("tell places apart", num, "nodes");
+    ParallelFor(num, num_threads, [&](int64_t i) {
       if (progress && progress->Cancelled()) return;
-      work(static_cast<NodeIdx>(node));
+      scores[nodes[i]] = search.Score(nodes[i], again);
       if (progress) progress->Advance();
     });
+    if (progress) progress->End();
   };
-  if (search.OverPlaces()) for_all_nodes([&](NodeIdx node) { nearby[node] = search.BestNearby(node); });
-  std::erase(nearby, 0);
-  const double again = nearby.empty() ? 1 : Decile(nearby, 1);
-  for_all_nodes([&](NodeIdx node) { scores[node] = search.Score(node, again); });
-  if (progress) progress->End();
+  score_nodes(0);
+  if (search.OverPlaces()) {
+    std::vector<double> nearby;
+    for (const NodeScores& of_node : scores) {
+      if (of_node.best_nearby > 0) nearby.push_back(of_node.best_nearby);
+    }
+    const double again = nearby.empty() ? 1 : Decile(nearby, 1);
+    std::erase_if(nodes, [&](NodeIdx node) { return again <= scores[node].least_best; });
+    if (!nodes.empty()) score_nodes(again);
+  }
   if (progress && progress->Cancelled())
     return MakeError(ErrorCode::kCancelled, "telling places apart was stopped");
   appearance->confusable.clear();

@@ -138,6 +138,26 @@ TEST(FindAmbiguity, IsTheSameForAnyNumberOfThreadsAndSurvivesTheFile) {
   EXPECT_EQ(read->confusable, one.confusable);
 }
 
+TEST(FindAmbiguity, OnlyImagesThatThoseAroundThemResembleLeastAreScoredTwice) {
+  struct Counter : Progress {
+    void Begin(std::string_view, int64_t, std::string_view) override {}
+    void Advance(int64_t num_items) override { num_advances += num_items; }
+    void End() override {}
+    int64_t num_advances = 0;
+  };
+  std::vector<std::vector<WordIdx>> words(20);  // of each, two thirds are the next one's too
+  std::vector<double> xs(20);
+  for (int i = 0; i < 20; ++i) {
+    for (WordIdx word = 3 * i; word < 3 * i + 9; ++word) words[i].push_back(word);
+    xs[i] = i;
+  }
+  Appearance appearance = NodesWithAnImageEach(20, {});
+  Counter counter;
+  ASSERT_TRUE(FindAmbiguity(VocabularyOf(words, 66), PlacesAt(xs), {}, 1, &counter, &appearance).ok());
+  EXPECT_GE(counter.num_advances, 20);
+  EXPECT_LE(counter.num_advances, 22);  // those below the first decile
+}
+
 TEST(FindAmbiguity, OptionsThatCannotBeMeantAreErrors) {
   Appearance appearance = NodesWithAnImageEach(4, {});
   for (const AmbiguityOptions& options :
