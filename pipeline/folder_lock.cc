@@ -1,7 +1,6 @@
 #include "pipeline/folder_lock.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -31,7 +30,7 @@ constexpr std::chrono::seconds kWaitForOwnSession{30};
 // Another session may be on its way out, or look at the lock and be refused as well.
 constexpr std::chrono::milliseconds kWaitForOtherSession{300};
 
-enum class Claim { kHeld, kTaken, kNoLocks };
+using Claim = FileLock::Claim;
 
 void RemoveTemporariesIn(const fs::path& folder, const std::string& target) {
   std::error_code error;
@@ -55,8 +54,8 @@ bool WriteSession(int fd, const std::string& session) {
          pwrite(fd, line.data(), line.size(), 0) == static_cast<ssize_t>(line.size());
 }
 
-// Makes the folder and opens its lock file, instead of `old_fd`.
-Result<int> OpenLockFile(const std::string& build_dir, int old_fd) {
+// Makes the folder and opens its lock file.
+Result<FileLock> OpenLockFile(const std::string& build_dir) {
   std::error_code error;
   fs::create_directories(build_dir, error);
   if (error)
@@ -64,8 +63,7 @@ Result<int> OpenLockFile(const std::string& build_dir, int old_fd) {
   const std::string path = build_dir + kLockFile;
   const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0666);
   if (fd < 0) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
-  if (old_fd >= 0) close(old_fd);
-  return fd;
+  return FileLock(fd);
 }
 
 bool IsRemoved(int fd) {
@@ -75,21 +73,21 @@ bool IsRemoved(int fd) {
 
 // One try.  Turning an exclusive lock into a shared one lets go of it for a moment: whoever's name stands in
 // the file afterwards has it.
-Result<Claim> TryToClaim(int fd, const std::string& build_dir, const std::string& session) {
-  if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+Result<Claim> TryToClaim(FileLock& lock, const std::string& build_dir, const std::string& session) {
+  const Claim alone = lock.Try(FileLock::Kind::kExclusive);
+  if (alone == Claim::kNoLocks) return alone;
+  if (alone == Claim::kHeld) {
     RemoveStaleTemporaries(build_dir);
-    if (!WriteSession(fd, session)) {
+    if (!WriteSession(lock.descriptor(), session)) {
       return MakeError(ErrorCode::kIo, "{}{}: cannot be written: {}", build_dir, kLockFile,
                        std::strerror(errno));
     }
-    while (flock(fd, LOCK_SH) != 0 && errno == EINTR) continue;
-  } else if (errno != EWOULDBLOCK && errno != EINTR) {
-    return Claim::kNoLocks;
-  } else if (flock(fd, LOCK_SH | LOCK_NB) != 0) {
+    lock.Share();
+  } else if (lock.Try(FileLock::Kind::kShared) != Claim::kHeld) {
     return Claim::kTaken;
   }
-  if (ReadSession(fd) == session) return Claim::kHeld;
-  flock(fd, LOCK_UN);
+  if (ReadSession(lock.descriptor()) == session) return Claim::kHeld;
+  lock.Release();
   return Claim::kTaken;
 }
 
@@ -120,23 +118,22 @@ void RemoveStaleTemporaries(const std::string& build_dir) {
 }
 
 Result<FolderLock> FolderLock::Acquire(const std::string& build_dir, const std::string& session) {
-  CAIRN_ASSIGN_OR_RETURN(const int fd, OpenLockFile(build_dir, -1));
-  FolderLock lock(fd);
+  CAIRN_ASSIGN_OR_RETURN(FileLock lock, OpenLockFile(build_dir));
   const auto begin = std::chrono::steady_clock::now();
   while (true) {
-    CAIRN_ASSIGN_OR_RETURN(const Claim claim, TryToClaim(lock.fd_, build_dir, session));
-    if (claim == Claim::kHeld && !IsRemoved(lock.fd_)) return lock;
+    CAIRN_ASSIGN_OR_RETURN(const Claim claim, TryToClaim(lock, build_dir, session));
+    if (claim == Claim::kHeld && !IsRemoved(lock.descriptor())) return FolderLock(std::move(lock));
     if (claim == Claim::kHeld) {  // `cairn clean` has been there in between
-      CAIRN_ASSIGN_OR_RETURN(lock.fd_, OpenLockFile(build_dir, lock.fd_));
+      CAIRN_ASSIGN_OR_RETURN(lock, OpenLockFile(build_dir));
       continue;
     }
     if (claim == Claim::kNoLocks) {
       spdlog::warn(
           "{}: this file system has no locks; see to it yourself that one build at a time works there",
           build_dir);
-      return lock;
+      return FolderLock(std::move(lock));
     }
-    const std::string owner = ReadSession(lock.fd_);
+    const std::string owner = ReadSession(lock.descriptor());
     const auto waited = std::chrono::steady_clock::now() - begin;
     if (owner == session ? waited > kWaitForOwnSession : waited > kWaitForOtherSession) {
       return MakeError(ErrorCode::kBusy,
@@ -146,12 +143,6 @@ Result<FolderLock> FolderLock::Acquire(const std::string& build_dir, const std::
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-}
-
-FolderLock::FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-
-FolderLock::~FolderLock() {
-  if (fd_ >= 0) close(fd_);
 }
 
 }  // namespace cairn

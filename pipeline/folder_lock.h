@@ -1,8 +1,10 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "core/error.h"
+#include "core/file_lock.h"
 
 namespace cairn {
 
@@ -33,13 +35,10 @@ class FolderLock {
   // Makes the folder if there is none.  Where the file system has no locks, warns and goes on without.
   // Errors: Busy (says which session has it), Io.
   static Result<FolderLock> Acquire(const std::string& build_dir, const std::string& session);
-  FolderLock(FolderLock&& other) noexcept;
-  FolderLock& operator=(FolderLock&&) = delete;
-  ~FolderLock();
 
  private:
-  explicit FolderLock(int fd) : fd_(fd) {}
-  int fd_;
+  explicit FolderLock(FileLock lock) : lock_(std::move(lock)) {}
+  FileLock lock_;
 };
 
 }  // namespace cairn

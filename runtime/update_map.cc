@@ -2,17 +2,15 @@
 
 #include <fcntl.h>
 #include <stdio.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <utility>
 
 #include "core/file.h"
+#include "core/file_lock.h"
 #include "core/map_delta.h"
 #include "core/map_file.h"
 #include "core/output_path.h"
@@ -26,32 +24,18 @@ namespace {
 namespace fs = std::filesystem;
 
 // Holds the folder of a map against other updates and rollbacks there, until it goes.
-class UpdateLock {
- public:
-  // Errors: Busy, NotFound, Io.
-  static Result<UpdateLock> Acquire(const std::string& map_path) {
-    const fs::path folder = fs::path(map_path).parent_path();
-    UpdateLock lock;
-    lock.file_ = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (lock.file_ < 0)
-      return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}",
-                       map_path, std::strerror(errno));
-    if (flock(lock.file_, LOCK_EX | LOCK_NB) != 0) {
-      return MakeError(ErrorCode::kBusy, "{}: another update or rollback is at work in its folder; try again",
-                       map_path);
-    }
-    return lock;
+// Errors: Busy, NotFound, Io.
+Result<FileLock> LockFolderOf(const std::string& map_path) {
+  const fs::path folder = fs::path(map_path).parent_path();
+  FileLock lock(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock.descriptor() < 0) {
+    return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}", map_path,
+                     std::strerror(errno));
   }
-  UpdateLock(UpdateLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
-  UpdateLock& operator=(UpdateLock&&) = delete;
-  ~UpdateLock() {
-    if (file_ >= 0) close(file_);
-  }
-
- private:
-  UpdateLock() = default;
-  int file_ = -1;
-};
+  if (lock.Try(FileLock::Kind::kExclusive) == FileLock::Claim::kHeld) return lock;
+  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is at work in its folder; try again",
+                   map_path);
+}
 
 // The file itself where the path is a link to it: that is what others read.
 std::string FileOf(const std::string& map_path) {
@@ -60,7 +44,7 @@ std::string FileOf(const std::string& map_path) {
   return error ? map_path : file.string();
 }
 
-// What updates that were killed have left beside a map.  REQUIRES: its UpdateLock
+// What updates that were killed have left beside a map.  REQUIRES: LockFolderOf(map_path)
 void RemoveStale(const std::string& map_path) {
   std::error_code error;
   const fs::path map(map_path);
@@ -128,7 +112,7 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
   return WithoutExceptions("UpdateMap", [&]() -> Result<bool> {
     const std::string map_path = FileOf(given_path);
     CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(map_path, {delta_path}));
-    CAIRN_ASSIGN_OR_RETURN(const UpdateLock lock, UpdateLock::Acquire(map_path));
+    CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
     RemoveStale(map_path);
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
@@ -145,7 +129,7 @@ std::string PreviousMapPath(const std::string& map_path) { return map_path + ".p
 Status RollBackMap(const std::string& given_path, const UpdateOptions& options) {
   return WithoutExceptions("RollBackMap", [&]() -> Status {
     const std::string map_path = FileOf(given_path);
-    CAIRN_ASSIGN_OR_RETURN(const UpdateLock lock, UpdateLock::Acquire(map_path));
+    CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
     const std::string previous = PreviousMapPath(map_path);
     std::error_code error;
     if (!fs::exists(previous, error)) {

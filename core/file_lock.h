@@ -1,0 +1,29 @@
+#pragma once
+
+namespace cairn {
+
+// What processes keep each other out with, as long as the object lives: an flock on an open file or folder.
+// Child processes that inherit the descriptor hold the lock too.
+class FileLock {
+ public:
+  enum class Kind { kShared, kExclusive };
+  enum class Claim { kHeld, kTaken, kNoLocks };  // kNoLocks: the file system has none
+
+  // Takes over an open file's descriptor; nothing is locked yet.
+  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
+  FileLock(FileLock&& other) noexcept;
+  FileLock& operator=(FileLock&& other) noexcept;
+  ~FileLock();
+
+  int descriptor() const { return descriptor_; }
+  // One try, which does not wait.
+  Claim Try(Kind kind);
+  // Turns an exclusive lock into a shared one; for a moment it is none, and another process may come first.
+  void Share();
+  void Release();
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace cairn
