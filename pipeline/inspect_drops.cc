@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/explain/station_losses.h"
+#include "core/landmarks_seen.h"
 #include "pipeline/explain/station_text.h"
 
 namespace cairn {

@@ -1,28 +1,10 @@
 #include "pipeline/explain/station_losses.h"
 
-#include <algorithm>
+#include "core/landmarks_seen.h"
 
 namespace cairn {
 
 namespace {
-
-// Of the landmarks that count, distinct ones that the images taken at each station see.
-std::vector<int> CountSeenAt(const MapRows& rows, const std::vector<char>& counts) {
-  std::vector<std::vector<LandmarkIdx>> seen(rows.stations.size());
-  for (const MapImage& image : rows.images) {
-    if (image.station < 0) continue;
-    for (const LandmarkIdx landmark : image.landmarks) {
-      if (counts[landmark] != 0) seen[image.station].push_back(landmark);
-    }
-  }
-  std::vector<int> numbers;
-  for (std::vector<LandmarkIdx>& at_station : seen) {
-    std::sort(at_station.begin(), at_station.end());
-    numbers.push_back(
-        static_cast<int>(std::unique(at_station.begin(), at_station.end()) - at_station.begin()));
-  }
-  return numbers;
-}
 
 std::vector<char> LandmarksOfRegions(const MapRows& rows) {
   std::vector<char> is_kept(rows.landmarks.size(), 0);
@@ -34,14 +16,10 @@ std::vector<char> LandmarksOfRegions(const MapRows& rows) {
 
 }  // namespace
 
-std::vector<int> LandmarksSeenAt(const MapRows& rows) {
-  return CountSeenAt(rows, std::vector<char>(rows.landmarks.size(), 1));
-}
-
 StationLosses::StationLosses(const MapRows& rows)
     : rows_(rows),
       num_landmarks_(LandmarksSeenAt(rows)),
-      num_of_regions_(CountSeenAt(rows, LandmarksOfRegions(rows))) {}
+      num_of_regions_(LandmarksSeenAt(rows, LandmarksOfRegions(rows))) {}
 
 int StationLosses::At(DropReason reason, StationIdx station) const {
   for (const DropCount& drop : rows_.findings.drops) {

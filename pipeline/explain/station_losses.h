@@ -8,9 +8,6 @@
 
 namespace cairn {
 
-// Distinct landmarks that the images taken at each station see.
-std::vector<int> LandmarksSeenAt(const MapRows& rows);
-
 // What of the scene at every station became of it, from the map's own counts (core/map_findings.h).
 class StationLosses {
  public:

@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "core/landmarks_seen.h"
 #include "stages/emit_map/choose_landmarks.h"
 
 namespace cairn {
@@ -215,12 +216,9 @@ SizeGuarantee GuaranteeOf(const MapRows& rows) {
     const int num = static_cast<int>(rows.regions[i].landmarks.size());
     guarantee.min_common_landmarks = i == 0 ? num : std::min(guarantee.min_common_landmarks, num);
   }
-  std::vector<std::set<LandmarkIdx>> seen(rows.stations.size());
-  for (const MapImage& image : rows.images) {
-    if (image.station >= 0) seen[image.station].insert(image.landmarks.begin(), image.landmarks.end());
-  }
-  guarantee.num_stations_below_k = static_cast<int>(std::count_if(
-      seen.begin(), seen.end(), [&](const auto& landmarks) { return std::ssize(landmarks) < rows.k; }));
+  const std::vector<int> num_seen = LandmarksSeenAt(rows);
+  guarantee.num_stations_below_k = static_cast<int>(
+      std::count_if(num_seen.begin(), num_seen.end(), [&](int num) { return num < rows.k; }));
   return guarantee;
 }
 

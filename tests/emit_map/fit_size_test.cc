@@ -107,6 +107,7 @@ TEST(GuaranteeOf, CountsCommonLandmarksAndPoorStations) {
   MapRows rows;
   rows.k = 2;
   rows.stations.resize(2);
+  rows.landmarks.resize(3);
   rows.images = {{.image_id = 1, .station = 0, .landmarks = {0, 1, 2}},
                  {.image_id = 2, .station = 1, .landmarks = {2}}};
   rows.regions = {{.stations = {0}, .landmarks = {0, 1, 2}}, {.stations = {0, 1}, .landmarks = {2}}};
