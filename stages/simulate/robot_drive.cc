@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/pose.h"
+#include "stages/simulate/drive_way.h"
 
 namespace cairn {
 namespace {
@@ -56,22 +57,20 @@ class Driver {
  private:
   Status FollowWays(const ServoTarget& goal) {
     while (num_legs_ < options_.max_num_legs) {
-      const bool is_goal = next_ >= way_.size();
-      if (is_goal) {
+      if (way_.LeadsToGoal()) {
         DriveLeg& leg = Go("go", goal, goal_node_, true);
         if (leg.arrived) return Ok();
         CAIRN_RETURN_IF_ERROR(Relocalize(leg.why));
         continue;
       }
-      const NodeIdx node = way_[next_];
+      const NodeIdx node = way_.nodes()[way_.next()];
       CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, TargetOfNode(node));
       DriveLeg& leg = Go("go", target, node, false);
       if (!leg.arrived) {
         CAIRN_RETURN_IF_ERROR(GiveUp(&leg));
         continue;
       }
-      ++next_;
-      has_left_out_ = false;
+      way_.Arrive();
       const Features seen = robot_.Look();
       trail_.push_back(TargetOfFeatures(seen, robot_.pose()));
       const HypothesisVerdict verdict = hypotheses_->Observe(model_.Look(seen.descriptors));
@@ -131,8 +130,8 @@ class Driver {
   // Whether it shows what the image at `index` of the way does; the goal's after the last one.
   Result<bool> SeesNode(const Features& seen, size_t index) const {
     if (options_.min_start_inliers == 0) return false;
-    CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, index < way_.size()
-                                                         ? TargetOfNode(way_[index])
+    CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, index < way_.nodes().size()
+                                                         ? TargetOfNode(way_.nodes()[index])
                                                          : TargetOfImage(map_, drive_.goal_image));
     return robot_.NumAgreeing(seen, target) >= options_.min_start_inliers;
   }
@@ -158,13 +157,12 @@ class Driver {
     if (leg->seen) {
       Note(leg);
       unreached_ = leg->node;
-      if (has_left_out_) {
-        has_left_out_ = false;
-      } else {
-        CAIRN_ASSIGN_OR_RETURN(has_left_out_, SeesNode(robot_.Look(), next_ + 1));
+      bool is_dispensable = false;
+      if (way_.MayLeaveOut()) {
+        CAIRN_ASSIGN_OR_RETURN(is_dispensable, SeesNode(robot_.Look(), way_.next() + 1));
       }
-      if (!has_left_out_) return Relocalize(leg->why);
-      ++next_;
+      if (!is_dispensable) return Relocalize(leg->why);
+      way_.LeaveOut();
       return Ok();
     }
     const bool has_other = options_.hypotheses.switching && hypotheses_->Refute();
@@ -197,15 +195,16 @@ class Driver {
   // From its first image on, where what the second one shows is not to be seen from here; without the image
   // that it could not reach before, where what comes after that is seen.
   Status TakeWay(const NodePath& path, const Features& seen) {
-    way_ = path.nodes;
-    next_ = std::min<size_t>(1, way_.size());
-    if (way_.size() > 1) way_.pop_back();  // the goal's image itself comes last
+    std::vector<NodeIdx> nodes = path.nodes;
+    if (nodes.size() > 1) nodes.pop_back();  // the goal's image itself comes last
+    way_ = DriveWay(std::move(nodes));
+    way_.BeginAt(std::min<size_t>(1, path.nodes.size()));
     if (path.nodes.size() < 2 || options_.min_start_inliers == 0) return Ok();
     CAIRN_ASSIGN_OR_RETURN(const bool second_is_seen, SeesNode(seen, 1));
-    if (!second_is_seen) next_ = 0;
-    if (next_ >= way_.size() || way_[next_] != unreached_) return Ok();
-    CAIRN_ASSIGN_OR_RETURN(const bool is_dispensable, SeesNode(seen, next_ + 1));
-    if (is_dispensable) ++next_;
+    if (!second_is_seen) way_.BeginAt(0);
+    if (way_.LeadsToGoal() || way_.nodes()[way_.next()] != unreached_) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(const bool is_dispensable, SeesNode(seen, way_.next() + 1));
+    if (is_dispensable) way_.BeginAt(way_.next() + 1);
     return Ok();
   }
 
@@ -248,10 +247,8 @@ class Driver {
   RobotDrive drive_;
   std::optional<StartHypotheses> hypotheses_;
   std::vector<ServoTarget> trail_;  // its own images since the start, that first
-  std::vector<NodeIdx> way_;        // without the goal, unless it is the start
-  size_t next_ = 0;                 // of the way; past it: the goal
+  DriveWay way_;                    // without the goal, unless it is the start
   NodeIdx unreached_ = -1;          // seen last and not reached
-  bool has_left_out_ = false;       // the image before the next one
   int num_legs_ = 0;
 };
 
