@@ -79,6 +79,15 @@ Status CheckOutputs(const CLI::App& subcommand, const std::vector<std::string>& 
       inputs.insert(inputs.end(), paths.begin(), paths.end());
     }
   }
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    for (size_t k = 0; k < i; ++k) {
+      if (fs::path(outputs[i].path).lexically_normal() == fs::path(outputs[k].path).lexically_normal()) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "{}: two different files cannot be written there; choose another name for one",
+                         outputs[i].path);
+      }
+    }
+  }
   for (const Output& output : outputs) {
     for (const std::string& input : inputs) CAIRN_RETURN_IF_ERROR(CheckOutput(output, input));
   }

@@ -122,7 +122,7 @@ std::string FloorPicture(const std::string& folder) { return folder + "/floor.sv
 std::string AmbiguityPicture(const std::string& folder) { return folder + "/ambiguity.svg"; }
 
 // The page and the pictures can be written, and none is a file that is read, given or found.
-Status CheckOutputs(const Arguments& arguments, std::vector<std::string> inputs) {
+Status CheckPageAndPictures(const Arguments& arguments, std::vector<std::string> inputs) {
   CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(arguments.output_path));
   CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.output_path, inputs));
   if (arguments.svg_dir.empty()) return Ok();
@@ -149,7 +149,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
   const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
   const std::string pareto_path = Beside(arguments, "", ".pareto.csv");
-  CAIRN_RETURN_IF_ERROR(CheckOutputs(
+  CAIRN_RETURN_IF_ERROR(CheckPageAndPictures(
       arguments, {arguments.map_path, arguments.compare_path, arguments.check_path, arguments.drive_path,
                   build_path, pareto_path, build_dir + "/check.json", build_dir + "/classes.db"}));
   std::error_code error;

@@ -431,6 +431,6 @@ const axisNumbers = new Drawing((context, place, inside, scale) => {
   eachTick(scale, (x, y, text) => {
     const [px, py] = place(100 * (x || 0), 100 * (y || 0));
     if (y === null) label(context, text, px + 3, margin.y + size.y - 6, colour);
-    else if (py > margin.y + 90 && py < margin.y + size.y - 24) label(context, text, margin.x + 4, py - 3, colour);
+    else if (py > margin.y + 130 && py < margin.y + size.y - 24) label(context, text, margin.x + 4, py - 3, colour);
   });
 }, 90);

@@ -29,7 +29,8 @@ nlohmann::json FloorJson(const Pose& cam_from_world, const MapRows& rows) {
   return {floor.position.x(), floor.position.y(), floor.heading_deg};
 }
 
-nlohmann::json ImagesJson(const CheckMapReport& report, const PrintedReport& printed, bool with_errors) {
+nlohmann::json ImagesJson(const CheckMapReport& report, const PrintedReport& printed, bool with_errors,
+                          bool with_times) {
   const MapRows& rows = *printed.rows;
   nlohmann::json images = nlohmann::json::array();
   for (const HeldOutResult& result : report.images) {
@@ -49,8 +50,10 @@ nlohmann::json ImagesJson(const CheckMapReport& report, const PrintedReport& pri
       image["num_unguided_inliers"] = localization.num_unguided_inliers;
       image["num_inliers"] = localization.num_inliers;
       image["scope"] = ScopeName(localization.scope);
-      image["sift_ms"] = result.sift_ms;
-      image["total_ms"] = result.total_ms;
+      if (with_times) {
+        image["sift_ms"] = result.sift_ms;
+        image["total_ms"] = result.total_ms;
+      }
       if (!localization.has_fix()) image["message"] = localization.message;
       if (localization.has_fix()) {
         image["region"] = localization.region;
@@ -144,7 +147,7 @@ std::string ReportText(const PrintedReport& report) {
   return text;
 }
 
-std::string ReportJson(const PrintedReport& report) {
+std::string ReportJson(const PrintedReport& report, bool with_times) {
   nlohmann::json json = {{"map", report.rows->name},
                          {"sealed", report.rows->sealed},
                          {"num_landmarks", report.rows->landmarks.size()},
@@ -161,15 +164,17 @@ std::string ReportJson(const PrintedReport& report) {
     for (const auto& [name, value] : report.held_out->figures) json[name] = value;
   }
   if (report.held_out != nullptr && !report.held_out->images.empty()) {
-    json["mean_total_ms"] = report.held_out->mean_total_ms;
-    json["mean_sift_ms"] = report.held_out->mean_sift_ms;
+    if (with_times) {
+      json["mean_total_ms"] = report.held_out->mean_total_ms;
+      json["mean_sift_ms"] = report.held_out->mean_sift_ms;
+    }
     json["regions"] = SelfTestRegionsJson(report.held_out->regions);
-    json["images"] = ImagesJson(*report.held_out, report, true);
+    json["images"] = ImagesJson(*report.held_out, report, true, with_times);
   }
   if (report.foreign != nullptr) {
     json["num_foreign"] = report.foreign->images.size();
     json["num_false_fixes"] = NumFixes(*report.foreign);
-    json["foreign_images"] = ImagesJson(*report.foreign, report, false);
+    json["foreign_images"] = ImagesJson(*report.foreign, report, false, with_times);
   }
   // A name need not be UTF-8.
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";

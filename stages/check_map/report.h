@@ -24,8 +24,9 @@ struct PrintedReport {
 
 // For people, a figure per line.
 std::string ReportText(const PrintedReport& report);
-// One JSON object: the same figures, and every image with its fix or reason.
-std::string ReportJson(const PrintedReport& report);
+// One JSON object: the same figures, and every image with its fix or reason.  Without times: same images,
+// same map, same bytes.
+std::string ReportJson(const PrintedReport& report, bool with_times);
 
 // For people, a line per region: those with the fewest images localized right first, at most `max_num_lines`.
 // Empty where no region has held-out images.

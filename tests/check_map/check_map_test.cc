@@ -60,7 +60,9 @@ TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
   const CheckMapOptions options;
   const PrintedReport printed{&rows, 1000000, &*report, nullptr, &options};
   EXPECT_THAT(ReportText(printed), HasSubstr("held-out images        1"));
-  EXPECT_THAT(ReportJson(printed), HasSubstr("quote\\\".png"));
+  EXPECT_THAT(ReportJson(printed, true), HasSubstr("quote\\\".png"));
+  EXPECT_THAT(ReportJson(printed, true), HasSubstr("mean_total_ms"));
+  EXPECT_THAT(ReportJson(printed, false), Not(HasSubstr("_ms\"")));
 }
 
 }  // namespace
