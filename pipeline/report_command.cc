@@ -17,6 +17,7 @@
 #include "pipeline/explain/block_bytes.h"
 #include "pipeline/floor_svg.h"
 #include "pipeline/report/report_data.h"
+#include "pipeline/report/report_inputs.h"
 #include "pipeline/report/report_page.h"
 
 namespace cairn {

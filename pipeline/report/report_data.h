@@ -30,18 +30,10 @@ struct ReportInputs {
   std::vector<ParetoPoint> pareto;  // the place's maps of other sizes; none: not known
 };
 
-// Whether they have what a page shows of them, of the right types, and numbers that can be.
-bool IsBuildReport(const nlohmann::ordered_json& build);
-bool IsCheckReport(const nlohmann::ordered_json& check);
-// Whether a check was of this map: of as many landmarks and regions; of a sealed map, with its figures.
-// REQUIRES: IsCheckReport
-bool IsCheckOf(const nlohmann::ordered_json& check, const MapRows& rows);
-bool IsDrive(const nlohmann::ordered_json& drive);
-
 // What would make the map better (Advise, AddSizes).
 std::vector<Advice> ReportAdvice(const ReportInputs& inputs);
 
-// REQUIRES: IsBuildReport, IsCheckReport, IsDrive
+// REQUIRES: IsBuildReport, IsCheckReport, IsDrive (report_inputs.h)
 nlohmann::ordered_json ReportData(const ReportInputs& inputs);
 
 }  // namespace cairn

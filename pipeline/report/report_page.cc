@@ -14,6 +14,7 @@
 #include "report/chart_notice.h"
 #include "report/charts_js.h"
 #include "report/compare_js.h"
+#include "report/draw_js.h"
 #include "report/drive_js.h"
 #include "report/explain_js.h"
 #include "report/floor_js.h"
@@ -58,8 +59,9 @@ std::string Notices() {
 // One script: its parts share their names.
 std::string Script() {
   std::string script;
-  for (const char* part : {kPageJsText, kFloorJsText, kLayersJsText, kExplainJsText, kSummaryJsText,
-                           kStagesJsText, kChartsJsText, kCompareJsText, kDriveJsText, kStartJsText}) {
+  for (const char* part :
+       {kPageJsText, kFloorJsText, kDrawJsText, kLayersJsText, kExplainJsText, kSummaryJsText, kStagesJsText,
+        kChartsJsText, kCompareJsText, kDriveJsText, kStartJsText}) {
     script += part;
   }
   return script;

@@ -220,7 +220,7 @@ class ReportTest(unittest.TestCase):
 
     def test_hovering_names_what_is_there(self):
         self.switch('held-out images', False)
-        place = self.browser.script('return [S.x[0], S.y[0]]')
+        place = self.browser.script('return markPlace(0)')
         self.click(*place)
         ActionChains(self.browser.driver).move_by_offset(2, 2).perform()
         self.assertIn('station 0: ', self.browser.text('.leaflet-tooltip'))
