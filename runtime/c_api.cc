@@ -14,6 +14,7 @@
 #include "runtime/handles.h"
 #include "runtime/localizer.h"
 #include "runtime/no_throw.h"
+#include "runtime/update_map.h"
 #include "runtime/visual_estimate.h"
 #include "runtime/visual_map.h"
 
@@ -86,6 +87,21 @@ void CopyText(const std::string& text, char (&to)[kNumBytes]) {
   }
   std::memcpy(to, text.data(), length);
   to[length] = 0;
+}
+
+// The caller's options; NULL: the defaults.
+Result<MapOptions> MapOptionsOf(const cairn_map_options* options) {
+  MapOptions given;
+  if (options == nullptr) return given;
+  CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options"));
+  if (options->memory_budget_bytes < 0)
+    return Misuse("options->memory_budget_bytes is {}; must not be negative", options->memory_budget_bytes);
+  if (options->memory_budget_bytes > 0) given.memory_budget_bytes = options->memory_budget_bytes;
+  if (options->public_key != nullptr) {
+    given.public_key.emplace();
+    std::copy_n(options->public_key, given.public_key->size(), given.public_key->begin());
+  }
+  return given;
 }
 
 Result<std::shared_ptr<const Map>> FindMap(const cairn_map* handle) {
@@ -225,23 +241,34 @@ const char* cairn_reason_name(int32_t reason) {
 
 const char* cairn_last_error(void) { return LastError().c_str(); }
 
+int32_t cairn_map_update(const char* map_path, const char* delta_path, const cairn_map_options* options,
+                         int32_t* was_updated) {
+  if (was_updated != nullptr) *was_updated = 0;
+  return Call("cairn_map_update", [&]() -> Status {
+    if (map_path == nullptr || delta_path == nullptr)
+      return Misuse("{} is NULL", map_path == nullptr ? "map_path" : "delta_path");
+    CAIRN_ASSIGN_OR_RETURN(const MapOptions given, MapOptionsOf(options));
+    CAIRN_ASSIGN_OR_RETURN(const bool updated,
+                           UpdateMap(map_path, delta_path, {.public_key = given.public_key}));
+    if (was_updated != nullptr) *was_updated = updated ? 1 : 0;
+    return Ok();
+  });
+}
+
+int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options) {
+  return Call("cairn_map_roll_back", [&]() -> Status {
+    if (map_path == nullptr) return Misuse("map_path is NULL");
+    CAIRN_ASSIGN_OR_RETURN(const MapOptions given, MapOptionsOf(options));
+    return RollBackMap(map_path, {.public_key = given.public_key});
+  });
+}
+
 int32_t cairn_map_open(const char* path, const cairn_map_options* options, cairn_map** map) {
   if (map != nullptr) *map = nullptr;
   return Call("cairn_map_open", [&]() -> Status {
     if (path == nullptr) return Misuse("path is NULL");
     if (map == nullptr) return Misuse("map is NULL: there is no place for the handle");
-    MapOptions opened;
-    if (options != nullptr) {
-      CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options"));
-      if (options->memory_budget_bytes < 0)
-        return Misuse("options->memory_budget_bytes is {}; must not be negative",
-                      options->memory_budget_bytes);
-      if (options->memory_budget_bytes > 0) opened.memory_budget_bytes = options->memory_budget_bytes;
-      if (options->public_key != nullptr) {
-        opened.public_key.emplace();
-        std::copy_n(options->public_key, opened.public_key->size(), opened.public_key->begin());
-      }
-    }
+    CAIRN_ASSIGN_OR_RETURN(const MapOptions opened, MapOptionsOf(options));
     CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Map> open, Map::Open(path, opened));
     *map = Maps().Add(std::move(open));
     return Ok();

@@ -209,6 +209,17 @@ CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* 
 CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
                                           const cairn_camera* camera, cairn_floor_fix* fix);
 
+/* Maps sent as what changed (`cairn delta`).  Brings the file at `map_path` to the map that the delta leads
+ * to: at any instant it is the whole old or the whole new one, and the old one stays beside it, for
+ * cairn_map_roll_back.  Who has the map open keeps the old one; open it again.  Of `options`, which may be
+ * NULL, the public key counts: delta and new map must be signed with it.  *was_updated (may be NULL): 0 where
+ * the map is the new one already.  CAIRN_INVALID_ARGUMENT: the delta leads from another map; CAIRN_BUSY:
+ * another update is at work in the folder. */
+CAIRN_API int32_t cairn_map_update(const char* map_path, const char* delta_path,
+                                   const cairn_map_options* options, int32_t* was_updated);
+/* Exchanges the map and the one before the last update; a second time exchanges them back. */
+CAIRN_API int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options);
+
 #ifdef __cplusplus
 } /* extern "C" */
 #endif

@@ -10,6 +10,7 @@
 
 #include "runtime/localizer.h"
 #include "runtime/python/convert.h"
+#include "runtime/update_map.h"
 
 namespace py = pybind11;
 
@@ -21,25 +22,33 @@ struct PyMap {
   std::string path;
 };
 
+// As bytes: names of files need not be text.
+std::string PathOf(const py::object& path) {
+  std::string name = py::cast<py::bytes>(py::module_::import("os").attr("fsencode")(path));
+  if (name.empty()) throw py::value_error("path is empty; expected the name of a file");
+  if (name.find('\0') != std::string::npos) throw py::value_error("embedded null byte in path");
+  return name;
+}
+
+std::optional<PublicKey> KeyOf(const std::optional<py::bytes>& given) {
+  if (!given) return std::nullopt;
+  const std::string bytes = *given;
+  PublicKey key;
+  if (bytes.size() != key.size())
+    throw py::value_error(
+        fmt::format("public_key has {} bytes, expected {}: the bytes, not their hexadecimal text",
+                    bytes.size(), key.size()));
+  std::copy(bytes.begin(), bytes.end(), key.begin());
+  return key;
+}
+
 PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes,
               const std::optional<py::bytes>& public_key) {
-  // As bytes: names of files need not be text.
-  const std::string name = py::cast<py::bytes>(py::module_::import("os").attr("fsencode")(path));
-  if (name.empty()) throw py::value_error("path is empty; expected the name of a map");
-  if (name.find('\0') != std::string::npos) throw py::value_error("embedded null byte in path");
+  const std::string name = PathOf(path);
   if (memory_budget_bytes < 0)
     throw py::value_error(
         fmt::format("memory_budget_bytes is {}; must not be negative", memory_budget_bytes));
-  MapOptions options = {.memory_budget_bytes = memory_budget_bytes};
-  if (public_key) {
-    const std::string key = *public_key;
-    options.public_key.emplace();
-    if (key.size() != options.public_key->size())
-      throw py::value_error(
-          fmt::format("public_key has {} bytes, expected {}: the bytes, not their hexadecimal text",
-                      key.size(), options.public_key->size()));
-    std::copy(key.begin(), key.end(), options.public_key->begin());
-  }
+  const MapOptions options = {.memory_budget_bytes = memory_budget_bytes, .public_key = KeyOf(public_key)};
   const py::gil_scoped_release release;
   return {ValueOrThrow(Map::Open(name, options)), name};
 }
@@ -114,6 +123,27 @@ Camera MakeCamera(const std::string& model, int width, int height, std::vector<d
   camera.params = std::move(params);
   ThrowIfError(CheckCamera(camera));
   return camera;
+}
+
+void BindUpdates(py::module_& module) {
+  module.def(
+      "update_map",
+      [](const py::object& map, const py::object& delta, const std::optional<py::bytes>& public_key) {
+        const std::string map_path = PathOf(map), delta_path = PathOf(delta);
+        const UpdateOptions options = {.public_key = KeyOf(public_key)};
+        const py::gil_scoped_release release;
+        return ValueOrThrow(UpdateMap(map_path, delta_path, options));
+      },
+      py::arg("map"), py::arg("delta"), py::kw_only(), py::arg("public_key") = py::none());
+  module.def(
+      "roll_back_map",
+      [](const py::object& map, const std::optional<py::bytes>& public_key) {
+        const std::string map_path = PathOf(map);
+        const UpdateOptions options = {.public_key = KeyOf(public_key)};
+        const py::gil_scoped_release release;
+        ThrowIfError(RollBackMap(map_path, options));
+      },
+      py::arg("map"), py::kw_only(), py::arg("public_key") = py::none());
 }
 
 void BindMap(py::module_& module) {
@@ -192,5 +222,6 @@ PYBIND11_MODULE(_cairn, module) {
   module.attr("__version__") = CAIRN_VERSION;
   cairn::BindErrors(module);
   cairn::BindMap(module);
+  cairn::BindUpdates(module);
   cairn::BindLocalizer(module);
 }

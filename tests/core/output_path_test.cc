@@ -25,7 +25,8 @@ TEST(OutputPath, OnlyFilesAreReplaced) {
   EXPECT_TRUE(CheckCanBeReplaced(file).ok());
   EXPECT_TRUE(CheckCanBeReplaced(folder / "new").ok());
   EXPECT_EQ(CheckCanBeReplaced("").error().code, ErrorCode::kInvalidArgument);
-  for (const std::string& path : {pipe, link, std::string(folder / "folder"), std::string(folder / "none" / "file")}) {
+  for (const std::string& path :
+       {pipe, link, std::string(folder / "folder"), std::string(folder / "none" / "file")}) {
     const Status status = WriteFileAtomically(path, "new");
     ASSERT_FALSE(status.ok()) << path;
     EXPECT_THAT(status.error().message, testing::HasSubstr(path));

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
+#include "core/map_delta.h"
 #include "core/map_rows.h"
 #include "runtime/cairn.h"
 #include "runtime/localizer.h"
@@ -125,6 +126,39 @@ TEST_F(CApi, DamagedMapGivesTheCodeOfItsDamage) {
   EXPECT_EQ(cairn_map_open(bad.c_str(), nullptr, &map), CAIRN_TRUNCATED);
   EXPECT_THAT(cairn_last_error(), HasSubstr("bad.cairn"));
   EXPECT_EQ(map, nullptr);
+}
+
+TEST_F(CApi, MapIsUpdatedByADeltaAndRolledBack) {
+  const std::string map = testing::TempDir() + "/c_api_update.cairn",
+                    delta = testing::TempDir() + "/c_api.delta";
+  MapRows rows = MakePosterMap(scene_);
+  rows.name = "changed";
+  const std::string changed = testing::TempDir() + "/c_api_changed.cairn";
+  ASSERT_TRUE(WriteMapRows(rows, changed).ok());
+  ASSERT_TRUE(WriteFileAtomically(map, *ReadFile(path_)).ok());
+  const auto made = MakeMapDelta(path_, changed, std::nullopt);
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  ASSERT_TRUE(WriteFileAtomically(delta, EncodeMapDelta(*made)).ok());
+
+  int32_t was_updated = -1;
+  ASSERT_EQ(cairn_map_update(map.c_str(), delta.c_str(), nullptr, &was_updated), CAIRN_OK)
+      << cairn_last_error();
+  EXPECT_EQ(was_updated, 1);
+  EXPECT_EQ(*ReadFile(map), *ReadFile(changed));
+  ASSERT_EQ(cairn_map_update(map.c_str(), delta.c_str(), nullptr, &was_updated), CAIRN_OK);
+  EXPECT_EQ(was_updated, 0);
+  ASSERT_EQ(cairn_map_roll_back(map.c_str(), nullptr), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(*ReadFile(map), *ReadFile(path_));
+
+  const std::vector<uint8_t> key(32, 7);
+  cairn_map_options options = CAIRN_MAP_OPTIONS_INIT;
+  options.public_key = key.data();
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_NOT_SIGNED);
+  EXPECT_EQ(*ReadFile(map), *ReadFile(path_));
+  EXPECT_EQ(cairn_map_update(nullptr, delta.c_str(), nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_map_update(map.c_str(), nullptr, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_map_roll_back(nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_map_roll_back("nowhere.cairn", nullptr), CAIRN_NOT_FOUND);
 }
 
 }  // namespace

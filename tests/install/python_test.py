@@ -6,6 +6,7 @@ import json
 import pathlib
 import subprocess
 import sys
+import tempfile
 import threading
 import unittest
 
@@ -195,6 +196,31 @@ class Refusing(Poster):
         for use in uses:
             with self.assertRaisesRegex(TypeError, "__init__ has not been called"):
                 use()
+
+
+class Updates(Poster):
+    def test_map_is_updated_by_a_delta_and_rolled_back(self):
+        with tempfile.TemporaryDirectory() as folder:
+            old, new, delta = (pathlib.Path(folder) / name for name in ["old.cairn", "new.cairn", "delta"])
+            old.write_bytes((POSTER / "poster.cairn").read_bytes())
+            key = pathlib.Path(folder) / "key"
+            for words in [["keygen", key], ["sign", old, "--key", key, "-o", new], ["delta", old, new, "-o", delta]]:
+                run = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
+                self.assertEqual(run.returncode, 0, run.stderr)
+            before, after = old.read_bytes(), new.read_bytes()
+            self.assertTrue(cairn.update_map(old, delta))
+            self.assertEqual(old.read_bytes(), after)
+            self.assertFalse(cairn.update_map(old, delta))
+            cairn.roll_back_map(old)
+            self.assertEqual(old.read_bytes(), before)
+            with self.assertRaises(cairn.Error) as caught:
+                cairn.update_map(old, delta, public_key=bytes(32))
+            self.assertIn(caught.exception.name, ["not_signed", "wrong_key"])
+            with self.assertRaises(ValueError):
+                cairn.update_map(old, delta, public_key=b"short")
+            with self.assertRaises(cairn.Error) as caught:
+                cairn.roll_back_map(delta)
+            self.assertEqual(caught.exception.name, "not_found")
 
 
 class Facts(Poster):

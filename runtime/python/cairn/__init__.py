@@ -8,6 +8,6 @@
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
 """
-from ._cairn import Camera, Error, Fix, Localizer, Map, Prior, __version__
+from ._cairn import Camera, Error, Fix, Localizer, Map, Prior, __version__, roll_back_map, update_map
 
-__all__ = ["Camera", "Error", "Fix", "Localizer", "Map", "Prior", "__version__"]
+__all__ = ["Camera", "Error", "Fix", "Localizer", "Map", "Prior", "__version__", "roll_back_map", "update_map"]

@@ -115,3 +115,12 @@ class Localizer:
 
         `camera` None: the survey's of the image's size.  Releases the interpreter's lock meanwhile.
         """
+
+def update_map(map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None) -> bool:
+    """Brings the map's file to the one that a delta (`cairn delta`) leads to; the old one stays beside it.  False: it is the new one already.
+
+    Raises Error: invalid_argument (the delta leads from another map), not_signed and wrong_key (with `public_key`), busy.
+    """
+
+def roll_back_map(map: str | PathLike[str], *, public_key: bytes | None = None) -> None:
+    """Exchanges the map and the one before the last update; a second time exchanges them back.  Raises Error (not_found)."""
