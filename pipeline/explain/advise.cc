@@ -24,6 +24,7 @@ constexpr double kMoreLocalized = 0.01;
 // Errors that one turn, scale and shift reduces to this part are those of a frame; fewer images cannot tell.
 constexpr double kAlignedErrors = 0.7;
 constexpr size_t kMinAligned = 10;
+constexpr double kLeastFromWallM = 0.2;
 // Part of the poses that lie within 10 cm and 5 degrees where there is nothing to mend.
 constexpr double kManyWithin = 0.8;
 
@@ -57,6 +58,16 @@ std::vector<std::vector<StationIdx>> Components(const std::vector<StationIdx>& s
   return components;
 }
 
+// Whether a camera can stand there: not in a wall of the floor plan, nor right at one.
+bool IsFree(const Eigen::Vector2d& place, const Views& views) {
+  return std::none_of(views.plan.walls.begin(), views.plan.walls.end(), [&](const PlanWall& wall) {
+    const Eigen::Vector2d along = wall.end - wall.start;
+    const double squared = along.squaredNorm();
+    const double at = squared > 0 ? std::clamp((place - wall.start).dot(along) / squared, 0.0, 1.0) : 0;
+    return (wall.start + at * along - place).norm() < kLeastFromWallM;
+  });
+}
+
 // Half way to the neighbouring places, looking as the stations do: from there, what these stations see is
 // seen from one more place.  Those nearest the middle of the stations first.
 std::vector<Advice::View> ViewsBetween(const MapRows& rows, const std::vector<StationIdx>& stations,
@@ -69,6 +80,7 @@ std::vector<Advice::View> ViewsBetween(const MapRows& rows, const std::vector<St
     for (const StationIdx next : neighbours[station]) {
       if ((rows.stations[next].position - here.position).norm() < 0.01) continue;  // another heading
       const Eigen::Vector2d place = (here.position + rows.stations[next].position) / 2;
+      if (!IsFree(place, rows.views)) continue;
       const std::array<int64_t, 3> key = {std::llround(place.x() * 1e3), std::llround(place.y() * 1e3),
                                           std::llround(here.heading_deg.value_or(0))};
       views.emplace(key, Advice::View{place, here.heading_deg});
@@ -172,10 +184,10 @@ void AddPoorRegions(const MapRows& rows, const std::vector<StationIdx>& about,
     const MapRegion& region = rows.regions[test->region];
     advice->push_back(
         {.text = fmt::format(
-             "Region {} ({}) localizes {} of {} held-out images with its {} landmarks. A larger k, or "
+             "Region {} ({}) localizes {} of {} held-out image{} with its {} landmarks. A larger k, or "
              "images between its stations, would help.",
              test->region, WhereText(rows, region.stations), test->num_localized, test->num_held_out,
-             region.landmarks.size()),
+             test->num_held_out == 1 ? "" : "s", region.landmarks.size()),
          .stations = region.stations,
          .region = test->region,
          .images_to_take = ViewsBetween(rows, region.stations, neighbours)});
@@ -247,6 +259,10 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
   }
 }
 
+std::string BytesText(double bytes) {
+  return bytes >= 1e6 ? fmt::format("{:.2f} MB", bytes / 1e6) : fmt::format("{:.0f} kB", bytes / 1e3);
+}
+
 }  // namespace
 
 std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& about) {
@@ -300,10 +316,10 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
         size.median_error_m ? fmt::format(", median error {:.2f} cm", 100 * *size.median_error_m) : "";
     const std::string limit = size.max_bytes > 0 ? fmt::format(", max_bytes = {}", size.max_bytes) : "";
     return fmt::format(
-        "a map of {:.0f} kB ([emit_map] landmarks = \"all\"{}) localizes {:.1f} % of the held-out images{}; "
-        "this one of {:.0f} kB {:.1f} %.",
-        static_cast<double>(size.num_bytes) / 1e3, limit, 100 * size.localized_ratio, error, bytes / 1e3,
-        100 * localized->second);
+        "a map of {} ([emit_map] landmarks = \"all\"{}) localizes {:.1f} % of the held-out images{}; "
+        "this one of {} {:.1f} %.",
+        BytesText(static_cast<double>(size.num_bytes)), limit, 100 * size.localized_ratio, error,
+        BytesText(bytes), 100 * localized->second);
   };
   if (better != nullptr) {
     advice->push_back({.text = "More can be had: " + text(*better)});

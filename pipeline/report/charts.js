@@ -14,6 +14,7 @@ function bars(caption, labels, values, xTitle, yTitle, {horizontal = false, colo
   if (!values.some(value => value > 0) && !onPick) return;
   chart(caption, {type: 'bar', data: {labels, datasets: [{data: values, backgroundColor: colours, minBarLength: onPick ? 3 : 0}]}, options: {
     indexAxis: horizontal ? 'y' : 'x',
+    interaction: onPick ? {mode: 'index', intersect: false} : {},
     plugins: {legend: {display: false}, tooltip: told ? {callbacks: {title: () => '', label: item => told[item.dataIndex].split('; ')}} : {}},
     onClick: onPick ? (event, items) => items.length && onPick(items[0].index) : undefined,
     onHover: onPick ? (event, items) => { event.native.target.style.cursor = items.length ? 'pointer' : ''; } : undefined,
@@ -42,12 +43,12 @@ function drawRegionCharts() {
   const worst = all.slice(0, mostBars);
   const told = ([i, test]) => `region ${i}: ${testText(test)}`;
   if (worst.length) {
-    bars([term('recall', 'Recall'), ` by region${which}; click a bar to see the region`], worst.map(([i]) => String(i)), worst.map(entry => Math.round(1000 * ratio(entry)) / 10), 'region', 'localized right, %',
+    bars([term('recall', 'Recall'), ` by region${which}; orange: below ${percent(data.poor_localized_ratio, 0)}; click a bar to see its region`], worst.map(([i]) => String(i)), worst.map(entry => Math.round(1000 * ratio(entry)) / 10), 'region', 'localized right, %',
          {colours: worst.map(([, test]) => isPoor(test) ? inked(orange) : inked(blue)), told: worst.map(told), onPick: bar => pickRegion(worst[bar][0]), yScale: {min: 0, max: 100}});
   }
   const farthest = all.filter(([, test]) => test.median_m !== undefined).sort((a, b) => b[1].median_m - a[1].median_m).slice(0, mostBars), factor = unit === 'm' ? 100 : 1;
   if (farthest.length) {
-    bars(`Median error by region, largest first`, farthest.map(([i]) => String(i)), farthest.map(([, test]) => factor * test.median_m), 'region', unit === 'm' ? 'cm' : unit, {told: farthest.map(told), onPick: bar => pickRegion(farthest[bar][0])});
+    bars('Median error by region, largest first; click a bar', farthest.map(([i]) => String(i)), farthest.map(([, test]) => factor * test.median_m), 'region', unit === 'm' ? 'cm' : unit, {told: farthest.map(told), onPick: bar => pickRegion(farthest[bar][0])});
   }
 }
 // What the two charts above show, for the keyboard and for reading aloud.

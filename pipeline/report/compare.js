@@ -3,7 +3,7 @@ if (data.changes) {
   $('changes').hidden = $('changes-link').hidden = false;
   const changes = data.changes, change = value => value > 0 ? `+${count(value)}` : value < 0 ? `\u2212${count(-value)}` : '0';
   const row = (name, [a, b]) => [name.replaceAll('_', ' '), a, b, change(b - a)];
-  const figure = value => value === null ? '\u2013' : Math.round(value * 1e4) / 1e4;
+  const figure = value => value === null ? '\u2013' : String(Number(value.toPrecision(4)));
   $('changes-text').append(element('p', {}, `A: ${changes.file}; B: this map`),
     table(['bytes', 'landmarks', 'regions', 'stations', 'stations_not_covered', 'survey_images'].map(name => row(name, changes[name])), ['', 'A', 'B', 'B \u2212 A']),
     element('p', {}, `${counted(changes.num_landmarks_shared, 'landmark is', 'landmarks are')} of both; ${counted(changes.num_regions_changed, 'region differs', 'regions differ')}; `,

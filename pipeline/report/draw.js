@@ -88,7 +88,7 @@ const missed = byPlace(regionsAt.map(regions => regions.map(region => R[region].
 const patchAlpha = 0.6;
 function drawRecall(context, place, inside, scale, whole) {
   context.globalAlpha = patchAlpha;
-  for (const [x, y, part] of missed) patch(context, place, scale, whole, x, y, inked(recallClasses.find(([least]) => 1 - part >= least)[1]));
+  for (const [x, y, part] of missed) patch(context, place, scale, whole, x, y, recallClasses.find(([least]) => 1 - part >= least)[1]);
 }
 const landmarkColours = [...palette, '#888888'];
 const landmarkColour = L.region.map(region => region >= 0 ? palette.indexOf(regionColour[region]) : palette.length);
@@ -140,7 +140,7 @@ function drawLookAlikes(context, place) {
 function drawViews(context, place) {
   context.strokeStyle = sky;
   context.lineWidth = 0.7;
-  context.globalAlpha = 0.6;
+  context.globalAlpha = 0.4;
   for (const face of data.views.faces) {
     context.beginPath();
     for (let i = 0; i < face.length; i += 2) context[i ? 'lineTo' : 'moveTo'](...place(face[i], face[i + 1]));
@@ -164,12 +164,12 @@ function drawUncovered(context, place, inside, scale) {
   context.lineWidth = 2.5;
   for (let i = 0; i < numStations; ++i) {
     if (!isUncovered(i)) continue;
-    const [x, y] = place(S.x[i], S.y[i]);
+    const [x, y] = place(...markPlace(i));
     if (inside(x, y)) cross(context, x, y, Math.min(9, Math.max(2.5, 0.4 * markSize(scale))));
   }
 }
 function drawAdjacency(context, place) {
-  context.strokeStyle = context.fillStyle = inked('#A0468A');
+  context.strokeStyle = context.fillStyle = styled('--soft');
   context.lineWidth = 1.3;
   context.globalAlpha = R.length > 200 ? 0.4 : 1;
   for (const middle of regionMiddle) {
@@ -234,8 +234,9 @@ function drawErrors(context, place) {
   }
 }
 const viewsToTake = data.advice.flatMap((entry, advice) => entry.views.map(([x, y, heading]) => ({x, y, heading, advice})));
+const viewSize = scale => Math.min(13, Math.max(5, 0.6 * markSize(scale)));
 function drawViewsToTake(context, place, inside, scale) {
-  const size = Math.min(13, Math.max(5, 0.6 * markSize(scale)));
+  const size = viewSize(scale);
   context.lineWidth = 2;
   for (const {x, y, heading} of viewsToTake) {
     wedge(context, ...place(x, y), heading, size);
@@ -243,7 +244,7 @@ function drawViewsToTake(context, place, inside, scale) {
     context.globalAlpha = 0.6;
     context.fill();
     context.globalAlpha = 1;
-    context.strokeStyle = inked(green);
+    context.strokeStyle = inked(purple);
     context.stroke();
   }
 }
@@ -292,7 +293,7 @@ function drawNumbers(context, place, inside, scale, whole) {
   context.textBaseline = 'middle';
   context.font = '600 13px sans-serif';
   const shown = [];
-  if (isShown('regions')) eachRegion(place, whole, (i, corners, size, box) => shown.push([i, size, box]));
+  if (isShown('regions') || isShown('region adjacency')) eachRegion(place, whole, (i, corners, size, box) => shown.push([i, size, box]));
   shown.sort((a, b) => (b[0] === selected.region) - (a[0] === selected.region) || b[1] - a[1]);
   for (const [i, size, [west, north, east, south]] of shown) {
     if ((size < 28 || shown.length > mostNumbers) && i !== selected.region) break;

@@ -20,6 +20,8 @@ function sayFirst() {
       open.className = 'wide';
       return open;
     }));
+    const num = data.advice.length - first.length;
+    if (num > 0) nodes.push(element('p', {}, element('a', {href: '#advice'}, `and ${counted(num, 'other advice', 'other pieces of advice')}`)));
   }
   $('explanation').replaceChildren(...nodes);
   $('explanation').classList.remove('open');
@@ -54,7 +56,7 @@ function testText(test) {
   return text;
 }
 // Why a held-out image was not localized, powers of ten written out.
-const reason = image => (image.message || 'no reason is known').replace(/10\^(-[\d.]+)/g, (text, power) => Number((10 ** power).toPrecision(1)).toLocaleString('en', {maximumFractionDigits: 20}));
+const reason = image => (image.message || 'no reason is known').replace(/10\^(-?[\d.]+)/g, (text, power) => Number((10 ** power).toPrecision(power < 0 ? 1 : 2)).toLocaleString('en', {maximumFractionDigits: 20}));
 // What helps against it.
 const remedies = {
   too_few_features: 'The image is blank, dark or blurred: no map helps.',
@@ -99,7 +101,7 @@ function explainRegion(i, others = []) {
   const region = R[i];
   const nodes = [element('h3', {}, `Region ${i}`),
     table([['stations', region.stations.length], [term('common landmarks'), region.landmarks.length], ['neighbouring regions', region.adjacent.length]])];
-  if (others.length) nodes.splice(1, 0, element('p', {class: 'buttons'}, 'Also here (click again): ', ...others.map(other => button(String(other), () => explainRegion(other, others.map(one => one === other ? i : one))))));
+  if (others.length) nodes.splice(1, 0, element('p', {class: 'buttons'}, 'Also here: ', ...others.map(other => button(String(other), () => explainRegion(other, others.map(one => one === other ? i : one))))));
   nodes.push(element('p', region.test && isPoor(region.test) ? {class: 'bad'} : {}, testText(region.test)));
   if (region.entropy !== undefined) nodes.push(element('p', {}, term('entropy'), `: ${region.entropy.toFixed(2)} nats on the mean`));
   nodes.push(...adviceNodes(data.advice.filter(entry => entry.region === i)), ...heldOutNodes(heldOutOf(i)));
@@ -126,6 +128,13 @@ function explainImage(i) {
   if (remedies[image.reason]) nodes.push(element('h3', {}, 'What would help'), element('p', {}, remedies[image.reason]));
   say(...nodes);
 }
+function explainView(i) {
+  const {x, y, heading, advice} = viewsToTake[i], {text, region, stations} = data.advice[advice];
+  choose({region: region === null ? -1 : region});
+  say(element('h3', {}, 'Image to take'), element('p', {}, `at ${metres(x / 100)}, ${metres(y / 100)}, ${heading === null ? 'in all directions' : `looking towards ${heading}\u00B0`}`),
+    element('h3', {}, 'Why'), element('p', {}, text),
+    element('p', {class: 'buttons'}, region === null ? button(`station ${stations[0]}`, () => explainStation(stations[0])) : button(`region ${region}`, () => explainRegion(region))));
+}
 
 // ---- what is under the pointer
 // The nearest within some pixels, of places in hundredths.
@@ -141,15 +150,16 @@ function nearest(latlng, num, placeOf, pixels) {
   }
   return found;
 }
-// A station with a heading is drawn ahead of its place.
-function markPlace(i) {
-  if (S.heading[i] === null) return [S.x[i], S.y[i]];
-  const turn = S.heading[i] * Math.PI / 180, ahead = 60 * markSize(scaleNow()) / scaleNow();
-  return [S.x[i] + ahead * Math.cos(turn), S.y[i] + ahead * Math.sin(turn)];
+// What looks somewhere is drawn ahead of its place.
+function aheadOf(x, y, heading, size) {
+  if (heading === null) return [x, y];
+  const turn = heading * Math.PI / 180, ahead = 60 * size / scaleNow();
+  return [x + ahead * Math.cos(turn), y + ahead * Math.sin(turn)];
 }
+const markPlace = i => aheadOf(S.x[i], S.y[i], S.heading[i], markSize(scaleNow()));
 const stationNear = latlng => isShown('stations') || isShown('uncovered') ? nearest(latlng, numStations, markPlace, Math.max(1.3 * markSize(scaleNow()), 9)) : -1;
 const imageNear = latlng => isShown('held-out images') ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
-const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => [viewsToTake[i].x, viewsToTake[i].y], 9) : -1;
+const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => aheadOf(viewsToTake[i].x, viewsToTake[i].y, viewsToTake[i].heading, viewSize(scaleNow())), 9) : -1;
 const isSmallScreen = () => window.innerWidth <= 800;
 // All stations whose marks are under the pointer, nearest first.
 function stationsUnder(latlng) {
@@ -168,10 +178,10 @@ function regionsUnder(latlng) {
 // What is drawn on top first; clicking on the same place again goes on to what lies below.
 const clicked = {point: null, index: 0};
 function explainAt(latlng) {
-  const image = imageNear(latlng), view = viewNear(latlng), advice = view >= 0 && data.advice[viewsToTake[view].advice];
+  const image = imageNear(latlng), view = viewNear(latlng);
   const below = [];
   if (image >= 0) below.push(() => explainImage(image));
-  if (advice) below.push(() => advice.region !== null ? explainRegion(advice.region) : explainStation(advice.stations[0]));
+  if (view >= 0) below.push(() => explainView(view));
   for (const station of stationsUnder(latlng)) below.push(() => explainStation(station));
   const regions = isShown('regions') ? regionsUnder(latlng) : [];
   for (const region of regions) below.push(() => explainRegion(region, regions.filter(other => other !== region)));
@@ -180,6 +190,7 @@ function explainAt(latlng) {
   clicked.index = clicked.point && clicked.point.distanceTo(point) < 6 ? (clicked.index + 1) % below.length : 0;
   clicked.point = point;
   below[clicked.index]();
+  if (below.length > 1) $('explanation').append(element('p', {class: 'soft'}, `${clicked.index + 1} of ${below.length} things here: click again for the next`));
 }
 map.on('zoomstart movestart', () => { clicked.point = null; });
 map.on('click', event => explainAt(event.latlng));
@@ -208,6 +219,8 @@ map.on('mousemove', event => {
   tip.setLatLng(place).setContent(content);
   map.openTooltip(tip);
 });
+// On a phone the explanation belongs to the floor: where that is out of sight, so is this.
+new IntersectionObserver(([floor]) => $('explanation').classList.toggle('away', !floor.isIntersecting)).observe($('map'));
 map.on('mouseout', () => map.closeTooltip(tip));
 $('map').addEventListener('keydown', event => {
   if (event.key === 'Enter' && event.target === $('map')) explainAt(map.getCenter());
@@ -223,14 +236,14 @@ $('find').addEventListener('submit', event => {
   if (!text) return;
   const number = Number(text.replace(/[^0-9]/g, ''));
   const named = names => {
-    const exact = names.indexOf(text);
-    return exact >= 0 || !text ? exact : names.findIndex(name => name.startsWith(text));
+    const exact = names.indexOf(text), wanted = text.toLowerCase();
+    return exact >= 0 ? exact : names.findIndex(name => name.toLowerCase().startsWith(wanted));
   };
   if (/^(region|r)\s*\d+$/i.test(text) && number < R.length) {
     explainRegion(number);
     return void goTo(placesOf(R[number].stations));
   }
-  const isStation = /^(station\s*)?\d+$/i.test(text) && number < numStations;
+  const isStation = /^(station|s)?\s*\d+$/i.test(text) && number < numStations;
   const held = isStation ? -1 : named(heldOut.map(image => image.name));
   if (held >= 0) {
     explainImage(held);

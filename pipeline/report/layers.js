@@ -7,10 +7,10 @@ function mark(kind, colour) {
   const path = document.createElementNS('http://www.w3.org/2000/svg', 'path');
   for (const [key, value] of Object.entries({viewBox: '0 0 22 14', width: 22, height: 14, 'aria-hidden': 'true'})) svg.setAttribute(key, value);
   path.setAttribute('d', shapes[kind]);
-  path.setAttribute('stroke', inked(colour));
+  path.setAttribute('stroke', kind === 'block' ? colour : inked(colour));
   path.setAttribute('stroke-width', 2);
   if (kind === 'block') path.setAttribute('opacity', patchAlpha);
-  path.setAttribute('fill', ['disc', 'dot', 'block'].includes(kind) ? inked(colour) : 'none');
+  path.setAttribute('fill', kind === 'block' ? colour : ['disc', 'dot'].includes(kind) ? inked(colour) : 'none');
   svg.append(path);
   return svg;
 }
@@ -35,7 +35,7 @@ const layers = [
    legend: says(['line', sky, 'view-invariant regions of the floor plan: inside of one the same walls are in sight'])},
   {name: 'walls', group: 'the map', draw: drawWalls, on: true, exists: data.views.walls.length > 0,
    legend: () => element('div', {}, mark('line', styled('--ink')), ' walls of the floor plan')},
-  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: says(['line', '#A0468A', 'regions with common or neighbouring stations'])},
+  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: () => says(['line', styled('--soft'), 'regions with common or neighbouring stations'])()},
   {name: 'appearance graph', group: 'images', draw: drawKept, exists: I.links.length > 0,
    legend: says(['disc', green, counted(I.kept.length, 'kept image')], ['line', green, counted(I.links.length, 'link') + ' of them'])},
   {name: 'look-alikes', group: 'images', draw: drawLookAlikes, exists: I.look_alikes.length > 0,
@@ -51,14 +51,14 @@ const layers = [
   {name: 'self-test errors', group: 'how well', draw: drawErrors, exists: heldOut.some(isLocalized),
    legend: () => element('div', {}, mark('arrow', blue), ` from where an image was taken to where the map puts it${errorFactor > 1 ? `, ${errorFactor} times as long` : ''}`)},
   {name: 'images to take', group: 'images', draw: drawViewsToTake, exists: viewsToTake.length > 0,
-   legend: says(viewsToTake.some(view => view.heading !== null) ? ['wedge', green, 'images to take next'] : ['ring', green, 'images to take next, in all directions'])},
+   legend: says(viewsToTake.some(view => view.heading !== null) ? ['wedge', purple, 'images to take next'] : ['ring', purple, 'images to take next, in all directions'])},
   {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: has.held_out,
    legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(has.wrong ? [['diamond', pink, 'wrong']] : []))},
   {name: 'changes', group: 'the map', draw: drawChanges, on: true, exists: Boolean(data.changes),
-   legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'gone'], ['ring', orange, 'lost'])},
+   legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'landmarks gone'], ['ring', orange, 'coverage lost'])},
   {name: 'drive', group: 'images', draw: drawDrive, on: true, exists: Boolean(data.drive), legend: says(['wedge', pink, 'the robot and its way'])},
   {name: 'numbers', group: 'the map', draw: drawNumbers, on: true, exists: numStations > 0,
-   legend: () => element('div', {}, 'R3: region 3; stations have their numbers when zoomed in')},
+   legend: () => element('div', {}, R.length ? 'R0: region 0; stations have their numbers when zoomed in' : 'stations have their numbers when zoomed in')},
 ].filter(layer => layer.exists);
 const drawings = {};
 const isShown = name => Boolean(drawings[name]) && map.hasLayer(drawings[name]);

@@ -25,7 +25,7 @@ function button(text, action) {
 // Rows of cells; numbers stand right.
 function table(rows, head) {
   const node = element('table');
-  const isNumber = cell => typeof cell === 'number' || (typeof cell === 'string' && /^[-\u2212\d.,]+( [kM]B)?$/.test(cell));
+  const isNumber = cell => typeof cell === 'number' || (typeof cell === 'string' && /^[-+\u2212\d.,]+( [kM]B)?$/.test(cell));
   const style = cell => isNumber(cell) ? {class: 'num'} : {};
   if (head) node.append(element('tr', {}, ...head.map((text, i) => element('th', rows.length ? style(rows[0][i]) : {}, text))));
   for (const row of rows) node.append(element('tr', {}, ...row.map(cell => element('td', style(cell), typeof cell === 'number' ? count(cell) : cell))));
@@ -84,9 +84,9 @@ document.addEventListener('keydown', event => {
 });
 
 // ---- colours that colour-blind readers tell apart: Okabe and Ito's; cividis for amounts
-const blue = '#0072B2', orange = '#D55E00', green = '#009E73', pink = '#CC79A7', sky = '#56B4E9';
+const blue = '#0072B2', orange = '#D55E00', green = '#009E73', pink = '#CC79A7', sky = '#56B4E9', purple = '#A0468A';
 const palette = [blue, '#E69F00', green, orange, pink, sky, '#B8A800'];
-const onDark = {[blue]: '#4FA8E8', [green]: '#2FC79B', [orange]: '#FF8A3D', '#A0468A': '#E58BD0'};
+const onDark = {[blue]: '#4FA8E8', [green]: '#2FC79B', [orange]: '#FF8A3D', [purple]: '#E58BD0'};
 const isDark = () => document.documentElement.classList.contains('dark');
 // The same colour, light enough for the dark ground.
 const inked = colour => isDark() && onDark[colour] || colour;

@@ -156,6 +156,10 @@ TEST(Advise, TellsWhereToTakeImagesAndWhereTheyWouldNotHelp) {
   EXPECT_EQ(advice[0].images_to_take[0].position, Eigen::Vector2d(2.5, 0));
   EXPECT_EQ(advice[0].images_to_take[1].position, Eigen::Vector2d(3.5, 0));
   EXPECT_EQ(advice[0].images_to_take[0].heading_deg, 90);
+  rows.views.plan.walls = {{.start = {2.4, -1}, .end = {2.4, 1}}};  // nobody stands that near to a wall
+  advice = Advise(rows);
+  ASSERT_THAT(advice[0].images_to_take, SizeIs(1));
+  EXPECT_EQ(advice[0].images_to_take[0].position, Eigen::Vector2d(3.5, 0));
 
   rows.findings.drops[0] = Drop(DropReason::kAmbiguous, {0, 0, 0, 30, 0});
   advice = Advise(rows);
