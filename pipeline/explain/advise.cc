@@ -25,6 +25,7 @@ constexpr double kMoreLocalized = 0.01;
 constexpr double kAlignedErrors = 0.7;
 constexpr size_t kMinAligned = 10;
 constexpr double kLeastFromWallM = 0.2;
+constexpr int kMaxNames = 6;
 // Part of the poses that lie within 10 cm and 5 degrees where there is nothing to mend.
 constexpr double kManyWithin = 0.8;
 
@@ -326,6 +327,43 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
   } else if (smaller != nullptr) {
     advice->push_back({.text = "Smaller will do: " + text(*smaller)});
   }
+}
+
+void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>* advice) {
+  std::map<size_t, std::vector<Advice::View>> views;  // by advice
+  Advice elsewhere;
+  std::set<StationIdx> stations;
+  std::string names;
+  int num_elsewhere = 0;
+  for (const FailedImage& image : failed) {
+    bool is_told = false;
+    for (size_t i = 0; image.station && i < advice->size(); ++i) {
+      const std::vector<StationIdx>& about = (*advice)[i].stations;
+      if (!std::binary_search(about.begin(), about.end(), *image.station)) continue;
+      views[i].push_back(image.view);
+      is_told = true;
+    }
+    if (is_told) continue;
+    if (image.station) stations.insert(*image.station);
+    if (++num_elsewhere <= kMaxNames) names += (names.empty() ? "" : ", ") + image.name;
+    if (elsewhere.images_to_take.size() < Advice::kMaxViews) elsewhere.images_to_take.push_back(image.view);
+  }
+  for (const auto& [i, added] : views) {
+    std::vector<Advice::View>& to_take = (*advice)[i].images_to_take;
+    to_take.insert(to_take.begin(), added.begin(), added.end());
+    if (to_take.size() > Advice::kMaxViews) to_take.resize(Advice::kMaxViews);
+  }
+  if (num_elsewhere == 0) return;
+  elsewhere.stations.assign(stations.begin(), stations.end());
+  elsewhere.text = fmt::format(
+      "{} held-out image{} failed where most are localized ({}{}). Survey images taken there, looking the "
+      "same "
+      "way, would help.",
+      num_elsewhere, num_elsewhere == 1 ? "" : "s", names, num_elsewhere > kMaxNames ? ", ..." : "");
+  // What is about the map as a whole stays last.
+  const auto place = std::find_if(advice->begin(), advice->end(),
+                                  [](const Advice& entry) { return entry.stations.empty(); });
+  advice->insert(place, std::move(elsewhere));
 }
 
 void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>* advice) {

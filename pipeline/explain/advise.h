@@ -39,6 +39,16 @@ std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& a
 void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPoint>& sizes,
               std::vector<Advice>* advice);
 
+// A held-out image that was not localized, or at a wrong place: where it was taken.
+struct FailedImage {
+  std::string name;
+  std::optional<StationIdx> station;
+  Advice::View view;
+};
+// Images to take where held-out images failed: in the advice about their places they come first, those of no
+// such advice have one of their own.
+void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>* advice);
+
 // Where held-out images were taken, and where the map puts them, floor frame, metres.
 struct PlacedImage {
   Eigen::Vector2d taken = Eigen::Vector2d::Zero();

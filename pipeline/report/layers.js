@@ -22,7 +22,6 @@ const scaleOf = (colourOf, text, low, high) => {
 const says = (...marks) => () => element('div', {}, ...marks.map(([kind, colour, text]) => element('span', {class: 'key'}, mark(kind, colour), ` ${text} `)));
 
 const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy));
-const has = {held_out: heldOut.length > 0, wrong: heldOut.some(image => image.wrong)};
 // Those that a map has nothing for are left out.
 const layers = [
   {name: 'recall', group: 'how well', draw: drawRecall, exists: missed.length > 0,
@@ -35,11 +34,11 @@ const layers = [
    legend: says(['line', sky, 'view-invariant regions of the floor plan: inside of one the same walls are in sight'])},
   {name: 'walls', group: 'the map', draw: drawWalls, on: true, exists: data.views.walls.length > 0,
    legend: () => element('div', {}, mark('line', styled('--ink')), ' walls of the floor plan')},
-  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: () => says(['line', styled('--soft'), 'regions with common or neighbouring stations'])()},
+  {name: 'region adjacency', group: 'the map', draw: drawAdjacency, exists: R.length > 1, legend: () => element('div', {}, mark('line', styled('--soft')), ' regions with common or neighbouring stations')},
   {name: 'appearance graph', group: 'images', draw: drawKept, exists: I.links.length > 0,
    legend: says(['disc', green, counted(I.kept.length, 'kept image')], ['line', green, counted(I.links.length, 'link') + ' of them'])},
   {name: 'look-alikes', group: 'images', draw: drawLookAlikes, exists: I.look_alikes.length > 0,
-   legend: says(['bow', orange, 'images of different places that look alike; the wider, the more']) },
+   legend: says(['bow', orange, 'images of different places that look alike; the wider, the more'])},
   {name: 'landmarks', group: 'the map', draw: drawLandmarks, isOfDots: L.x.length >= manyDots, on: true, exists: L.x.length > 0,
    legend: () => element('div', {}, ...(R.length ? [element('span', {class: 'key'}, ...[...new Set(regionColour)].slice(0, 3).map(colour => mark('dot', colour)), ' landmarks, in the colour of a region ')] : []),
      ...(L.region.some(region => region < 0) ? [element('span', {class: 'key'}, mark('dot', '#888888'), R.length ? ' of no region ' : ' landmarks')] : []),
@@ -51,9 +50,9 @@ const layers = [
   {name: 'self-test errors', group: 'how well', draw: drawErrors, exists: heldOut.some(isLocalized),
    legend: () => element('div', {}, mark('arrow', blue), ` from where an image was taken to where the map puts it${errorFactor > 1 ? `, ${errorFactor} times as long` : ''}`)},
   {name: 'images to take', group: 'images', draw: drawViewsToTake, exists: viewsToTake.length > 0,
-   legend: says(viewsToTake.some(view => view.heading !== null) ? ['wedge', purple, 'images to take next'] : ['ring', purple, 'images to take next, in all directions'])},
-  {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: has.held_out,
-   legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(has.wrong ? [['diamond', pink, 'wrong']] : []))},
+   legend: says(...[['wedge', purple, 'images to take next', true], ['ring', purple, 'images to take next, in all directions', false]].filter(([, , , hasHeading]) => viewsToTake.some(view => (view.heading !== null) === hasHeading)))},
+  {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: heldOut.length > 0,
+   legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(heldOut.some(image => image.wrong) ? [['diamond', pink, 'wrong']] : []))},
   {name: 'changes', group: 'the map', draw: drawChanges, on: true, exists: Boolean(data.changes),
    legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'landmarks gone'], ['ring', orange, 'coverage lost'])},
   {name: 'drive', group: 'images', draw: drawDrive, on: true, exists: Boolean(data.drive), legend: says(['wedge', pink, 'the robot and its way'])},

@@ -226,6 +226,14 @@ Json PlaceJson(const Json& floor) {
   return place;
 }
 
+// The station of a check's image, if it is one of the map.
+std::optional<StationIdx> StationOf(const Json& image, const MapRows& rows) {
+  if (!image.contains("station") || !image["station"].is_number_integer()) return std::nullopt;
+  const auto station = image["station"].get<int64_t>();
+  if (station < 0 || station >= static_cast<int64_t>(rows.stations.size())) return std::nullopt;
+  return static_cast<StationIdx>(station);
+}
+
 // Per held-out image: where it was taken and where the map put it, or why it did not.
 Json HeldOutJson(const Json& check, const MapRows& rows) {
   Json list = Json::array();
@@ -233,10 +241,7 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
     if (!image.contains("true_floor")) continue;
     Json entry = {
         {"name", image.value("name", "")}, {"at", PlaceJson(image["true_floor"])}, {"station", nullptr}};
-    if (image.contains("station") && image["station"].is_number_integer()) {
-      const auto station = image["station"].get<int64_t>();
-      if (station >= 0 && station < static_cast<int64_t>(rows.stations.size())) entry["station"] = station;
-    }
+    if (const auto station = StationOf(image, rows)) entry["station"] = *station;
     if (image.contains("floor")) {
       entry["found"] = PlaceJson(image["floor"]);
       entry["error_m"] = Rounded(image["error_m"].get<double>(), 1e-5);
@@ -251,6 +256,20 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
     list.push_back(std::move(entry));
   }
   return list;
+}
+
+std::vector<FailedImage> FailedImages(const Json& check, const MapRows& rows) {
+  std::vector<FailedImage> failed;
+  for (const Json& image : check["images"]) {
+    if (!image.contains("true_floor") || (image.contains("floor") && !image.value("is_gross_error", false)))
+      continue;
+    const Json& floor = image["true_floor"];
+    FailedImage entry{.name = image.value("name", ""), .station = StationOf(image, rows)};
+    entry.view.position = {floor[0].get<double>(), floor[1].get<double>()};
+    if (floor.size() > 2) entry.view.heading_deg = floor[2].get<double>();
+    failed.push_back(std::move(entry));
+  }
+  return failed;
 }
 
 // Of a check's images those that were localized, and not at a wrong place.
@@ -329,6 +348,7 @@ Json BuildJson(const Json& build) {
 
 std::vector<Advice> ReportAdvice(const ReportInputs& inputs) {
   std::vector<Advice> advice = Advise(*inputs.rows);
+  if (inputs.check != nullptr) AddFailedImages(FailedImages(*inputs.check, *inputs.rows), &advice);
   if (inputs.check != nullptr && inputs.rows->frame.unit == "metre")
     AddMisalignment(PlacedImages(*inputs.check), &advice);
   AddSizes(*inputs.rows, inputs.num_bytes, inputs.pareto, &advice);

@@ -46,7 +46,7 @@ for (const entry of data.advice) {
   if (entry.views.length) {
     const allAround = entry.views.every(([, , heading]) => heading === null);
     item.append(element('div', {class: 'soft'}, `images ${allAround ? 'in all directions ' : ''}at `,
-      entry.views.map(([x, y, heading]) => `${metres(x / 100)}, ${metres(y / 100)}${heading === null ? '' : ` towards ${heading}\u00B0`}`).join('; ')));
+      entry.views.map(([x, y, heading]) => `${metres(x / 100)}, ${metres(y / 100)}${heading === null ? (allAround ? '' : ' in all directions') : ` towards ${heading}\u00B0`}`).join('; ')));
   }
   $('advice-list').append(item);
 }

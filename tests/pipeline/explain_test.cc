@@ -235,6 +235,26 @@ TEST(Advise, NamesTheSmallestMapThatDoesAsMuchOrTheSmallestThatDoesMore) {
   EXPECT_THAT(SizesText({every_class}), HasSubstr("([emit_map] landmarks = \"all\") localizes"));
 }
 
+TEST(Advise, SendsTheSurveyWhereHeldOutImagesFailed) {
+  const Advice::View between{.position = {0.5, 0}, .heading_deg = 90};
+  std::vector<Advice> advice = {{.text = "region 0", .stations = {0, 1}, .images_to_take = {between}},
+                                {.text = "an option"}};
+  const auto failed = [](const char* name, std::optional<StationIdx> station, double x) {
+    return FailedImage{.name = name, .station = station, .view = {.position = {x, 0}, .heading_deg = 45}};
+  };
+  AddFailedImages({failed("a.jpg", 1, 1.1), failed("b.jpg", 3, 3.1), failed("c.jpg", std::nullopt, 9)},
+                  &advice);
+  ASSERT_THAT(advice, SizeIs(3));
+  ASSERT_THAT(advice[0].images_to_take, SizeIs(2));
+  EXPECT_EQ(advice[0].images_to_take[0].position.x(), 1.1);
+  EXPECT_THAT(advice[1].text, HasSubstr("2 held-out images failed where most are localized (b.jpg, c.jpg)"));
+  EXPECT_THAT(advice[1].stations, ElementsAre(3));
+  EXPECT_THAT(advice[1].images_to_take, SizeIs(2));
+  EXPECT_EQ(advice[2].text, "an option");
+  for (int i = 0; i < 20; ++i) AddFailedImages({failed("a.jpg", 1, i)}, &advice);
+  EXPECT_THAT(advice[0].images_to_take, SizeIs(Advice::kMaxViews));
+}
+
 TEST(Advise, TellsErrorsOfAFrameFromNoise) {
   Random random(1);
   std::vector<PlacedImage> noisy, scaled, at_one_place;
