@@ -130,10 +130,11 @@ function explainImage(i) {
 }
 function explainView(i) {
   const {x, y, heading, advice} = viewsToTake[i], {text, region, stations} = data.advice[advice];
+  const about = region !== null ? [button(`region ${region}`, () => explainRegion(region))] : stations.slice(0, 1).map(station => button(`station ${station}`, () => explainStation(station)));
   choose({region: region === null ? -1 : region});
   say(element('h3', {}, 'Image to take'), element('p', {}, `at ${metres(x / 100)}, ${metres(y / 100)}, ${heading === null ? 'in all directions' : `looking towards ${heading}\u00B0`}`),
     element('h3', {}, 'Why'), element('p', {}, text),
-    element('p', {class: 'buttons'}, region === null ? button(`station ${stations[0]}`, () => explainStation(stations[0])) : button(`region ${region}`, () => explainRegion(region))));
+    element('p', {class: 'buttons'}, ...about));
 }
 
 // ---- what is under the pointer
