@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/output_path.h"
 #include "core/temporary.h"
 #include "core/write_error.h"
 
@@ -46,8 +47,7 @@ void RemoveLeftovers(const std::string& path) {
   const fs::path target(path);
   std::vector<fs::path> leftovers;
   std::error_code error;
-  const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  for (const fs::directory_entry& entry : fs::directory_iterator(parent, error)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(path), error)) {
     const std::string name = entry.path().filename().string();
     if (!IsTemporaryName(name, target.filename().string())) continue;
     const auto process = static_cast<pid_t>(std::strtol(name.c_str() + name.rfind(".tmp-") + 5, nullptr, 10));
@@ -60,10 +60,9 @@ void RemoveLeftovers(const std::string& path) {
 Status CheckTarget(const std::string& path, const std::string& kind, const std::vector<std::string>& marks) {
   std::error_code error;
   if (!fs::exists(path, error)) {
-    const fs::path parent = fs::path(path).parent_path();
-    if (parent.empty() || fs::is_directory(parent, error)) return Ok();
-    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path,
-                     parent.string());
+    const std::string parent = FolderOf(path);
+    if (fs::is_directory(parent, error)) return Ok();
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", path, parent);
   }
   if (!fs::is_directory(path, error)) {
     return MakeError(ErrorCode::kIo, "{}: is a file, expected a folder; remove it or name another", path);

@@ -12,7 +12,8 @@ namespace fs = std::filesystem;
 
 bool IsSameFile(const std::string& path1, const std::string& path2) {
   std::error_code error;
-  return path1 == path2 || fs::equivalent(path1, path2, error);
+  return fs::path(path1).lexically_normal() == fs::path(path2).lexically_normal() ||
+         fs::equivalent(path1, path2, error);
 }
 
 std::string FolderOf(const std::string& path) {

@@ -7,7 +7,7 @@
 
 namespace cairn {
 
-// Whether two paths lead to one file, under whichever names.
+// Whether two paths lead to one file, under whichever names; of files that do not exist, by the names alone.
 bool IsSameFile(const std::string& path1, const std::string& path2);
 
 // The folder that a file is in, or is to be in: "." where the path names none.

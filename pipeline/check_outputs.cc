@@ -81,7 +81,7 @@ Status CheckOutputs(const CLI::App& subcommand, const std::vector<std::string>& 
   }
   for (size_t i = 0; i < outputs.size(); ++i) {
     for (size_t k = 0; k < i; ++k) {
-      if (fs::path(outputs[i].path).lexically_normal() == fs::path(outputs[k].path).lexically_normal()) {
+      if (IsSameFile(outputs[i].path, outputs[k].path)) {
         return MakeError(ErrorCode::kInvalidArgument,
                          "{}: two different files cannot be written there; choose another name for one",
                          outputs[i].path);

@@ -123,13 +123,12 @@ std::string FloorPicture(const std::string& folder) { return folder + "/floor.sv
 std::string AmbiguityPicture(const std::string& folder) { return folder + "/ambiguity.svg"; }
 
 // The page and the pictures can be written, and none is a file that is read, given or found.
-Status CheckPageAndPictures(const Arguments& arguments, std::vector<std::string> inputs) {
+Status CheckPageAndPictures(const Arguments& arguments, const std::vector<std::string>& inputs) {
   CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(arguments.output_path));
   CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.output_path, inputs));
   if (arguments.svg_dir.empty()) return Ok();
-  inputs.push_back(arguments.output_path);
   for (const std::string& picture : {FloorPicture(arguments.svg_dir), AmbiguityPicture(arguments.svg_dir)}) {
-    if (fs::path(picture).lexically_normal() == fs::path(arguments.output_path).lexically_normal())
+    if (IsSameFile(picture, arguments.output_path))
       return MakeError(ErrorCode::kInvalidArgument, "{}: is the page and a picture; choose another name",
                        picture);
     CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(picture, inputs));
@@ -187,6 +186,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     inputs.compared_bytes = static_cast<int64_t>(fs::file_size(arguments.compare_path));
     inputs.compared_name = fs::path(arguments.compare_path).filename().string();
   }
+  inputs.advice = ReportAdvice(inputs);
   const Json data = ReportData(inputs);
   const std::string page = arguments.print ? PrintedReportPage(inputs, data) : ReportPage(data);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, page));

@@ -26,8 +26,7 @@ namespace fs = std::filesystem;
 // Holds the folder of a map against other updates and rollbacks there, until it goes.
 // Errors: Busy, NotFound, Io.
 Result<FileLock> LockFolderOf(const std::string& map_path) {
-  const fs::path folder = fs::path(map_path).parent_path();
-  FileLock lock(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  FileLock lock(open(FolderOf(map_path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (lock.descriptor() < 0) {
     return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}", map_path,
                      std::strerror(errno));
@@ -48,7 +47,7 @@ std::string FileOf(const std::string& map_path) {
 void RemoveStale(const std::string& map_path) {
   std::error_code error;
   const fs::path map(map_path);
-  for (const fs::directory_entry& entry : fs::directory_iterator(map.parent_path(), error)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(map_path), error)) {
     const std::string name = entry.path().filename().string();
     for (const std::string& target : {map.filename().string(), PreviousMapPath(map.filename().string())}) {
       if (IsTemporaryName(name, target)) fs::remove(entry.path(), error);

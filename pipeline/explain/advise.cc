@@ -298,19 +298,15 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
   const auto within = rows.self_test.find("within_10cm_5deg_ratio");
   if (localized == rows.self_test.end() || within == rows.self_test.end()) return;
   const auto bytes = static_cast<double>(num_bytes);
-  const auto does_more = [&](const ParetoPoint& size) {
-    return size.localized_ratio >= localized->second + kMoreLocalized &&
-           size.within_10cm_5deg_ratio >= within->second;
-  };
   const ParetoPoint *smaller = nullptr, *better = nullptr;
   for (const ParetoPoint& size : sizes) {
-    const auto of_size = static_cast<double>(size.num_bytes);
-    const bool does_as_much =
-        size.localized_ratio >= localized->second && size.within_10cm_5deg_ratio >= within->second;
-    if (does_as_much && of_size * kOtherSizeFactor <= bytes &&
+    if (size.localized_ratio < localized->second || size.within_10cm_5deg_ratio < within->second) continue;
+    if (static_cast<double>(size.num_bytes) * kOtherSizeFactor <= bytes &&
         (smaller == nullptr || size.num_bytes < smaller->num_bytes))
       smaller = &size;
-    if (does_more(size) && (better == nullptr || size.num_bytes < better->num_bytes)) better = &size;
+    if (size.localized_ratio >= localized->second + kMoreLocalized &&
+        (better == nullptr || size.num_bytes < better->num_bytes))
+      better = &size;
   }
   const auto text = [&](const ParetoPoint& size) {
     const std::string error =
@@ -357,8 +353,7 @@ void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>
   elsewhere.stations.assign(stations.begin(), stations.end());
   elsewhere.text = fmt::format(
       "{} held-out image{} failed where most are localized ({}{}). Survey images taken there, looking the "
-      "same "
-      "way, would help.",
+      "same way, would help.",
       num_elsewhere, num_elsewhere == 1 ? "" : "s", names, num_elsewhere > kMaxNames ? ", ..." : "");
   // What is about the map as a whole stays last.
   const auto place = std::find_if(advice->begin(), advice->end(),

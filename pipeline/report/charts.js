@@ -33,17 +33,15 @@ function histogram(caption, values, xTitle, yTitle) {
 }
 function pickRegion(region) {
   explainRegion(region);
-  goTo(placesOf(R[region].stations));
-  $('floor').scrollIntoView();
+  lookAt(placesOf(R[region].stations));
 }
 function drawRegionCharts() {
-  const ratio = ([, test]) => (test.localized - test.wrong) / test.held_out;
-  const all = R.map((region, i) => [i, region.test]).filter(([, test]) => test).sort((a, b) => ratio(a) - ratio(b) || b[1].held_out - a[1].held_out || a[0] - b[0]);
+  const all = R.map((region, i) => [i, region.test]).filter(([, test]) => test).sort((a, b) => recall(a[1]) - recall(b[1]) || b[1].held_out - a[1].held_out || a[0] - b[0]);
   const which = all.length > mostBars ? `, the ${mostBars} worst of ${all.length}` : ', worst first';
   const worst = all.slice(0, mostBars);
   const told = ([i, test]) => `region ${i}: ${testText(test)}`;
   if (worst.length) {
-    bars([term('recall', 'Recall'), ` by region${which}; orange: below ${percent(data.poor_localized_ratio, 0)}; click a bar to see its region`], worst.map(([i]) => String(i)), worst.map(entry => Math.round(1000 * ratio(entry)) / 10), 'region', 'localized right, %',
+    bars([term('recall', 'Recall'), ` by region${which}; orange: below ${percent(data.poor_localized_ratio, 0)}; click a bar to see its region`], worst.map(([i]) => String(i)), worst.map(([, test]) => Math.round(1000 * recall(test)) / 10), 'region', 'localized right, %',
          {colours: worst.map(([, test]) => isPoor(test) ? inked(orange) : inked(blue)), told: worst.map(told), onPick: bar => pickRegion(worst[bar][0]), yScale: {min: 0, max: 100}});
   }
   const farthest = all.filter(([, test]) => test.median_m !== undefined).sort((a, b) => b[1].median_m - a[1].median_m).slice(0, mostBars), factor = unit === 'm' ? 100 : 1;

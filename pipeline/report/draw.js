@@ -2,8 +2,10 @@
 const selected = {station: -1, region: -1, image: -1};
 const ground = '#ffffff', dark = '#000000';
 
+const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy));
+const levels = S.visible.map(visible => Math.round(63 * visible / (mostSeen || 1)));
 function drawStations(context, place, inside, scale) {
-  const size = markSize(scale), levels = S.visible.map(visible => Math.round(63 * visible / (mostSeen || 1)));
+  const size = markSize(scale);
   if (size < 4) dots(context, place, 3, S.x, S.y, shades, i => levels[i]);
   for (let i = 0; i < numStations; ++i) {
     if (size < 4 && i !== selected.station) continue;
@@ -84,7 +86,7 @@ function drawRegions(context, place, inside, scale, whole) {
 // Of the regions of a station, the one that localizes the smallest part of its held-out images.
 const recallClasses = [[1, blue, 'all'], [data.poor_localized_ratio, sky, `${percent(data.poor_localized_ratio, 0)} or more`], [0.5, '#E69F00', 'half or more'], [0, orange, 'less']];
 const missed = byPlace(regionsAt.map(regions => regions.map(region => R[region].test).filter(Boolean)
-  .reduce((most, test) => Math.max(most, 1 - (test.localized - test.wrong) / test.held_out), null)));
+  .reduce((most, test) => Math.max(most, 1 - recall(test)), null)));
 const patchAlpha = 0.6;
 function drawRecall(context, place, inside, scale, whole) {
   context.globalAlpha = patchAlpha;
@@ -301,11 +303,9 @@ function drawNumbers(context, place, inside, scale, whole) {
     [[x, y], [x, (y + north) / 2], [x, (y + south) / 2], [(x + west) / 2, y], [(x + east) / 2, y]]
       .some(([px, py]) => put(`R${i}`, px, py, inked(regionColour[i])));
   }
-  const size = markSize(scale);
   if (0.4 * spacing / 100 * scale < 28 || !isShown('stations')) return;
   context.font = '11px sans-serif';
   for (let i = 0; i < numStations && taken.length < 2 * mostNumbers; ++i) {
-    const [x, y] = place(S.x[i], S.y[i]), turn = (S.heading[i] || 0) * Math.PI / 180, ahead = S.heading[i] === null ? 0 : 0.75 * size;
-    put(String(i), x + ahead * Math.cos(turn), y - ahead * Math.sin(turn));
+    put(String(i), ...place(...aheadOf(S.x[i], S.y[i], S.heading[i], 1.25 * markSize(scale))));
   }
 }

@@ -36,12 +36,16 @@ function goTo(places) {
   if (shown.contains(bounds) && shown.getEast() - shown.getWest() < 4 * Math.max(6, bounds.getEast() - bounds.getWest())) return;
   map.fitBounds(bounds.pad(0.2));
 }
+// The same from another part of the page.
+function lookAt(places) {
+  goTo(places);
+  $('floor').scrollIntoView();
+}
 const placesOf = stations => stations.map(i => [S.x[i], S.y[i]]);
 function showAdvice(entry) {
   if (entry.views.length) show('images to take');
   if (entry.region !== null) explainRegion(entry.region); else explainStation(entry.stations[0]);
-  goTo(placesOf(entry.stations));
-  $('floor').scrollIntoView();
+  lookAt(placesOf(entry.stations));
 }
 function choose({station = -1, region = -1, image = -1}) {
   Object.assign(selected, {station, region, image});

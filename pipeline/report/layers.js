@@ -21,7 +21,6 @@ const scaleOf = (colourOf, text, low, high) => {
 };
 const says = (...marks) => () => element('div', {}, ...marks.map(([kind, colour, text]) => element('span', {class: 'key'}, mark(kind, colour), ` ${text} `)));
 
-const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy));
 // Those that a map has nothing for are left out.
 const layers = [
   {name: 'recall', group: 'how well', draw: drawRecall, exists: missed.length > 0,

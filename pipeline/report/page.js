@@ -112,16 +112,15 @@ heldOut.forEach((image, i) => image.station !== null && heldOutAt[image.station]
 const isLocalized = image => Boolean(image.found);
 const isBad = image => !image.found || image.wrong;
 const heldOutOf = region => [...new Set(R[region].stations.flatMap(station => heldOutAt[station]))].sort((a, b) => a - b);
-// A map that is not sealed, or was checked with other images, says of its regions what these images say.
-if (heldOut.length && !data.held_out_is_self_test) {
-  R.forEach((region, i) => {
-    const images = heldOutOf(i).map(image => heldOut[image]), placed = images.filter(isLocalized);
-    region.test = images.length ? {held_out: images.length, localized: placed.length, wrong: placed.filter(isBad).length} : undefined;
-    if (placed.length) {
-      Object.assign(region.test, {median_m: quantile(placed.map(image => image.error_m), 0.5),
-                                  median_deg: quantile(placed.map(image => image.error_deg), 0.5),
-                                  p90_m: quantile(placed.map(image => image.error_m), 0.9)});
-    }
-  });
+// How images fared, in the words of a region's self-test; of none, nothing.
+function fared(images) {
+  if (!images.length) return undefined;
+  const placed = images.filter(isLocalized), test = {held_out: images.length, localized: placed.length, wrong: placed.filter(isBad).length};
+  if (!placed.length) return test;
+  const part = (key, at) => quantile(placed.map(image => image[key]), at);
+  return {...test, median_m: part('error_m', 0.5), median_deg: part('error_deg', 0.5), p90_m: part('error_m', 0.9), p90_deg: part('error_deg', 0.9)};
 }
-const isPoor = test => test.localized - test.wrong < data.poor_localized_ratio * test.held_out;
+// A map that is not sealed, or was checked with other images, says of its regions what these images say.
+if (heldOut.length && !data.held_out_is_self_test) R.forEach((region, i) => { region.test = fared(heldOutOf(i).map(image => heldOut[image])); });
+const recall = test => (test.localized - test.wrong) / test.held_out;
+const isPoor = test => recall(test) < data.poor_localized_ratio;

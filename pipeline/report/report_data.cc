@@ -258,32 +258,25 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
   return list;
 }
 
-std::vector<FailedImage> FailedImages(const Json& check, const MapRows& rows) {
-  std::vector<FailedImage> failed;
-  for (const Json& image : check["images"]) {
-    if (!image.contains("true_floor") || (image.contains("floor") && !image.value("is_gross_error", false)))
-      continue;
-    const Json& floor = image["true_floor"];
-    FailedImage entry{.name = image.value("name", ""), .station = StationOf(image, rows)};
-    entry.view.position = {floor[0].get<double>(), floor[1].get<double>()};
-    if (floor.size() > 2) entry.view.heading_deg = floor[2].get<double>();
-    failed.push_back(std::move(entry));
-  }
-  return failed;
-}
+Eigen::Vector2d PlaceOf(const Json& floor) { return {floor[0].get<double>(), floor[1].get<double>()}; }
 
-// Of a check's images those that were localized, and not at a wrong place.
-std::vector<PlacedImage> PlacedImages(const Json& check) {
+// What a check's images say: where they failed, and how those err that were localized right.
+void AddCheckAdvice(const Json& check, const MapRows& rows, std::vector<Advice>* advice) {
+  std::vector<FailedImage> failed;
   std::vector<PlacedImage> placed;
   for (const Json& image : check["images"]) {
-    if (!image.contains("true_floor") || !image.contains("floor") || image.value("is_gross_error", false))
+    if (!image.contains("true_floor")) continue;
+    const Json& taken = image["true_floor"];
+    if (image.contains("floor") && !image.value("is_gross_error", false)) {
+      placed.push_back({.taken = PlaceOf(taken), .found = PlaceOf(image["floor"])});
       continue;
-    const auto place = [&](const char* key) {
-      return Eigen::Vector2d(image[key][0].get<double>(), image[key][1].get<double>());
-    };
-    placed.push_back({.taken = place("true_floor"), .found = place("floor")});
+    }
+    failed.push_back({.name = image.value("name", ""), .station = StationOf(image, rows)});
+    failed.back().view.position = PlaceOf(taken);
+    if (taken.size() > 2) failed.back().view.heading_deg = taken[2].get<double>();
   }
-  return placed;
+  AddFailedImages(failed, advice);
+  if (rows.frame.unit == "metre") AddMisalignment(placed, advice);
 }
 
 // The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees, median
@@ -348,9 +341,7 @@ Json BuildJson(const Json& build) {
 
 std::vector<Advice> ReportAdvice(const ReportInputs& inputs) {
   std::vector<Advice> advice = Advise(*inputs.rows);
-  if (inputs.check != nullptr) AddFailedImages(FailedImages(*inputs.check, *inputs.rows), &advice);
-  if (inputs.check != nullptr && inputs.rows->frame.unit == "metre")
-    AddMisalignment(PlacedImages(*inputs.check), &advice);
+  if (inputs.check != nullptr) AddCheckAdvice(*inputs.check, *inputs.rows, &advice);
   AddSizes(*inputs.rows, inputs.num_bytes, inputs.pareto, &advice);
   return advice;
 }
@@ -376,7 +367,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
                {"views", ViewsJson(rows.views)},
                {"drops", DropsJson(rows.findings)},
                {"self_test", rows.self_test},
-               {"advice", AdviceJson(ReportAdvice(inputs))},
+               {"advice", AdviceJson(inputs.advice)},
                {"poor_localized_ratio", kPoorLocalizedRatio},
                {"pareto", ParetoJson(inputs.pareto)},
                {"options", rows.stage_options}};

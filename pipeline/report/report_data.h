@@ -27,10 +27,11 @@ struct ReportInputs {
   const MapRows* compared = nullptr;                         // the map to compare with; may be null
   int64_t compared_bytes = 0;
   std::string compared_name;        // its file
+  std::vector<Advice> advice;       // ReportAdvice
   std::vector<ParetoPoint> pareto;  // the place's maps of other sizes; none: not known
 };
 
-// What would make the map better (Advise, AddSizes).
+// What would make the map better, from all the other inputs (pipeline/explain/advise.h).
 std::vector<Advice> ReportAdvice(const ReportInputs& inputs);
 
 // REQUIRES: IsBuildReport, IsCheckReport, IsDrive (report_inputs.h)

@@ -127,7 +127,7 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
                       rows.stations.size(), EscapeXml(rows.writer));
   html += "<figure>" + FloorSvg(rows) + "</figure>\n";
   if (const Result<std::string> svg = AmbiguitySvg(rows); svg.ok()) html += "<figure>" + *svg + "</figure>\n";
-  html += block("What would make it better", AdviceText(ReportAdvice(inputs)));
+  html += block("What would make it better", AdviceText(inputs.advice));
   std::string self_test;
   for (const auto& [name, value] : rows.self_test) self_test += fmt::format("{:<26} {:.4g}\n", name, value);
   html += block("Self-test", self_test);

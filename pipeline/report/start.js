@@ -1,14 +1,16 @@
 // Light and dark, and in which order the page is drawn: first the floor, then the rest.
-let chartsDrawn = false;
-function setTheme(isNowDark) {
+function markTheme(isNowDark) {
   document.documentElement.classList.toggle('dark', isNowDark);
   $('theme').textContent = isNowDark ? 'light' : 'dark';
   $('theme').setAttribute('aria-pressed', String(isNowDark));
+}
+function setTheme(isNowDark) {
+  markTheme(isNowDark);
   redrawAll();
   showLegend();
   charts.splice(0).forEach(one => one.destroy());
   $('charts').replaceChildren();
-  if (chartsDrawn) drawCharts();
+  drawCharts();
 }
 // What was chosen last, on this machine; where the browser does not keep it, what the system says.
 function keptTheme() {
@@ -26,7 +28,7 @@ function extent(places, landmarks) {
   return [places.reduce((a, b) => Math.min(a, b), shown[0] ?? Infinity), places.reduce((a, b) => Math.max(a, b), shown[1] ?? -Infinity)];
 }
 if (isSmallScreen()) $('layers-box').open = false;
-document.documentElement.classList.toggle('dark', keptTheme() ? keptTheme() === 'dark' : window.matchMedia('(prefers-color-scheme: dark)').matches);
+markTheme(keptTheme() ? keptTheme() === 'dark' : window.matchMedia('(prefers-color-scheme: dark)').matches);
 const [west, east] = extent(S.x.concat(heldOut.map(image => image.at[0])), L.x), [south, north] = extent(S.y.concat(heldOut.map(image => image.at[1])), L.y);
 const everything = leaflet.latLngBounds(at(west, south), at(east, north)).pad(0.05);
 map.fitBounds(everything);
@@ -51,7 +53,6 @@ showLegend();
 sayFirst();
 document.documentElement.dataset.floorDrawn = String(Math.round(performance.now()));
 setTimeout(() => {
-  chartsDrawn = true;
-  setTheme(isDark());
+  drawCharts();
   document.documentElement.dataset.ready = 'yes';
 }, 0);

@@ -1,18 +1,14 @@
 // The head of the page, the advice, and what the self-test says.
 const hasSelfTest = data.self_test.num_held_out > 0 && data.self_test.num_localized !== undefined;
 const numCovered = S.x.filter((x, i) => !isUncovered(i)).length;
-const placed = heldOut.filter(isLocalized);
 // Figures of the self-test: the map's own, or else those of the images that were given.
 const tested = (() => {
   const figures = data.self_test;
   if (hasSelfTest) {
-    return {num: figures.num_held_out, localized: figures.num_localized, wrong: figures.num_gross_errors || 0, median_m: figures.median_error_m,
+    return {held_out: figures.num_held_out, localized: figures.num_localized, wrong: figures.num_gross_errors || 0, median_m: figures.median_error_m,
             median_deg: figures.median_error_deg, p90_m: figures.p90_error_m, p90_deg: figures.p90_error_deg};
   }
-  if (!heldOut.length) return null;
-  const part = (key, at) => placed.length ? quantile(placed.map(image => image[key]), at) : undefined;
-  return {num: heldOut.length, localized: placed.length, wrong: placed.filter(isBad).length, median_m: part('error_m', 0.5),
-          median_deg: part('error_deg', 0.5), p90_m: part('error_m', 0.9), p90_deg: part('error_deg', 0.9)};
+  return fared(heldOut);
 })();
 function card(value, caption, {bad = false, action = null} = {}) {
   const content = [element('strong', bad ? {class: 'bad'} : {}, value), element('span', {}, ...[].concat(caption))];
@@ -30,7 +26,7 @@ card(count(L.x.length), [term('landmark', L.x.length === 1 ? 'landmark' : 'landm
 card(count(R.length), [term('region', R.length === 1 ? 'region' : 'regions'), data.lower_bound ? `, at least ${data.lower_bound} are needed` : '']);
 card(`${count(numCovered)} of ${count(numStations)}`, [term('station', 'stations'), ' ', term('covered')], {bad: numCovered < numStations});
 if (tested) {
-  card(`${tested.localized} of ${tested.num}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.num});
+  card(`${tested.localized} of ${tested.held_out}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.held_out});
   if (tested.median_m !== undefined && tested.median_deg !== undefined) {
     card(`${lengthText(tested.median_m)}, ${degrees(tested.median_deg)}`, tested.p90_m === undefined || tested.p90_deg === undefined ? 'median error' : `median error; nine of ten within ${lengthText(tested.p90_m)}, ${degrees(tested.p90_deg)}`);
   }
@@ -52,7 +48,7 @@ for (const entry of data.advice) {
 }
 if (!data.advice.length) $('advice-list').replaceWith(element('p', {}, 'Every station is covered, and no region stands out.'));
 // Of many, the most important first.
-const hidden = [...$('advice-list') ? $('advice-list').children : []].slice(10);
+const hidden = [...document.querySelectorAll('#advice-list > li')].slice(10);
 if (hidden.length) {
   hidden.forEach(item => { item.hidden = true; });
   const all = button(`show ${hidden.length} more`, () => {
@@ -109,8 +105,7 @@ function failedNodes() {
     const image = heldOut[i];
     return [button(image.name, () => {
       explainImage(i);
-      goTo([image.at]);
-      $('floor').scrollIntoView();
+      lookAt([image.at]);
     }), `${metres(image.at[0] / 100)}, ${metres(image.at[1] / 100)}`, image.station === null ? 'none near' : `${image.station}${regionsAt[image.station].length ? ` (region ${regionsAt[image.station].join(', ')})` : ' (no region)'}`,
             image.found ? outcome(image) : reason(image)];
   });

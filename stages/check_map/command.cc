@@ -54,10 +54,8 @@ Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const
 }
 
 Result<std::vector<HeldOutImage>> ReadHeldOutImages(const Arguments& arguments, const MapHead& rows) {
-  const fs::path folder = fs::path(arguments.queries_path).parent_path();
-  const std::string root = !arguments.capture_path.empty() ? arguments.capture_path
-                           : folder.empty()                ? "."
-                                                           : folder.string();
+  const std::string root =
+      arguments.capture_path.empty() ? FolderOf(arguments.queries_path) : arguments.capture_path;
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(root));
   std::vector<Reject> rejects;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> queries,
