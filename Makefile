@@ -83,4 +83,4 @@ docs: all  ## Write docs/recipe.md from the options that the stages declare
 	@$(CAIRN) recipe-reference > docs/recipe.md
 
 clean:  ## Remove everything that was built, maps included
-	@rm -rf build maps/*.cairn maps/*.build maps/*.report.json maps/*.svg maps/*.png
+	@rm -rf build maps/*.cairn maps/*.build maps/*.report.json maps/*.pareto.csv maps/*.svg maps/*.png
