@@ -46,6 +46,10 @@ const char* ErrorCodeName(ErrorCode code) {
       return "disk_full";
     case ErrorCode::kLost:
       return "lost";
+    case ErrorCode::kNotNewer:
+      return "not_newer";
+    case ErrorCode::kOtherMap:
+      return "other_map";
   }
   return "failed";
 }

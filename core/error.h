@@ -34,6 +34,9 @@ enum class ErrorCode : int {
   kReadOnly = 19,     // the folder or file may not be written
   kDiskFull = 20,     // no space is left
   kLost = 21,         // a robot that does not know any more where it is
+  // Signed maps that are right in themselves, but not what this robot may take.
+  kNotNewer = 22,  // of an epoch that is not after that of the map in place, or below the least one asked for
+  kOtherMap = 23,  // of another name: another site's
 };
 
 // Stable lower-case name of a code, as it stands in error.json ("corrupt", "no_data", ...).

@@ -21,7 +21,7 @@
 namespace cairn {
 namespace {
 
-static_assert(CAIRN_LOST == static_cast<int>(ErrorCode::kLost));
+static_assert(CAIRN_OTHER_MAP == static_cast<int>(ErrorCode::kOtherMap));
 static_assert(CAIRN_AMBIGUOUS == static_cast<int>(NoFix::kAmbiguous));
 
 struct OpenLocalizer {
@@ -232,7 +232,7 @@ const char* cairn_version(void) { return CAIRN_VERSION; }
 
 const char* cairn_error_name(int32_t code) {
   if (code == CAIRN_OK) return "ok";
-  return code < CAIRN_OK || code > CAIRN_LOST ? "unknown" : ErrorCodeName(static_cast<ErrorCode>(code));
+  return code < CAIRN_OK || code > CAIRN_OTHER_MAP ? "unknown" : ErrorCodeName(static_cast<ErrorCode>(code));
 }
 
 const char* cairn_reason_name(int32_t reason) {

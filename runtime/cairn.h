@@ -53,7 +53,9 @@ enum {
   CAIRN_WRONG_KEY = 18,
   CAIRN_READ_ONLY = 19,
   CAIRN_DISK_FULL = 20,
-  CAIRN_LOST = 21
+  CAIRN_LOST = 21,
+  CAIRN_NOT_NEWER = 22, /* a signed map of an epoch that is not after what this robot has or asks for */
+  CAIRN_OTHER_MAP = 23  /* a signed map of another name: another site's */
 };
 
 /* Why an image has no fix: a result, not an error.  Append-only. */
