@@ -9,6 +9,10 @@
 #include "core/map_rows.h"
 #include "core/map_seal.h"
 
+namespace SQLite {
+class Database;
+}
+
 namespace cairn {
 
 struct MapFileOptions {
@@ -31,13 +35,14 @@ class MapFile {
   const MapHead& head() const { return head_; }
   const MapDirectory& directory() const { return directory_; }
   const Seal& seal() const { return seal_; }
-  // Minor version of the file's format.
+  // Minor version of the file's format: for people.  Nothing is read otherwise because of it, since no hash
+  // but the whole file's covers it.
   int minor_version() const { return minor_version_; }
 
   // The bytes of directory().blocks()[block].  Errors: Corrupt (not those whose hash the directory has), Io.
   Result<std::string> ReadBlock(int64_t block) const;
-  // What the compilation found out: not under the root's hash, so for who judges the map, not for robots.
-  // To be checked with CheckMapFindings.  Errors: Corrupt, Io.
+  // What the compilation found out, checked against the hash that the head has of it, or, of earlier formats,
+  // that of the file.  To be checked with CheckMapFindings.  Errors: Corrupt, Io.
   Result<MapFindings> ReadFindings() const;
   // "PATH: block 7", for messages.
   std::string NameOf(int64_t block) const;
@@ -45,8 +50,11 @@ class MapFile {
  private:
   struct Connection;
   MapFile();
+  // Throws SQLite::Exception.
+  Status ReadHead(SQLite::Database& database, const MapFileOptions& options);
 
   std::string path_;
+  int64_t num_bytes_ = 0;
   MapHead head_;
   MapDirectory directory_;
   Seal seal_;

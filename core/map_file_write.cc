@@ -1,10 +1,13 @@
 // Maps written: the tables of schemas/0002_map.sql and map_findings.sql.
+#include <limits>
+
 #include "core/database.h"
+#include "core/map_findings_tables.h"
 #include "core/map_head.h"
 #include "core/map_layout.h"
-#include "core/map_root.h"
 #include "core/map_rows.h"
 #include "core/map_seal.h"
+#include "core/map_tables.h"
 #include "schemas/0002_map_sql.h"
 #include "schemas/map_findings_sql.h"
 
@@ -45,12 +48,17 @@ Result<std::string> WriteBlocks(SQLite::Database& database, const MapRows& rows)
 }
 
 // Everything but the hashes of the seal; returns the root.
-Result<Hash> WriteTables(SQLite::Database& database, const MapRows& rows) {
+Result<Hash> WriteTables(SQLite::Database& database, const MapRows& rows, const std::string& path) {
+  constexpr int64_t kAnyNumBytes = std::numeric_limits<int64_t>::max();
   InsertBlob(database, "INSERT INTO seal VALUES (?)", EncodeSeal(Seal()));
-  WriteMapHead(database, rows);
-  CAIRN_ASSIGN_OR_RETURN(const std::string directory, WriteBlocks(database, rows));
   WriteMapFindings(database, rows.findings);
-  return RootHash(database, directory);
+  CAIRN_ASSIGN_OR_RETURN(const StoredRows findings, ReadFindingsRows(database, path, kAnyNumBytes));
+  MapHead head = rows;
+  head.findings_hash = HexOf(TablesHash(findings));
+  WriteMapHead(database, head);
+  CAIRN_ASSIGN_OR_RETURN(const std::string directory, WriteBlocks(database, rows));
+  CAIRN_ASSIGN_OR_RETURN(const StoredRows stored, ReadStoredRows(database, path, HeadTables(), kAnyNumBytes));
+  return RootHash(stored, directory);
 }
 
 }  // namespace
@@ -67,7 +75,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
       database.exec("BEGIN");
       database.exec(k0002MapSql);
       database.exec(kMapFindingsSql);
-      CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows));
+      CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows, path));
       database.exec("COMMIT");
       return Ok();
     }));

@@ -8,10 +8,6 @@
 #include "core/error.h"
 #include "core/ids.h"
 
-namespace SQLite {
-class Database;
-}
-
 namespace cairn {
 
 // The region of held-out images that were taken at no station of any region.
@@ -73,11 +69,5 @@ struct MapFindings {
 // Errors: InvalidArgument, naming the row: one out of order, of no such region, or with numbers that cannot
 // be.
 Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations);
-
-// The tables inside a map file.  Both throw SQLite::Exception: call them inside WithDatabaseErrors.
-void WriteMapFindings(SQLite::Database& database, const MapFindings& findings);
-// A file without the tables has no findings.  What is read is to be checked with CheckMapFindings.
-// Errors: Corrupt.
-Status ReadMapFindings(SQLite::Database& database, const std::string& path, MapFindings* findings);
 
 }  // namespace cairn

@@ -1,6 +1,6 @@
 #include "core/map_head.h"
 
-#include <cmath>
+#include <array>
 
 #include "core/blob.h"
 #include "core/text.h"
@@ -48,11 +48,26 @@ std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
   return texts;
 }
 
-std::map<std::string, std::string> ReadTexts(SQLite::Database& database, const char* sql) {
+using Texts = std::map<std::string, std::string>;
+
+// Rows of a key and a value.
+Result<Texts> TextsOf(const std::vector<StoredRow>& rows) {
   std::map<std::string, std::string> texts;
-  SQLite::Statement query(database, sql);
-  while (query.executeStep()) texts[query.getColumn(0).getString()] = query.getColumn(1).getString();
+  for (const StoredRow& row : rows) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string key, row.Text(0));
+    CAIRN_ASSIGN_OR_RETURN(texts[key], row.Text(1));
+  }
   return texts;
+}
+
+// Columns first .. first + 6: qw, qx, qy, qz, tx, ty, tz.
+Result<Pose> PoseOf(const StoredRow& row, size_t first) {
+  std::array<double, 7> values;
+  for (size_t i = 0; i < values.size(); ++i) {
+    CAIRN_ASSIGN_OR_RETURN(values[i], row.Real(first + i));
+  }
+  return Pose{Eigen::Quaterniond(values[0], values[1], values[2], values[3]),
+              {values[4], values[5], values[6]}};
 }
 
 // Of a map without these rows, the frame is a survey's, in metres.
@@ -73,8 +88,15 @@ Status ReadFrame(std::map<std::string, std::string> meta, const std::string& pat
   return status.ok() ? status : Corrupt(path, "table meta: {}", status.error().message);
 }
 
-Status ReadTables(SQLite::Database& database, const std::string& path, MapHead* head) {
-  auto meta = ReadTexts(database, "SELECT key, value FROM meta");
+// An optional whole number of `meta`.
+template <typename T>
+Status ReadNumber(const Texts& meta, const char* key, const std::string& path, T* value) {
+  const auto row = meta.find(key);
+  if (row == meta.end() || ParseNumber(row->second, value)) return Ok();
+  return Corrupt(path, "table meta: {} '{}' is not a number that fits", key, row->second);
+}
+
+Status DecodeMeta(Texts meta, const std::string& path, MapHead* head) {
   head->name = meta["name"];
   head->writer = meta["writer"];
   head->sessions = SplitWords(meta["sessions"]);
@@ -101,53 +123,54 @@ Status ReadTables(SQLite::Database& database, const std::string& path, MapHead* 
     return Corrupt(path, "table meta: stated_pose_sigma_m '{}' or stated_pose_sigma_deg '{}' is not a number",
                    meta["stated_pose_sigma_m"], meta["stated_pose_sigma_deg"]);
   }
-  CAIRN_RETURN_IF_ERROR(ReadFrame(meta, path, &head->frame));
-  head->stage_options = ReadTexts(database, "SELECT stage, options FROM stage_options");
-  head->input_hashes = ReadTexts(database, "SELECT name, hash FROM inputs");
-  SQLite::Statement frames(database, "SELECT name, qw, qx, qy, qz, tx, ty, tz FROM frames");
-  int num_frames = 0;
-  while (frames.executeStep()) {
-    const std::string name = frames.getColumn(0).getString();
-    if (name != "floor_from_world" && name != "camera_from_given") continue;  // of a later minor version
-    (name == "floor_from_world" ? head->floor_from_world : head->camera_from_given) =
-        PoseFromColumns(frames, 1);
-    ++num_frames;
-  }
-  if (num_frames != 2) return Corrupt(path, "table frames lacks floor_from_world or camera_from_given");
-  SQLite::Statement figures(database, "SELECT name, value FROM self_test");
-  while (figures.executeStep())
-    head->self_test[figures.getColumn(0).getString()] = figures.getColumn(1).getDouble();
-  return Ok();
+  CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "epoch", path, &head->epoch));
+  if (meta.count("findings")) head->findings_hash = meta["findings"];
+  return ReadFrame(std::move(meta), path, &head->frame);
 }
 
-Status ReadCameras(SQLite::Database& database, const std::string& path, MapHead* head) {
-  SQLite::Statement query(
-      database,
-      "SELECT camera_id, model, width, height, has_focal_prior, params FROM cameras ORDER BY camera_id");
-  while (query.executeStep()) {
-    Camera camera;
-    const int64_t camera_id = query.getColumn(0).getInt64();
-    if (camera_id < 0 || camera_id > UINT32_MAX)
-      return Corrupt(path, "camera {}: id out of range", camera_id);
-    camera.camera_id = static_cast<CameraId>(camera_id);
-    const Result<CameraModel> model = CameraModelFromId(query.getColumn(1).getInt());
-    if (!model.ok()) return Corrupt(path, "camera {}: {}", camera_id, model.error().message);
-    camera.model = *model;
-    camera.width = query.getColumn(2).getInt();
-    camera.height = query.getColumn(3).getInt();
-    camera.has_focal_prior = query.getColumn(4).getInt() != 0;
-    const std::string_view params = BlobView(query.getColumn(5));
-    BlobReader reader(params);
-    for (int i = 0; i < NumCameraParams(camera.model); ++i) camera.params.push_back(reader.Float64());
-    if (!reader.Finished())
-      return Corrupt(path, "camera {}: {} bytes of parameters", camera_id, params.size());
-    head->cameras.push_back(std::move(camera));
+Status DecodeFrames(const std::vector<StoredRow>& rows, const std::string& path, MapHead* head) {
+  bool has_floor = false;
+  bool has_given = false;
+  for (const StoredRow& row : rows) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string name, row.Text(0));
+    const bool is_floor = name == "floor_from_world";
+    if (!is_floor && name != "camera_from_given") continue;  // of a later minor version
+    CAIRN_ASSIGN_OR_RETURN((is_floor ? head->floor_from_world : head->camera_from_given), PoseOf(row, 1));
+    (is_floor ? has_floor : has_given) = true;
   }
-  return Ok();
+  if (has_floor && has_given) return Ok();
+  return Corrupt(path, "table frames lacks floor_from_world or camera_from_given");
+}
+
+Result<Camera> DecodeCamera(const StoredRow& row, const std::string& path) {
+  Camera camera;
+  CAIRN_ASSIGN_OR_RETURN(const int64_t camera_id, row.Integer(0, 0, UINT32_MAX));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t model_id, row.Integer(1, INT32_MIN, INT32_MAX));
+  const Result<CameraModel> model = CameraModelFromId(static_cast<int>(model_id));
+  if (!model.ok()) return Corrupt(path, "camera {}: {}", camera_id, model.error().message);
+  CAIRN_ASSIGN_OR_RETURN(const int64_t width, row.Integer(2, 0, INT32_MAX));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t height, row.Integer(3, 0, INT32_MAX));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t has_focal_prior, row.Integer(4));
+  CAIRN_ASSIGN_OR_RETURN(const std::string params, row.Blob(5));
+  camera.camera_id = static_cast<CameraId>(camera_id);
+  camera.model = *model;
+  camera.width = static_cast<int>(width);
+  camera.height = static_cast<int>(height);
+  camera.has_focal_prior = has_focal_prior != 0;
+  BlobReader reader(params);
+  for (int i = 0; i < NumCameraParams(camera.model); ++i) camera.params.push_back(reader.Float64());
+  if (!reader.Finished()) return Corrupt(path, "camera {}: {} bytes of parameters", camera_id, params.size());
+  return camera;
 }
 
 void WriteTables(SQLite::Database& database, const MapHead& head) {
   WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", FrameTexts(head.frame));
+  if (head.epoch != 0) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"epoch", std::to_string(head.epoch)}});
+  }
+  if (!head.findings_hash.empty()) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"findings", head.findings_hash}});
+  }
   if (!head.sessions.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
                {{"sessions", fmt::format("{}", fmt::join(head.sessions, " "))}});
@@ -207,17 +230,6 @@ void WriteCameras(SQLite::Database& database, const MapHead& head) {
 
 }  // namespace
 
-Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table) {
-  SQLite::Statement query(
-      database,
-      "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0 "
-      "AND sql LIKE 'CREATE TABLE%' AND NOT EXISTS "
-      "(SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden <> 0)");
-  query.bind(1, table);
-  if (query.executeStep() && query.getColumn(0).getInt() == 1) return Ok();
-  return Corrupt(path, "has no plain table '{}'", table);
-}
-
 std::string_view BlobView(const SQLite::Column& column) {
   return {static_cast<const char*>(column.getBlob()), static_cast<size_t>(column.getBytes())};
 }
@@ -240,8 +252,8 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
   if (found == major) return Ok();
   std::string writer = "an unknown program";
   if (HasTable(database, "meta")) {
-    const auto meta = ReadTexts(database, "SELECT key, value FROM meta WHERE key = 'writer'");
-    if (!meta.empty()) writer = meta.begin()->second;
+    SQLite::Statement query(database, "SELECT value FROM meta WHERE key = 'writer'");
+    if (query.executeStep()) writer = query.getColumn(0).getString();
   }
   return MakeError(found > major ? ErrorCode::kTooNew : ErrorCode::kTooOld,
                    "{}: map version {}.{}, written by {}; {}.x is read here. {}", path, found, version % 1000,
@@ -250,9 +262,21 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
                                  : "Make a new one of it with `cairn migrate`, or compile the map again.");
 }
 
-Status ReadMapHead(SQLite::Database& database, const std::string& path, MapHead* head) {
-  CAIRN_RETURN_IF_ERROR(ReadTables(database, path, head));
-  return ReadCameras(database, path, head);
+Status DecodeMapHead(const StoredRows& rows, const std::string& path, MapHead* head) {
+  CAIRN_ASSIGN_OR_RETURN(Texts meta, TextsOf(rows.at("meta")));
+  CAIRN_RETURN_IF_ERROR(DecodeMeta(std::move(meta), path, head));
+  CAIRN_ASSIGN_OR_RETURN(head->stage_options, TextsOf(rows.at("stage_options")));
+  CAIRN_ASSIGN_OR_RETURN(head->input_hashes, TextsOf(rows.at("inputs")));
+  CAIRN_RETURN_IF_ERROR(DecodeFrames(rows.at("frames"), path, head));
+  for (const StoredRow& row : rows.at("self_test")) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string figure, row.Text(0));
+    CAIRN_ASSIGN_OR_RETURN(head->self_test[figure], row.Real(1));
+  }
+  for (const StoredRow& row : rows.at("cameras")) {
+    CAIRN_ASSIGN_OR_RETURN(Camera camera, DecodeCamera(row, path));
+    head->cameras.push_back(std::move(camera));
+  }
+  return Ok();
 }
 
 void WriteMapHead(SQLite::Database& database, const MapHead& head) {

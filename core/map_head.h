@@ -5,22 +5,19 @@
 
 #include "core/database.h"
 #include "core/map_rows.h"
+#include "core/map_tables.h"
 
 namespace cairn {
 
 // The small tables of a map, which every format has: meta, stage_options, inputs, frames, cameras, self_test.
 // All of these throw SQLite::Exception: call them inside WithDatabaseErrors.
 
-// Errors: Corrupt.
-Status ReadMapHead(SQLite::Database& database, const std::string& path, MapHead* head);
+// From the rows of HeadTables().  Errors: Corrupt.
+Status DecodeMapHead(const StoredRows& rows, const std::string& path, MapHead* head);
 void WriteMapHead(SQLite::Database& database, const MapHead& head);
 
 // Whether the file is a map of this major version.  Errors: ForeignFile; TooNew, naming the writer; TooOld.
 Status CheckMapVersion(SQLite::Database& database, const std::string& path, int major);
-
-// Whether `table` is a plain one: no view, no virtual table, no generated column, which could run a program
-// of whoever made the file.  Errors: Corrupt.
-Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
 
 // A column's bytes, valid until the statement's next step.
 std::string_view BlobView(const SQLite::Column& column);

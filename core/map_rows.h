@@ -87,6 +87,11 @@ struct MapHead {
   std::string instruction_set;
   uint64_t seed = 0;    // of the compilation
   bool sealed = false;  // checked, with its self-test figures
+  // Counts the releases of a map of this name: a robot takes no map of an epoch that is not later than what
+  // it has (docs/updates.md).  0: never counted.
+  uint64_t epoch = 0;
+  // Of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4 or earlier.
+  std::string findings_hash;
   // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
   std::string landmark_choice = "regions";
   // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
@@ -138,7 +143,7 @@ struct MapRows : MapHead {
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 4;
+inline constexpr int kMapVersionMinor = 5;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

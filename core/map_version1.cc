@@ -1,6 +1,6 @@
 // Maps of format 1.x, read and checked: the tables of schemas/0001_map.sql, and those of vocabulary.sql
 // beside them.
-#include <cmath>
+#include <filesystem>
 
 #include "core/blob.h"
 #include "core/database.h"
@@ -127,9 +127,13 @@ Status ReadLandmarks(SQLite::Database& database, const std::string& path, MapRow
 }
 
 Result<MapRows> ReadTables(SQLite::Database& database, const std::string& path) {
+  std::error_code error;
+  const auto num_bytes = static_cast<int64_t>(std::filesystem::file_size(path, error));
+  const StepLimit steps(database, 100 * MaxStepsFor(num_bytes));
   CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path, 1));
   MapRows rows;
-  CAIRN_RETURN_IF_ERROR(ReadMapHead(database, path, &rows));
+  CAIRN_ASSIGN_OR_RETURN(const StoredRows head, ReadStoredRows(database, path, HeadTables(), num_bytes));
+  CAIRN_RETURN_IF_ERROR(DecodeMapHead(head, path, &rows));
   CAIRN_RETURN_IF_ERROR(ReadLandmarks(database, path, &rows));
   CAIRN_RETURN_IF_ERROR(ReadStations(database, path, &rows));
   CAIRN_RETURN_IF_ERROR(ReadRegions(database, path, &rows));
