@@ -16,6 +16,17 @@ uint64_t BigEndian(std::string_view bytes) {
   return value;
 }
 
+// Steps between two looks at what is left.
+constexpr int kStepsPerLook = 1000;
+// Some 3000 tables and indices.
+constexpr int64_t kMaxSchemaSteps = 20'000;
+
+int CountDown(void* num_left) {
+  auto& left = *static_cast<int64_t*>(num_left);
+  left -= kStepsPerLook;
+  return left <= 0 ? 1 : 0;
+}
+
 // 0 where there is none.
 uint64_t NumBytes(const std::string& path) {
   std::error_code error;
@@ -71,9 +82,22 @@ void LimitSteps(SQLite::Database& database, uint64_t num_bytes) {
       database.getHandle(), static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
 }
 
+StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)
+    : handle_(database.getHandle()), num_left_(max_num_steps) {
+  sqlite3_progress_handler(handle_, kStepsPerLook, CountDown, &num_left_);
+}
+
+StepLimit::~StepLimit() { sqlite3_progress_handler(handle_, 0, nullptr, nullptr); }
+
+void ReadSchema(SQLite::Database& database) {
+  const StepLimit steps(database, kMaxSchemaSteps);
+  database.execAndGet("SELECT count(*) FROM sqlite_schema WHERE name = ''");
+}
+
 SQLite::Database OpenImmutable(const std::string& path) {
   SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
   Harden(database, NumBytes(path));
+  ReadSchema(database);
   return database;
 }
 
@@ -110,8 +134,6 @@ Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
   return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
     SQLite::Database database = OpenImmutable(path);
     LimitSteps(database, NumBytes(path));
-    database.execAndGet(
-        "SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
     return database;
   });
 }

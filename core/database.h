@@ -63,8 +63,27 @@ void Harden(SQLite::Database& database, uint64_t num_bytes);
 // for one that is kept for a program's life.  Such a statement fails as SQLite's "interrupted".
 void LimitSteps(SQLite::Database& database, uint64_t num_bytes);
 
-// Hardened.  Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody writes meanwhile.
-// Throws SQLite::Exception: call it inside WithDatabaseErrors.
+// While it lives, all that SQLite does on a connection may take so many steps of its machine together, then
+// it ends with SQLITE_INTERRUPT: pages of a hostile file may lead to one another, so that few bytes show more
+// rows than anybody can read.  (LimitSteps is for connections that live for one reading.)
+class StepLimit {
+ public:
+  StepLimit(SQLite::Database& database, int64_t max_num_steps);
+  ~StepLimit();
+  StepLimit(const StepLimit&) = delete;
+  StepLimit& operator=(const StepLimit&) = delete;
+
+ private:
+  sqlite3* handle_;
+  int64_t num_left_;
+};
+
+// Reads a connection's schema, which SQLite would otherwise do when it is first needed, within few steps: it
+// parses every row.  Throws SQLite::Exception.
+void ReadSchema(SQLite::Database& database);
+
+// Hardened, its schema read.  Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody
+// writes meanwhile. Throws SQLite::Exception: call it inside WithDatabaseErrors.
 SQLite::Database OpenImmutable(const std::string& path);
 
 // Errors: NotFound, Corrupt (empty, no regular file, without SQLite's magic bytes, or not whole pages).

@@ -75,21 +75,6 @@ Hash RootHash(const StoredRows& head, std::string_view directory);
 // of whoever made the file.  Errors: Corrupt.
 Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
 
-// While it lives, all that SQLite does on a connection may take so many steps of its machine together, then
-// it ends with SQLITE_INTERRUPT: pages of a hostile file may lead to one another, so that few bytes show more
-// rows than anybody can read.  (LimitSteps is for connections that live for one reading.)
-class StepLimit {
- public:
-  StepLimit(SQLite::Database& database, int64_t max_num_steps);
-  ~StepLimit();
-  StepLimit(const StepLimit&) = delete;
-  StepLimit& operator=(const StepLimit&) = delete;
-
- private:
-  sqlite3* handle_;
-  int64_t num_left_;
-};
-
 // More steps than it takes to read the head, the findings or a block of a map of this size.
 int64_t MaxStepsFor(int64_t num_bytes);
 
