@@ -77,7 +77,7 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
       if (i / kRunLength % step != step / 2) continue;
       const SurveyImage& image = classes.images[i];
       left_out.insert(image.image_id);
-      LeftOutImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
+      TrialImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
       CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id));
       survey.images.push_back(std::move(row));
     }
@@ -102,7 +102,7 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
   });
 }
 
-Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<LeftOutImage>& images,
+Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads) {
   // Fixes are in the frame of the stated poses; the true ones here are the map's own.
   rows.camera_from_given = Pose();

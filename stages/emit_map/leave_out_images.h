@@ -11,7 +11,7 @@
 namespace cairn {
 
 // A survey image that plays the robot's: what it shows, and where it was.
-struct LeftOutImage {
+struct TrialImage {
   Camera camera;
   Pose cam_from_world;
   Features features;
@@ -21,7 +21,7 @@ struct LeftOutImage {
 // held-out image is looked at.
 struct LeftOutSurvey {
   Classes classes;  // without the images' observations; classes left with fewer than two are left out
-  std::vector<LeftOutImage> images;
+  std::vector<TrialImage> images;
 };
 
 // Leaves out every n-th run of four images, at most about `max_num_images`, and never more than one of four:
@@ -47,7 +47,7 @@ struct LeftOutLimits {
 };
 // Localizes them in a map of the survey that lacks them.  Same result for any number of threads.
 // Errors: InvalidArgument (CheckMapRows), Corrupt.
-Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<LeftOutImage>& images,
+Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads);
 
 }  // namespace cairn
