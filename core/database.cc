@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/input_file.h"
+
 namespace cairn {
 namespace {
 
@@ -26,6 +28,7 @@ SqliteHeader ParseSqliteHeader(std::string_view head) {
 
 SqliteHeader ReadSqliteHeader(const std::string& path) {
   char head[32] = {};
+  if (!CheckInputFile(path).ok()) return {};
   std::ifstream file(path, std::ios::binary);
   file.read(head, sizeof(head));
   return ParseSqliteHeader({head, static_cast<size_t>(file.gcount())});
@@ -49,19 +52,20 @@ SQLite::Database OpenImmutable(const std::string& path) {
 
 bool IsSqliteFile(const std::string& path) {
   char head[sizeof(kMagic)] = {};
+  if (!CheckInputFile(path).ok()) return false;
   std::ifstream file(path, std::ios::binary);
   return file.read(head, sizeof(head)) && std::memcmp(head, kMagic, sizeof(kMagic)) == 0;
 }
 
 Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+  CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
   if (!IsSqliteFile(path)) {
     return MakeError(
         ErrorCode::kCorrupt,
         "{}: not a SQLite database ({} bytes, expected the magic bytes 'SQLite format 3'); is it truncated "
         "or another kind of file?",
-        path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
+        path, std::filesystem::file_size(path, error));
   }
   const uint64_t page_size = ReadSqliteHeader(path).page_size;
   const uint64_t num_bytes = std::filesystem::file_size(path, error);
