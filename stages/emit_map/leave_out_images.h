@@ -1,12 +1,16 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/appearance.h"
+#include "core/decomposition.h"
 #include "core/error.h"
 #include "core/feature_class.h"
 #include "core/features.h"
 #include "core/map_rows.h"
+#include "core/world.h"
 
 namespace cairn {
 
@@ -31,6 +35,18 @@ struct LeftOutSurvey {
 // than twelve survey images).
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
                                      int max_num_images);
+
+// What a map is made of beside its classes, all of one survey.
+struct SurveyParts {
+  World world;
+  Decomposition decomposition;
+  std::optional<Appearance> appearance;
+};
+
+// The parts without what `classes`, those of a LeftOutSurvey, lack: images of stations, features of the world
+// and of regions (numbered anew, in their order), and kept nodes of the appearance graph whose images are all
+// left out, for which their neighbours are kept.  Stations, areas and regions stay.  O(parts).
+SurveyParts PartsOf(const Classes& classes, SurveyParts parts);
 
 // How a map fares on them.
 struct LeftOutTrial {
