@@ -208,9 +208,11 @@ $(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
 	    $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
-# Matching wants the visual words first where it looks for images that look alike.
+# Matching wants the visual words first where it looks for images that look alike.  Those of a reconstructed capture
+# come after its poses, which say what is held out, and so after the matches: there matching takes the tree that the
+# recipe names, or grows one for itself from all images.
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
-    $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
+    $(BUILD)/options/match_features.toml)),$(if $(filter yes,$(RECONSTRUCTED)),$(VOCABULARY_TREE),$(BUILD)/vocabulary.db))
 $(BUILD)/%: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
 CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) \
     --options $(@D)/options/match_features.toml
