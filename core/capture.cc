@@ -72,36 +72,169 @@ Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t fir
   return camera;
 }
 
-// A folder of images without lists: one camera for each session, image size and focal length.
+// Whether there is something of that name, be it a link to nothing: whoever put it there wants it read.
+bool IsThere(const std::string& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
+}
+
+// Cameras that a capture without poses gives: for all of its images, or for those of single sessions.
+struct KnownCameras {
+  struct List {
+    std::string path;
+    std::map<CameraId, Camera> cameras;
+  };
+  std::optional<List> of_all;
+  std::map<int, List> of_session;
+
+  // Those that may have taken a session's images (-1: of none); null where nothing is known of them.
+  const List* Of(int session) const {
+    if (const auto found = of_session.find(session); found != of_session.end()) return &found->second;
+    return of_all ? &*of_all : nullptr;
+  }
+};
+
+Result<KnownCameras> ReadKnownCameras(const std::string& root, const std::vector<std::string>& sessions) {
+  KnownCameras known;
+  if (const std::string path = root + "/cameras.txt"; IsThere(path)) {
+    CAIRN_ASSIGN_OR_RETURN(auto cameras, ReadCamerasText(path));
+    known.of_all = {path, std::move(cameras)};
+  }
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    const std::string path = SessionCamerasPath(root, sessions[i]);
+    if (!IsThere(path)) continue;
+    CAIRN_ASSIGN_OR_RETURN(auto cameras, ReadCamerasText(path));
+    known.of_session[static_cast<int>(i)] = {path, std::move(cameras)};
+  }
+  return known;
+}
+
+// The camera of an image of this size; null: none has it.  Errors: InvalidArgument (several have it and
+// differ).
+Result<const Camera*> CameraOfSize(const KnownCameras::List& list, const std::string& name, int width,
+                                   int height) {
+  const Camera* found = nullptr;
+  for (const auto& [camera_id, camera] : list.cameras) {
+    if (camera.width != width || camera.height != height) continue;
+    if (found == nullptr) found = &camera;
+    if (camera.model == found->model && camera.params == found->params) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: cameras {} and {} are both {} x {}, and without images.txt nothing tells which of "
+                     "them took {}; leave one camera of each size, or make each camera's images a capture of "
+                     "its own and name them all in the recipe",
+                     list.path, found->camera_id, camera_id, width, height, name);
+  }
+  return found;
+}
+
+// Gives the images of a capture without poses their cameras.
+class FlatFolderCameras {
+ public:
+  FlatFolderCameras(KnownCameras known, Capture* capture) : known_(std::move(known)), capture_(*capture) {
+    if (known_.of_all) capture_.cameras = known_.of_all->cameras;
+  }
+
+  // Appends the image, or a reject.
+  Status Add(const std::string& name, int session, const cv::Mat& image) {
+    const KnownCameras::List* list = known_.Of(session);
+    if (list == nullptr) {
+      AddGuessed(name, session, image);
+      return Ok();
+    }
+    CAIRN_ASSIGN_OR_RETURN(const Camera* camera, CameraOfSize(*list, name, image.cols, image.rows));
+    if (camera == nullptr) {
+      capture_.rejects.push_back({name, fmt::format("the image has {} x {} pixels, as no camera of {} has",
+                                                    image.cols, image.rows, list->path)});
+      return Ok();
+    }
+    CameraId camera_id = camera->camera_id;
+    if (list != (known_.of_all ? &*known_.of_all : nullptr))
+      camera_id = NewCamera(known_ids_, std::pair(session, camera_id), [&] { return *camera; });
+    capture_.images.push_back({name, camera_id, std::nullopt});
+    return Ok();
+  }
+
+ private:
+  // One camera for each session, image size and focal length in EXIF.
+  void AddGuessed(const std::string& name, int session, const cv::Mat& image) {
+    const double focal_mm = ReadExif(capture_.images_folder + "/" + name).focal_length_35mm_mm;
+    const CameraId camera_id =
+        NewCamera(guessed_ids_, std::tuple(session, image.cols, image.rows, focal_mm), [&] {
+          Camera camera = GuessCamera(0, image.cols, image.rows);
+          if (focal_mm > 0) {
+            // 36 mm: width of the film
+            camera.params[0] = focal_mm / 36.0 * std::max(image.cols, image.rows);
+            camera.has_focal_prior = true;
+          } else {
+            capture_.warnings.push_back(
+                fmt::format("{}: no cameras.txt and no focal length in EXIF: f = 1.2 max(w, h) = {:g} px "
+                            "assumed for {} x {} images",
+                            capture_.root, camera.params[0], camera.width, camera.height));
+          }
+          return camera;
+        });
+    capture_.images.push_back({name, camera_id, std::nullopt});
+  }
+
+  // The id of what `key` names; `make` tells the camera where it is new.
+  template <typename Key, typename Make>
+  CameraId NewCamera(std::map<Key, CameraId>& ids, const Key& key, const Make& make) {
+    const auto [entry, is_new] =
+        ids.emplace(key, capture_.cameras.empty() ? 1 : capture_.cameras.rbegin()->first + 1);
+    if (is_new) {
+      Camera camera = make();
+      camera.camera_id = entry->second;
+      capture_.cameras.emplace(entry->second, camera);
+    }
+    return entry->second;
+  }
+
+  KnownCameras known_;
+  Capture& capture_;
+  std::map<std::pair<int, CameraId>, CameraId> known_ids_;
+  std::map<std::tuple<int, int, int, double>, CameraId> guessed_ids_;
+};
+
+// Image files in the capture's folder itself, where it has one for images.
+size_t NumImagesBeside(const Capture& capture) {
+  if (capture.images_folder == capture.root) return 0;
+  size_t num_beside = 0;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(capture.root, error))
+    num_beside += HasImageSuffix(entry.path().string());
+  return num_beside;
+}
+
+// A capture without image lists.
 Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
+  const std::string queries = capture->root + "/queries.txt";
+  if (IsThere(queries)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: held-out images are given with their poses, but without images.txt the capture has "
+                     "none; add images.txt, or remove the list: [reconstruct] hold_out_every holds images "
+                     "out of a capture without poses",
+                     queries);
+  }
+  if (const std::string frame = capture->root + "/" + kCaptureFrameFile; IsThere(frame)) {
+    capture->warnings.push_back(
+        fmt::format("{}: not read: it says what poses mean, and without images.txt there are none", frame));
+  }
+  std::error_code error;
   capture->images_folder =
-      fs::is_directory(capture->root + "/images") ? capture->root + "/images" : capture->root;
-  std::map<std::tuple<int, int, int, double>, CameraId> camera_ids;
+      fs::is_directory(capture->root + "/images", error) ? capture->root + "/images" : capture->root;
+  if (const size_t num_beside = NumImagesBeside(*capture); num_beside > 0) {
+    capture->warnings.push_back(
+        fmt::format("{}: {} images beside the folder images/ are left out", capture->root, num_beside));
+  }
+  CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions));
+  FlatFolderCameras cameras(std::move(known), capture);
   for (const std::string& name : ListImages(capture->images_folder, sessions)) {
-    const std::string path = capture->images_folder + "/" + name;
-    const Result<cv::Mat> image = ReadGreyImage(path);
+    const Result<cv::Mat> image = ReadGreyImage(capture->images_folder + "/" + name);
     if (!image.ok()) {
       capture->rejects.push_back({name, image.error().message});
       continue;
     }
-    const double focal_mm = ReadExif(path).focal_length_35mm_mm;
-    const int session = SessionOfImage(sessions, name);
-    const auto [entry, is_new] = camera_ids.emplace(std::tuple(session, image->cols, image->rows, focal_mm),
-                                                    static_cast<CameraId>(camera_ids.size() + 1));
-    if (is_new) {
-      Camera camera = GuessCamera(entry->second, image->cols, image->rows);
-      if (focal_mm > 0) {
-        camera.params[0] = focal_mm / 36.0 * std::max(image->cols, image->rows);  // 36 mm: width of the film
-        camera.has_focal_prior = true;
-      } else {
-        capture->warnings.push_back(
-            fmt::format("{}: no cameras.txt and no focal length in EXIF: f = 1.2 max(w, h) = {:g} px "
-                        "assumed for {} x {} images",
-                        capture->root, camera.params[0], camera.width, camera.height));
-      }
-      capture->cameras.emplace(camera.camera_id, camera);
-    }
-    capture->images.push_back({name, entry->second, std::nullopt});
+    CAIRN_RETURN_IF_ERROR(cameras.Add(name, SessionOfImage(sessions, name), *image));
   }
   return Ok();
 }
@@ -128,6 +261,10 @@ void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
 }
 
 }  // namespace
+
+std::string SessionCamerasPath(const std::string& root, const std::string& session) {
+  return fmt::format("{}/cameras/{}.txt", root, session);
+}
 
 Result<Camera> ParseCamera(const std::string& text) {
   std::string spaced = text;
@@ -219,20 +356,26 @@ Result<Capture> ReadCapture(const std::string& root) {
   Capture capture;
   capture.root = root;
   std::vector<std::string> sessions;
-  if (const std::string path = root + "/" + kSessionsFile; fs::exists(path, error)) {
+  if (const std::string path = root + "/" + kSessionsFile; IsThere(path)) {
     CAIRN_ASSIGN_OR_RETURN(sessions, ReadSessionsText(path));
   }
-  if (!fs::exists(root + "/images.txt", error)) {
+  if (!IsThere(root + "/images.txt")) {
     CAIRN_RETURN_IF_ERROR(ReadFlatFolder(sessions, &capture));
   } else {
+    if (!IsThere(root + "/cameras.txt")) {
+      return MakeError(ErrorCode::kNotFound,
+                       "{}/cameras.txt: no such file, but images.txt names its cameras; write it, or remove "
+                       "images.txt: the capture then has no poses, and its cameras come from EXIF",
+                       root);
+    }
     capture.has_poses = true;
     capture.images_folder = root + "/images";
     CAIRN_ASSIGN_OR_RETURN(capture.cameras, ReadCamerasText(root + "/cameras.txt"));
     CAIRN_ASSIGN_OR_RETURN(capture.images, ReadImagesText(root + "/images.txt", &capture.rejects));
-    if (fs::exists(root + "/queries.txt", error)) {
+    if (IsThere(root + "/queries.txt")) {
       CAIRN_ASSIGN_OR_RETURN(capture.queries, ReadImagesText(root + "/queries.txt", &capture.rejects));
     }
-    if (const std::string frame = root + "/" + kCaptureFrameFile; fs::exists(frame, error)) {
+    if (const std::string frame = root + "/" + kCaptureFrameFile; IsThere(frame)) {
       CAIRN_ASSIGN_OR_RETURN(capture.frame, ReadCaptureFrame(frame));
     }
     const std::vector<std::string> names = ListImages(capture.images_folder, sessions);
@@ -249,7 +392,7 @@ Result<Capture> ReadCapture(const std::string& root) {
   }
   if (capture.images.empty()) {
     const std::string first = capture.rejects.empty()
-                                  ? ""
+                                  ? capture.has_poses ? "; images.txt lists none" : ""
                                   : "; the first of " + std::to_string(capture.rejects.size()) +
                                         " rejected: " + capture.rejects[0].reason;
     return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);

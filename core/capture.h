@@ -40,11 +40,17 @@ struct Capture {
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
 };
 
-// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt and frame.json) or a
-// flat folder of images: then cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.  Image
-// files are looked for, not decoded. Errors: NotFound (no such folder), NoData (no image), Corrupt (a list
-// that cannot be parsed; file and line), Unsupported (camera model).
+// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt and frame.json); image
+// files are looked for, not decoded.  Without images.txt the capture has no poses: its images are those of
+// images/, else of the folder itself.  Each then has the camera of cameras.txt that has its size; without
+// cameras.txt cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.
+// Errors: NotFound (no such folder; images.txt without cameras.txt), NoData (no image), Corrupt (a list that
+// cannot be parsed; file and line), Unsupported (camera model), InvalidArgument (without images.txt:
+// queries.txt, or different cameras of one image size).
 Result<Capture> ReadCapture(const std::string& root);
+
+// Where a capture of several sessions without poses has the cameras of one of them.
+std::string SessionCamerasPath(const std::string& root, const std::string& session);
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
 // may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;

@@ -1,6 +1,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -83,11 +85,11 @@ bool IsFilled(const std::string& path) { return NumBytes(path) > 0; }
 
 // Opens copies of a database and its write-ahead log in a folder that vanishes at once.
 SQLite::Database OpenCopy(const std::string& path) {
-  std::string folder_name = (fs::temp_directory_path() / "cairn-XXXXXX").string();
-  if (mkdtemp(folder_name.data()) == nullptr)
-    throw fs::filesystem_error("no folder can be made", folder_name,
+  std::string name = fs::temp_directory_path() / "cairn-XXXXXX";
+  if (mkdtemp(name.data()) == nullptr)
+    throw fs::filesystem_error("no folder can be made", name,
                                std::error_code(errno, std::generic_category()));
-  const fs::path folder(folder_name);
+  const fs::path folder = name;  // new, and so nobody else's
   const std::string copy = (folder / fs::path(path).filename()).string();
   fs::copy_file(path, copy, fs::copy_options::overwrite_existing);
   fs::copy_file(path + "-wal", copy + "-wal", fs::copy_options::overwrite_existing);

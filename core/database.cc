@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/input_file.h"
+
 namespace cairn {
 namespace {
 
@@ -46,6 +48,7 @@ SqliteHeader ParseSqliteHeader(std::string_view head) {
 
 SqliteHeader ReadSqliteHeader(const std::string& path) {
   char head[32] = {};
+  if (!CheckInputFile(path).ok()) return {};
   std::ifstream file(path, std::ios::binary);
   file.read(head, sizeof(head));
   return ParseSqliteHeader({head, static_cast<size_t>(file.gcount())});
@@ -103,16 +106,14 @@ SQLite::Database OpenImmutable(const std::string& path) {
 
 bool IsSqliteFile(const std::string& path) {
   char head[sizeof(kMagic)] = {};
+  if (!CheckInputFile(path).ok()) return false;
   std::ifstream file(path, std::ios::binary);
   return file.read(head, sizeof(head)) && std::memcmp(head, kMagic, sizeof(kMagic)) == 0;
 }
 
 Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
-  if (!std::filesystem::is_regular_file(path, error) && !std::filesystem::is_directory(path, error)) {
-    return MakeError(ErrorCode::kCorrupt, "{}: not a regular file, expected a SQLite database", path);
-  }
+  CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
   if (!IsSqliteFile(path)) {
     return MakeError(
         ErrorCode::kCorrupt,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 
+#include "core/input_file.h"
+
 namespace cairn {
 namespace {
 
@@ -63,6 +65,7 @@ void ReadGps(const ExifContent* gps, ExifByteOrder order, ExifTags* tags) {
 
 ExifTags ReadExif(const std::string& path) {
   ExifTags tags;
+  if (!CheckInputFile(path).ok()) return tags;
   const std::unique_ptr<ExifData, void (*)(ExifData*)> exif(exif_data_new_from_file(path.c_str()),
                                                             exif_data_unref);
   if (exif == nullptr) return tags;

@@ -1,7 +1,5 @@
 #include "core/join_captures.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -9,7 +7,9 @@
 #include <tuple>
 
 #include "core/file.h"
+#include "core/folder.h"
 #include "core/image_list.h"
+#include "core/output_path.h"
 #include "core/sessions.h"
 #include "core/write_error.h"
 
@@ -48,6 +48,13 @@ Status CheckSessions(const std::vector<CaptureSession>& sessions) {
     if (!fs::is_directory(session.root, error))
       return MakeError(ErrorCode::kNotFound, "session '{}': {}: no such folder", session.name, session.root);
   }
+  for (const CaptureSession& session : sessions) {
+    if (HasPoses(session) || QueriesOf(session).empty()) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "'{}': {}: held-out images are given with their poses, but {} has none (no images.txt); "
+                     "leave the list out: [reconstruct] hold_out_every holds images out",
+                     session.name, QueriesOf(session), session.root);
+  }
   const CaptureSession& first = sessions.front();
   for (const CaptureSession& session : sessions) {
     if (HasPoses(session) == HasPoses(first)) continue;
@@ -60,16 +67,6 @@ Status CheckSessions(const std::vector<CaptureSession>& sessions) {
                      posed.name, posed.root, unposed.name, unposed.root, unposed.name, posed.name);
   }
   return Ok();
-}
-
-// Only what a join wrote is overwritten.
-Status CheckFolder(const std::string& folder) {
-  std::error_code error;
-  if (fs::exists(folder + "/" + kSessionsFile, error) || !fs::exists(folder, error)) return Ok();
-  if (fs::is_directory(folder, error) && fs::is_empty(folder, error)) return Ok();
-  return MakeError(ErrorCode::kUnsupported,
-                   "{}: holds something else than joined captures; remove it, or name another folder",
-                   folder);
 }
 
 // Gives the cameras of a session their ids in the joined capture.
@@ -152,41 +149,35 @@ Result<CaptureFrame> JoinFrames(const std::vector<CaptureSession>& sessions,
   return joined;
 }
 
-// Writes a list, or removes the one of an earlier join.
-Status WriteOrRemove(const std::string& path, const std::string& text) {
-  if (!text.empty()) return WriteFileAtomically(path, text);
-  std::error_code error;
-  fs::remove(path, error);
-  if (!error) return Ok();
-  return WriteError(path, "cannot be removed", error.value());
+// The cameras of sessions without poses that give any.
+Status WriteSessionCameras(const std::vector<CaptureSession>& sessions, const std::string& folder) {
+  for (const CaptureSession& session : sessions) {
+    const std::string given = session.root + "/cameras.txt";
+    if (!fs::exists(given)) continue;
+    CAIRN_ASSIGN_OR_RETURN(const auto cameras, ReadCamerasText(given));
+    const std::string path = SessionCamerasPath(folder, session.name);
+    std::error_code error;
+    fs::create_directories(FolderOf(path), error);
+    CAIRN_RETURN_IF_ERROR(WriteCamerasText(path, cameras));
+  }
+  return Ok();
 }
 
-// images/SESSION -> the session's images, and no other links.
+// images/SESSION -> the session's images.
 Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   std::error_code error;
-  fs::create_directories(folder, error);
+  fs::create_directory(folder, error);
   if (error) return WriteError(folder, "the folder cannot be made", error.value());
-  std::set<std::string> names;
   for (const CaptureSession& session : sessions) {
-    names.insert(session.name);
     const bool is_flat = !fs::is_directory(session.root + "/images", error);
     const fs::path target =
         fs::absolute(is_flat ? session.root : session.root + "/images").lexically_normal();
     const fs::path link = fs::path(folder) / session.name;
-    if (fs::read_symlink(link, error) == target) continue;
-    const fs::path temporary = fmt::format("{}.tmp-{}", link.string(), getpid());
-    fs::remove(temporary, error);
-    fs::create_directory_symlink(target, temporary, error);
-    if (!error) fs::rename(temporary, link, error);
+    fs::create_directory_symlink(target, link, error);
     if (error) {
       return WriteError(link.string(), fmt::format("the link to {} cannot be made", target.string()),
                         error.value());
     }
-  }
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    std::error_code ignored;  // a link too many only takes room
-    if (!names.contains(entry.path().filename()) && entry.is_symlink(ignored))
-      fs::remove(entry.path(), ignored);
   }
   return Ok();
 }
@@ -195,7 +186,6 @@ Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string
 
 Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   CAIRN_RETURN_IF_ERROR(CheckSessions(sessions));
-  CAIRN_RETURN_IF_ERROR(CheckFolder(folder));
   JoinedCapture joined;
   std::map<CameraId, Camera> cameras;
   std::string images, queries, frame_text;
@@ -222,16 +212,21 @@ Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, 
   for (const CaptureSession& session : sessions)
     names += fmt::format("{} {}\n", session.name, fs::absolute(session.root).lexically_normal().string());
 
-  CAIRN_RETURN_IF_ERROR(LinkImages(sessions, folder + "/images"));
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kSessionsFile, names));
-  if (cameras.empty()) {
-    CAIRN_RETURN_IF_ERROR(WriteOrRemove(folder + "/cameras.txt", ""));
-  } else {
-    CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", cameras));
-  }
-  CAIRN_RETURN_IF_ERROR(WriteOrRemove(folder + "/images.txt", images));
-  CAIRN_RETURN_IF_ERROR(WriteOrRemove(folder + "/queries.txt", queries));
-  CAIRN_RETURN_IF_ERROR(WriteOrRemove(folder + "/" + kCaptureFrameFile, frame_text));
+  std::error_code error;
+  fs::create_directories(FolderOf(folder), error);
+  CAIRN_RETURN_IF_ERROR(
+      ReplaceFolderAtomically(folder, "joined captures", [&](const std::string& written) -> Status {
+        CAIRN_RETURN_IF_ERROR(LinkImages(sessions, written + "/images"));
+        CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + kSessionsFile, names));
+        if (!HasPoses(sessions.front())) return WriteSessionCameras(sessions, written);
+        if (!cameras.empty()) CAIRN_RETURN_IF_ERROR(WriteCamerasText(written + "/cameras.txt", cameras));
+        for (const auto& [name, text] : {std::pair<const char*, const std::string&>("images.txt", images),
+                                         {"queries.txt", queries},
+                                         {kCaptureFrameFile, frame_text}}) {
+          if (!text.empty()) CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + name, text));
+        }
+        return Ok();
+      }));
   return joined;
 }
 

@@ -28,13 +28,14 @@ struct JoinedCapture {
 //   images.txt, queries.txt    the lines of each with the name SESSION/NAME; poses as they are written
 //   frame.json       what all coordinates mean (CaptureFrame)
 //   sessions.txt     SESSION and its folder, a line each
-// Captures without poses have only images/ and sessions.txt.  Files that keep their bytes keep their date;
-// lists and links of earlier joins that are none any more are removed.  What one capture alone would reject
-// is kept, and rejected by who reads the result.
+// Captures without poses have only images/, sessions.txt and, for each that has cameras.txt,
+// cameras/SESSION.txt.  The folder is replaced as a whole
+// (ReplaceFolderAtomically): files that keep their bytes keep their date.  What one capture alone would
+// reject is kept, and rejected by who reads the result.
 //
 // All poses must be in one frame.  Errors: InvalidArgument (fewer than one session, a name that is none or
-// stands twice, captures with poses beside ones without, frames of different units or anchors); Unsupported
-// (`folder` holds something else); NotFound, Corrupt, Io.
+// stands twice, captures with poses beside ones without, frames of different units or anchors;
+// `folder` holds something else); NotFound, Corrupt, Io.
 Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, const std::string& folder);
 
 }  // namespace cairn

@@ -13,6 +13,7 @@
 #include "core/blob.h"
 #include "core/database.h"
 #include "core/file.h"
+#include "core/input_file.h"
 #include "core/map_file.h"
 #include "core/signature.h"
 #include "core/write_error.h"
@@ -40,8 +41,7 @@ class SealedFile {
  public:
   static Result<SealedFile> Open(const std::string& path, const char* mode) {
     SealedFile file;
-    std::error_code error;
-    if (!fs::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+    CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
     file.path_ = path;
     file.file_.reset(std::fopen(path.c_str(), mode));
     if (!file.file_) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));

@@ -1,7 +1,6 @@
 // World JSON.  A million stations with a hundred features each are a file of 700 MB, so the reader is a
 // handler for a streaming parser: it never holds the document, only the world.
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/input_file.h"
 #include "core/world.h"
 
 namespace cairn {
@@ -229,9 +229,9 @@ Status CheckDocument(const WorldHandler& handler) {
 }  // namespace
 
 Result<World> ReadWorldJson(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
   std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path))
-    return MakeError(ErrorCode::kNotFound, "{}: no such file, or not a readable one", path);
+  if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be read", path);
   WorldHandler handler;
   const bool parsed = nlohmann::json::sax_parse(file, &handler);
   const Status status = parsed ? CheckDocument(handler) : Status(handler.error);

@@ -179,6 +179,12 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string floor_plan = FloorPlanPath(recipe, capture);
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the floor plan", floor_plan));
   CAIRN_ASSIGN_OR_RETURN(const SessionWords sessions, JoinedSessions(recipe));
+  if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
+                     "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
+                     recipe.captures.front().queries_path, recipe.captures.front().path);
+  }
 
   const std::string options = paths.build_dir + "/options";
   CAIRN_RETURN_IF_ERROR(CreateFolder(options));

@@ -5,12 +5,10 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <regex>
 #include <set>
 
-#include "core/capture.h"
-#include "core/file.h"
-#include "core/temporary.h"
+#include "core/folder_manifest.h"
+#include "pipeline/build_files.h"
 #include "pipeline/build_folder.h"
 #include "pipeline/folder_lock.h"
 
@@ -31,37 +29,6 @@ struct Removal {
   std::vector<fs::path> files, folders;
   std::vector<fs::path> kept;  // not cairn's
 };
-
-bool IsStageFileName(const std::string& name) {
-  static const std::regex kStageFile(
-      "(capture|images|features|matches|poses|classes|world|regions|vocabulary|appearance|views|unsealed|map)"
-      "([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
-  return std::regex_match(name, kStageFile);
-}
-
-bool IsBuildFileName(const std::string& name) {
-  return name == "config.mk" || name == "check.json" || name == "error.json" || name == "lock" ||
-         IsStageFileName(name) || IsTemporaryName(name, "");
-}
-
-bool IsOptionsFileName(const std::string& name) {
-  static const std::regex kOptionsFile("[a-z_]+(-[0-9]+)?(\\.toml)?");
-  return std::regex_match(name, kOptionsFile) || IsTemporaryName(name, "");
-}
-
-// Files of a capture that cairn wrote, relative to its folder.
-std::set<fs::path> CaptureFiles(const fs::path& folder) {
-  std::set<fs::path> files = {"cameras.txt", "images.txt",         "queries.txt",
-                              "frame.json",  "floor_plan.geojson", "reconstruction.json"};
-  std::vector<Reject> rejects;
-  for (const char* list : {"images.txt", "queries.txt"}) {
-    const auto images = ReadImagesText((folder / list).string(), &rejects);
-    if (!images.ok()) continue;
-    for (const CaptureImage& image : *images) files.insert(fs::path("images") / image.name);
-  }
-  if (fs::is_symlink(folder / "images")) files.insert("images");  // of a reconstruction: the images stay
-  return files;
-}
 
 // Files and folders below `folder`; `is_ours` judges the paths of files relative to it.
 template <typename IsOurs>
@@ -90,13 +57,10 @@ Removal CollectBuildFolder(const std::string& build_dir) {
     } else if (name == "options") {
       CollectFolder(
           entry.path(), [](const fs::path& path) { return IsOptionsFileName(path.string()); }, &removal);
-    } else if (IsTemporaryName(name, "")) {
+    } else if (IsBuildFileName(name)) {
+      const std::set<std::string> files = OwnFiles(entry.path().string());
       CollectFolder(
-          entry.path(), [](const fs::path&) { return true; }, &removal);
-    } else if (IsStageFileName(name)) {
-      const std::set<fs::path> files = CaptureFiles(entry.path());
-      CollectFolder(
-          entry.path(), [&](const fs::path& path) { return files.contains(path); }, &removal);
+          entry.path(), [&](const fs::path& path) { return files.contains(path.string()); }, &removal);
     } else {
       removal.kept.push_back(entry.path());
     }

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "pipeline/build_files.h"
 #include "pipeline/build_folder.h"
 #include "pipeline/build_report.h"
 #include "pipeline/build_step.h"
@@ -62,6 +63,7 @@ Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
   fs::path build_dir = fs::path(map).replace_extension(".build");
   if (!arguments.build_dir.empty()) build_dir = fs::absolute(arguments.build_dir).lexically_normal();
   if (!build_dir.has_filename()) build_dir = build_dir.parent_path();  // a trailing '/'
+  CAIRN_RETURN_IF_ERROR(CheckBuildFolder(build_dir.string()));
   CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
   return BuildPaths{.build_dir = build_dir.string(),
                     .map = map.string(),

@@ -61,7 +61,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const ColmapModel model, ReadModel(arguments));
   const ModelFormat format = arguments.text ? ModelFormat::kText : ModelFormat::kBinary;
   CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(
-      arguments.output, "a COLMAP model", {"cameras.bin", "cameras.txt"},
+      arguments.output, "a COLMAP model",
       [&](const std::string& folder) { return WriteColmapModel(model, format, folder); }));
   size_t num_observations = 0;
   for (const ModelPoint& point : model.points) num_observations += point.track.size();

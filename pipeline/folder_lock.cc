@@ -16,7 +16,9 @@
 #include <spdlog/spdlog.h>
 
 #include "core/file.h"
+#include "core/folder_manifest.h"
 #include "core/temporary.h"
+#include "pipeline/build_files.h"
 #include "pipeline/build_folder.h"
 
 namespace cairn {
@@ -32,12 +34,18 @@ constexpr std::chrono::milliseconds kWaitForOtherSession{300};
 
 using Claim = FileLock::Claim;
 
-void RemoveTemporariesIn(const fs::path& folder, const std::string& target) {
+// Temporaries of what `is_ours` knows by its name; folders only where they are cairn's.
+template <typename IsOurs>
+void RemoveTemporariesIn(const fs::path& folder, const IsOurs& is_ours) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (!IsTemporaryName(entry.path().filename().string(), target)) continue;
+    const std::string name = entry.path().filename().string();
+    if (!IsTemporaryName(name, "") || !is_ours(name)) continue;
     std::error_code remove_error;  // one that cannot be removed only takes room
-    fs::remove_all(entry.path(), remove_error);
+    if (entry.is_directory(remove_error) && !entry.is_symlink(remove_error))
+      RemoveOwnFolder(entry.path().string());
+    else
+      fs::remove(entry.path(), remove_error);
   }
 }
 
@@ -109,12 +117,14 @@ std::string ReportPath(const std::string& map) {
 }
 
 void RemoveStaleTemporaries(const std::string& build_dir) {
-  RemoveTemporariesIn(build_dir, "");
-  RemoveTemporariesIn(build_dir + "/options", "");
+  RemoveTemporariesIn(build_dir, IsBuildFileName);
+  RemoveTemporariesIn(build_dir + "/options", IsOptionsFileName);
   const fs::path map = ConfiguredMap(build_dir);
   if (map.empty()) return;
-  RemoveTemporariesIn(map.parent_path(), map.filename().string());
-  RemoveTemporariesIn(map.parent_path(), fs::path(ReportPath(map.string())).filename().string());
+  RemoveTemporariesIn(map.parent_path(), [&](const std::string& name) {
+    return IsTemporaryName(name, map.filename().string()) ||
+           IsTemporaryName(name, fs::path(ReportPath(map.string())).filename().string());
+  });
 }
 
 Result<FolderLock> FolderLock::Acquire(const std::string& build_dir, const std::string& session) {

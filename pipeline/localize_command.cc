@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -15,8 +14,10 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/capture.h"
+#include "core/file.h"
 #include "core/image_file.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "pipeline/visual_answer.h"
 #include "runtime/region_tracker.h"
 
@@ -204,10 +205,9 @@ class ImageNames {
     ImageNames names;
     names.names_ = arguments.images;
     if (!arguments.list_path.empty()) {
-      std::ifstream list(arguments.list_path);
-      if (!list) return MakeError(ErrorCode::kNotFound, "{}: no such file", arguments.list_path);
-      for (std::string line; std::getline(list, line);) {
-        if (!line.empty()) names.names_.push_back(line);
+      CAIRN_ASSIGN_OR_RETURN(const std::string list, ReadFile(arguments.list_path));
+      for (const std::string_view line : SplitLines(list)) {
+        if (!line.empty()) names.names_.emplace_back(line);
       }
     }
     if (names.names_.empty()) {

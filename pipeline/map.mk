@@ -99,11 +99,14 @@ endif
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
 -include $(BUILD)/images.d
-# Held-out images that exist, with a backslash before what Make would take for more than a name.
-QUERY_LIST := $(firstword $(wildcard $(QUERIES) $(CAPTURE)/queries.txt))
+# Held-out images that exist, with a backslash before what Make would take for more than a name.  Pipes are no files: to
+# read one would wait for ever.
+QUERY_LIST := $(shell for list in $(wildcard $(QUERIES) $(CAPTURE)/queries.txt); do \
+    [ -f $$list ] && echo $$list && break; done)
 QUERY_IMAGES := $(if $(QUERY_LIST),$(shell awk '/^\#/ || NF < 10 || $$10 ~ /^[-+.0-9eE]+$$/ {next} \
-    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); path = "$(CAPTURE)/images/" $$0} \
-    (getline line < path) >= 0 {close(path); gsub(/[ \t:;|*?[\#]/, "\\\\&", path); print path}' $(QUERY_LIST)))
+    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); print "$(CAPTURE)/images/" $$0}' \
+    $(QUERY_LIST) | while IFS= read -r path; do [ -f "$$path" ] && printf '%s\n' "$$path"; done | \
+    sed 's/[ \t:;|*?[\#]/\\&/g'))
 
 .DELETE_ON_ERROR:
 .PHONY: cairn-missing
@@ -205,9 +208,11 @@ $(BUILD)/features.db.stamp: $(FEATURES_INPUTS) $(FEATURES_SHARDS)
 	    $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
-# Matching wants the visual words first where it looks for images that look alike.
+# Matching wants the visual words first where it looks for images that look alike.  Those of a reconstructed capture
+# come after its poses, which say what is held out, and so after the matches: there matching takes the tree that the
+# recipe names, or grows one for itself from all images.
 PAIRS_VOCABULARY := $(if $(filter 'retrieval' 'sequence',$(shell sed -n 's/^pairs = //p' \
-    $(BUILD)/options/match_features.toml)),$(BUILD)/vocabulary.db)
+    $(BUILD)/options/match_features.toml)),$(if $(filter yes,$(RECONSTRUCTED)),$(VOCABULARY_TREE),$(BUILD)/vocabulary.db))
 $(BUILD)/%: PAIRS_VOCABULARY := $(PAIRS_VOCABULARY)
 CAIRN_MATCH = match-features $(@D)/features.db --capture $(CAPTURE) $(CAIRN_NO_SPACE_CHECK) $(addprefix --vocabulary ,$(PAIRS_VOCABULARY)) \
     --options $(@D)/options/match_features.toml

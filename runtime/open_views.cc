@@ -4,6 +4,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "core/input_file.h"
 #include "runtime/map.h"
 
 namespace cairn {
@@ -12,6 +13,7 @@ namespace {
 // By the application_id in SQLite's header.
 bool IsMap(const std::string& path) {
   std::array<char, 72> head{};
+  if (!CheckInputFile(path).ok()) return false;  // reading it as views says why
   std::ifstream file(path, std::ios::binary);
   return file.read(head.data(), head.size()) && std::string_view(&head[68], 4) == "crmp";
 }

@@ -103,20 +103,20 @@ class Estimator {
 
   // The most likely maxima, each refined from the best point around it; their masses are those of the search,
   // or what Laplace makes of the maximum itself where that is more: points lie too far apart for sharp ones.
-  std::vector<RefinedPose> RefineMaxima() {
+  std::vector<DensityMaximum> RefineMaxima() {
     const std::vector<VisualHypothesis>& hypotheses = search_.hypotheses();
     std::vector<size_t> order(hypotheses.size() - search_.first_point());
     std::iota(order.begin(), order.end(), search_.first_point());
     std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
       return std::pair(-hypotheses[a].log_mass, a) < std::pair(-hypotheses[b].log_mass, b);
     });
-    std::vector<RefinedPose> maxima;
+    std::vector<DensityMaximum> maxima;
     std::vector<std::pair<int32_t, int32_t>> tried;
     for (const size_t i : order) {
       const std::pair place(hypotheses[i].place, hypotheses[i].heading);
       const Eigen::Vector2d at = map_.places()[place.first] + hypotheses[i].offset;
       if (std::find(tried.begin(), tried.end(), place) != tried.end()) continue;
-      if (std::any_of(maxima.begin(), maxima.end(), [&](const RefinedPose& other) {
+      if (std::any_of(maxima.begin(), maxima.end(), [&](const DensityMaximum& other) {
             return other.start.heading == place.second && IsAround(other, at);
           }))
         continue;
@@ -124,12 +124,12 @@ class Estimator {
       tried.push_back(place);
       if (auto refined = RefineFromNearest(hypotheses[i])) maxima.push_back(std::move(*refined));
     }
-    for (const RefinedPose& refined : maxima)
+    for (const DensityMaximum& refined : maxima)
       search_.AddMissingMass(PointAt(refined), kReachSpacings * map_.spacing_m());
     return maxima;
   }
 
-  VisualHypothesis PointAt(const RefinedPose& refined) const {
+  VisualHypothesis PointAt(const DensityMaximum& refined) const {
     const int32_t place = NearestPlace(refined.position);
     return {.place = place,
             .heading = refined.start.heading,
@@ -139,7 +139,7 @@ class Estimator {
   }
 
   // With the models that extend to where it ends: again where that is nearer to another place.
-  std::optional<RefinedPose> RefineFromNearest(const VisualHypothesis& start) const {
+  std::optional<DensityMaximum> RefineFromNearest(const VisualHypothesis& start) const {
     auto refined = RefinePose(map_, search_, start);
     if (!refined) return refined;
     const VisualHypothesis end = PointAt(*refined);
@@ -148,15 +148,15 @@ class Estimator {
     return again && again->log_density > refined->log_density ? again : refined;
   }
 
-  bool IsAround(const RefinedPose& refined, const Eigen::Vector2d& at) const {
+  bool IsAround(const DensityMaximum& refined, const Eigen::Vector2d& at) const {
     return (at - refined.position).norm() <= kReachSpacings * map_.spacing_m();
   }
 
   // The maximum with what landmarks' errors share.
-  std::optional<RefinedPose> Best(std::vector<RefinedPose> maxima) const {
+  std::optional<DensityMaximum> Best(std::vector<DensityMaximum> maxima) const {
     const auto best = std::max_element(
         maxima.begin(), maxima.end(),
-        [](const RefinedPose& a, const RefinedPose& b) { return a.log_density < b.log_density; });
+        [](const DensityMaximum& a, const DensityMaximum& b) { return a.log_density < b.log_density; });
     if (best == maxima.end()) return std::nullopt;
     const double growth = SharedGrowth(SpreadRatio(best->agreeing));
     const double shared_m = std::hypot(options_.shared_sigma_m, growth * map_.errors().shared_m);
@@ -178,7 +178,7 @@ class Estimator {
 
   // What the points around the maximum have of the posterior is shared out anew among the places, as the
   // normal distribution of the refined pose says: the points are too far apart to do so.
-  void SpreadAround(const RefinedPose& refined, VisualPose* pose) const {
+  void SpreadAround(const DensityMaximum& refined, VisualPose* pose) const {
     const int32_t heading = refined.start.heading;
     double mass = 0;
     for (int32_t place = 0; place < num_places_; ++place) {
@@ -210,7 +210,7 @@ class Estimator {
     for (double& share : pose->at_place) share = std::max(share, 0.0);
   }
 
-  void FillPose(const RefinedPose& refined, VisualPose* pose) const {
+  void FillPose(const DensityMaximum& refined, VisualPose* pose) const {
     pose->position = refined.position;
     pose->higher_m = refined.turn.higher_m;
     pose->spread_ratio = SpreadRatio(refined.agreeing);
@@ -272,7 +272,7 @@ class Estimator {
     pose->position = pose->mean;
   }
 
-  VisualPose Judge(const RefinedPose& refined, VisualPose pose) const {
+  VisualPose Judge(const DensityMaximum& refined, VisualPose pose) const {
     // Matches that could agree with it.
     const VisualHypothesis found{.place = NearestPlace(pose.position), .heading = refined.start.heading};
     pose.num_possible =

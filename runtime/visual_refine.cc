@@ -33,8 +33,8 @@ class Refiner {
     least_ << 1e-4, 1e-4, 1, 0, 0, 0;
   }
 
-  std::optional<RefinedPose> Run(const VisualHypothesis& start) const {
-    RefinedPose refined{
+  std::optional<DensityMaximum> Run(const VisualHypothesis& start) const {
+    DensityMaximum refined{
         .start = start, .position = map_.places()[start.place] + start.offset, .turn = start.turn};
     for (int step = 0; step < kNumPoseSteps; ++step) {
       const NormalEquations equations =
@@ -56,7 +56,7 @@ class Refiner {
 
  private:
   // Also counts what agrees.  `scale`: by how much larger errors are believed.
-  NormalEquations Linearise(double scale, RefinedPose* refined) const {
+  NormalEquations Linearise(double scale, DensityMaximum* refined) const {
     const TurnFitOptions& fit = search_.fit();
     const Turn& turn = refined->turn;
     const Eigen::Matrix3d rotation = CameraTurn(turn.left, turn.up, turn.clockwise);
@@ -85,7 +85,7 @@ class Refiner {
     return equations;
   }
 
-  void Step(Vector6d change, RefinedPose* refined) const {
+  void Step(Vector6d change, DensityMaximum* refined) const {
     const double way_m = change.head<2>().norm();
     if (way_m > map_.spacing_m()) change *= map_.spacing_m() / way_m;
     refined->position += change.head<2>();
@@ -103,8 +103,8 @@ class Refiner {
 
 }  // namespace
 
-std::optional<RefinedPose> RefinePose(const VisualMap& map, const VisualSearch& search,
-                                      const VisualHypothesis& start) {
+std::optional<DensityMaximum> RefinePose(const VisualMap& map, const VisualSearch& search,
+                                         const VisualHypothesis& start) {
   return Refiner(map, search).Run(start);
 }
 

@@ -10,7 +10,7 @@
 namespace cairn {
 
 // A maximum of p(x | z) between the survey's places.
-struct RefinedPose {
+struct DensityMaximum {
   VisualHypothesis start;  // what it was found from
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Turn turn;
@@ -24,7 +24,7 @@ struct RefinedPose {
 
 // Gauss-Newton over place, turn and height with the models themselves, from a point that `search` has found.
 // Nothing where the matches do not determine a pose.
-std::optional<RefinedPose> RefinePose(const VisualMap& map, const VisualSearch& search,
-                                      const VisualHypothesis& start);
+std::optional<DensityMaximum> RefinePose(const VisualMap& map, const VisualSearch& search,
+                                         const VisualHypothesis& start);
 
 }  // namespace cairn

@@ -102,15 +102,14 @@ Status ChooseQueries(const HoldOut& hold_out, ImportedSurvey* survey) {
 Status WriteImportedCapture(const ImportedSurvey& survey, ImageTransfer transfer, const std::string& path,
                             Progress& progress) {
   progress.Begin("import", static_cast<int64_t>(survey.images.size()), "images");
-  const Status status =
-      ReplaceFolderAtomically(path, "a capture", {"images.txt"}, [&](const std::string& folder) -> Status {
-        for (const ImportedImage& image : survey.images) {
-          if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "importing was stopped");
-          CAIRN_RETURN_IF_ERROR(TransferImage(image, transfer, folder + "/images"));
-          progress.Advance();
-        }
-        return WriteLists(survey, folder);
-      });
+  const Status status = ReplaceFolderAtomically(path, "a capture", [&](const std::string& folder) -> Status {
+    for (const ImportedImage& image : survey.images) {
+      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "importing was stopped");
+      CAIRN_RETURN_IF_ERROR(TransferImage(image, transfer, folder + "/images"));
+      progress.Advance();
+    }
+    return WriteLists(survey, folder);
+  });
   progress.End();
   return status;
 }

@@ -54,7 +54,7 @@ class ShrinkingRegion {
 // A feature that a region could have.
 struct Candidate {
   FeatureIdx feature = 0;
-  std::vector<Sight> sights;
+  std::vector<SightInformation> sights;
 };
 
 class Chooser {
@@ -143,7 +143,7 @@ class Chooser {
       const double angle = DescriptorAngleRad(nearest[i].second);
       const double distinctiveness =
           angle * angle / (angle * angle + options_.confusion_angle_rad * options_.confusion_angle_rad);
-      CAIRN_ASSIGN_OR_RETURN(std::vector<Sight> sights,
+      CAIRN_ASSIGN_OR_RETURN(std::vector<SightInformation> sights,
                              SightsOf(*feature_classes[i], distinctiveness, classes_, options_));
       candidates.push_back({common[i], std::move(sights)});
     }

@@ -36,9 +36,9 @@ std::optional<Matrix26d> WhitenedJacobian(const FeatureClass& feature_class, con
 
 }  // namespace
 
-Result<std::vector<Sight>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
-                                    const Classes& classes, const ChooseFeaturesOptions& options) {
-  std::vector<Sight> sights;
+Result<std::vector<SightInformation>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
+                                               const Classes& classes, const ChooseFeaturesOptions& options) {
+  std::vector<SightInformation> sights;
   for (const Observation& observation : feature_class.observations) {
     const auto image = std::lower_bound(
         classes.images.begin(), classes.images.end(), observation.image_id,
@@ -74,9 +74,9 @@ PoseInformation::PoseInformation(size_t num_images, const ChooseFeaturesOptions&
   views_.assign(num_images, {variance.cwiseInverse().asDiagonal(), variance.asDiagonal()});
 }
 
-double PoseInformation::Gain(const std::vector<Sight>& sights) const {
+double PoseInformation::Gain(const std::vector<SightInformation>& sights) const {
   double gain = 0;
-  for (const Sight& sight : sights) {
+  for (const SightInformation& sight : sights) {
     // det(A + R' R) = det(A) det(1 + R A^-1 R')
     const Eigen::Matrix2d factor =
         Eigen::Matrix2d::Identity() + sight.root * views_[sight.image].covariance * sight.root.transpose();
@@ -85,8 +85,8 @@ double PoseInformation::Gain(const std::vector<Sight>& sights) const {
   return gain;
 }
 
-void PoseInformation::Add(const std::vector<Sight>& sights) {
-  for (const Sight& sight : sights) {
+void PoseInformation::Add(const std::vector<SightInformation>& sights) {
+  for (const SightInformation& sight : sights) {
     View& view = views_[sight.image];
     view.information += sight.root.transpose() * sight.root;
     view.covariance = view.information.inverse();

@@ -11,23 +11,23 @@
 namespace cairn {
 
 // A landmark as one survey image sees it.
-struct Sight {
+struct SightInformation {
   size_t image = 0;                  // position in Classes::images
   Eigen::Matrix<double, 2, 6> root;  // I_lv = root' root (choose_features.h)
 };
 
 // The sights of a class with weight p_l = `distinctiveness`, in [0, 1].  An image in which the class lies at
 // the camera's own centre is left out.  Errors: InvalidArgument, naming an image or camera that is not there.
-Result<std::vector<Sight>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
-                                    const Classes& classes, const ChooseFeaturesOptions& options);
+Result<std::vector<SightInformation>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
+                                               const Classes& classes, const ChooseFeaturesOptions& options);
 
 // What every survey image knows of its pose from the landmarks taken so far.
 class PoseInformation {
  public:
   PoseInformation(size_t num_images, const ChooseFeaturesOptions& options);
   // What a landmark would add to the sum over images of log det; >= 0.
-  double Gain(const std::vector<Sight>& sights) const;
-  void Add(const std::vector<Sight>& sights);
+  double Gain(const std::vector<SightInformation>& sights) const;
+  void Add(const std::vector<SightInformation>& sights);
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;

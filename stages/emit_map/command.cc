@@ -4,7 +4,6 @@
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -108,10 +107,8 @@ Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
 // What emit-map reads.
 struct Inputs {
   Classes classes;
-  World world;
-  Decomposition decomposition;
+  SurveyParts parts;
   Vocabulary vocabulary;
-  std::optional<Appearance> appearance;
   std::optional<Views> views;
   MapHead provenance;
   std::vector<DroppedItem> dropped;
@@ -120,11 +117,11 @@ struct Inputs {
 Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
   Inputs inputs;
   CAIRN_ASSIGN_OR_RETURN(inputs.classes, ReadClasses(arguments.classes_path));
-  CAIRN_ASSIGN_OR_RETURN(inputs.world, ReadWorld(arguments.world_path));
-  CAIRN_ASSIGN_OR_RETURN(inputs.decomposition, ReadDecomposition(arguments.regions_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.parts.world, ReadWorld(arguments.world_path));
+  CAIRN_ASSIGN_OR_RETURN(inputs.parts.decomposition, ReadDecomposition(arguments.regions_path));
   CAIRN_ASSIGN_OR_RETURN(inputs.vocabulary, ReadVocabulary(arguments.vocabulary_path));
   if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(inputs.appearance, ReadAppearance(arguments.appearance_path));
+    CAIRN_ASSIGN_OR_RETURN(inputs.parts.appearance, ReadAppearance(arguments.appearance_path));
   }
   if (!arguments.views_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(inputs.views, ReadViews(arguments.views_path));
@@ -135,7 +132,7 @@ Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
 }
 
 Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, MapRows* rows) {
-  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.world, dropped));
+  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.parts.world, dropped));
   for (const DroppedItem& item : dropped) {
     if (DescribeDropReason(item.reason).kind == DropKind::kStation)
       rows->stations[item.item_id].is_covered = false;
@@ -154,21 +151,12 @@ std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<cha
   return dropped;
 }
 
-// The world without images that the classes lack.
-World WorldOf(const Classes& classes, World world) {
-  std::set<ImageId> images;
-  for (const SurveyImage& image : classes.images) images.insert(image.image_id);
-  for (std::vector<ImageId>& of_station : world.station_images)
-    std::erase_if(of_station, [&](ImageId image) { return !images.contains(image); });
-  return world;
-}
-
-// The whole map but for its self-test.  `classes` and `world` may be those of a part of the survey.
-Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const World& world,
+// The whole map but for its self-test.  `classes` and `parts` may be those of a part of the survey.
+Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const SurveyParts& parts,
                          EmitMapOptions options, const std::vector<char>* keep, int num_threads) {
   CAIRN_ASSIGN_OR_RETURN(MapRows rows,
-                         EmitMap(classes, world, inputs.decomposition, inputs.vocabulary, options,
-                                 inputs.appearance ? &*inputs.appearance : nullptr, keep));
+                         EmitMap(classes, parts.world, parts.decomposition, inputs.vocabulary, options,
+                                 parts.appearance ? &*parts.appearance : nullptr, keep));
   rows.name = inputs.provenance.name;
   rows.writer = inputs.provenance.writer;
   rows.instruction_set = inputs.provenance.instruction_set;
@@ -212,15 +200,15 @@ Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& argument
         "emit_map: max_bytes needs --matches: landmarks are chosen by what the survey's images show");
   }
   EmitMapOptions options = arguments.options;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep,
-                         KeptClasses(inputs.classes, inputs.world, inputs.decomposition, options));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep, KeptClasses(inputs.classes, inputs.parts.world,
+                                                                       inputs.parts.decomposition, options));
   const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
                             int descriptor_bits) -> Result<MapRows> {
     options.descriptor_bits = descriptor_bits;
     const bool is_whole = classes.images.size() == inputs.classes.images.size();
     options.visual_map = arguments.options.visual_map && is_whole;
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
-                           MakeRows(inputs, classes, is_whole ? inputs.world : WorldOf(classes, inputs.world),
+                           MakeRows(inputs, classes, is_whole ? inputs.parts : PartsOf(classes, inputs.parts),
                                     options, &keep, environment.num_threads));
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep), inputs, &rows));
     return rows;
@@ -247,7 +235,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (arguments.options.max_bytes > 0) {
     CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsWithin(arguments, inputs, environment));
   } else {
-    CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.world, arguments.options, nullptr,
+    CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.parts, arguments.options, nullptr,
                                           environment.num_threads));
     CAIRN_RETURN_IF_ERROR(AddDrops(inputs.dropped, inputs, &rows));
   }

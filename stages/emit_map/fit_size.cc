@@ -175,6 +175,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
                          LeaveOutImages(classes, matches_path, options.max_num_left_out));
   const std::vector<size_t> survey_pool = PoolIn(survey, classes, may_keep);
   const auto try_first = [&](const std::vector<size_t>& order, size_t n, int bits) -> Result<LeftOutTrial> {
+    // Where no class outlives the images that are left out, a map of the rest shows nothing.
+    if (order.empty()) return LeftOutTrial{.num_tried = static_cast<int>(survey.images.size())};
     CAIRN_ASSIGN_OR_RETURN(
         MapRows rows,
         emit(survey.classes, SizeFitter::FirstOf(order, n, survey.classes.classes.size()), bits));

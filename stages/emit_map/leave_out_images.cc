@@ -53,6 +53,40 @@ Status DescribeAnew(SQLite::Database& database, const std::set<size_t>& affected
   return Ok();
 }
 
+// Leaves out the features of vanished classes; the rest are numbered anew in their order.
+void LeaveOutFeatures(const std::set<ClassId>& class_ids, World* world, Decomposition* decomposition) {
+  constexpr FeatureIdx kGone = -1;
+  std::vector<FeatureIdx> number_of(world->class_ids.size(), kGone);
+  FeatureIdx num_left = 0;
+  for (size_t feature = 0; feature < number_of.size(); ++feature) {
+    if (!class_ids.contains(world->class_ids[feature])) continue;
+    number_of[feature] = num_left;
+    world->class_ids[num_left] = world->class_ids[feature];
+    world->areas[num_left] = std::move(world->areas[feature]);
+    ++num_left;
+  }
+  world->class_ids.resize(num_left);
+  world->areas.resize(num_left);
+  for (Region& region : decomposition->regions) {
+    for (FeatureIdx& feature : region.features) feature = number_of[feature];
+    std::erase(region.features, kGone);
+  }
+}
+
+// A kept node that lost all its images leaves its neighbours without one to be found by: they are kept.
+void LeaveOutNodes(const std::set<ImageId>& images, Appearance* appearance) {
+  const std::vector<NodeIdx> kept = appearance->Kept();
+  for (AppearanceNode& node : appearance->nodes)
+    std::erase_if(node.images, [&](ImageId image) { return !images.contains(image); });
+  for (const NodeIdx node : kept) {
+    if (!appearance->nodes[node].images.empty()) continue;
+    for (const AppearanceGraph::Neighbour& neighbour : appearance->graph.Neighbours(node)) {
+      NodeRole& role = appearance->nodes[neighbour.node].role;
+      if (role == NodeRole::kDropped) role = NodeRole::kRestored;
+    }
+  }
+}
+
 }  // namespace
 
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
@@ -77,7 +111,7 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
       if (i / kRunLength % step != step / 2) continue;
       const SurveyImage& image = classes.images[i];
       left_out.insert(image.image_id);
-      LeftOutImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
+      TrialImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
       CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id));
       survey.images.push_back(std::move(row));
     }
@@ -102,7 +136,19 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
   });
 }
 
-Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<LeftOutImage>& images,
+SurveyParts PartsOf(const Classes& classes, SurveyParts parts) {
+  std::set<ImageId> images;
+  for (const SurveyImage& image : classes.images) images.insert(image.image_id);
+  for (std::vector<ImageId>& of_station : parts.world.station_images)
+    std::erase_if(of_station, [&](ImageId image) { return !images.contains(image); });
+  std::set<ClassId> class_ids;
+  for (const FeatureClass& feature_class : classes.classes) class_ids.insert(feature_class.class_id);
+  LeaveOutFeatures(class_ids, &parts.world, &parts.decomposition);
+  if (parts.appearance) LeaveOutNodes(images, &*parts.appearance);
+  return parts;
+}
+
+Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads) {
   // Fixes are in the frame of the stated poses; the true ones here are the map's own.
   rows.camera_from_given = Pose();

@@ -1,17 +1,21 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/appearance.h"
+#include "core/decomposition.h"
 #include "core/error.h"
 #include "core/feature_class.h"
 #include "core/features.h"
 #include "core/map_rows.h"
+#include "core/world.h"
 
 namespace cairn {
 
 // A survey image that plays the robot's: what it shows, and where it was.
-struct LeftOutImage {
+struct TrialImage {
   Camera camera;
   Pose cam_from_world;
   Features features;
@@ -21,7 +25,7 @@ struct LeftOutImage {
 // held-out image is looked at.
 struct LeftOutSurvey {
   Classes classes;  // without the images' observations; classes left with fewer than two are left out
-  std::vector<LeftOutImage> images;
+  std::vector<TrialImage> images;
 };
 
 // Leaves out every n-th run of four images, at most about `max_num_images`, and never more than one of four:
@@ -31,6 +35,18 @@ struct LeftOutSurvey {
 // than twelve survey images).
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
                                      int max_num_images);
+
+// What a map is made of beside its classes, all of one survey.
+struct SurveyParts {
+  World world;
+  Decomposition decomposition;
+  std::optional<Appearance> appearance;
+};
+
+// The parts without what `classes`, those of a LeftOutSurvey, lack: images of stations, features of the world
+// and of regions (numbered anew, in their order), and kept nodes of the appearance graph whose images are all
+// left out, for which their neighbours are kept.  Stations, areas and regions stay.  O(parts).
+SurveyParts PartsOf(const Classes& classes, SurveyParts parts);
 
 // How a map fares on them.
 struct LeftOutTrial {
@@ -47,7 +63,7 @@ struct LeftOutLimits {
 };
 // Localizes them in a map of the survey that lacks them.  Same result for any number of threads.
 // Errors: InvalidArgument (CheckMapRows), Corrupt.
-Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<LeftOutImage>& images,
+Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads);
 
 }  // namespace cairn

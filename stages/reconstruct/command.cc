@@ -59,22 +59,6 @@ Status WritePosesFolder(const ReconstructResult& result, const Capture& capture,
                     error.value());
 }
 
-// The files of a folder with what is in them, or what links point to.
-std::map<std::string, std::string> Contents(const std::string& folder) {
-  std::map<std::string, std::string> contents;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename();
-    if (entry.is_symlink()) {
-      contents[name] = fs::read_symlink(entry.path(), error);
-    } else {
-      const auto text = ReadFile(entry.path());
-      contents[name] = text.ok() ? *text : "";
-    }
-  }
-  return contents;
-}
-
 std::string ResidualText(const ReconstructResult& result) {
   double total = 0, most = 0;
   int num_off = 0;
@@ -125,9 +109,6 @@ Result<ReconstructResult> ReconstructInto(const Arguments& arguments, const Capt
                          Reconstruct(input, capture, arguments.options, work, progress));
   fs::remove_all(work, error);
   CAIRN_RETURN_IF_ERROR(WritePosesFolder(result, capture, folder));
-  // The same contents as before keep the folder's date: nothing that reads it has to run again.
-  if (fs::is_directory(arguments.output, error) && Contents(folder) == Contents(arguments.output))
-    fs::last_write_time(folder, fs::last_write_time(arguments.output, error), error);
   return result;
 }
 
@@ -141,7 +122,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const MapperInput input, ReadMapperInput(arguments.matches));
   ReconstructResult result;
   CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(
-      arguments.output, "a folder of poses", {kCaptureFrameFile}, [&](const std::string& folder) -> Status {
+      arguments.output, "a folder of poses", [&](const std::string& folder) -> Status {
         CAIRN_ASSIGN_OR_RETURN(result,
                                ReconstructInto(arguments, capture, input, folder, *environment.progress));
         return Ok();

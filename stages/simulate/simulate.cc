@@ -78,23 +78,22 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
   const uint64_t survey_seed = options.run == 0 ? seed : MixSeed(MixSeed(seed, 21), options.run);
   CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, survey_seed));
 
-  CAIRN_RETURN_IF_ERROR(
-      ReplaceFolderAtomically(path, "a capture", {"images.txt"}, [&](const std::string& folder) -> Status {
-        std::error_code error;
-        if (!fs::create_directory(folder + "/images", error)) {
-          return WriteError(folder, "cannot be created", error.value());
-        }
-        CAIRN_RETURN_IF_ERROR(
-            WriteImages(building, survey, options, survey_seed, folder + "/images", num_threads, progress));
-        CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt",
-                                               {{survey.camera.camera_id, survey.camera},
-                                                {survey.query_camera.camera_id, survey.query_camera}}));
-        CAIRN_RETURN_IF_ERROR(
-            WriteImagesText(folder + "/images.txt", StatedImages(survey.images, survey.camera.camera_id)));
-        CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt",
-                                              StatedImages(survey.queries, survey.query_camera.camera_id)));
-        return WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
-      }));
+  CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(path, "a capture", [&](const std::string& folder) -> Status {
+    std::error_code error;
+    if (!fs::create_directory(folder + "/images", error)) {
+      return WriteError(folder, "cannot be created", error.value());
+    }
+    CAIRN_RETURN_IF_ERROR(
+        WriteImages(building, survey, options, survey_seed, folder + "/images", num_threads, progress));
+    CAIRN_RETURN_IF_ERROR(WriteCamerasText(
+        folder + "/cameras.txt",
+        {{survey.camera.camera_id, survey.camera}, {survey.query_camera.camera_id, survey.query_camera}}));
+    CAIRN_RETURN_IF_ERROR(
+        WriteImagesText(folder + "/images.txt", StatedImages(survey.images, survey.camera.camera_id)));
+    CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt",
+                                          StatedImages(survey.queries, survey.query_camera.camera_id)));
+    return WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
+  }));
   return SimulateResult{static_cast<int>(survey.stations.size()), static_cast<int>(survey.images.size()),
                         static_cast<int>(survey.queries.size())};
 }

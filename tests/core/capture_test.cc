@@ -23,6 +23,7 @@ class CaptureTest : public testing::Test {
     Write("cameras.txt", "# comment\n1 PINHOLE 640 480 525 525 320 240\n");
   }
   void Write(const std::string& name, const std::string& text) {
+    fs::create_directories(fs::path(root_ + "/" + name).parent_path());
     ASSERT_TRUE(WriteFileAtomically(root_ + "/" + name, text).ok());
   }
   void AddFiles(const std::vector<std::string>& names) {
@@ -142,6 +143,132 @@ TEST_F(CaptureTest, BrokenListsNameFileAndLine) {
   const auto capture = ReadCapture(root_);
   EXPECT_EQ(capture.error().code, ErrorCode::kUnsupported);
   EXPECT_THAT(capture.error().message, HasSubstr("cameras.txt:1: unknown camera model 'SPHERE'; known are"));
+}
+
+// Images of 3 x 2 and of 2 x 3 pixels.
+constexpr const char* kWide = "P5\n3 2\n255\nabcdef";
+constexpr const char* kHigh = "P5\n2 3\n255\nabcdef";
+
+class CaptureWithoutPoses : public CaptureTest {
+ protected:
+  void SetUp() override {
+    CaptureTest::SetUp();
+    Write("images/a.pgm", kWide);
+    Write("images/deep/B.PGM", kHigh);
+  }
+};
+
+TEST_F(CaptureWithoutPoses, CamerasOfTheListAreThoseOfImagesOfTheirSize) {
+  Write("cameras.txt", "7 PINHOLE 3 2 9 8 1.5 1\n4 OPENCV 2 3 6 7 1 1.5 0.1 0 0 0\n5 PINHOLE 9 9 9 9 4 4\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_FALSE(capture->has_poses);
+  EXPECT_THAT(capture->warnings, testing::IsEmpty());
+  ASSERT_EQ(capture->images.size(), 2u);
+  EXPECT_EQ(capture->images[0].name, "a.pgm");
+  EXPECT_EQ(capture->images[0].camera_id, 7u);
+  EXPECT_EQ(capture->images[1].name, "deep/B.PGM");
+  EXPECT_EQ(capture->images[1].camera_id, 4u);
+  EXPECT_FALSE(capture->images[0].cam_from_world.has_value());
+  EXPECT_THAT(capture->cameras.at(7).params, testing::ElementsAre(9, 8, 1.5, 1));
+  EXPECT_EQ(capture->cameras.at(4).model, CameraModel::kOpenCv);
+  EXPECT_TRUE(capture->cameras.at(7).has_focal_prior);
+}
+
+TEST_F(CaptureWithoutPoses, ImagesOfASizeThatNoCameraHasAreRejected) {
+  Write("cameras.txt", "1 PINHOLE 3 2 9 8 1.5 1\n");
+  auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_EQ(capture->images.size(), 1u);
+  ASSERT_EQ(capture->rejects.size(), 1u);
+  EXPECT_EQ(capture->rejects[0].name, "deep/B.PGM");
+  EXPECT_THAT(capture->rejects[0].reason, HasSubstr("has 2 x 3 pixels, as no camera of " + root_));
+  Write("cameras.txt", "1 PINHOLE 30 20 9 8 1.5 1\n");
+  capture = ReadCapture(root_);
+  EXPECT_EQ(capture.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(capture.error().message, HasSubstr("the first of 2 rejected: the image has 3 x 2 pixels"));
+}
+
+TEST_F(CaptureWithoutPoses, SeveralCamerasOfOneSizeMustAgree) {
+  Write("cameras.txt", "2 PINHOLE 3 2 9 8 1.5 1\n1 PINHOLE 3 2 9 8 1.5 1\n");
+  EXPECT_EQ(ReadCapture(root_)->images[0].camera_id, 1u);
+  Write("cameras.txt", "1 PINHOLE 3 2 9 8 1.5 1\n2 PINHOLE 3 2 9 9 1.5 1\n");
+  auto capture = ReadCapture(root_);
+  EXPECT_EQ(capture.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(capture.error().message, HasSubstr("cameras 1 and 2 are both 3 x 2, and without images.txt"));
+  Write("cameras.txt", "1 SIMPLE_PINHOLE 3 2 9 1.5 1\n2 FOV 3 2 9 9 1.5 1 0.5\n");
+  EXPECT_EQ(ReadCapture(root_).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(CaptureWithoutPoses, BrokenCamerasAreErrorsAndNotGuessed) {
+  Write("cameras.txt", "# none\n");
+  EXPECT_THAT(ReadCapture(root_).error().message, HasSubstr("cameras.txt: lists no camera"));
+  Write("cameras.txt", "1 PINHOLE three 2 9 8 1.5 1\n");
+  EXPECT_THAT(ReadCapture(root_).error().message, HasSubstr("cameras.txt:1: image size"));
+  fs::remove(root_ + "/cameras.txt");
+  fs::create_symlink("nowhere", root_ + "/cameras.txt");
+  EXPECT_THAT(ReadCapture(root_).error().message,
+              HasSubstr("cameras.txt: a link to a file that does not exist"));
+}
+
+TEST_F(CaptureWithoutPoses, WithoutCamerasTheyAreGuessedForEachSize) {
+  fs::remove(root_ + "/cameras.txt");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_EQ(capture->images.size(), 2u);
+  EXPECT_EQ(capture->cameras.size(), 2u);
+  EXPECT_NE(capture->images[0].camera_id, capture->images[1].camera_id);
+  EXPECT_FALSE(capture->cameras.begin()->second.has_focal_prior);
+  EXPECT_THAT(capture->warnings, testing::ElementsAre(HasSubstr("no cameras.txt and no focal length in EXIF"),
+                                                      HasSubstr("no cameras.txt")));
+}
+
+TEST_F(CaptureWithoutPoses, ListsThatOnlyPosesGiveAMeaningAreNotReadSilently) {
+  Write("cameras.txt", "1 PINHOLE 3 2 9 8 1.5 1\n");
+  Write("frame.json", "{}");
+  Write("beside.pgm", kWide);
+  auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_THAT(capture->warnings, testing::ElementsAre(HasSubstr("frame.json: not read"),
+                                                      HasSubstr("1 images beside the folder images/")));
+  Write("queries.txt", "1 1 0 0 0 0 0 0 1 a.pgm\n\n");
+  capture = ReadCapture(root_);
+  EXPECT_EQ(capture.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(capture.error().message, HasSubstr("held-out images are given with their poses"));
+}
+
+TEST_F(CaptureWithoutPoses, ALostImageListIsNoMissingOne) {
+  fs::create_symlink("nowhere", root_ + "/images.txt");
+  EXPECT_THAT(ReadCapture(root_).error().message,
+              HasSubstr("images.txt: a link to a file that does not exist"));
+}
+
+TEST_F(CaptureWithoutPoses, SessionsMayHaveCamerasOfTheirOwn) {
+  Write("sessions.txt", "day1\nday2\nday3\n");
+  fs::remove_all(root_ + "/images");
+  for (const char* name : {"day1/1.pgm", "day1/2.pgm", "day2/1.pgm", "day3/1.pgm"})
+    Write(std::string("images/") + name, kWide);
+  fs::remove(root_ + "/cameras.txt");
+  Write("cameras/day1.txt", "5 PINHOLE 3 2 9 8 1.5 1\n");
+  Write("cameras/day2.txt", "5 PINHOLE 3 2 7 8 1.5 1\n");
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  ASSERT_EQ(capture->images.size(), 4u);
+  EXPECT_EQ(capture->images[0].camera_id, capture->images[1].camera_id);
+  ASSERT_EQ(capture->cameras.size(), 3u);
+  EXPECT_EQ(capture->cameras.at(capture->images[0].camera_id).params[0], 9);
+  EXPECT_EQ(capture->cameras.at(capture->images[2].camera_id).params[0], 7);
+  EXPECT_FALSE(capture->cameras.at(capture->images[3].camera_id).has_focal_prior);
+}
+
+TEST_F(CaptureTest, AnImageListWithoutCamerasIsAnError) {
+  AddFiles({"a.jpg"});
+  Write("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n");
+  fs::remove(root_ + "/cameras.txt");
+  const auto capture = ReadCapture(root_);
+  EXPECT_EQ(capture.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(capture.error().message,
+              HasSubstr("cameras.txt: no such file, but images.txt names its cameras"));
 }
 
 TEST_F(CaptureTest, ImpossibleFoldersAreErrors) {

@@ -125,6 +125,24 @@ TEST_F(JoinCapturesTest, CapturesWithoutPosesHaveTheirOwnCameras) {
   EXPECT_EQ(capture->images[1].camera_id, 2u);
 }
 
+TEST_F(JoinCapturesTest, SessionsWithoutPosesKeepTheCamerasThatTheyGive) {
+  const std::string image = "P5\n1 1\n255\nx";
+  for (const std::string day : {"day1", "day2", "day3"}) Write(day + "/images/1.pgm", image);
+  Write("day1/cameras.txt", "8 PINHOLE 1 1 5 5 0.5 0.5\n");
+  Write("day2/cameras.txt", "8 PINHOLE 1 1 6 6 0.5 0.5\n");
+  ASSERT_TRUE(Join({Session("day1"), Session("day2"), Session("day3")}).ok());
+  const auto capture = ReadCapture(Path("joined"));
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  ASSERT_EQ(capture->images.size(), 3u);
+  const auto focal = [&](int i) { return capture->cameras.at(capture->images[i].camera_id).FocalX(); };
+  EXPECT_EQ(focal(0), 5);
+  EXPECT_EQ(focal(1), 6);
+  EXPECT_EQ(focal(2), 1.2);  // guessed
+  Write("day2/queries.txt", "");
+  EXPECT_THAT(Refusal({Session("day1"), Session("day2")}),
+              HasSubstr("held-out images are given with their poses"));
+}
+
 TEST_F(JoinCapturesTest, SecondJoinTouchesOnlyWhatChanged) {
   WriteCapture("day1", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
   WriteCapture("day2", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
@@ -198,8 +216,19 @@ TEST_F(JoinCapturesTest, WhatCannotBeJoinedIsRefusedWithTheRemedy) {
   EXPECT_THAT(Refusal({{.name = "a", .root = Path("none")}}, ErrorCode::kNotFound),
               HasSubstr("no such folder"));
   Write("joined/images.txt", "somebody's own");
-  EXPECT_THAT(Refusal({Session("posed")}, ErrorCode::kUnsupported), HasSubstr("holds something else"));
+  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing tells that cairn made it"));
   EXPECT_EQ(Text("joined/images.txt"), "somebody's own");
+}
+
+TEST_F(JoinCapturesTest, ACaptureThatHasSessionsOfItsOwnIsNotReplaced) {
+  WriteCapture("posed", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
+  Write("joined/sessions.txt", "day1\n");
+  Write("joined/queries.txt", "mine");
+  fs::create_directories(Path("joined/images"));
+  fs::create_directory_symlink(Path("posed"), Path("joined/images/day1"));
+  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing tells that cairn made it"));
+  EXPECT_EQ(Text("joined/queries.txt"), "mine");
+  EXPECT_TRUE(fs::is_symlink(Path("joined/images/day1")));
 }
 
 TEST_F(JoinCapturesTest, SessionListsWithNamesThatAreNoneAreCorrupt) {

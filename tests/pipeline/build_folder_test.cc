@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
+#include "pipeline/build_files.h"
 #include "tests/pipeline/test_stages.h"
 
 namespace cairn {
@@ -80,6 +81,39 @@ TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_THAT(Text("config.mk"),
               HasSubstr("CAPTURE := " + paths_.build_dir + "/capture\nSIMULATED := yes\n"));
+}
+
+TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) {
+  const auto check = [&] { return CheckBuildFolder(paths_.build_dir); };
+  EXPECT_TRUE(check().ok());  // none yet
+  fs::create_directories(paths_.build_dir + "/options");
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/lock", "").ok());
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/notes.txt", "mine").ok());
+  EXPECT_TRUE(
+      check().ok());  // as a build leaves it that is killed early, beside a file that is nobody's business
+  for (const char* name : {"features.db", "capture", "error.json", "config.mk", "world.db.tmp-7"}) {
+    ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/" + name, "mine").ok());
+    const Status status = check();
+    ASSERT_FALSE(status.ok()) << name;
+    EXPECT_THAT(status.error().message, HasSubstr(std::string("its ") + name + " would be overwritten"));
+    fs::remove(paths_.build_dir + "/" + name);
+  }
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/features.db", "").ok());
+  EXPECT_TRUE(check().ok());
+}
+
+TEST(BuildFiles, NamesAreThoseThatABuildWrites) {
+  for (const char* name :
+       {"features.db", "matches-1-2of3.db.stamp", "poses", "capture.stamp", "map.report.json",
+        "features.db.reuse", "lock", "matches.begun", "images.d", "regions.db.tmp-12"})
+    EXPECT_TRUE(IsBuildFileName(name)) << name;
+  for (const char* name : {"notes.txt", "notes.tmp-2024", "features.db.bak", "my-features.db", "pareto", ""})
+    EXPECT_FALSE(IsBuildFileName(name)) << name;
+  for (const char* name : {"seed", "emit_map.toml", "simulate.toml", "name.tmp-1"})
+    EXPECT_TRUE(IsOptionsFileName(name)) << name;
+  for (const char* name : {"notes", "mine.toml", "seed.toml", "notes.tmp-2024", "emit_map"})
+    EXPECT_FALSE(IsOptionsFileName(name)) << name;
 }
 
 TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {

@@ -87,28 +87,22 @@ TEST_F(SimulateCaptureTest, WritesACaptureThatReadsBack) {
 
 TEST_F(SimulateCaptureTest, ReplacesAnOldCaptureAsAWhole) {
   ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("capture"), 0, 2, progress_).ok());
-  std::ofstream(Path("capture") + "/images/stray.jpg") << "x";
-  ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("capture") + "/", 0, 2, progress_).ok());
-  EXPECT_FALSE(fs::exists(Path("capture") + "/images/stray.jpg"));
+  SimulateOptions fewer = TinyOptions();
+  fewer.num_queries = 2;
+  ASSERT_TRUE(SimulateCapture(fewer, Path("capture") + "/", 0, 2, progress_).ok());
+  ASSERT_TRUE(SimulateCapture(fewer, Path("other"), 0, 2, progress_).ok());
+  EXPECT_EQ(Files(Path("capture")), Files(Path("other")));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()),
-            1);  // nothing left beside it
+            2);  // nothing left beside them
 }
 
-TEST_F(SimulateCaptureTest, ClearsAwayWhatAKilledRunLeft) {
-  fs::create_directories(Path("capture.tmp-999999999") + "/images");  // no process has this number
-  fs::create_directories(Path("capture.tmp-notes"));
+TEST_F(SimulateCaptureTest, RefusesToReplaceWhatItDidNotMake) {
   ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("capture"), 0, 2, progress_).ok());
-  EXPECT_FALSE(fs::exists(Path("capture.tmp-999999999")));
-  EXPECT_TRUE(fs::exists(Path("capture.tmp-notes")));
-}
-
-TEST_F(SimulateCaptureTest, RefusesToReplaceWhatIsNotACapture) {
-  fs::create_directories(Path("home"));
-  std::ofstream(Path("home") + "/letter.txt") << "x";
-  const Result<SimulateResult> result = SimulateCapture(TinyOptions(), Path("home"), 0, 2, progress_);
+  std::ofstream(Path("capture") + "/images/mine.jpg") << "x";
+  const Result<SimulateResult> result = SimulateCapture(TinyOptions(), Path("capture"), 0, 2, progress_);
   ASSERT_FALSE(result.ok());
-  EXPECT_NE(result.error().message.find("not a capture"), std::string::npos);
-  EXPECT_TRUE(fs::exists(Path("home") + "/letter.txt"));
+  EXPECT_NE(result.error().message.find("images/mine.jpg: was not made by cairn"), std::string::npos);
+  EXPECT_TRUE(fs::exists(Path("capture") + "/images/mine.jpg"));
   EXPECT_FALSE(SimulateCapture(TinyOptions(), Path("nowhere/capture"), 0, 2, progress_).ok());
 }
 
