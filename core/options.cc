@@ -11,13 +11,14 @@ namespace cairn {
 namespace {
 
 std::string RangeText(const Option& option) {
-  if (std::isinf(option.max)) return fmt::format("at least {:g}", option.min);
+  if (std::isinf(option.min) && std::isinf(option.max)) return "a finite number";
+  if (std::isinf(option.max)) return fmt::format("a finite number, at least {:g}", option.min);
   if (std::isinf(option.min)) return fmt::format("at most {:g}", option.max);
   return fmt::format("in [{:g}, {:g}]", option.min, option.max);
 }
 
 Status CheckRange(const Option& option, double value) {
-  if (value >= option.min && value <= option.max) return Ok();  // false for NaN
+  if (std::isfinite(value) && value >= option.min && value <= option.max) return Ok();
   return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}", option.name, value,
                    RangeText(option));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/vector_geometry.h"
 
@@ -221,16 +222,17 @@ FaceIdx FaceLocator::Find(const Vec2& place) const {
   const size_t index = static_cast<size_t>(cell.y()) * num_columns_ + static_cast<size_t>(cell.x());
   for (int64_t i = offsets_[index]; i < offsets_[index + 1]; ++i) {
     const FaceIdx face = faces_[i];
-    bool inside = true;
     const Vec2 point = views_.plan.Grid(place);
     const int64_t first = views_.face_offsets[face], end = views_.face_offsets[face + 1];
-    // Even-odd, so that merged regions that are not convex are found too.
-    inside = false;
+    // Even-odd, so that merged regions that are not convex are found too.  A border is taken from its lower
+    // end by both regions beside it: rounding puts a point on it into just one of them.
+    bool inside = false;
     for (int64_t k = first, before = end - 1; k < end; before = k++) {
-      const Vec2 a = Real(views_.vertices[views_.face_vertices[before]]);
-      const Vec2 b = Real(views_.vertices[views_.face_vertices[k]]);
-      if ((a.y() > point.y()) != (b.y() > point.y()) &&
-          point.x() < a.x() + (point.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x())) {
+      Vec2 low = Real(views_.vertices[views_.face_vertices[before]]);
+      Vec2 high = Real(views_.vertices[views_.face_vertices[k]]);
+      if (low.y() > high.y()) std::swap(low, high);
+      if (low.y() <= point.y() && point.y() < high.y() &&
+          point.x() < low.x() + (point.y() - low.y()) / (high.y() - low.y()) * (high.x() - low.x())) {
         inside = !inside;
       }
     }

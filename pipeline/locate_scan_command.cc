@@ -6,6 +6,7 @@
 
 #include "core/file.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "core/views.h"
 #include "runtime/interpretation_tree.h"
 #include "runtime/open_views.h"
@@ -23,7 +24,8 @@ constexpr int kMaxDrawnSolutions = 6;
 struct Arguments {
   std::string views;
   std::string scans;
-  int scan = -1;
+  bool has_scan = false;  // otherwise all
+  std::string scan;
   std::string svg;
   ScanSegmentsOptions segment_options;
   InterpretationTreeOptions search_options{.max_null_ratio = 0.25, .one_segment_per_wall = false};
@@ -68,20 +70,27 @@ ViewsOverlay Overlay(const ScanView& scan, const InterpretationTreeResult& resul
   return overlay;
 }
 
+// The first of the scans to locate, and the one after the last.
+// Errors: InvalidArgument for a --scan that is not the number of one.
+Result<std::pair<int, int>> ChosenScans(const Arguments& arguments, int num_scans) {
+  if (!arguments.has_scan) return std::pair(0, num_scans);
+  int scan = 0;
+  if (ParseNumber(arguments.scan, &scan) && scan >= 0 && scan < num_scans) return std::pair(scan, scan + 1);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: --scan '{}' is none of its {} scans; they have the numbers 0 to {}", arguments.scans,
+                   arguments.scan, num_scans, num_scans - 1);
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ScanView> scans,
                          ReadScans(arguments.scans, arguments.segment_options));
-  if (arguments.scan >= static_cast<int>(scans.size())) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: --scan {}, but there are scans 0 to {}",
-                     arguments.scans, arguments.scan, scans.size() - 1);
-  }
+  CAIRN_ASSIGN_OR_RETURN(const auto chosen, ChosenScans(arguments, static_cast<int>(scans.size())));
+  const auto [first, end] = chosen;
   const ViewSearchIndex index(views);
   const FaceLocator locator(views);
-  const int first = std::max(0, arguments.scan);
-  const int end = arguments.scan >= 0 ? arguments.scan + 1 : static_cast<int>(scans.size());
   int64_t num_located = 0;
   environment.progress->Begin("locate-scan", end - first, "scans");
   for (int i = first; i < end; ++i) {
@@ -133,7 +142,15 @@ Command LocateScanCommand() {
                    "Carmen log, or lines x0,y0,x1,y1 of the walls seen (robot frame, metres)")
         ->required()
         ->type_name("FILE");
-    app.add_option("--scan", arguments->scan, "number of the only scan to locate, from 0")->type_name("INT");
+    // As text, for one error that says how many scans there are.
+    app.add_option_function<std::string>(
+           "--scan",
+           [arguments](const std::string& scan) {
+             arguments->has_scan = true;
+             arguments->scan = scan;
+           },
+           "number of the only scan to locate, from 0")
+        ->type_name("INT");
     app.add_option("--svg", arguments->svg, "also draw the first scan over the plan")->type_name("FILE.svg");
     OptionTable table = DescribeOptions(&arguments->segment_options);
     for (Option& option : DescribeOptions(&arguments->search_options)) table.push_back(std::move(option));

@@ -1,5 +1,6 @@
 #include "pipeline/plan_path_command.h"
 
+#include <cmath>
 #include <numbers>
 
 #include <nlohmann/json.hpp>
@@ -38,6 +39,10 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   if (arguments.kind != "search" && arguments.to.empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "--kind {} needs --to X,Y", arguments.kind);
+  }
+  if (arguments.kind == "search" && !arguments.to.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--kind search ends where the last of the plan is seen: it takes no --to");
   }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
@@ -78,16 +83,66 @@ struct ApartArguments {
   OptionArguments option_arguments;
 };
 
+// Errors: InvalidArgument for a heading that is no angle; places are checked with the plan.
+Result<PlanarPose> ParsePose(const std::string& option, const std::vector<double>& values) {
+  if (!(std::abs(values[2]) <= 360)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} {:g},{:g},{:g}: the heading must be in [-360, 360] degrees", option, values[0],
+                     values[1], values[2]);
+  }
+  return PlanarPose{{values[0], values[1]}, values[2] * kDegree};
+}
+
+const char* OutcomeName(DisambiguationOutcome outcome) {
+  switch (outcome) {
+    case DisambiguationOutcome::kFound:
+      return "found";
+    case DisambiguationOutcome::kAlike:
+      return "alike";
+    case DisambiguationOutcome::kGaveUp:
+      return "gave_up";
+  }
+  return "";
+}
+
+std::string Caption(const DisambiguationPlan& plan) {
+  switch (plan.outcome) {
+    case DisambiguationOutcome::kFound:
+      return fmt::format("case {}: {:.1f} m to go", plan.kind, plan.path_length_m);
+    case DisambiguationOutcome::kAlike:
+      return "nothing tells a from b";
+    case DisambiguationOutcome::kGaveUp:
+      return fmt::format("gave up after {} regions", plan.num_regions);
+  }
+  return "";
+}
+
+std::string Drawn(const Views& views, const PlanarPose& a, const PlanarPose& b,
+                  const DisambiguationPlan& plan) {
+  ViewsOverlay overlay;
+  overlay.robots = {{a.position, a.heading_rad, "a"}, {b.position, b.heading_rad, "b"}};
+  overlay.captions = {Caption(plan)};
+  if (plan.kind > 0) {
+    overlay.paths = {plan.path_a, plan.path_b};
+    overlay.segments = {{plan.feature_start_a, plan.feature_end_a, plan.feature_is_at_a},
+                        {plan.feature_start_b, plan.feature_end_b, !plan.feature_is_at_a}};
+    overlay.captions.push_back(plan.feature_is_at_a ? "a wall seen from a only" : "a wall seen from b only");
+  }
+  return DrawViews(views, overlay, /*regions=*/false);
+}
+
 Status RunApart(const ApartArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
   const PlanSpace space(views);
-  const PlanarPose a{{arguments.a[0], arguments.a[1]}, arguments.a[2] * kDegree};
-  const PlanarPose b{{arguments.b[0], arguments.b[1]}, arguments.b[2] * kDegree};
+  CAIRN_ASSIGN_OR_RETURN(const PlanarPose a, ParsePose("--a", arguments.a));
+  CAIRN_ASSIGN_OR_RETURN(const PlanarPose b, ParsePose("--b", arguments.b));
   CAIRN_ASSIGN_OR_RETURN(const DisambiguationPlan plan, PlanDisambiguation(space, a, b, arguments.options));
-  ordered_json line = {{"case", plan.kind}, {"regions", plan.num_regions}};
+  ordered_json line = {
+      {"outcome", OutcomeName(plan.outcome)}, {"case", plan.kind}, {"regions", plan.num_regions}};
   if (plan.kind > 0) {
+    line["is_best"] = plan.is_best;
     line["length_m"] = plan.path_length_m;
     line["path_a"] = Json(plan.path_a);
     line["path_b"] = Json(plan.path_b);
@@ -97,18 +152,13 @@ Status RunApart(const ApartArguments& arguments, const CommandEnvironment& envir
     line["distance_m"] = plan.distance_m;
   }
   *environment.out << line.dump() << "\n";
-  if (arguments.svg.empty()) return Ok();
-  ViewsOverlay overlay;
-  overlay.robots = {{a.position, a.heading_rad, "a"}, {b.position, b.heading_rad, "b"}};
-  overlay.captions = {plan.kind == 0 ? "nothing tells a from b"
-                                     : fmt::format("case {}: {:.1f} m to go", plan.kind, plan.path_length_m)};
-  if (plan.kind > 0) {
-    overlay.paths = {plan.path_a, plan.path_b};
-    overlay.segments = {{plan.feature_start_a, plan.feature_end_a, plan.feature_is_at_a},
-                        {plan.feature_start_b, plan.feature_end_b, !plan.feature_is_at_a}};
-    overlay.captions.push_back(plan.feature_is_at_a ? "a wall seen from a only" : "a wall seen from b only");
-  }
-  return WriteFileAtomically(arguments.svg, DrawViews(views, overlay, /*regions=*/false));
+  if (!arguments.svg.empty())
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, Drawn(views, a, b, plan)));
+  if (plan.outcome != DisambiguationOutcome::kGaveUp) return Ok();
+  return MakeError(ErrorCode::kFailed,
+                   "gave up: nothing that tells a from b is seen from the {} regions nearest to them, and "
+                   "there are more; allow more with --max-num-regions",
+                   plan.num_regions);
 }
 
 }  // namespace

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <queue>
-#include <unordered_map>
+#include <tuple>
+#include <unordered_set>
 
 #include "core/pose.h"
 
@@ -25,12 +26,22 @@ class Planner {
           const DisambiguateOptions& options)
       : space_(space), a_(a), b_(b), options_(options) {}
 
-  DisambiguationPlan Run() {
+  Result<DisambiguationPlan> Run() {
     DisambiguationPlan plan;
     plan.num_regions = 1;
     if (const auto feature = Telling(Vec2::Zero())) {
       Fill(1, {Vec2::Zero(), Towards(*feature)}, *feature, &plan);
       return plan;
+    }
+    // One and the same pose.
+    if (a_.position == b_.position && WrapAngle(a_.heading_rad - b_.heading_rad) == 0) return plan;
+    for (const PlanarPose* pose : {&a_, &b_}) {
+      if (space_.IsFree(pose->position, pose->position, options_.radius_m)) continue;
+      return MakeError(
+          ErrorCode::kNoData,
+          "the views from both places are the same, and a robot of radius {:g} m does not fit at "
+          "({:g}, {:g}): a wall is {:.3f} m away",
+          options_.radius_m, pose->position.x(), pose->position.y(), space_.Clearance(pose->position));
     }
     Search(&plan);
     return plan;
@@ -39,6 +50,7 @@ class Planner {
  private:
   struct Step {
     double length;
+    bool is_around_b;  // the region's pose: the walk around a, or that around b
     FaceIdx face;
     Vec2 place;  // in the robot's first frame
     int before;  // step
@@ -51,6 +63,12 @@ class Planner {
     for (const VisibleStretch& stretch : space_.ViewFrom(pose.FloorFromRobot(moved)))
       seen.push_back({pose.RobotFromFloor(stretch.start), pose.RobotFromFloor(stretch.end)});
     return seen;
+  }
+
+  // Nearer, or as near and first by place: by nothing that depends on which pose is a.
+  static bool IsBefore(double distance, const Vec2& start, const Feature& other) {
+    return std::make_tuple(distance, start.x(), start.y()) <
+           std::make_tuple(other.distance, other.start.x(), other.start.y());
   }
 
   // The longest part of a stretch of which the other view has nothing, if it is long enough and near enough.
@@ -79,7 +97,7 @@ class Planner {
         if (gap_end - at >= options_.min_feature_m) {
           const Vec2 from = start + at * along, to = start + gap_end * along;
           const double distance = (0.5 * (from + to) - moved).norm();
-          if (distance <= options_.max_range_m && (!*best || distance < (*best)->distance))
+          if (distance <= options_.max_range_m && (!*best || IsBefore(distance, from, **best)))
             *best = Feature{from, to, distance, is_at_a};
         }
         at = std::max(at, high);
@@ -96,12 +114,11 @@ class Planner {
   }
 
   bool IsFree(const Vec2& from, const Vec2& to) const {
-    return space_.IsFree(a_.FloorFromRobot(from), a_.FloorFromRobot(to), options_.radius_m) &&
-           FreeAtB(from, to);
+    return IsFreeAt(a_, from, to) && IsFreeAt(b_, from, to);
   }
-  bool FreeAtB(const Vec2& from, const Vec2& to) const {
-    return space_.IsFree(b_.FloorFromRobot(from), b_.FloorFromRobot(to), options_.radius_m) &&
-           space_.FaceAt(b_.FloorFromRobot(to)) >= 0;
+  bool IsFreeAt(const PlanarPose& pose, const Vec2& from, const Vec2& to) const {
+    const Vec2 end = pose.FloorFromRobot(to);
+    return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m) && space_.FaceAt(end) >= 0;
   }
 
   // Straight to one metre before the feature, or as far as nothing stands in the way in either case.
@@ -113,22 +130,30 @@ class Planner {
   }
 
   void Search(DisambiguationPlan* plan) {
-    const auto later = [&](int x, int y) {
-      return steps_[x].length != steps_[y].length ? steps_[x].length > steps_[y].length : x > y;
+    const auto key = [&](int i) {
+      return std::make_tuple(steps_[i].length, steps_[i].place.x(), steps_[i].place.y(), i);
     };
+    const auto later = [&](int i, int k) { return key(i) > key(k); };
     std::priority_queue<int, std::vector<int>, decltype(later)> queue(later);
-    std::unordered_map<FaceIdx, bool> done;
-    steps_.push_back({0, space_.FaceAt(a_.position), Vec2::Zero(), -1, 0});
-    queue.push(0);
+    std::unordered_set<FaceIdx> done[2];
+    for (const bool is_around_b : {false, true}) {
+      const PlanarPose& pose = is_around_b ? b_ : a_;
+      steps_.push_back({0, is_around_b, space_.FaceAt(pose.position), Vec2::Zero(), -1, 0});
+      queue.push(static_cast<int>(steps_.size()) - 1);
+    }
     double best_cost = std::numeric_limits<double>::infinity();
-    while (!queue.empty() && plan->num_regions < options_.max_num_regions) {
+    while (!queue.empty()) {
       const int at = queue.top();
       queue.pop();
       const Step step = steps_[at];
-      if (step.length >= best_cost) break;
-      if (done[step.face]) continue;
-      done[step.face] = true;
+      if (step.length >= best_cost) return;
+      if (!done[step.is_around_b].insert(step.face).second) continue;
       if (step.depth > 0) {
+        if (plan->num_regions >= options_.max_num_regions) {
+          plan->is_best = false;
+          if (plan->kind == 0) plan->outcome = DisambiguationOutcome::kGaveUp;
+          return;
+        }
         ++plan->num_regions;
         const auto feature = Telling(step.place);
         const double cost = feature ? step.length + options_.cost_of_distance * feature->distance : best_cost;
@@ -137,15 +162,23 @@ class Planner {
           Fill(step.depth == 1 ? 2 : 3, PathTo(at), *feature, plan);
         }
       }
-      for (auto* next = space_.NeighboursBegin(step.face); next != space_.NeighboursEnd(step.face); ++next) {
-        if (done.contains(next->face)) continue;
-        const Vec2 middle = a_.RobotFromFloor(next->middle);
-        const Vec2 place = a_.RobotFromFloor(space_.views().Centroid(next->face));
-        if (!IsFree(step.place, middle) || !IsFree(middle, place)) continue;
-        const double length = step.length + (middle - step.place).norm() + (place - middle).norm();
-        steps_.push_back({length, next->face, place, at, step.depth + 1});
-        queue.push(static_cast<int>(steps_.size()) - 1);
-      }
+      AddNeighbours(at, done[step.is_around_b], [&](int next) { queue.push(next); });
+    }
+  }
+
+  // Over the middle of each border to the middle of the region behind it.
+  template <typename Push>
+  void AddNeighbours(int at, const std::unordered_set<FaceIdx>& done, const Push& push) {
+    const Step step = steps_[at];
+    const PlanarPose& pose = step.is_around_b ? b_ : a_;
+    for (auto* next = space_.NeighboursBegin(step.face); next != space_.NeighboursEnd(step.face); ++next) {
+      if (done.contains(next->face)) continue;
+      const Vec2 middle = pose.RobotFromFloor(next->middle);
+      const Vec2 place = pose.RobotFromFloor(space_.views().Centroid(next->face));
+      if (!IsFree(step.place, middle) || !IsFree(middle, place)) continue;
+      const double length = step.length + (middle - step.place).norm() + (place - middle).norm();
+      steps_.push_back({length, step.is_around_b, next->face, place, at, step.depth + 1});
+      push(static_cast<int>(steps_.size()) - 1);
     }
   }
 
@@ -158,6 +191,7 @@ class Planner {
   }
 
   void Fill(int kind, const std::vector<Vec2>& path, const Feature& feature, DisambiguationPlan* plan) const {
+    plan->outcome = DisambiguationOutcome::kFound;
     plan->kind = kind;
     plan->path_a.clear();
     plan->path_b.clear();
@@ -213,7 +247,7 @@ OptionTable DescribeOptions(DisambiguateOptions* o) {
        .max = 1e3},
       {.name = "max_num_regions",
        .value = &o->max_num_regions,
-       .help = "most regions to look from",
+       .help = "most regions to look from, around both poses together, before giving up",
        .min = 1,
        .max = 1e9},
   };
@@ -223,8 +257,13 @@ Result<DisambiguationPlan> PlanDisambiguation(const PlanSpace& space, const Plan
                                               const PlanarPose& b, const DisambiguateOptions& options) {
   DisambiguateOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(a.position));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(b.position));
+  for (const PlanarPose* pose : {&a, &b}) {
+    CAIRN_RETURN_IF_ERROR(space.CheckInside(pose->position));
+    if (!std::isfinite(pose->heading_rad)) {
+      return MakeError(ErrorCode::kInvalidArgument, "the pose at ({:g}, {:g}) has no heading: {:g}",
+                       pose->position.x(), pose->position.y(), pose->heading_rad);
+    }
+  }
   return Planner(space, a, b, options).Run();
 }
 

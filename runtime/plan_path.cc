@@ -8,6 +8,8 @@
 #include <numeric>
 #include <queue>
 
+#include "runtime/plan_roadmap.h"
+
 namespace cairn {
 namespace {
 
@@ -19,11 +21,30 @@ Error NoWay(const Vec2& from, const Vec2& to, double radius_m) {
                    from.y(), to.x(), to.y(), radius_m);
 }
 
+// Errors: InvalidArgument outside of the domain, NoData where the robot does not fit.
+Status CheckStands(const PlanSpace& space, const Vec2& place, double radius_m) {
+  CAIRN_RETURN_IF_ERROR(space.CheckInside(place));
+  if (space.IsFree(place, place, radius_m)) return Ok();
+  if (radius_m <= 0) {
+    return MakeError(ErrorCode::kNoData, "the place ({:g}, {:g}) lies on a wall, on neither side of it",
+                     place.x(), place.y());
+  }
+  return MakeError(ErrorCode::kNoData,
+                   "a robot of radius {:g} m does not fit at ({:g}, {:g}): a wall is {:.3f} m away", radius_m,
+                   place.x(), place.y(), space.Clearance(place));
+}
+
 PlanPath Measured(std::vector<Vec2> points) {
   PlanPath path{std::move(points), 0};
   for (size_t i = 0; i + 1 < path.points.size(); ++i)
     path.length_m += (path.points[i + 1] - path.points[i]).norm();
   return path;
+}
+
+std::vector<Vec2> PlacesOf(const PlanRoadmap& roadmap, const std::vector<int>& nodes) {
+  std::vector<Vec2> places;
+  for (const int node : nodes) places.push_back(roadmap.place(node));
+  return places;
 }
 
 // A region that stands for those around it.
@@ -64,38 +85,36 @@ std::vector<Spot> SpreadSpots(const Views& views, int most) {
 
 // Whether the middle of a region and its corners are seen from a place.
 bool SeesRegion(const PlanSpace& space, const Vec2& place, const Spot& spot) {
-  if (!space.IsFree(place, spot.middle, 0)) return false;
+  if (!space.PassageBetween(place, spot.middle).IsOpen()) return false;
   const Views& views = space.views();
   for (int64_t i = views.face_offsets[spot.face]; i < views.face_offsets[spot.face + 1]; ++i) {
     // A little inside, where no wall begins.
     const Vec2 corner = views.plan.Metres(views.vertices[views.face_vertices[i]]);
-    if (!space.IsFree(place, corner + 1e-3 * (spot.middle - corner), 0)) return false;
+    if (!space.PassageBetween(place, corner + 1e-3 * (spot.middle - corner)).IsOpen()) return false;
   }
   return true;
 }
 
-// Places joined by free straight ways, and the shortest ways over them.  Place 0 is the start.
-class Roadmap {
+// All links of a roadmap, and the shortest ways over them from node 0, the start, and others.
+class RoadmapWays {
  public:
-  Roadmap(const PlanSpace& space, std::vector<Vec2> points, double radius_m)
-      : points_(std::move(points)), ways_(points_.size()) {
-    for (size_t i = 0; i < points_.size(); ++i) {
-      for (size_t k = 0; k < i; ++k) {
-        if (!space.IsFree(points_[i], points_[k], radius_m)) continue;
-        ways_[i].push_back(static_cast<int>(k));
-        ways_[k].push_back(static_cast<int>(i));
+  explicit RoadmapWays(const PlanRoadmap& roadmap) : roadmap_(roadmap), links_(roadmap.num_nodes()) {
+    for (int i = 0; i < roadmap.num_nodes(); ++i) {
+      for (int k = 0; k < i; ++k) {
+        if (!roadmap.AreJoined(i, k)) continue;
+        links_[i].push_back(k);
+        links_[k].push_back(i);
       }
     }
     Lengths(0, &from_start_, nullptr);
   }
 
-  const std::vector<Vec2>& points() const { return points_; }
-  bool IsReached(size_t place) const { return std::isfinite(from_start_[place]); }
+  bool IsReached(int node) const { return std::isfinite(from_start_[node]); }
 
-  // Dijkstra: lengths of the shortest ways from a place to all, and the place before each.
+  // Dijkstra: lengths of the shortest ways from a node to all, and the node before each.
   void Lengths(int from, std::vector<double>* lengths, std::vector<int>* before) const {
-    lengths->assign(points_.size(), std::numeric_limits<double>::infinity());
-    if (before != nullptr) before->assign(points_.size(), -1);
+    lengths->assign(links_.size(), std::numeric_limits<double>::infinity());
+    if (before != nullptr) before->assign(links_.size(), -1);
     (*lengths)[from] = 0;
     using Entry = std::pair<double, int>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
@@ -104,8 +123,8 @@ class Roadmap {
       const auto [length, at] = queue.top();
       queue.pop();
       if (length > (*lengths)[at]) continue;
-      for (const int next : ways_[at]) {
-        const double sum = length + (points_[next] - points_[at]).norm();
+      for (const int next : links_[at]) {
+        const double sum = length + (roadmap_.place(next) - roadmap_.place(at)).norm();
         if (sum >= (*lengths)[next]) continue;
         (*lengths)[next] = sum;
         if (before != nullptr) (*before)[next] = at;
@@ -114,34 +133,34 @@ class Roadmap {
     }
   }
 
-  std::vector<Vec2> Way(int from, int to) const {
+  std::vector<int> Way(int from, int to) const {
     std::vector<double> lengths;
-    std::vector<int> before;
+    std::vector<int> before, nodes;
     Lengths(from, &lengths, &before);
-    std::vector<Vec2> points;
-    for (int at = to; at >= 0; at = before[at]) points.push_back(points_[at]);
-    std::reverse(points.begin(), points.end());
-    return points;
+    for (int at = to; at >= 0; at = before[at]) nodes.push_back(at);
+    std::reverse(nodes.begin(), nodes.end());
+    return Tightened(nodes, [&](int a, int b) { return roadmap_.AreJoined(a, b); });
   }
 
  private:
-  std::vector<Vec2> points_;
-  std::vector<std::vector<int>> ways_;
+  const PlanRoadmap& roadmap_;
+  std::vector<std::vector<int>> links_;
   std::vector<double> from_start_;
 };
 
-// Reached places that add the most area to what is seen, the start first, until enough is seen.
-std::vector<int> ChooseLookingPlaces(const PlanSpace& space, const Roadmap& roadmap,
-                                     const std::vector<Spot>& spots, double seen_ratio, SearchPath* result) {
-  const std::vector<Vec2>& points = roadmap.points();
-  const size_t num = points.size();
+// Reached places (the start, node 0, and the middles of regions, the nodes after it) that add the most area
+// to what is seen, the start first, until enough is seen.
+std::vector<int> ChooseLookingPlaces(const PlanSpace& space, const PlanRoadmap& roadmap,
+                                     const RoadmapWays& ways, const std::vector<Spot>& spots,
+                                     double seen_ratio, SearchPath* result) {
+  const size_t num = spots.size() + 1;
   std::vector<std::vector<size_t>> sees(num);
   std::vector<bool> to_see(spots.size(), false);
   for (size_t i = 0; i < num; ++i) {
-    if (!roadmap.IsReached(i)) continue;
+    if (!ways.IsReached(static_cast<int>(i))) continue;
     for (size_t k = 0; k < spots.size(); ++k) {
       // A region is convex: its own middle sees it.
-      if (k + 1 != i && !SeesRegion(space, points[i], spots[k])) continue;
+      if (k + 1 != i && !SeesRegion(space, roadmap.place(static_cast<int>(i)), spots[k])) continue;
       sees[i].push_back(k);
       to_see[k] = true;
     }
@@ -173,12 +192,12 @@ std::vector<int> ChooseLookingPlaces(const PlanSpace& space, const Roadmap& road
 }
 
 // An open tour from the first place: the nearest next, then exchanges of two legs while they shorten it.
-std::vector<int> ShortTour(const Roadmap& roadmap, const std::vector<int>& places) {
+std::vector<int> ShortTour(const RoadmapWays& ways, const std::vector<int>& places) {
   const size_t num = places.size();
   std::vector<std::vector<double>> legs(num);
   for (size_t i = 0; i < num; ++i) {
     std::vector<double> lengths;
-    roadmap.Lengths(places[i], &lengths, nullptr);
+    ways.Lengths(places[i], &lengths, nullptr);
     for (const int place : places) legs[i].push_back(lengths[place]);
   }
   std::vector<size_t> tour(num);
@@ -231,77 +250,51 @@ Result<PlanPath> FindPath(const PlanSpace& space, const Vec2& from, const Vec2& 
                           const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(to));
-  const auto is_free = [&](const Vec2& a, const Vec2& b) { return space.IsFree(a, b, options.radius_m); };
-  const FaceIdx first = space.FaceAt(from), goal = space.FaceAt(to);
-  if (space.IsFree(from, to, options.radius_m)) return Measured({from, to});
-  struct Step {
-    double length;
-    FaceIdx face;
-    Vec2 place;
-    int before;
-  };
-  std::vector<Step> steps{{0, first, from, -1}};
-  using Entry = std::pair<double, int>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  queue.push({(to - from).norm(), 0});
-  std::vector<bool> done(space.views().num_faces(), false);
-  while (!queue.empty()) {
-    const int at = queue.top().second;
-    queue.pop();
-    const Step step = steps[at];
-    if (done[step.face]) continue;
-    if (step.face == goal && !space.IsFree(step.place, to, options.radius_m)) continue;
-    done[step.face] = true;
-    if (step.face == goal) {
-      std::vector<Vec2> points{to};
-      for (int i = at; i >= 0; i = steps[i].before) points.push_back(steps[i].place);
-      std::reverse(points.begin(), points.end());
-      return Measured(Tightened(points, is_free));
-    }
-    for (auto* next = space.NeighboursBegin(step.face); next != space.NeighboursEnd(step.face); ++next) {
-      if (done[next->face] || !space.IsFree(step.place, next->middle, options.radius_m)) continue;
-      const double length = step.length + (next->middle - step.place).norm();
-      steps.push_back({length, next->face, next->middle, at});
-      queue.push({length + (to - next->middle).norm(), static_cast<int>(steps.size()) - 1});
-    }
-  }
-  return NoWay(from, to, options.radius_m);
+  CAIRN_RETURN_IF_ERROR(CheckStands(space, from, options.radius_m));
+  CAIRN_RETURN_IF_ERROR(CheckStands(space, to, options.radius_m));
+  if (from == to) return PlanPath{{from}, 0};
+  const PlanRoadmap roadmap(space, options.radius_m, {from, to});
+  const std::vector<int> way = roadmap.ShortestWay(0, 1);
+  if (way.empty()) return NoWay(from, to, options.radius_m);
+  return Measured(PlacesOf(roadmap, way));
 }
 
 Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Vec2& from, const Vec2& to,
                                      const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(to));
-  std::vector<Vec2> places{from};
+  CAIRN_RETURN_IF_ERROR(CheckStands(space, from, options.radius_m));
+  CAIRN_RETURN_IF_ERROR(CheckStands(space, to, options.radius_m));
+  if (from == to) return PlanPath{{from}, 0};
+  constexpr int kFrom = 0, kTo = 1;
+  std::vector<Vec2> places{from, to};
   for (const Spot& spot : SpreadSpots(space.views(), options.max_num_places)) places.push_back(spot.middle);
-  std::vector<int> before(places.size(), -1), order{0};
-  std::vector<bool> reached(places.size(), false);
-  reached[0] = true;
-  // Places of one level are tried in the order of their distance to the goal.
+  const PlanRoadmap roadmap(space, options.radius_m, places);
+  std::vector<int> before(roadmap.num_nodes(), -1), order{kFrom};
+  std::vector<bool> reached(roadmap.num_nodes(), false);
+  reached[kFrom] = true;
+  // Nodes of one level are tried in the order of their distance to the goal.
   for (size_t level = 0; level < order.size();) {
     const size_t end = order.size();
     for (size_t i = level; i < end; ++i) {
-      if (!space.IsFree(places[order[i]], to, options.radius_m)) continue;
-      std::vector<Vec2> points{to};
-      for (int at = order[i]; at >= 0; at = before[at]) points.push_back(places[at]);
-      std::reverse(points.begin(), points.end());
-      return Measured(std::move(points));
+      if (!roadmap.AreJoined(order[i], kTo)) continue;
+      std::vector<int> way{kTo};
+      for (int at = order[i]; at >= 0; at = before[at]) way.push_back(at);
+      std::reverse(way.begin(), way.end());
+      return Measured(PlacesOf(roadmap, way));
     }
     for (size_t i = level; i < end; ++i) {
-      for (size_t other = 0; other < places.size(); ++other) {
-        if (reached[other] || !space.IsFree(places[order[i]], places[other], options.radius_m)) continue;
+      for (int other = kTo + 1; other < roadmap.num_nodes(); ++other) {
+        if (reached[other] || !roadmap.AreJoined(order[i], other)) continue;
         reached[other] = true;
         before[other] = order[i];
-        order.push_back(static_cast<int>(other));
+        order.push_back(other);
       }
     }
     level = end;
+    const auto distance = [&](int node) { return (roadmap.place(node) - to).norm(); };
     std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(level), order.end(),
-                     [&](int a, int b) { return (places[a] - to).norm() < (places[b] - to).norm(); });
+                     [&](int a, int b) { return distance(a) < distance(b); });
   }
   return NoWay(from, to, options.radius_m);
 }
@@ -309,21 +302,22 @@ Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Vec2& from, c
 Result<SearchPath> FindSearchPath(const PlanSpace& space, const Vec2& from, const PlanPathOptions& options) {
   PlanPathOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  CAIRN_RETURN_IF_ERROR(space.CheckInside(from));
+  CAIRN_RETURN_IF_ERROR(CheckStands(space, from, options.radius_m));
   const std::vector<Spot> spots = SpreadSpots(space.views(), options.max_num_places);
-  std::vector<Vec2> middles{from};
-  for (const Spot& spot : spots) middles.push_back(spot.middle);
-  const Roadmap roadmap(space, std::move(middles), options.radius_m);
+  std::vector<Vec2> places{from};
+  for (const Spot& spot : spots) places.push_back(spot.middle);
+  const PlanRoadmap roadmap(space, options.radius_m, places);
+  const RoadmapWays ways(roadmap);
   SearchPath result;
-  const std::vector<int> looks = ChooseLookingPlaces(space, roadmap, spots, options.seen_ratio, &result);
-  const std::vector<int> tour = ShortTour(roadmap, looks);
-  const auto is_free = [&](const Vec2& a, const Vec2& b) { return space.IsFree(a, b, options.radius_m); };
+  const std::vector<int> looks =
+      ChooseLookingPlaces(space, roadmap, ways, spots, options.seen_ratio, &result);
+  const std::vector<int> tour = ShortTour(ways, looks);
   std::vector<Vec2> points{from};
   for (size_t i = 0; i < tour.size(); ++i) {
-    result.places.push_back(roadmap.points()[tour[i]]);
+    result.places.push_back(roadmap.place(tour[i]));
     if (i == 0) continue;
-    const std::vector<Vec2> way = Tightened(roadmap.Way(tour[i - 1], tour[i]), is_free);
-    points.insert(points.end(), way.begin() + 1, way.end());
+    const std::vector<Vec2> leg = PlacesOf(roadmap, ways.Way(tour[i - 1], tour[i]));
+    points.insert(points.end(), leg.begin() + 1, leg.end());
   }
   result.path = Measured(std::move(points));
   return result;

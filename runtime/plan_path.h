@@ -26,14 +26,21 @@ struct PlanPath {
   int num_links() const { return points.empty() ? 0 : static_cast<int>(points.size()) - 1; }
 };
 
-// A short path over the adjacency graph of the regions [Simsarian96 §4]: A* from border to border, then drawn
-// tight.  Errors: InvalidArgument (options, a place outside of the domain), NoData (no way for this radius).
+// All paths are planned over one roadmap (plan_roadmap.h): of any two places either all kinds find a way or
+// none does.  A point robot (radius 0) may touch walls and walk along them; it never passes a joint.  Places
+// count as the nearest points of the plan's grid there.
+
+// The shortest path [Simsarian96 §4 plans over the adjacency graph of regions; there ways go from border to
+// border, which finds no shortest one, and none where a border's middle is too near to a wall].  Exact for a
+// point; for a disc at most 2 % longer.  From a place to itself: this one point, no links.
+// Errors: InvalidArgument (options, a place outside of the domain), NoData (no way for this radius, a place
+// nearer to a wall than it, or on a wall).
 Result<PlanPath> FindPath(const PlanSpace& space, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                           const PlanPathOptions& options);
 
 // A path with few straight links: breadth first over what is seen from start, from there, and so on, turns
-// being made in the middles of regions.  No path that turns there only has fewer links; one that turns
-// elsewhere may.  Errors: as FindPath.
+// being made in the middles of regions and around the corners of walls.  No path that turns there only has
+// fewer links; one that turns elsewhere may.  Errors: as FindPath.
 Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Eigen::Vector2d& from,
                                      const Eigen::Vector2d& to, const PlanPathOptions& options);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "core/descriptor_distance.h"
 #include "core/descriptor_matcher.h"
@@ -10,44 +12,106 @@
 namespace cairn {
 namespace {
 
-constexpr int kSmallRange = 64;
+// Sets of fewer pairs than this are compared one by one.
+constexpr size_t kFewPairs = 64 * 64;
 
-struct Nearest {
-  int32_t idx = -1;
-  int32_t dot_product = -1;
-};
-
-void Offer(Nearest* nearest, int32_t idx, int32_t dot_product) {
-  if (idx < 0) return;
-  if (dot_product > nearest->dot_product || (dot_product == nearest->dot_product && idx < nearest->idx)) {
-    *nearest = {idx, dot_product};
+// The least dot product of two centres that lie within `angle_rad` of each other.
+int32_t LeastDot(double angle_rad) {
+  int32_t low = 0, high = static_cast<int32_t>(kSquaredDescriptorNorm);
+  while (low < high) {
+    const int32_t middle = (low + high) / 2;
+    if (DescriptorAngleRad(middle) <= angle_rad) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
   }
+  return low;
 }
 
-// Nearest other class of each in [begin, end): the range's halves against each other, then each half by
-// itself.  Every pair is looked at once.
-void FindNearest(const DescriptorMatrix& centres, int begin, int end, std::vector<Nearest>* nearest) {
-  if (end - begin <= kSmallRange) {
-    for (int i = begin; i < end; ++i) {
-      for (int j = i + 1; j < end; ++j) {
-        const int32_t dot = DescriptorDot(centres.row(i).data(), centres.row(j).data());
-        Offer(&(*nearest)[i], j, dot);
-        Offer(&(*nearest)[j], i, dot);
+// All pairs of classes of which one lies within the other's radius.  Classes are compared in the order of
+// their radii, the widest first: of any two the first one's radius then counts, and a row's largest dot
+// product with a set of later columns says by itself whether the set has a look-alike of the row.
+class LookAlikeSearch {
+ public:
+  LookAlikeSearch(const std::vector<ClassAppearance>& classes, double ratio)
+      : centres_(classes.size(), kDescriptorDim), order_(classes.size()), least_dots_(classes.size()) {
+    std::iota(order_.begin(), order_.end(), 0);
+    std::sort(order_.begin(), order_.end(), [&](int a, int b) {
+      return std::tie(classes[b].radius_rad, a) < std::tie(classes[a].radius_rad, b);
+    });
+    for (size_t i = 0; i < order_.size(); ++i) {
+      centres_.row(static_cast<int>(i)) = classes[order_[i]].centre;
+      least_dots_[i] = LeastDot(ratio * classes[order_[i]].radius_rad);
+    }
+  }
+
+  // Calls visit(i, k) for each pair once, in no particular order.
+  template <typename Visit>
+  void ForEachPair(const Visit& visit) const {
+    std::vector<int> ranks(order_.size());
+    std::iota(ranks.begin(), ranks.end(), 0);
+    Within(ranks.data(), ranks.data() + ranks.size(), visit);
+  }
+
+ private:
+  // Pairs of ascending ranks: the halves against each other, then each half by itself.
+  template <typename Visit>
+  void Within(const int* begin, const int* end, const Visit& visit) const {
+    if (end - begin < 2) return;
+    const int* const middle = begin + (end - begin) / 2;
+    Between({begin, middle}, {middle, end}, visit);
+    Within(begin, middle, visit);
+    Within(middle, end, visit);
+  }
+
+  // Pairs of a row and a column.  REQUIRES: both ascending, all rows before all columns
+  template <typename Visit>
+  void Between(const std::vector<int>& rows, const std::vector<int>& columns, const Visit& visit) const {
+    if (rows.size() * columns.size() <= kFewPairs) {
+      for (const int row : rows) {
+        for (const int column : columns) {
+          const int32_t dot = DescriptorDot(centres_.row(row).data(), centres_.row(column).data());
+          if (dot >= least_dots_[row]) visit(order_[row], order_[column]);
+        }
+      }
+      return;
+    }
+    std::vector<BestTwo> row_bests, column_bests;
+    FindBestTwo(Centres(rows), Centres(columns), FastestKernel(), &row_bests, &column_bests);
+    // Rows of one look-alike are done; those of more are looked at again, with the columns that may be
+    // theirs.
+    std::vector<int> other_rows, other_columns;
+    for (size_t i = 0; i < rows.size(); ++i) {
+      const int32_t least_dot = least_dots_[rows[i]];
+      if (row_bests[i].second >= least_dot) {
+        other_rows.push_back(rows[i]);
+      } else if (row_bests[i].best >= least_dot) {
+        visit(order_[rows[i]], order_[columns[row_bests[i].idx]]);
       }
     }
-    return;
+    if (other_rows.empty()) return;
+    for (size_t k = 0; k < columns.size(); ++k) {
+      if (column_bests[k].best >= least_dots_[other_rows[0]]) other_columns.push_back(columns[k]);
+    }
+    const bool halve_rows = other_rows.size() > other_columns.size();
+    const std::vector<int>& halved = halve_rows ? other_rows : other_columns;
+    const auto middle = halved.begin() + static_cast<std::ptrdiff_t>(halved.size() / 2);
+    for (const std::vector<int>& half : {std::vector<int>(halved.begin(), middle), {middle, halved.end()}}) {
+      Between(halve_rows ? half : other_rows, halve_rows ? other_columns : half, visit);
+    }
   }
-  const int middle = (begin + end) / 2;
-  std::vector<BestTwo> rows, columns;
-  FindBestTwo(centres.middleRows(begin, middle - begin), centres.middleRows(middle, end - middle),
-              FastestKernel(), &rows, &columns);
-  for (int i = begin; i < middle; ++i)
-    Offer(&(*nearest)[i], middle + rows[i - begin].idx, rows[i - begin].best);
-  for (int i = middle; i < end; ++i)
-    Offer(&(*nearest)[i], begin + columns[i - middle].idx, columns[i - middle].best);
-  FindNearest(centres, begin, middle, nearest);
-  FindNearest(centres, middle, end, nearest);
-}
+
+  DescriptorMatrix Centres(const std::vector<int>& ranks) const {
+    DescriptorMatrix centres(ranks.size(), kDescriptorDim);
+    for (size_t i = 0; i < ranks.size(); ++i) centres.row(static_cast<int>(i)) = centres_.row(ranks[i]);
+    return centres;
+  }
+
+  DescriptorMatrix centres_;         // by rank: the widest class first
+  std::vector<int> order_;           // class of each rank
+  std::vector<int32_t> least_dots_;  // by rank, ascending: with it or more, a later class is a look-alike
+};
 
 }  // namespace
 
@@ -68,30 +132,17 @@ void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearan
 
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
                                      const FindAmbiguousOptions& options) {
-  const int num_classes = static_cast<int>(classes.size());
-  DescriptorMatrix centres(num_classes, kDescriptorDim);
-  for (int i = 0; i < num_classes; ++i) centres.row(i) = classes[i].centre;
-  std::vector<Nearest> nearest(num_classes);
-  FindNearest(centres, 0, num_classes, &nearest);
-
-  std::vector<Ambiguity> ambiguity(num_classes, Ambiguity::kNone);
-  const auto mark = [&](int i, Ambiguity value) {
-    if (ambiguity[i] == Ambiguity::kNone) ambiguity[i] = value;
-  };
-  for (int i = 0; i < num_classes; ++i) {
-    const int j = nearest[i].idx;
-    if (j < 0) continue;
-    const double radius = std::max(classes[i].radius_rad, classes[j].radius_rad);
-    if (DescriptorAngleRad(nearest[i].dot_product) > options.min_separation_ratio * radius) continue;
-    if ((classes[i].position - classes[j].position).norm() <= options.max_duplicate_distance_m) {
-      const bool i_stays = classes[i].num_observations > classes[j].num_observations ||
-                           (classes[i].num_observations == classes[j].num_observations && i < j);
-      mark(i_stays ? j : i, Ambiguity::kDuplicate);
-    } else {
-      mark(i, Ambiguity::kAmbiguous);
-      mark(j, Ambiguity::kAmbiguous);
+  std::vector<Ambiguity> ambiguity(classes.size(), Ambiguity::kNone);
+  if (options.min_separation_ratio <= 0) return ambiguity;
+  LookAlikeSearch(classes, options.min_separation_ratio).ForEachPair([&](int i, int k) {
+    if ((classes[i].position - classes[k].position).norm() > options.max_duplicate_distance_m) {
+      ambiguity[i] = ambiguity[k] = Ambiguity::kAmbiguous;
+      return;
     }
-  }
+    const bool i_stays = std::tie(classes[k].num_observations, i) < std::tie(classes[i].num_observations, k);
+    Ambiguity& other = ambiguity[i_stays ? k : i];
+    if (other == Ambiguity::kNone) other = Ambiguity::kDuplicate;
+  });
   return ambiguity;
 }
 

@@ -23,17 +23,23 @@ void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearan
 
 struct FindAmbiguousOptions {
   // Two classes are told apart when their centres lie farther apart than this many times the larger of their
-  // radii [Sala06 §VI-B: "not significantly larger than the radius of the classes"].  REQUIRES: >= 0; 0
-  // switches it off
+  // radii [Sala06 §VI-B: "not significantly larger than the radius of the classes"; there the distance
+  // is that of two features, here that of the centres, so that one odd keypoint does not decide].
+  // REQUIRES: >= 0; 0 switches it off
   double min_separation_ratio = 1.0;
   // Classes that look alike and lie closer together than this are one scene feature found twice: the one with
   // more keypoints stays, metres.  REQUIRES: >= 0
   double max_duplicate_distance_m = 0.05;
 };
 
+// kAmbiguous goes before kDuplicate.
 enum class Ambiguity : uint8_t { kNone, kAmbiguous, kDuplicate };
 
-// Per class.  The nearest other class of each is found exactly; O(n^2) dot products.
+// Per class.  Every pair of classes is judged, not only the nearest ones: of a class's look-alikes the
+// nearest may be its duplicate, and another that lies within a wide class's radius may have nearer
+// neighbours.  Both classes of an ambiguous pair go [Sala06 §VI-B: all features of both classes], also where
+// only one's radius reaches the other.  Exact, whatever the order of the classes; O(n^2) dot products, by the
+// kernels of core/descriptor_matcher.h, and as many again as look-alikes are dense.
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
                                      const FindAmbiguousOptions& options);
 
