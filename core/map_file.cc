@@ -1,6 +1,5 @@
 #include "core/map_file.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <mutex>
 
@@ -52,18 +51,6 @@ Status CheckContainer(const std::string& path) {
   return Ok();
 }
 
-// A damaged or hostile file must not make SQLite run programs, or allocate more than the file has.
-void Harden(SQLite::Database& database, uint64_t num_bytes) {
-  sqlite3* const handle = database.getHandle();
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
-                static_cast<int>(std::clamp<uint64_t>(num_bytes, 100'000, 1'000'000'000)));
-  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0; PRAGMA cache_size = -256;");
-}
-
 // Those that every map has.
 Status CheckTables(SQLite::Database& database, const std::string& path) {
   for (const char* const table :
@@ -99,7 +86,7 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
     std::error_code error;
     const uint64_t num_bytes = fs::file_size(path, error);
     SQLite::Database database = OpenImmutable(path);
-    Harden(database, num_bytes);
+    database.exec("PRAGMA cache_size = -256");  // what is read is kept decoded: memory for it would be lost
     CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path, kMapVersionMajor));
     CAIRN_RETURN_IF_ERROR(CheckTables(database, path));
     MapFile file;
