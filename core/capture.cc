@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "core/image_file.h"
 #include "core/image_list.h"
+#include "core/printable.h"
 #include "core/sessions.h"
 #include "core/text.h"
 
@@ -78,6 +79,10 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
       fs::is_directory(capture->root + "/images") ? capture->root + "/images" : capture->root;
   std::map<std::tuple<int, int, int, double>, CameraId> camera_ids;
   for (const std::string& name : ListImages(capture->images_folder, sessions)) {
+    if (HasControlCharacter(name)) {
+      capture->rejects.push_back({name, "its name has a control character, such as a line's end; rename it"});
+      continue;
+    }
     const std::string path = capture->images_folder + "/" + name;
     const Result<cv::Mat> image = ReadGreyImage(path);
     if (!image.ok()) {
@@ -180,6 +185,10 @@ Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::v
     if (const Status status = NormalizePose(&image.cam_from_world); !status.ok()) {
       rejects->push_back(
           {image.name, fmt::format("{}:{}: {}", path, listed.line_number, status.error().message)});
+    } else if (HasControlCharacter(image.name)) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: the image's name has a control character; rename it", path,
+                                   listed.line_number)});
     } else {
       images.push_back({std::move(image.name), image.camera_id, image.cam_from_world});
     }
@@ -199,6 +208,7 @@ Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>&
   std::string text =
       "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME (cam_from_world, metres); second line empty\n";
   for (size_t i = 0; i < images.size(); ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckListedName(path, images[i].name));
     const Pose& pose = *images[i].cam_from_world;
     text +=
         fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.6f} {:.6f} {:.6f} {} {}\n\n", i + 1, pose.rotation.w(),
