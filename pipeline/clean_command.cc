@@ -40,8 +40,8 @@ bool IsStageFileName(const std::string& name) {
 }
 
 bool IsBuildFileName(const std::string& name) {
-  return name == "config.mk" || name == "check.json" || name == "error.json" || name == "lock" ||
-         IsStageFileName(name) || IsTemporaryName(name, "");
+  return name == "config.mk" || name == "recipe" || name == "check.json" || name == "error.json" ||
+         name == "lock" || IsStageFileName(name) || IsTemporaryName(name, "");
 }
 
 bool IsOptionsFileName(const std::string& name) {
