@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "core/image_file.h"
 #include "core/image_list.h"
+#include "core/printable.h"
 #include "core/sessions.h"
 #include "core/text.h"
 
@@ -229,6 +230,10 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
   CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions));
   FlatFolderCameras cameras(std::move(known), capture);
   for (const std::string& name : ListImages(capture->images_folder, sessions)) {
+    if (HasControlCharacter(name)) {
+      capture->rejects.push_back({name, "its name has a control character, such as a line's end; rename it"});
+      continue;
+    }
     const Result<cv::Mat> image = ReadGreyImage(capture->images_folder + "/" + name);
     if (!image.ok()) {
       capture->rejects.push_back({name, image.error().message});
@@ -317,6 +322,10 @@ Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::v
     if (const Status status = NormalizePose(&image.cam_from_world); !status.ok()) {
       rejects->push_back(
           {image.name, fmt::format("{}:{}: {}", path, listed.line_number, status.error().message)});
+    } else if (HasControlCharacter(image.name)) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: the image's name has a control character; rename it", path,
+                                   listed.line_number)});
     } else {
       images.push_back({std::move(image.name), image.camera_id, image.cam_from_world});
     }
@@ -336,6 +345,7 @@ Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>&
   std::string text =
       "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME (cam_from_world, metres); second line empty\n";
   for (size_t i = 0; i < images.size(); ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckListedName(path, images[i].name));
     const Pose& pose = *images[i].cam_from_world;
     text +=
         fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.6f} {:.6f} {:.6f} {} {}\n\n", i + 1, pose.rotation.w(),

@@ -1,5 +1,7 @@
 #include "core/colmap_database.h"
 
+#include "core/printable.h"
+
 #include <algorithm>
 #include <cmath>
 #include <string_view>
@@ -149,6 +151,8 @@ Result<std::vector<DatabaseImage>> ReadDatabaseImages(SQLite::Database& database
     image.name = query.getColumn(1).getString();
     image.camera_id = static_cast<CameraId>(row.Integer(2, 0, kMaxId));
     if (image.name.empty()) row.Fail("the image has no name");
+    if (HasControlCharacter(image.name))
+      row.Fail(fmt::format("the image's name, '{}', has a control character", image.name));
     const auto [named, is_new] = names.emplace(image.name, image.image_id);
     if (!is_new) row.Fail(fmt::format("image {} has the same name, '{}'", named->second, image.name));
     if (!row.ok()) return BadRow(database, "images", query.getColumn(0).getInt64(), row.problem());

@@ -5,6 +5,7 @@
 #include "core/capture.h"
 #include "core/colmap_model.h"
 #include "core/file.h"
+#include "core/image_list.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -161,8 +162,11 @@ Result<ColmapModel> ReadColmapModelText(const std::string& folder) {
 }
 
 Status WriteColmapModelText(const ColmapModel& model, const std::string& folder) {
+  const std::string images_path = folder + "/images.txt";
+  for (const ModelImage& image : model.images)
+    CAIRN_RETURN_IF_ERROR(CheckListedName(images_path, image.name));
   CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", model.cameras));
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/images.txt", ImagesText(model)));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(images_path, ImagesText(model)));
   return WriteFileAtomically(folder + "/points3D.txt", PointsText(model));
 }
 

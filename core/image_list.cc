@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/printable.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -20,6 +21,14 @@ bool IsPointsLine(const std::vector<std::string>& words) {
 }
 
 }  // namespace
+
+Status CheckListedName(const std::string& path, const std::string& name) {
+  if (!HasControlCharacter(name)) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: cannot list the image '{}': its name has a control character, such as a line's end; "
+                   "rename it",
+                   path, name);
+}
 
 Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));

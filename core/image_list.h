@@ -19,4 +19,8 @@ struct ListedImage {
 // or empty, may be missing.  Errors: those of ReadFile and ParseImageLine, the latter with file and line.
 Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit);
 
+// Whether an image of this name can stand in a list of one image per line, `path`.  Errors: InvalidArgument
+// (a control character, such as a line's end, which would make two lines of one).
+Status CheckListedName(const std::string& path, const std::string& name);
+
 }  // namespace cairn

@@ -6,6 +6,7 @@
 
 #include "core/appearance.h"
 #include "core/map_documents.h"
+#include "core/printable.h"
 #include "core/sessions.h"
 
 namespace cairn {
@@ -48,6 +49,8 @@ Status CheckImages(const MapRows& rows) {
     }
     if (image.name.size() > kMaxNameBytes)
       return Invalid("image {}: a name of {} bytes", image.image_id, image.name.size());
+    if (HasControlCharacter(image.name))
+      return Invalid("image {}: its name has a control character", image.image_id);
     if (image.landmarks.size() > kMaxImageLandmarks) {
       return Invalid("image {}: {} landmarks, at most {} are stored", image.image_id, image.landmarks.size(),
                      kMaxImageLandmarks);
@@ -170,6 +173,17 @@ std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
 }
 
 Status CheckMapHead(const MapHead& head) {
+  for (const std::string* text : {&head.name, &head.writer, &head.instruction_set, &head.landmark_choice,
+                                  &head.algorithm, &head.frame.unit, &head.frame.source}) {
+    if (HasControlCharacter(*text)) return Invalid("'{}' has a control character", *text);
+  }
+  for (const auto& [stage, options] : head.stage_options) {
+    if (HasControlCharacter(stage)) return Invalid("stage '{}' has a control character", stage);
+  }
+  for (const auto& [file, hash] : head.input_hashes) {
+    if (HasControlCharacter(file) || HasControlCharacter(hash))
+      return Invalid("input '{}' has a control character", file);
+  }
   CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(head.frame));
   if (head.sessions.size() > kMaxNumSessions)
     return Invalid("{} sessions, at most {} are stored", head.sessions.size(), kMaxNumSessions);
@@ -195,6 +209,7 @@ Status CheckMapHead(const MapHead& head) {
     return Invalid("documents = '{}', expected all or kept", head.documents);
   for (const auto& [name, value] : head.self_test) {
     if (!std::isfinite(value)) return Invalid("self-test figure '{}' is not finite", name);
+    if (HasControlCharacter(name)) return Invalid("self-test figure '{}' has a control character", name);
   }
   return Ok();
 }

@@ -1,8 +1,21 @@
 #include "core/svg.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
+#include "core/printable.h"
+
 namespace cairn {
+namespace {
+
+// [XML 1.0 production 2]
+bool IsXmlCharacter(const Utf8Character& character) {
+  if (character.num_bytes == 0 || character.code == 0xfffe || character.code == 0xffff) return false;
+  return character.code >= 0x20 || character.code == '\t' || character.code == '\n' || character.code == '\r';
+}
+
+}  // namespace
 
 std::string BeginSvg(double width_px, double height_px, int font_size_px) {
   return fmt::format(
@@ -13,25 +26,27 @@ std::string BeginSvg(double width_px, double height_px, int font_size_px) {
       width_px, height_px, font_size_px);
 }
 
-std::string EscapeXml(const std::string& text) {
+std::string EscapeXml(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
+  while (!text.empty()) {
+    const Utf8Character character = FirstCharacter(text);
+    const size_t num_bytes = std::max(character.num_bytes, 1);
+    if (!IsXmlCharacter(character)) {
+      escaped += "\ufffd";
+    } else if (text[0] == '&') {
+      escaped += "&amp;";
+    } else if (text[0] == '<') {
+      escaped += "&lt;";
+    } else if (text[0] == '>') {
+      escaped += "&gt;";
+    } else if (text[0] == '"') {
+      escaped += "&quot;";
+    } else if (text[0] == '\'') {
+      escaped += "&#39;";
+    } else {
+      escaped += text.substr(0, num_bytes);
     }
+    text.remove_prefix(num_bytes);
   }
   return escaped;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 
 namespace cairn {
 
@@ -15,6 +16,8 @@ inline constexpr std::array<const char*, 7> kSvgColours = {"#0072B2", "#E69F00",
 // The first lines of a picture: its size, its font, white ground.
 std::string BeginSvg(double width_px, double height_px, int font_size_px);
 
-std::string EscapeXml(const std::string& text);
+// Text for an element or for an attribute between quotes; what XML cannot hold (control characters, bytes
+// that are no UTF-8) becomes U+FFFD.
+std::string EscapeXml(std::string_view text);
 
 }  // namespace cairn

@@ -23,7 +23,7 @@ bool IsBuildFileName(const std::string& name) {
   static const std::regex kStageFile(
       "(capture|images|features|matches|poses|classes|world|regions|vocabulary|appearance|views|unsealed|map)"
       "([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
-  static const std::set<std::string> kOthers = {"config.mk", "check.json", "error.json", "lock"};
+  static const std::set<std::string> kOthers = {"config.mk", "recipe", "check.json", "error.json", "lock"};
   const std::string stem = WithoutTemporaryMark(name);
   return kOthers.contains(stem) || std::regex_match(stem, kStageFile);
 }

@@ -6,14 +6,16 @@
 #include <filesystem>
 
 #include "core/file.h"
+#include "pipeline/make_words.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kConfigHead = "# Written by cairn from ";
-constexpr std::string_view kConfigHeadEnd = "; edit that instead.";
+constexpr const char* kConfigHead =
+    "# Written by cairn from the recipe whose path is in the file `recipe` beside this one; edit that "
+    "instead.\n";
 
 Status CreateFolder(const std::string& path) {
   std::error_code error;
@@ -38,15 +40,6 @@ std::string SizeAndDate(const std::string& path) {
   return fmt::format("{}-{}", status.st_size, status.st_mtim.tv_sec);
 }
 
-// What stands between two texts in a build folder's config.mk; empty where it has them not.
-std::string TextAfter(const std::string& build_dir, std::string_view before, std::string_view after) {
-  const auto config = ReadFile(build_dir + "/config.mk");
-  const size_t found = config.ok() ? config->find(before) : std::string::npos;
-  if (found == std::string::npos) return "";
-  const size_t begin = found + before.size();
-  return config->substr(begin, config->find(after, begin) - begin);
-}
-
 // The value of an option of a stage.
 std::string OptionText(const Recipe& recipe, const std::string& stage_name, const std::string& name) {
   for (const StageOptions& stage : recipe.stages) {
@@ -59,8 +52,8 @@ std::string OptionText(const Recipe& recipe, const std::string& stage_name, cons
 }
 
 // Files that tell where images stand, beside the capture's own.
-Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture) {
-  std::string files;
+Result<std::vector<std::string>> KnownPlaces(const Recipe& recipe, const std::string& capture) {
+  std::vector<std::string> files;
   for (const char* name : {"control_points", "distances"}) {
     const std::string file = OptionText(recipe, "reconstruct", name);
     if (file.empty()) continue;
@@ -72,13 +65,12 @@ Result<std::string> KnownPlaces(const Recipe& recipe, const std::string& capture
           name, file, recipe.captures.size());
     }
     const std::string path = (fs::path(capture) / file).lexically_normal().string();
-    CAIRN_RETURN_IF_ERROR(CheckMakePath(fmt::format("[reconstruct] {}", name), path));
     if (!fs::exists(path)) {
       return MakeError(ErrorCode::kNotFound,
                        "[reconstruct] {} = \"{}\": there is no {} (paths are relative to the capture)", name,
                        file, path);
     }
-    files += (files.empty() ? "" : " ") + path;
+    files.push_back(path);
   }
   return files;
 }
@@ -88,7 +80,6 @@ Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
   const std::string file = OptionText(recipe, "build_vocabulary", "tree_from");
   if (file.empty()) return file;
   const std::string path = (fs::path(paths.recipe).parent_path() / file).lexically_normal().string();
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("[build_vocabulary] tree_from", path));
   if (!fs::exists(path)) {
     return MakeError(
         ErrorCode::kNotFound,
@@ -106,23 +97,25 @@ std::string CaptureFolder(const Recipe& recipe, const std::string& build_dir) {
 
 // What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
 struct SessionWords {
-  std::string folders;
-  std::string queries;
+  std::vector<std::pair<std::string, std::string>> folders, queries;
 };
 
-Result<SessionWords> JoinedSessions(const Recipe& recipe) {
+SessionWords JoinedSessions(const Recipe& recipe) {
   SessionWords words;
   if (!IsJoined(recipe)) return words;
   for (const RecipeCapture& capture : recipe.captures) {
-    const std::string folder = Absolute(capture.path);
-    CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", folder));
-    words.folders += fmt::format("{}{}={}", words.folders.empty() ? "" : " ", capture.name, folder);
-    if (capture.queries_path.empty()) continue;
-    const std::string queries = Absolute(capture.queries_path);
-    CAIRN_RETURN_IF_ERROR(CheckMakePath("the list of queries", queries));
-    words.queries += fmt::format("{}{}={}", words.queries.empty() ? "" : " ", capture.name, queries);
+    words.folders.emplace_back(capture.name, Absolute(capture.path));
+    if (!capture.queries_path.empty())
+      words.queries.emplace_back(capture.name, Absolute(capture.queries_path));
   }
   return words;
+}
+
+std::string PairsLine(const std::vector<std::pair<std::string, std::string>>& pairs) {
+  std::string line;
+  for (const auto& [first, second] : pairs)
+    line += fmt::format("{}{}={}", line.empty() ? "" : " ", first, second);
+  return line + "\n";
 }
 
 // The held-out images that check_map localizes; empty = the map is sealed without a self-test.
@@ -155,29 +148,10 @@ bool IsReconstructed(const Recipe& recipe) {
   return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
 }
 
-Status CheckMakePath(const std::string& what, const std::string& path) {
-  static constexpr std::string_view kSpecial = "$#%:;&|<>()[]*?'\"`\\=!";
-  for (const char c : path) {
-    const bool is_space = std::isspace(static_cast<unsigned char>(c)) != 0;
-    if (!is_space && kSpecial.find(c) == std::string_view::npos) continue;
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{} '{}' has {} in its path, which Make cannot carry; rename the folder or put it elsewhere", what,
-        path, is_space ? "a space" : fmt::format("'{}'", c));
-  }
-  return Ok();
-}
-
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string capture = CaptureFolder(recipe, paths.build_dir);
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the map", paths.map));
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", capture));
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the list of queries", queries));
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
   const std::string floor_plan = FloorPlanPath(recipe, capture);
-  CAIRN_RETURN_IF_ERROR(CheckMakePath("the floor plan", floor_plan));
   CAIRN_ASSIGN_OR_RETURN(const SessionWords sessions, JoinedSessions(recipe));
   if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -185,6 +159,30 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
                      "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
                      recipe.captures.front().queries_path, recipe.captures.front().path);
   }
+  const std::string seed = std::to_string(recipe.seed);
+  std::vector<std::string> known_places;
+  if (IsReconstructed(recipe)) {
+    CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
+  // Before anything is written: what make would not take for a name is refused.
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
+  MakeVariables config;
+  CAIRN_RETURN_IF_ERROR(config.Set("MAP", "the map", {paths.map}));
+  CAIRN_RETURN_IF_ERROR(config.Set("CAPTURE", "the capture", {capture}));
+  CAIRN_RETURN_IF_ERROR(config.Set("SIMULATED", "", {recipe.simulated ? "yes" : "no"}));
+  CAIRN_RETURN_IF_ERROR(config.Set("RECONSTRUCTED", "", {IsReconstructed(recipe) ? "yes" : "no"}));
+  CAIRN_RETURN_IF_ERROR(
+      config.Set("KNOWN_PLACES", "[reconstruct] control_points or distances", known_places));
+  CAIRN_RETURN_IF_ERROR(config.Set("QUERIES", "the list of queries", {queries}));
+  CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));
+  CAIRN_RETURN_IF_ERROR(config.Set("SEED", "the seed", {seed}));
+  CAIRN_RETURN_IF_ERROR(config.Set("PROGRAM", "the program", {SizeAndDate(paths.program)}));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSIONS", "the capture", sessions.folders));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
+  CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
+  CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
 
   const std::string options = paths.build_dir + "/options";
   CAIRN_RETURN_IF_ERROR(CreateFolder(options));
@@ -192,36 +190,31 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
     CAIRN_RETURN_IF_ERROR(
         WriteFileAtomically(options + "/" + stage.stage + ".toml", OptionsToml(stage.table)));
   }
-  const std::string seed = std::to_string(recipe.seed);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/seed", seed + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
       options + "/capture",
-      IsJoined(recipe) ? sessions.folders + "\n" + sessions.queries + "\n" : capture + "\n"));
+      IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) : capture + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));
-  std::string known_places;
-  if (IsReconstructed(recipe)) {
-    CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
-  }
-  CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
-  const std::string config = fmt::format(
-      "{}{}{}\n"
-      "MAP := {}\nCAPTURE := {}\nSIMULATED := {}\nRECONSTRUCTED := {}\nKNOWN_PLACES := {}\nQUERIES := {}\n"
-      "NAME := {}\nSEED := {}\nPROGRAM := {}\nSESSIONS := {}\nSESSION_QUERIES := {}\nFLOOR_PLAN := {}\n"
-      "VOCABULARY_TREE := {}\n",
-      kConfigHead, paths.recipe, kConfigHeadEnd, paths.map, capture, recipe.simulated ? "yes" : "no",
-      IsReconstructed(recipe) ? "yes" : "no", known_places, queries, recipe.name, seed,
-      SizeAndDate(paths.program), sessions.folders, sessions.queries, floor_plan, tree);
-  return WriteFileAtomically(paths.build_dir + "/config.mk", config);
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(paths.build_dir + "/recipe", paths.recipe + "\n"));
+  return WriteFileAtomically(paths.build_dir + "/config.mk", kConfigHead + config.MakefileText());
 }
 
-std::string ConfiguredMap(const std::string& build_dir) { return TextAfter(build_dir, "\nMAP := ", "\n"); }
+std::string ConfiguredMap(const std::string& build_dir) {
+  static constexpr std::string_view kBefore = "\nMAP := ";
+  const auto config = ReadFile(build_dir + "/config.mk");
+  const size_t found = config.ok() ? config->find(kBefore) : std::string::npos;
+  if (found == std::string::npos) return "";
+  const size_t begin = found + kBefore.size();
+  return config->substr(begin, config->find('\n', begin) - begin);
+}
 
 std::string ConfiguredRecipe(const std::string& build_dir) {
-  return TextAfter(build_dir, kConfigHead, kConfigHeadEnd);
+  const auto recipe = ReadFile(build_dir + "/recipe");
+  return recipe.ok() && recipe->ends_with('\n') ? recipe->substr(0, recipe->size() - 1) : "";
 }
 
 }  // namespace cairn

@@ -15,10 +15,6 @@ struct BuildPaths {
   std::string recipe;     // as an absolute path
 };
 
-// Errors: InvalidArgument when a path has characters that Make cannot carry: white space and
-// $#%:;&|<>()[]*?'"`\=!
-Status CheckMakePath(const std::string& what, const std::string& path);
-
 // Whether the captures have no poses of their own: then `reconstruct` finds them.
 bool IsReconstructed(const Recipe& recipe);
 // Whether the recipe names a floor plan: then `decompose_views` divides it.
@@ -30,6 +26,7 @@ bool HasFloorPlan(const Recipe& recipe);
 //   options/program       hash of the program: another one redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
 //                         QUERIES, NAME, SEED, PROGRAM and VOCABULARY_TREE for map.mk
+//   recipe                path of the recipe, for people and for `cairn clean`: no part of a Makefile
 // Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names beside several captures), NotFound
 // (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);

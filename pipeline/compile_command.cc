@@ -18,6 +18,7 @@
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/recipe.h"
+#include "pipeline/recipe_source.h"
 #include "pipeline/run_make.h"
 #include "pipeline/stop_signal.h"
 
@@ -71,8 +72,17 @@ Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
                     .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
 }
 
-Result<Recipe> ReadRecipeWithSeed(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(Recipe recipe, ReadRecipe(arguments.recipe, AllStageOptions()));
+// Puts in what was not given: the recipe of a folder, the map's name.
+Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, Arguments* arguments) {
+  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipe(arguments->recipe, arguments->output));
+  if (source.was_written) {
+    *environment.out << fmt::format(
+        "{}: the recipe of {}, with defaults; to change something, edit it and compile it\n", source.recipe,
+        arguments->recipe);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Recipe recipe, ReadRecipe(source.recipe, AllStageOptions()));
+  arguments->recipe = source.recipe;
+  arguments->output = source.map.empty() ? recipe.name + ".cairn" : source.map;
   if (environment.seed_given) recipe.seed = environment.seed;
   return recipe;
 }
@@ -144,10 +154,10 @@ Status TellOfRun(const BuildRun& run, const BuildPaths& paths, std::ostream& out
   return Ok();
 }
 
-Status Compile(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Compile(Arguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   const auto begin = std::chrono::steady_clock::now();
-  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
+  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
   CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, recipe, paths));
   CAIRN_ASSIGN_OR_RETURN(const std::string rules, RulesPath(paths.program));
@@ -160,16 +170,17 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
   const int num_jobs = arguments.num_jobs > 0 ? arguments.num_jobs : arguments.num_shards;
   // Bars of stages that run side by side would overwrite each other.
   const bool collides = num_jobs > 1 && environment.progress_style == "auto";
-  std::vector<std::string> words = MakeWords(rules, paths.build_dir, paths.program, environment,
-                                             collides ? "lines" : environment.progress_style);
-  for (const std::string& word :
-       {"--jobs=" + std::to_string(num_jobs),
-        "MEMORY=" + (environment.memory_given ? std::to_string(environment.memory_mib) : ""),
-        std::string("SPACE_CHECK=") + (arguments.no_space_check ? "no" : ""),
-        "SHARDS=" + std::to_string(arguments.num_shards), goal}) {
-    words.push_back(word);
-  }
-  if (!arguments.launcher.empty()) words.push_back("LAUNCH=" + arguments.launcher);
+  const std::string memory = environment.memory_given ? std::to_string(environment.memory_mib) : "";
+  MakeVariables variables;
+  CAIRN_RETURN_IF_ERROR(variables.SetLauncher("LAUNCH", "--launch", arguments.launcher));
+  CAIRN_RETURN_IF_ERROR(variables.Set("MEMORY", "--memory", {memory}));
+  CAIRN_RETURN_IF_ERROR(
+      variables.Set("SPACE_CHECK", "--no-space-check", {arguments.no_space_check ? "no" : ""}));
+  CAIRN_RETURN_IF_ERROR(variables.Set("SHARDS", "--shards", {std::to_string(arguments.num_shards)}));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<std::string> words,
+                         MakeWords(rules, paths.build_dir, paths.program, goal, environment,
+                                   collides ? "lines" : environment.progress_style, std::move(variables)));
+  words.push_back("--jobs=" + std::to_string(num_jobs));
   CAIRN_ASSIGN_OR_RETURN(
       const int wait_status,
       RunProgramAndWait(words, std::string(kBuildSessionVariable) + "=" + session, *environment.progress));
@@ -195,18 +206,22 @@ Status Compile(const Arguments& arguments, const CommandEnvironment& environment
   return Ok();
 }
 
-Status Configure(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(arguments, environment));
+Status Configure(Arguments arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
   CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, BuildSession()));
   return WriteBuildFolder(recipe, paths);
 }
 
 void AddRecipeArguments(CLI::App& app, Arguments* arguments) {
-  app.add_option("recipe", arguments->recipe, "Recipe of the map (docs/recipe.md)")
+  app.add_option("recipe", arguments->recipe,
+                 "Recipe of the map (docs/recipe.md), or the folder of a capture: then it is compiled with "
+                 "defaults, by the recipe NAME.toml that is written beside the map")
       ->required()
-      ->type_name("RECIPE.toml");
-  app.add_option("-o,--output", arguments->output, "Map to write")->required()->type_name("NAME.cairn");
+      ->type_name("RECIPE.toml|FOLDER");
+  app.add_option("-o,--output", arguments->output,
+                 "Map to write [by the name of the recipe or the folder, in the current folder]")
+      ->type_name("NAME.cairn");
   app.add_option("--build-dir", arguments->build_dir,
                  "Folder for the stages' files [NAME.build beside the map]")
       ->type_name("DIR");
@@ -218,7 +233,7 @@ Command CompileCommand() {
   const auto arguments = std::make_shared<Arguments>();
   return {
       .name = "compile",
-      .summary = "Compile a recipe's capture into a map; what is up to date is not redone",
+      .summary = "Compile a recipe, or the folder of a capture, into a map; what is up to date is not redone",
       .add_arguments =
           [arguments](CLI::App& app) {
             AddRecipeArguments(app, arguments.get());

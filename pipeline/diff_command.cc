@@ -8,6 +8,7 @@
 
 #include "core/map_rows.h"
 #include "pipeline/explain/compare_maps.h"
+#include "pipeline/json_text.h"
 
 namespace cairn {
 namespace {
@@ -32,7 +33,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const auto bytes_a = static_cast<int64_t>(std::filesystem::file_size(arguments.path_a));
   const auto bytes_b = static_cast<int64_t>(std::filesystem::file_size(arguments.path_b));
   const MapComparison comparison = CompareMaps(a, b, arguments.options);
-  *environment.out << (arguments.json ? ComparisonJson(a, b, bytes_a, bytes_b, comparison).dump(2) + "\n"
+  *environment.out << (arguments.json ? JsonText(ComparisonJson(a, b, bytes_a, bytes_b, comparison), 2) + "\n"
                                       : fmt::format("A  {}: map '{}'\nB  {}: map '{}'\n\n", arguments.path_a,
                                                     a.name, arguments.path_b, b.name) +
                                             ComparisonText(a, b, bytes_a, bytes_b, comparison, kMaxLines));

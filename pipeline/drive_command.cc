@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/pose.h"
 #include "core/text.h"
+#include "pipeline/json_text.h"
 #include "runtime/map.h"
 #include "runtime/place_model.h"
 #include "runtime/route.h"
@@ -138,7 +139,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   Print(drive, environment.out);
   if (!arguments.output_path.empty()) {
     CAIRN_RETURN_IF_ERROR(
-        WriteFileAtomically(arguments.output_path, DriveJson(drive, arguments.goal).dump(1) + "\n"));
+        WriteFileAtomically(arguments.output_path, JsonText(DriveJson(drive, arguments.goal), 1) + "\n"));
   }
   if (!arguments.picture_path.empty()) {
     std::vector<PlanarPose> node_poses;

@@ -16,6 +16,7 @@
 #include "pipeline/explain/advise.h"
 #include "pipeline/explain/explain_place.h"
 #include "pipeline/explain/station_losses.h"
+#include "pipeline/json_text.h"
 
 namespace cairn {
 namespace {
@@ -109,7 +110,7 @@ Status ExplainImage(const Arguments& arguments, const MapRows& rows, const Comma
   if (arguments.json) {
     nlohmann::ordered_json json = ExplainImageJson(rows, index);
     if (image->station >= 0) json["at"] = ExplainStationJson(rows, image->station);
-    *environment.out << json.dump(2) << "\n";
+    *environment.out << JsonText(json, 2) << "\n";
     return Ok();
   }
   *environment.out << ExplainImageText(rows, index);
@@ -125,7 +126,7 @@ Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const Comma
     nlohmann::ordered_json json = {{"stations", nlohmann::ordered_json::array()},
                                    {"advice", AdviceJson(advice)}};
     for (const StationIdx station : stations) json["stations"].push_back(ExplainStationJson(rows, station));
-    *environment.out << json.dump(2) << "\n";
+    *environment.out << JsonText(json, 2) << "\n";
     return Ok();
   }
   std::string text;
@@ -149,7 +150,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (arguments.place) return ExplainPlace(arguments, rows, environment);
   const std::vector<Advice> advice = Advise(rows);
   if (arguments.json) {
-    *environment.out << nlohmann::ordered_json({{"advice", AdviceJson(advice)}}).dump(2) << "\n";
+    *environment.out << JsonText({{"advice", AdviceJson(advice)}}, 2) << "\n";
     return Ok();
   }
   const auto num_covered = std::count_if(rows.stations.begin(), rows.stations.end(),

@@ -22,6 +22,7 @@
 #include "pipeline/floor_svg.h"
 #include "pipeline/inspect_ambiguity.h"
 #include "pipeline/inspect_drops.h"
+#include "pipeline/json_text.h"
 #include "stages/check_map/report.h"
 
 namespace cairn {
@@ -44,6 +45,10 @@ Result<std::vector<std::pair<std::string, int64_t>>> BytesPerTable(const std::st
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<std::pair<std::string, int64_t>>> {
     std::vector<std::pair<std::string, int64_t>> tables;
+    // A table of that name would stand in the way of SQLite's own.
+    if (database.execAndGet("SELECT count(*) FROM sqlite_master WHERE name = 'dbstat' COLLATE NOCASE")
+            .getInt() > 0)
+      return Corrupt(path, "has a table or view 'dbstat', which is no map's");
     SQLite::Statement query(
         database,
         "SELECT coalesce(s.tbl_name, d.name), sum(d.pgsize) FROM dbstat d LEFT JOIN sqlite_master s "
@@ -213,7 +218,7 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
     } else if (key == "num_regions") {
       text += RegionsLine(json);
     } else if (!value.is_object()) {
-      text += fmt::format("{:<24} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+      text += fmt::format("{:<24} {}\n", key, value.is_string() ? value.get<std::string>() : JsonText(value));
     }
     if (!value.is_object() || value.empty()) continue;
     text += fmt::format("\n{}\n", key);
@@ -229,8 +234,8 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
         text += fmt::format("  {:<22} {:>12} {:>5.1f} %\n", name, entry.get<int64_t>(),
                             100.0 * entry.get<double>() / json["bytes"].get<double>());
       } else {
-        text +=
-            fmt::format("  {:<22} {}\n", name, entry.is_string() ? entry.get<std::string>() : entry.dump());
+        text += fmt::format("  {:<22} {}\n", name,
+                            entry.is_string() ? entry.get<std::string>() : JsonText(entry));
       }
     }
   }
@@ -245,7 +250,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       MapJson(file, rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
-  *environment.out << (arguments.json ? json.dump(2) + "\n" : MapText(json, rows));
+  *environment.out << (arguments.json ? JsonText(json, 2) + "\n" : MapText(json, rows));
   if (!arguments.ambiguity_svg_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const std::string svg, AmbiguitySvg(rows));
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.ambiguity_svg_path, svg));

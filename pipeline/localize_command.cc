@@ -16,8 +16,10 @@
 #include "core/capture.h"
 #include "core/file.h"
 #include "core/image_file.h"
+#include "core/image_list.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "pipeline/json_text.h"
 #include "pipeline/visual_answer.h"
 #include "runtime/region_tracker.h"
 
@@ -266,14 +268,20 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                                            : LocalizeImage(batch[i], map, cameras, arguments.options);
     });
     for (const Answer& answer : answers) {
-      *environment.out << AnswerJson(answer, arguments.estimator).dump() << "\n" << std::flush;
+      *environment.out << JsonText(AnswerJson(answer, arguments.estimator)) << "\n" << std::flush;
       ++num_images;
       if (answer.visual && answer.visual->ok() && (*answer.visual)->flag == VisualFlag::kNone) ++num_places;
       if (!answer.localization.ok()) {
         ++num_failed;
         if (!first_error) first_error = answer.localization.error();
       } else if (answer.localization->has_fix()) {
-        poses.push_back({.name = std::filesystem::path(answer.image).filename().string(),
+        const std::string name = std::filesystem::path(answer.image).filename().string();
+        if (const Status status = CheckListedName(arguments.output_path, name);
+            !arguments.output_path.empty() && !status.ok()) {
+          spdlog::warn("{}", status.error().message);
+          continue;
+        }
+        poses.push_back({.name = name,
                          .camera_id = answer.camera_id,
                          .cam_from_world = answer.localization->cam_from_world});
       }

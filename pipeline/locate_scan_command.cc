@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/views.h"
+#include "pipeline/json_text.h"
 #include "runtime/interpretation_tree.h"
 #include "runtime/open_views.h"
 #include "runtime/read_scans.h"
@@ -118,7 +119,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
             arguments.svg, DrawViews(views, Overlay(scans[i], *result), /*regions=*/false)));
       }
     }
-    *environment.out << line.dump() << "\n";
+    *environment.out << JsonText(line) << "\n";
     environment.progress->Advance();
   }
   environment.progress->End();

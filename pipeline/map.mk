@@ -40,9 +40,11 @@ CAIRN_REASON = $(if $(wildcard $@),$(if $(filter cairn-missing,$?),is missing,$(
     2,$(words $(CAIRN_CHANGED)),$(CAIRN_CHANGED))) more)),not made yet)
 , := ,
 CAIRN_RESULT = $(notdir $(if $(filter map.stamp,$(@F)),$(MAP),$(@:.stamp=)))
-CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@echo '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
+# The names of a capture's images may hold what a terminal takes for a command: its bytes are shown as '?'.
+CAIRN_PRINTABLE = LC_ALL=C sed 's/[\x01-\x1f\x7f]\|\xc2[\x80-\x9f]\|\xe2\x80[\xaa-\xae]\|\xe2\x81[\xa6-\xa9]/?/g'
+CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
     "run"$(,) "file": "$(CAIRN_RESULT)"$(,) "reason": "$(subst ",\",$(subst \,\\,$(CAIRN_REASON)))"},$(CAIRN_RESULT): \
-    $(CAIRN_REASON)))' >&2)
+    $(CAIRN_REASON)))' | $(CAIRN_PRINTABLE) >&2)
 
 # Stages of one run of make share their build folders; another run is refused.
 ifndef CAIRN_BUILD_SESSION
@@ -100,13 +102,14 @@ endif
 CAPTURE_IMAGES :=
 -include $(BUILD)/images.d
 # Held-out images that exist, with a backslash before what Make would take for more than a name.  Pipes are no files: to
-# read one would wait for ever.
+# read one would wait for ever.  Names that have backslashes themselves, or control characters, are left out: no escaping
+# holds in all of Make.
 QUERY_LIST := $(shell for list in $(wildcard $(QUERIES) $(CAPTURE)/queries.txt); do \
     [ -f $$list ] && echo $$list && break; done)
 QUERY_IMAGES := $(if $(QUERY_LIST),$(shell awk '/^\#/ || NF < 10 || $$10 ~ /^[-+.0-9eE]+$$/ {next} \
-    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); print "$(CAPTURE)/images/" $$0}' \
-    $(QUERY_LIST) | while IFS= read -r path; do [ -f "$$path" ] && printf '%s\n' "$$path"; done | \
-    sed 's/[ \t:;|*?[\#]/\\&/g'))
+    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); path = "$(CAPTURE)/images/" $$0} \
+    path !~ /[\\[:cntrl:]]/ {print path}' $(QUERY_LIST) | \
+    while IFS= read -r path; do [ -f "$$path" ] && printf '%s\n' "$$path"; done | sed 's/[ \t:;|*?[\#]/\\&/g'))
 
 .DELETE_ON_ERROR:
 .PHONY: cairn-missing
@@ -318,5 +321,5 @@ $(BUILD)/pareto/%.json: $(BUILD)/pareto/%.unsealed.stamp $(BUILD)/options/check_
     $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_LAUNCH) $(CAIRN) check-map $(<:.stamp=) --queries $(QUERIES) --capture $(POSES) \
 	    --options $(@D)/../options/check_map.toml --min-localized-ratio 0 --min-precision-ratio 0 \
-	    --min-region-localized-ratio 0 --min-region-precision-ratio 0 --json -o $(@:.json=.cairn) --seed $(SEED) \
-	    --threads $(THREADS) --progress $(PROGRESS) --log-level $(LOG_LEVEL) > $@
+	    --min-region-localized-ratio 0 --min-region-precision-ratio 0 --plan-must-fit false --json -o $(@:.json=.cairn) \
+	    --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) --log-level $(LOG_LEVEL) > $@

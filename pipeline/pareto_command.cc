@@ -20,6 +20,8 @@
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/pareto_picture.h"
+#include "pipeline/recipe.h"
+#include "pipeline/recipe_source.h"
 #include "pipeline/run_make.h"
 #include "pipeline/stop_signal.h"
 #include "stages/emit_map/fit_size.h"
@@ -108,6 +110,12 @@ Status CompileMap(const Arguments& arguments, const Places& places, const Comman
                                     environment.progress_style,
                                     "--log-level",
                                     environment.log_level};
+  if (environment.seed_given) {
+    words.insert(words.end(), {"--seed", std::to_string(environment.seed)});
+  }
+  if (environment.memory_given) {
+    words.insert(words.end(), {"--memory", std::to_string(environment.memory_mib)});
+  }
   CAIRN_ASSIGN_OR_RETURN(const int exit_code, ExitCode(words, "", environment));
   if (exit_code == 0) return Ok();
   return MakeError(static_cast<ErrorCode>(exit_code), "{}: the map itself was not compiled",
@@ -147,9 +155,13 @@ Result<ParetoPoint> ReadPoint(const Places& places, int64_t size) {
 // Nothing where no map of so few bytes is possible; the stage has said so.
 Result<std::optional<ParetoPoint>> MakePoint(const Places& places, int64_t size,
                                              const CommandEnvironment& environment) {
-  std::vector<std::string> words =
-      MakeWords(places.rules, places.build_dir, places.program, environment, environment.progress_style);
-  words.push_back(places.Pareto(size, ".json"));
+  MakeVariables variables;
+  const std::string memory = environment.memory_given ? std::to_string(environment.memory_mib) : "";
+  CAIRN_RETURN_IF_ERROR(variables.Set("MEMORY", "--memory", {memory}));
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::vector<std::string> words,
+      MakeWords(places.rules, places.build_dir, places.program, places.Pareto(size, ".json"), environment,
+                environment.progress_style, std::move(variables)));
   fs::remove(places.build_dir + "/pareto" + kErrorFile);
   CAIRN_ASSIGN_OR_RETURN(const int exit_code, ExitCode(words, NewBuildSession(), environment));
   if (exit_code != 0) {
@@ -189,11 +201,21 @@ Status AddHalves(int64_t num_bytes, const std::function<Result<bool>(int64_t)>& 
   return Ok();
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Run(Arguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int64_t> asked,
                          !arguments.sizes ? std::vector<int64_t>() : ParseSizes(*arguments.sizes));
   CAIRN_ASSIGN_OR_RETURN(const std::optional<ParetoPeer> peer, ParsePeer(arguments.peer));
+  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipe(arguments.recipe, arguments.output));
+  if (source.was_written)
+    *environment.out << fmt::format("{}: the recipe of {}, with defaults\n", source.recipe, arguments.recipe);
+  arguments.recipe = source.recipe;
+  if (source.map.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(source.recipe, AllStageOptions()));
+    arguments.output = recipe.name + ".cairn";
+  } else {
+    arguments.output = source.map;
+  }
   Places places;
   places.map = fs::absolute(arguments.output).lexically_normal().string();
   places.build_dir = arguments.build_dir.empty()
@@ -235,12 +257,13 @@ Command ParetoCommand() {
       .add_arguments =
           [arguments](CLI::App& app) {
             app.add_option("recipe", arguments->recipe,
-                           "Recipe of the map; its capture needs held-out images")
+                           "Recipe of the map, or the folder of a capture; it needs held-out images")
                 ->required()
-                ->type_name("RECIPE.toml");
-            app.add_option("-o,--output", arguments->output,
-                           "Map to compile; NAME.pareto.csv and NAME.pareto.svg are written beside it")
-                ->required()
+                ->type_name("RECIPE.toml|FOLDER");
+            app.add_option(
+                   "-o,--output", arguments->output,
+                   "Map to compile; NAME.pareto.csv and NAME.pareto.svg are written beside it [by the "
+                   "name of the recipe or the folder, in the current folder]")
                 ->type_name("NAME.cairn");
             app.add_option("--build-dir", arguments->build_dir,
                            "Folder for the stages' files [NAME.build beside the map]")

@@ -7,6 +7,7 @@
 
 #include "core/file.h"
 #include "core/views.h"
+#include "pipeline/json_text.h"
 #include "runtime/disambiguate.h"
 #include "runtime/open_views.h"
 #include "runtime/plan_path.h"
@@ -67,7 +68,7 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   line["length_m"] = path.length_m;
   line["links"] = path.num_links();
   line["points"] = Json(path.points);
-  *environment.out << line.dump() << "\n";
+  *environment.out << JsonText(line) << "\n";
   environment.report->out = {{"links", path.num_links()}};
   if (arguments.svg.empty()) return Ok();
   overlay.captions.push_back(fmt::format("{:.1f} m, {} links", path.length_m, path.num_links()));
@@ -151,7 +152,7 @@ Status RunApart(const ApartArguments& arguments, const CommandEnvironment& envir
     line["feature_b"] = Json({plan.feature_start_b, plan.feature_end_b});
     line["distance_m"] = plan.distance_m;
   }
-  *environment.out << line.dump() << "\n";
+  *environment.out << JsonText(line) << "\n";
   if (!arguments.svg.empty())
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, Drawn(views, a, b, plan)));
   if (plan.outcome != DisambiguationOutcome::kGaveUp) return Ok();

@@ -12,6 +12,7 @@
 #include <sstream>
 #include <system_error>
 
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
@@ -19,10 +20,13 @@
 
 #include "core/file.h"
 #include "core/memory.h"
+#include "core/options.h"
 #include "core/parallel.h"
+#include "core/printable.h"
 #include "pipeline/build_step.h"
 #include "pipeline/check_outputs.h"
 #include "pipeline/common_arguments.h"
+#include "pipeline/printable_stream.h"
 #include "pipeline/progress.h"
 #include "pipeline/stop_signal.h"
 
@@ -43,12 +47,27 @@ std::unique_ptr<Progress> MakeTerminalProgress(ProgressStyle style) {
               .cancelled = [] { return StopRequested(); }});
 }
 
+// A message as a terminal may show it.
+class PrintableMessage : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const std::string text = Printable({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableMessage>();
+  }
+};
+
 // Messages go to stderr, as does the bar: a message first clears the bar's line.
 void ConfigureLog(const std::string& level, ProgressStyle style) {
   auto logger =
       std::make_shared<spdlog::logger>("cairn", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
   logger->set_level(spdlog::level::from_str(level));
-  logger->set_pattern(style == ProgressStyle::kBar ? "\r\x1b[K%^%l%$: %v" : "%^%l%$: %v");
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PrintableMessage>('*').set_pattern(style == ProgressStyle::kBar ? "\r\x1b[K%^%l%$: %*"
+                                                                                      : "%^%l%$: %*");
+  logger->set_formatter(std::move(formatter));
   spdlog::set_default_logger(logger);
 }
 
@@ -136,18 +155,49 @@ Status RunCommand(const Command& command, const CommonArguments& arguments, Comm
   return status;
 }
 
+std::string NearestText(const std::string& word, const std::vector<std::string>& candidates) {
+  const std::string nearest = NearestWord(word, candidates);
+  return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
+}
+
+// What is wrong with a word that no command and no option takes; empty where there is none.
+std::string UnknownWordText(const CLI::App& app, const std::vector<Command>& commands,
+                            const std::vector<std::string>& words) {
+  if (app.get_subcommands().empty()) {
+    if (words.empty() || words[0].starts_with('-')) return "";
+    std::vector<std::string> names;
+    for (const Command& command : commands) names.push_back(command.name);
+    return fmt::format("no command '{}'{}", words[0], NearestText(words[0], names));
+  }
+  const CLI::App& subcommand = *app.get_subcommands().front();
+  for (const std::string& word : subcommand.remaining()) {
+    if (word == "--" || !word.starts_with('-')) continue;
+    const std::string option = word.substr(0, word.find('='));
+    std::vector<std::string> names;
+    for (const CLI::Option* known : subcommand.get_options()) {
+      for (const std::string& name : known->get_lnames()) names.push_back("--" + name);
+    }
+    return fmt::format("no option '{}'{}", option, NearestText(option, names));
+  }
+  return "";
+}
+
 // Usage errors as one line that says where help is.
-int ReportUsage(const CLI::App& app, const CLI::ParseError& error, std::ostream& err) {
+int ReportUsage(const CLI::App& app, const std::vector<Command>& commands,
+                const std::vector<std::string>& words, const CLI::ParseError& error, std::ostream& err) {
   std::string name = "cairn";
   for (const CLI::App* subcommand : app.get_subcommands()) name += " " + subcommand->get_name();
-  err << name << ": " << error.what() << "; see " << name << " --help" << std::endl;
+  const std::string unknown = UnknownWordText(app, commands, words);
+  err << name << ": " << (unknown.empty() ? error.what() : unknown) << "; see " << name << " --help"
+      << std::endl;
   return kUsageExitCode;
 }
 
 }  // namespace
 
-int RunProgram(const std::vector<Command>& commands, int argc, const char* const* argv, std::ostream& out,
-               std::ostream& err) {
+int RunProgram(const std::vector<Command>& commands, int argc, const char* const* argv, std::ostream& raw_out,
+               std::ostream& raw_err) {
+  PrintableStream out(raw_out), err(raw_err);
   CommonArguments arguments;
   const std::unique_ptr<CLI::App> parser = MakeParser(commands, &arguments);
   CLI::App& app = *parser;
@@ -157,7 +207,7 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
     app.exit(success, out, err);
     return 0;
   } catch (const CLI::ParseError& error) {
-    return ReportUsage(app, error, err);
+    return ReportUsage(app, commands, std::vector<std::string>(argv + 1, argv + argc), error, err);
   }
 
   const std::string name = app.get_subcommands().front()->get_name();

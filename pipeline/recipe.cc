@@ -247,18 +247,6 @@ class RecipeReader {
     return Ok();
   }
 
-  // A session's name made of a folder's: what a name cannot have becomes '_'.
-  static std::string NameOfFolder(const std::string& path) {
-    fs::path folder(path);
-    if (!folder.has_filename()) folder = folder.parent_path();
-    std::string name = folder.filename().string().substr(0, 100);
-    for (char& c : name) {
-      if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';
-    }
-    if (name.empty() || name.front() == '.' || name.front() == '-') name = "capture";
-    return name;
-  }
-
   Result<std::string> Text(const std::string& key, const toml::node& node) const {
     if (const auto* text = node.as_string()) return text->get();
     return WrongType(path_, node, key, "a text in quotes");
@@ -324,6 +312,17 @@ void AppendOptions(std::string* page, const OptionTable& table) {
 }
 
 }  // namespace
+
+std::string NameOfFolder(const std::string& path) {
+  fs::path folder(path);
+  if (!folder.has_filename()) folder = folder.parent_path();
+  std::string name = folder.filename().string().substr(0, 100);
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';
+  }
+  if (name.empty() || name.front() == '.' || name.front() == '-') name = "capture";
+  return name;
+}
 
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages) {
   return RecipeReader(path, std::move(stages)).Read();

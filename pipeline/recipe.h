@@ -40,6 +40,9 @@ struct Recipe {
 // up directions.  Each names the file and the line.
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages);
 
+// The name that a map or a session has by its folder: what a name cannot have becomes '_'.
+std::string NameOfFolder(const std::string& path);
+
 // The reference page of recipes (docs/recipe.md): every key with its default, range and meaning, in Markdown.
 std::string RecipeReference(const std::vector<StageOptions>& stages);
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/floor_pose.h"
+#include "pipeline/json_text.h"
 #include "runtime/map.h"
 #include "runtime/route.h"
 
@@ -40,7 +41,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                               {"y_m", place.position.y()},
                               {"heading_deg", place.heading_deg}});
   }
-  *environment.out << (arguments.json ? json.dump(2) + "\n" : text);
+  *environment.out << (arguments.json ? JsonText(json, 2) + "\n" : text);
   return Ok();
 }
 

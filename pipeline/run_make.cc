@@ -12,7 +12,7 @@
 #include <thread>
 #include <utility>
 
-#include "pipeline/folder_lock.h"
+#include "core/child_environment.h"
 
 namespace cairn {
 
@@ -36,34 +36,31 @@ Result<std::string> RulesPath(const std::string& program) {
                    program);
 }
 
-std::vector<std::string> MakeWords(const std::string& rules, const std::string& build_dir,
-                                   const std::string& program, const CommandEnvironment& environment,
-                                   const std::string& progress_style) {
-  return {"make",
-          "--silent",
-          "--no-print-directory",
-          "--no-builtin-rules",
-          "--file=" + rules,
-          "BUILD=" + build_dir,
-          "CAIRN=" + program,
-          "THREADS=" + std::to_string(environment.num_threads),
-          "PROGRESS=" + progress_style,
-          "LOG_LEVEL=" + environment.log_level};
+Result<std::vector<std::string>> MakeWords(const std::string& rules, const std::string& build_dir,
+                                           const std::string& program, const std::string& goal,
+                                           const CommandEnvironment& environment,
+                                           const std::string& progress_style, MakeVariables variables) {
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the file of rules", rules));
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the file to make", goal));
+  CAIRN_RETURN_IF_ERROR(variables.Set("BUILD", "the build folder", {build_dir}));
+  CAIRN_RETURN_IF_ERROR(variables.Set("CAIRN", "the program", {program}));
+  CAIRN_RETURN_IF_ERROR(variables.Set("THREADS", "--threads", {std::to_string(environment.num_threads)}));
+  CAIRN_RETURN_IF_ERROR(variables.Set("PROGRESS", "--progress", {progress_style}));
+  CAIRN_RETURN_IF_ERROR(variables.Set("LOG_LEVEL", "--log-level", {environment.log_level}));
+  std::vector<std::string> words = {"make", "--silent", "--no-print-directory", "--no-builtin-rules",
+                                    "--file=" + rules};
+  for (std::string& word : variables.CommandWords()) words.push_back(std::move(word));
+  words.push_back(goal);
+  return words;
 }
 
 Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
                               const Progress& progress) {
+  const std::vector<std::string> environment = ChildEnvironment({variable});
   std::vector<char*> argv, envp;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
-  for (char** entry = environ; *entry != nullptr; ++entry) {
-    // An outer make's flags are not meant for this one.
-    if (std::strncmp(*entry, "MAKEFLAGS=", 10) != 0 && std::strncmp(*entry, "MAKELEVEL=", 10) != 0 &&
-        std::strncmp(*entry, kBuildSessionVariable, std::strlen(kBuildSessionVariable)) != 0) {
-      envp.push_back(*entry);
-    }
-  }
-  envp.push_back(const_cast<char*>(variable.c_str()));
+  for (const std::string& entry : environment) envp.push_back(const_cast<char*>(entry.c_str()));
   envp.push_back(nullptr);
   pid_t pid = 0;
   const int reason = posix_spawnp(&pid, argv[0], nullptr, nullptr, argv.data(), envp.data());

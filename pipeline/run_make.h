@@ -6,6 +6,7 @@
 #include "core/command.h"
 #include "core/error.h"
 #include "core/progress.h"
+#include "pipeline/make_words.h"
 
 namespace cairn {
 
@@ -16,13 +17,16 @@ Result<std::string> ProgramPath();
 // Errors: NotFound.
 Result<std::string> RulesPath(const std::string& program);
 
-// A command line of make for these rules and this build folder, without goals; `progress_style`: of the
-// stages.
-std::vector<std::string> MakeWords(const std::string& rules, const std::string& build_dir,
-                                   const std::string& program, const CommandEnvironment& environment,
-                                   const std::string& progress_style);
+// A command line of make that makes `goal` by these rules in this build folder; `progress_style`: of the
+// stages; `variables`: more of map.mk's.  Errors: InvalidArgument (a path with characters that Make cannot
+// carry).
+Result<std::vector<std::string>> MakeWords(const std::string& rules, const std::string& build_dir,
+                                           const std::string& program, const std::string& goal,
+                                           const CommandEnvironment& environment,
+                                           const std::string& progress_style, MakeVariables variables = {});
 
-// Runs a program with this one's terminal and `variable` added to its environment; returns its wait status.
+// Runs a program with this one's terminal and, of its environment, what programs get that cairn starts
+// (core/child_environment.h) and `variable`; returns its wait status.
 // Asked to stop, it asks the program to stop and waits for it.  Errors: NotFound, Failed.
 Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
                               const Progress& progress);

@@ -112,7 +112,7 @@ std::string ReportPage(const nlohmann::ordered_json& data) {
 std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordered_json& data) {
   const MapRows& rows = *inputs.rows;
   const auto block = [](const std::string& title, const std::string& text) {
-    return text.empty() ? "" : fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", title, EscapeXml(text));
+    return text.empty() ? "" : fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", EscapeXml(title), EscapeXml(text));
   };
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>"

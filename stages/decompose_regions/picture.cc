@@ -13,6 +13,7 @@
 
 #include "core/deciles.h"
 #include "core/pose.h"
+#include "core/svg.h"
 
 namespace cairn {
 namespace {
@@ -274,7 +275,7 @@ class Picture {
           NumRegionsText(decomposition_.regions.size(), decomposition_.lower_bound));
     y += 18;
     Write("<text x=\"{:.0f}\" y=\"{:.0f}\">algorithm {}, k = {}, tau = {}, rho = {}</text>\n", x, y,
-          decomposition_.algorithm, decomposition_.k, decomposition_.tau, decomposition_.rho);
+          EscapeXml(decomposition_.algorithm), decomposition_.k, decomposition_.tau, decomposition_.rho);
     y += 6;
     for (size_t i = 0; i < decomposition_.regions.size() && i < kMaxLegendRegions; ++i) {
       y += 18;

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "core/svg.h"
+
 namespace cairn {
 namespace {
 
@@ -148,7 +150,7 @@ class Picture {
           "<text x=\"{5:.1f}\" y=\"{6:.1f}\" fill=\"{2}\" "
           "font-weight=\"bold\">{7}</text>\n",
           at.x(), at.y(), colour, at.x() + 16 * ahead.x(), at.y() + 16 * ahead.y(), at.x() + 10, at.y() - 9,
-          robot.caption);
+          EscapeXml(robot.caption));
     }
     Write("</g>\n");
   }
@@ -197,7 +199,7 @@ class Picture {
     y += 8;
     for (const std::string& caption : overlay.captions) {
       y += 18;
-      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", x, y, caption);
+      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", x, y, EscapeXml(caption));
     }
   }
 

@@ -12,6 +12,8 @@
 #include <cstring>
 #include <thread>
 
+#include "core/child_environment.h"
+
 namespace cairn {
 namespace {
 
@@ -74,8 +76,8 @@ Result<pid_t> Spawn(const std::vector<std::string>& words, const std::vector<std
   std::vector<char*> argv, envp;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
-  for (const std::string& entry : environment) envp.push_back(const_cast<char*>(entry.c_str()));
-  for (char** entry = environ; *entry != nullptr; ++entry) envp.push_back(*entry);
+  const std::vector<std::string> entries = ChildEnvironment(environment);
+  for (const std::string& entry : entries) envp.push_back(const_cast<char*>(entry.c_str()));
   envp.push_back(nullptr);
 
   posix_spawn_file_actions_t actions;

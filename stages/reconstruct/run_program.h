@@ -11,7 +11,7 @@ namespace cairn {
 
 // How a program of somebody else is run.
 struct RunProgramOptions {
-  // "NAME=VALUE", put before this process's own environment.
+  // "NAME=VALUE", added to what programs get that cairn starts (core/child_environment.h).
   std::vector<std::string> environment;
   double max_seconds = 0;  // then it is ended; 0: no limit
   int num_last_lines = 12;

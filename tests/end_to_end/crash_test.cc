@@ -134,8 +134,8 @@ int CountCalls(const Workplace& workplace, const Stage& stage) {
   const std::string file = workplace.folder() + "/../calls";
   fs::remove(file);
   workplace.Forget(stage);
-  const ProgramRun run = workplace.Compile(std::string("LD_PRELOAD=" CAIRN_KILL_LIBRARY " KILL_STAGE=") +
-                                           stage.command + " COUNT_CALLS=" + file);
+  const ProgramRun run = workplace.Compile(std::string("LD_PRELOAD=" CAIRN_KILL_LIBRARY " LC_KILL_STAGE=") +
+                                           stage.command + " LC_COUNT_CALLS=" + file);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   const auto text = ReadFile(file);
   fs::remove(file);
@@ -178,12 +178,12 @@ TEST(Kill, AnywhereThenCompileGivesTheSameBytesAndNoTemporaryIsLeft) {
     const double share = static_cast<double>(random() >> 11) / (uint64_t{1} << 53);
     const std::string moment =
         round % 2 == 0
-            ? fmt::format("KILL_AT_CALL={}", 1 + static_cast<int>(share * num_moments[stage.command]))
-            : fmt::format("KILL_AFTER_US={:.0f}", share * seconds[stage.command] * 1e6);
+            ? fmt::format("LC_KILL_AT_CALL={}", 1 + static_cast<int>(share * num_moments[stage.command]))
+            : fmt::format("LC_KILL_AFTER_US={:.0f}", share * seconds[stage.command] * 1e6);
     SCOPED_TRACE(
         fmt::format("kill {}: {} {}{}", kill, stage.command, moment, has_old ? " over an old file" : ""));
     const ProgramRun killed = workplace.Compile(fmt::format(
-        "setsid -w env LD_PRELOAD=" CAIRN_KILL_LIBRARY " KILL_STAGE={} {}", stage.command, moment));
+        "setsid -w env LD_PRELOAD=" CAIRN_KILL_LIBRARY " LC_KILL_STAGE={} {}", stage.command, moment));
     if (killed.exit_code != 0) num_killed[stage.command]++;
     workplace.ExpectOnlyWholeFiles(has_old ? old_contents : Contents(), true);
     const ProgramRun run = workplace.Compile();

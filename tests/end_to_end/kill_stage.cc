@@ -1,11 +1,11 @@
 // A library to be preloaded: kills the process group (SIGKILL) of one stage of the line, at a moment of its
-// own.
-//   KILL_STAGE=match-features     the subcommand that is meant; others run on
-//   KILL_AFTER_US=N               N microseconds after the stage has begun
-//   KILL_AT_CALL=N                or before its N-th call that a crash could come between: creating, syncing,
-//   renaming
+// own.  Its variables begin with LC_, which `cairn compile` passes on to the stages.
+//   LC_KILL_STAGE=match-features     the subcommand that is meant; others run on
+//   LC_KILL_AFTER_US=N               N microseconds after the stage has begun
+//   LC_KILL_AT_CALL=N                or before its N-th call that a crash could come between: creating,
+//   syncing, renaming
 //                                 or removing a file
-//   COUNT_CALLS=FILE              or not at all: appends how many such calls the stage makes
+//   LC_COUNT_CALLS=FILE              or not at all: appends how many such calls the stage makes
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -29,7 +29,7 @@ std::atomic<long> kill_at_call = -1;
 bool is_counting = false;
 
 bool IsMeant() {
-  const char* stage = std::getenv("KILL_STAGE");
+  const char* stage = std::getenv("LC_KILL_STAGE");
   if (stage == nullptr) return false;
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::string program, subcommand;
@@ -44,9 +44,9 @@ void NoteCall() {
 
 __attribute__((constructor)) void Begin() {
   if (!IsMeant()) return;
-  if (const char* call = std::getenv("KILL_AT_CALL")) kill_at_call = std::atol(call);
-  is_counting = std::getenv("COUNT_CALLS") != nullptr;
-  if (const char* after = std::getenv("KILL_AFTER_US")) {
+  if (const char* call = std::getenv("LC_KILL_AT_CALL")) kill_at_call = std::atol(call);
+  is_counting = std::getenv("LC_COUNT_CALLS") != nullptr;
+  if (const char* after = std::getenv("LC_KILL_AFTER_US")) {
     std::thread([moment = std::chrono::microseconds(std::atol(after))] {
       std::this_thread::sleep_for(moment);
       kill(0, SIGKILL);
@@ -55,7 +55,7 @@ __attribute__((constructor)) void Begin() {
 }
 
 __attribute__((destructor)) void End() {
-  if (is_counting) std::ofstream(std::getenv("COUNT_CALLS"), std::ios::app) << num_calls << "\n";
+  if (is_counting) std::ofstream(std::getenv("LC_COUNT_CALLS"), std::ios::app) << num_calls << "\n";
 }
 
 template <typename Function>

@@ -122,9 +122,56 @@ TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(status.error().message, HasSubstr("has a space in its path, which Make cannot carry; rename"));
-  EXPECT_FALSE(CheckMakePath("the map", "/maps/50%.cairn").ok());
-  EXPECT_FALSE(CheckMakePath("the map", "/maps/$HOME.cairn").ok());
-  EXPECT_TRUE(CheckMakePath("the map", "/maps/Küche+Flur_2,b-1~@.cairn").ok());
+  EXPECT_FALSE(fs::exists(folder_ / "my maps"));  // nothing is written first
+}
+
+// Every value of config.mk is refused where make would read it as something else.
+TEST_F(BuildFolderTest, NoValueOfTheConfigurationEscapesTheCheck) {
+  const std::string hostile = (folder_ / "a\n$(shell touch PWNED)\n#").string();
+  fs::create_directories(hostile);
+  const auto expect_refused = [&](const Recipe& recipe, const BuildPaths& paths, const std::string& what) {
+    const Status status = WriteBuildFolder(recipe, paths);
+    ASSERT_FALSE(status.ok()) << what;
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument) << status.error().message;
+    EXPECT_THAT(status.error().message, testing::StartsWith(what));
+    EXPECT_FALSE(fs::exists(paths_.build_dir + "/config.mk")) << what;
+  };
+  BuildPaths paths = paths_;
+  paths.build_dir = hostile;
+  expect_refused(recipe_, paths, "the build folder");
+  paths = paths_;
+  paths.map = hostile + ".cairn";
+  expect_refused(recipe_, paths, "the map");
+  paths = paths_;
+  paths.program = hostile;
+  expect_refused(recipe_, paths, "the program");
+  Recipe recipe = recipe_;
+  recipe.name = "$(shell touch PWNED)";
+  expect_refused(recipe, paths_, "the name");
+  recipe = recipe_;
+  recipe.captures[0].path = hostile;
+  expect_refused(recipe, paths_, "the capture");
+  recipe = recipe_;
+  recipe.captures[0].queries_path = hostile;
+  expect_refused(recipe, paths_, "the list of queries");
+  recipe = recipe_;
+  recipe.captures[0].floor_plan_path = hostile;
+  expect_refused(recipe, paths_, "the floor plan");
+  recipe = recipe_;
+  recipe.captures.push_back({.name = "second", .path = hostile});
+  expect_refused(recipe, paths_, "the capture");
+  recipe.captures[1].path = recipe.captures[0].path;
+  recipe.captures[1].queries_path = hostile;
+  expect_refused(recipe, paths_, "the list of queries");
+}
+
+TEST_F(BuildFolderTest, RecipesOfAnyNameAreNoPartOfTheMakefile) {
+  paths_.recipe = (folder_ / "a\n$(shell touch PWNED)\n# my.toml").string();
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("config.mk").find("PWNED"), std::string::npos);
+  EXPECT_EQ(ConfiguredRecipe(paths_.build_dir), paths_.recipe);
+  EXPECT_EQ(ConfiguredMap(paths_.build_dir), paths_.map);
+  EXPECT_EQ(ConfiguredRecipe(folder_.string()), "");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "core/database.h"
@@ -22,6 +23,7 @@
 #include "core/temporary.h"
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
+#include "pipeline/json_text.h"
 
 namespace cairn {
 namespace {
@@ -78,6 +80,73 @@ TEST(Program, UsageErrorsExitWithTwoAndSayWhereHelpIs) {
     EXPECT_THAT(outcome.err, HasSubstr("--help"));
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   }
+}
+
+TEST(Program, UnknownCommandsAndOptionsNameTheNearest) {
+  const auto message = [](const std::vector<std::string>& words) {
+    const Outcome outcome = RunStage(words, Nothing);
+    EXPECT_EQ(outcome.exit_code, 2);
+    return outcome.err;
+  };
+  EXPECT_EQ(message({"stge"}), "cairn: no command 'stge'; did you mean 'stage'?; see cairn --help\n");
+  EXPECT_EQ(message({"stge", "--threads", "3"}),
+            "cairn: no command 'stge'; did you mean 'stage'?; see cairn --help\n");
+  EXPECT_EQ(message({"frobnicate"}), "cairn: no command 'frobnicate'; see cairn --help\n");
+  EXPECT_EQ(message({"stage", "--thread", "3"}),
+            "cairn stage: no option '--thread'; did you mean '--threads'?; see cairn stage --help\n");
+  EXPECT_EQ(message({"stage", "--theads=3"}),
+            "cairn stage: no option '--theads'; did you mean '--threads'?; see cairn stage --help\n");
+  EXPECT_EQ(message({"stage", "--frobnicate"}),
+            "cairn stage: no option '--frobnicate'; see cairn stage --help\n");
+  EXPECT_THAT(message({}), HasSubstr("subcommand is required"));
+  EXPECT_THAT(message({"--frobnicate"}), HasSubstr("see cairn --help"));
+}
+
+// An option that is not known is said before what is missing.
+TEST(Program, UnknownOptionIsNamedBesideAMissingArgument) {
+  const Outcome outcome =
+      RunWords({{.name = "stage",
+                 .summary = "Needs an argument",
+                 .add_arguments = [](CLI::App& app) { app.add_option("map")->required(); },
+                 .run = Nothing}},
+               {"stage", "--sed", "3"});
+  EXPECT_EQ(outcome.err, "cairn stage: no option '--sed'; did you mean '--seed'?; see cairn stage --help\n");
+}
+
+TEST(Program, NothingThatCommandsATerminalIsPrinted) {
+  const std::string hostile = "a\x1b[2Jb \xc2\x9b\xe2\x80\xae \xff\r";
+  const std::string shown = "a\\u001b[2Jb \\u009b\\u202e \\xff\\u000d";
+  const auto print = [&](const CommandEnvironment& environment) -> Status {
+    *environment.out << hostile << "\n"
+                     << "Küche\t\n";
+    // A character may be written in parts.
+    for (const char c : std::string("\xc3\xbc\xe2\x80\xae\xf0\x9f\xa4\x96")) environment.out->put(c);
+    *environment.out << "\xe2\x80" << std::flush << "\n";
+    spdlog::warn("{}", hostile);
+    return Error{ErrorCode::kNotFound, hostile};
+  };
+  testing::internal::CaptureStderr();
+  const Outcome outcome = RunStage({"stage"}, print);
+  const std::string logged = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(outcome.out, shown + "\nKüche\t\nü\\u202e🤖\\xe2\\x80\n");
+  EXPECT_EQ(outcome.err, "cairn stage: " + shown + "\n");
+  EXPECT_EQ(logged, "warning: " + shown + "\n");
+  // Words of the command line too.
+  EXPECT_EQ(RunStage({"st\x1b[2Jage"}, Nothing).err.find('\x1b'), std::string::npos);
+}
+
+TEST(Program, JsonStaysJsonAndSaysTheSame) {
+  const nlohmann::json json = {{"name", "a\x1b \x7f \xc2\x9b \xe2\x80\xae \"\\"}};
+  const Outcome outcome = RunStage({"stage"}, [&](const CommandEnvironment& environment) {
+    *environment.out << json.dump(2);
+    return Ok();
+  });
+  EXPECT_EQ(outcome.out.find('\x7f'), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(outcome.out), json);
+  EXPECT_EQ(JsonText({{"name",
+                       "K\xfc"
+                       "che"}}),
+            "{\"name\":\"K\ufffdche\"}");
 }
 
 TEST(Program, HelpAndVersionAreOnEverySubcommand) {
