@@ -1,7 +1,12 @@
 #include "core/database.h"
 
+#include <fcntl.h>
+
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
+
+#include "core/file_descriptor.h"
 
 namespace cairn {
 namespace {
@@ -56,6 +61,8 @@ bool IsSqliteFile(const std::string& path) {
 Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+  if (const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); file.get() < 0)
+    return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
   if (!IsSqliteFile(path)) {
     return MakeError(
         ErrorCode::kCorrupt,

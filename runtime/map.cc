@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/map_epoch.h"
 #include "runtime/no_throw.h"
 
 namespace cairn {
@@ -35,6 +36,7 @@ int64_t NumBytes(const AppearanceMap& appearance) {
 Result<std::shared_ptr<const Map>> Map::Open(const std::string& path, const MapOptions& options) {
   return WithoutExceptions(path.c_str(), [&]() -> Result<std::shared_ptr<const Map>> {
     CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {.public_key = options.public_key}));
+    CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), path, options.name, options.min_epoch));
     return std::shared_ptr<const Map>(new Map(std::move(file), options.memory_budget_bytes));
   });
 }
