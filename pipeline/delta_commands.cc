@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/map_delta.h"
 #include "core/map_file.h"
+#include "pipeline/epoch_argument.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/update_map.h"
 
@@ -100,7 +101,7 @@ void AddDemands(CLI::App& app, Arguments* arguments, const char* key_help) {
   app.add_option("--public-key", arguments->key_path, key_help)->type_name("KEY.pub");
   app.add_option("--name", arguments->name, "What the map that takes the place must be called")
       ->type_name("NAME");
-  app.add_option("--min-epoch", arguments->min_epoch, "Least epoch that it may have")->type_name("N");
+  AddEpochArgument(app, "--min-epoch", &arguments->min_epoch, 0, "Least epoch that it may have");
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "pipeline/seal_commands.h"
 
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include "core/map_file.h"
 #include "core/map_rows.h"
 #include "core/map_seal.h"
+#include "pipeline/epoch_argument.h"
 
 namespace cairn {
 namespace {
@@ -97,8 +97,7 @@ Command VerifyCommand() {
             app.add_option("--public-key", arguments->key_path, "Key whose signature the map must have")
                 ->type_name("KEY.pub");
             app.add_option("--name", arguments->name, "What the map must be called")->type_name("NAME");
-            app.add_option("--min-epoch", arguments->epoch, "Least epoch that the map may have")
-                ->type_name("N");
+            AddEpochArgument(app, "--min-epoch", &arguments->epoch, 0, "Least epoch that the map may have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Verify(*arguments, environment); },
   };
@@ -133,11 +132,8 @@ Command SignCommand() {
             app.add_option("-o,--output", arguments->output_path, "Signed map to write")
                 ->required()
                 ->type_name("SIGNED");
-            CLI::Option* const epoch =
-                app.add_option("--epoch", arguments->epoch,
-                               "Epoch of the map, at least 1 [that of the map, or 1]")
-                    ->check(CLI::Range(uint64_t{1}, std::numeric_limits<uint64_t>::max()))
-                    ->type_name("N");
+            CLI::Option* const epoch = AddEpochArgument(app, "--epoch", &arguments->epoch, 1,
+                                                        "Epoch of the map [that of the map, or 1]");
             app.add_option("--after", arguments->previous_path,
                            "Map that this one follows, signed with the same key: the epoch after its one")
                 ->excludes(epoch)

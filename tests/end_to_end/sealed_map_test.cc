@@ -41,7 +41,7 @@ TEST_F(SealedMap, IsSignedAndVerified) {
   ASSERT_EQ(sign.exit_code, 0) << sign.err;
   const ProgramRun verify = RunShell("cairn verify " + Path("signed.cairn") + required);
   EXPECT_EQ(verify.exit_code, 0) << verify.err;
-  EXPECT_THAT(verify.out, HasSubstr("whole, signed with key"));
+  EXPECT_THAT(verify.out, HasSubstr("whole of epoch 1, signed with key"));
   EXPECT_EQ(RunShell("cairn verify " + Path("signed.cairn") + " --public-key " + Path("other.pub")).exit_code,
             Code(ErrorCode::kWrongKey));
 }
@@ -61,8 +61,9 @@ TEST_F(SealedMap, SignedReleasesAreCounted) {
   EXPECT_EQ(RunShell(verify + " --name elsewhere").exit_code, Code(ErrorCode::kOtherMap));
   EXPECT_THAT(RunShell("cairn inspect " + Path("2.cairn")).out, HasSubstr("epoch"));
   // What cannot be meant.
-  for (const std::string arguments : {" --epoch 0", " --epoch -1", " --epoch 18446744073709551616",
-                                      " --epoch one", " --epoch 2 --after " + Path("1.cairn")}) {
+  for (const std::string& arguments :
+       std::vector<std::string>{" --epoch 0", " --epoch -1", " --epoch 18446744073709551616", " --epoch one",
+                                " --epoch 2 --after " + Path("1.cairn")}) {
     EXPECT_EQ(RunShell(sign + Path("no.cairn") + arguments).exit_code, 2) << arguments;
     EXPECT_FALSE(fs::exists(Path("no.cairn")));
   }
