@@ -72,20 +72,28 @@ bool IsInWalMode(const std::string& path) {
   return file.read(head, sizeof(head)) && head[18] == 2 && head[19] == 2;
 }
 
-bool IsFilled(const std::string& path) {
+// 0 where there is none.
+uint64_t NumBytes(const std::string& path) {
   std::error_code error;
-  const auto num_bytes = fs::file_size(path, error);
-  return !error && num_bytes > 0;
+  const uintmax_t num_bytes = fs::file_size(path, error);
+  return error ? 0 : num_bytes;
 }
+
+bool IsFilled(const std::string& path) { return NumBytes(path) > 0; }
 
 // Opens copies of a database and its write-ahead log in a folder that vanishes at once.
 SQLite::Database OpenCopy(const std::string& path) {
-  const fs::path folder = fs::temp_directory_path() / fmt::format("cairn-{}", getpid());
-  fs::create_directories(folder);
+  std::string folder_name = (fs::temp_directory_path() / "cairn-XXXXXX").string();
+  if (mkdtemp(folder_name.data()) == nullptr)
+    throw fs::filesystem_error("no folder can be made", folder_name,
+                               std::error_code(errno, std::generic_category()));
+  const fs::path folder(folder_name);
   const std::string copy = (folder / fs::path(path).filename()).string();
   fs::copy_file(path, copy, fs::copy_options::overwrite_existing);
   fs::copy_file(path + "-wal", copy + "-wal", fs::copy_options::overwrite_existing);
   SQLite::Database database(copy, SQLite::OPEN_READWRITE);
+  Harden(database, NumBytes(copy) + NumBytes(copy + "-wal"));
+  ReadSchema(database);
   database.exec("PRAGMA wal_checkpoint(TRUNCATE)");
   database.exec("PRAGMA journal_mode = DELETE");
   fs::remove_all(folder);
@@ -103,6 +111,8 @@ SQLite::Database OpenUnchanged(const std::string& path) {
   }
   SQLite::Database database(DatabaseUri(path) + "?mode=ro", SQLite::OPEN_READONLY | SQLite::OPEN_URI,
                             kBusyTimeoutMs);
+  Harden(database, NumBytes(path) + NumBytes(path + "-wal"));
+  ReadSchema(database);
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   database.exec("BEGIN");  // one snapshot for as long as it is open
   return database;
@@ -140,6 +150,7 @@ Result<SQLite::Database> OpenColmapDatabase(const std::string& path) {
 void CopyColmapDatabase(SQLite::Database& source, const std::string& copy_path) {
   SQLite::Database copy(copy_path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   SQLite::Backup(copy, source).executeStep(-1);
+  Harden(copy, NumBytes(copy_path));
   copy.exec("PRAGMA journal_mode = DELETE");  // a copy of a database in WAL mode is in WAL mode
   for (const char* column : {"F", "E", "H", "qvec", "tvec"}) {
     if (!HasColumn(copy, "two_view_geometries", column))

@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <filesystem>
 #include <fstream>
 
@@ -17,6 +19,24 @@ uint64_t BigEndian(std::string_view bytes) {
   uint64_t value = 0;
   for (const char byte : bytes) value = value << 8 | static_cast<uint8_t>(byte);
   return value;
+}
+
+// Steps between two looks at what is left.
+constexpr int kStepsPerLook = 1000;
+// Some 3000 tables and indices.
+constexpr int64_t kMaxSchemaSteps = 20'000;
+
+int CountDown(void* num_left) {
+  auto& left = *static_cast<int64_t*>(num_left);
+  left -= kStepsPerLook;
+  return left <= 0 ? 1 : 0;
+}
+
+// 0 where there is none.
+uint64_t NumBytes(const std::string& path) {
+  std::error_code error;
+  const uintmax_t num_bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : num_bytes;
 }
 
 }  // namespace
@@ -48,8 +68,42 @@ std::string DatabaseUri(const std::string& path) {
   return uri;
 }
 
+void Harden(SQLite::Database& database, uint64_t num_bytes) {
+  sqlite3* const handle = database.getHandle();
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
+                static_cast<int>(std::clamp<uint64_t>(num_bytes, 100'000, 1'000'000'000)));
+  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;");
+}
+
+void LimitSteps(SQLite::Database& database, uint64_t num_bytes) {
+  // A row takes five bytes or more, and about one step for each of its values.
+  const uint64_t max_num_steps = 10'000'000 + 16 * num_bytes;
+  if (max_num_steps > INT_MAX) return;
+  sqlite3_progress_handler(
+      database.getHandle(), static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
+}
+
+StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)
+    : handle_(database.getHandle()), num_left_(max_num_steps) {
+  sqlite3_progress_handler(handle_, kStepsPerLook, CountDown, &num_left_);
+}
+
+StepLimit::~StepLimit() { sqlite3_progress_handler(handle_, 0, nullptr, nullptr); }
+
+void ReadSchema(SQLite::Database& database) {
+  const StepLimit steps(database, kMaxSchemaSteps);
+  database.execAndGet("SELECT count(*) FROM sqlite_schema WHERE name = ''");
+}
+
 SQLite::Database OpenImmutable(const std::string& path) {
-  return SQLite::Database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  Harden(database, NumBytes(path));
+  ReadSchema(database);
+  return database;
 }
 
 bool IsSqliteFile(const std::string& path) {
@@ -61,6 +115,9 @@ bool IsSqliteFile(const std::string& path) {
 Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return MakeError(ErrorCode::kNotFound, "{}: no such file", path);
+  if (!std::filesystem::is_regular_file(path, error) && !std::filesystem::is_directory(path, error)) {
+    return MakeError(ErrorCode::kCorrupt, "{}: not a regular file, expected a SQLite database", path);
+  }
   if (const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); file.get() < 0)
     return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
   if (!IsSqliteFile(path)) {
@@ -68,10 +125,10 @@ Status CheckSqliteFile(const std::string& path) {
         ErrorCode::kCorrupt,
         "{}: not a SQLite database ({} bytes, expected the magic bytes 'SQLite format 3'); is it truncated "
         "or another kind of file?",
-        path, std::filesystem::is_directory(path, error) ? 0 : std::filesystem::file_size(path, error));
+        path, NumBytes(path));
   }
   const uint64_t page_size = ReadSqliteHeader(path).page_size;
-  const uint64_t num_bytes = std::filesystem::file_size(path, error);
+  const uint64_t num_bytes = NumBytes(path);
   if (page_size == 0 || num_bytes % page_size == 0) return Ok();
   return MakeError(
       ErrorCode::kCorrupt,
@@ -83,8 +140,7 @@ Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckSqliteFile(path));
   return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
     SQLite::Database database = OpenImmutable(path);
-    database.execAndGet(
-        "SELECT count(*) FROM sqlite_master");  // reads the schema: a damaged header shows here
+    LimitSteps(database, NumBytes(path));
     return database;
   });
 }

@@ -29,6 +29,12 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
         : code == SQLITE_IOERR || code == SQLITE_READONLY || code == SQLITE_CANTOPEN || code == SQLITE_PERM
             ? ErrorCode::kIo
             : ErrorCode::kCorrupt;
+    if (code == SQLITE_INTERRUPT) {
+      return MakeError(error,
+                       "{}: shows more rows than a file of its size can hold: it is damaged, or made to "
+                       "stall its readers; get it again from whoever made it",
+                       path);
+    }
     return MakeError(error, "{}: SQLite says: {}", path, exception.what());
   }
 }
@@ -45,14 +51,45 @@ SqliteHeader ReadSqliteHeader(const std::string& path);
 // The file as SQLite's URI, to which "?mode=ro" or the like can be appended.
 std::string DatabaseUri(const std::string& path);
 
-// Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody writes meanwhile.
-// Throws SQLite::Exception: call it inside WithDatabaseErrors.
+// Makes a connection safe for a file that somebody else wrote: SQLite runs none of its views and triggers,
+// calls no function of its schema that could do harm, checks its cells, maps none of it into memory, and
+// allocates no value longer than the `num_bytes` of the file (at least 100 kB).  Every connection to a file
+// that this process has not written itself is made safe first: OpenImmutable, OpenDatabaseReadOnly and
+// OpenColmapDatabase do it. Throws SQLite::Exception: call it inside WithDatabaseErrors.
+void Harden(SQLite::Database& database, uint64_t num_bytes);
+
+// Ends each statement that takes more steps than reading all of a file of `num_bytes` can need: a file whose
+// pages refer to each other can show rows without end.  The steps of a statement add up over its runs: not
+// for one that is kept for a program's life.  Such a statement fails as SQLite's "interrupted".
+void LimitSteps(SQLite::Database& database, uint64_t num_bytes);
+
+// While it lives, all that SQLite does on a connection may take so many steps of its machine together, then
+// it ends with SQLITE_INTERRUPT: pages of a hostile file may lead to one another, so that few bytes show more
+// rows than anybody can read.  (LimitSteps is for connections that live for one reading.)
+class StepLimit {
+ public:
+  StepLimit(SQLite::Database& database, int64_t max_num_steps);
+  ~StepLimit();
+  StepLimit(const StepLimit&) = delete;
+  StepLimit& operator=(const StepLimit&) = delete;
+
+ private:
+  sqlite3* handle_;
+  int64_t num_left_;
+};
+
+// Reads a connection's schema, which SQLite would otherwise do when it is first needed, within few steps: it
+// parses every row.  Throws SQLite::Exception.
+void ReadSchema(SQLite::Database& database);
+
+// Hardened, its schema read.  Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody
+// writes meanwhile. Throws SQLite::Exception: call it inside WithDatabaseErrors.
 SQLite::Database OpenImmutable(const std::string& path);
 
-// Errors: NotFound, Corrupt (empty, a folder, without SQLite's magic bytes, or not whole pages).
+// Errors: NotFound, Corrupt (empty, no regular file, without SQLite's magic bytes, or not whole pages).
 Status CheckSqliteFile(const std::string& path);
 
-// Opens an existing database immutable, and checks it.
+// Opens an existing database immutable, hardened and with limited steps, and checks it.
 // Errors: NotFound, Corrupt (empty, truncated, or not SQLite).
 Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path);
 

@@ -20,12 +20,12 @@ int64_t FewestBytes(BlockKind kind) {
     case BlockKind::kAppearance:
       return 4;
     case BlockKind::kAmbiguity:
+    case BlockKind::kRegions:
       return 2;
     case BlockKind::kViewRegions:
       return 26;
     case BlockKind::kFloorPlan:
       return 33;
-    case BlockKind::kRegions:
     case BlockKind::kWords:
     case BlockKind::kVocabularyTree:
     case BlockKind::kLandmarkModels:
@@ -157,6 +157,10 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
        directory.Count(BlockKind::kWords) > 0)) {
     return MakeError(ErrorCode::kCorrupt,
                      "directory: a vocabulary tree, words and a norm per image belong together");
+  }
+  if (directory.Count(BlockKind::kRegions) > directory.Count(BlockKind::kStations)) {
+    return MakeError(ErrorCode::kCorrupt, "directory: {} regions of {} stations",
+                     directory.Count(BlockKind::kRegions), directory.Count(BlockKind::kStations));
   }
   if ((directory.Count(BlockKind::kFloorPlan) > 0) != (directory.Count(BlockKind::kViewRegions) > 0)) {
     return MakeError(ErrorCode::kCorrupt, "directory: a floor plan and its regions belong together");

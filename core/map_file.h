@@ -32,6 +32,7 @@ class MapFile {
   ~MapFile();
 
   const std::string& path() const { return path_; }
+  int64_t num_bytes() const { return num_bytes_; }
   const MapHead& head() const { return head_; }
   const MapDirectory& directory() const { return directory_; }
   const Seal& seal() const { return seal_; }

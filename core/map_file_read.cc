@@ -6,9 +6,15 @@
 namespace cairn {
 namespace {
 
+// Memory that a map's blocks may take, in bytes per byte of the file, beyond a start; the largest seen of
+// maps that were compiled is 20, of stations alone.
+constexpr int64_t kMostUnfolding = 64;
+constexpr int64_t kSmallMapBytes = int64_t{64} << 20;
+
 class RowsReader {
  public:
-  RowsReader(const MapFile& file, MapRows* rows) : file_(file), rows_(*rows) {}
+  RowsReader(const MapFile& file, MapRows* rows)
+      : file_(file), rows_(*rows), num_bytes_left_(kSmallMapBytes + kMostUnfolding * file.num_bytes()) {}
 
   Status Read() {
     static_cast<MapHead&>(rows_) = file_.head();
@@ -32,52 +38,70 @@ class RowsReader {
     const MapDirectory& directory = file_.directory();
     switch (static_cast<BlockKind>(entry.kind)) {
       case BlockKind::kStations:
-        return AddStations(DecodeStationBlock(bytes, entry, directory, what));
+        return Take(DecodeStationBlock(bytes, entry, directory, what),
+                    [&](StationBlock block) { return AddStations(block); });
       case BlockKind::kRegions:  // follow from the landmark blocks
-        return ToStatus(DecodeRegionBlock(bytes, entry, directory, what));
-      case BlockKind::kVocabularyTree: {
-        CAIRN_ASSIGN_OR_RETURN(rows_.vocabulary, DecodeVocabularyTree(bytes, entry, directory, what));
-        return Ok();
-      }
+        return Take(DecodeRegionBlock(bytes, entry, directory, what),
+                    [](const RegionBlock&) { return Ok(); });
+      case BlockKind::kVocabularyTree:
+        return Take(DecodeVocabularyTree(bytes, entry, directory, what), [&](Vocabulary tree) {
+          rows_.vocabulary = std::move(tree);
+          return Ok();
+        });
       case BlockKind::kDocumentNorms:  // follow from the words
-        return ToStatus(DecodeDocumentNorms(bytes, entry, what));
-      case BlockKind::kWords: {
-        CAIRN_ASSIGN_OR_RETURN(WordBlock words, DecodeWordBlock(bytes, entry, directory, what));
-        // The tree stands before the words.
-        if (rows_.vocabulary.nodes.empty())
-          return MakeError(ErrorCode::kCorrupt, "{}: words without a tree", what);
-        std::move(words.postings.begin(), words.postings.end(),
-                  rows_.vocabulary.inverted_files.begin() + words.first);
-        return Ok();
-      }
-      case BlockKind::kImages: {
-        CAIRN_ASSIGN_OR_RETURN(ImageBlock images, DecodeImageBlock(bytes, entry, directory, what));
-        std::move(images.images.begin(), images.images.end(), std::back_inserter(rows_.images));
-        return Ok();
-      }
+        return Take(DecodeDocumentNorms(bytes, entry, what), [](const std::vector<float>&) { return Ok(); });
+      case BlockKind::kWords:
+        return Take(DecodeWordBlock(bytes, entry, directory, what), [&](WordBlock words) -> Status {
+          // The tree stands before the words.
+          if (rows_.vocabulary.nodes.empty())
+            return MakeError(ErrorCode::kCorrupt, "{}: words without a tree", what);
+          std::move(words.postings.begin(), words.postings.end(),
+                    rows_.vocabulary.inverted_files.begin() + words.first);
+          return Ok();
+        });
+      case BlockKind::kImages:
+        return Take(DecodeImageBlock(bytes, entry, directory, what), [&](ImageBlock images) {
+          std::move(images.images.begin(), images.images.end(), std::back_inserter(rows_.images));
+          return Ok();
+        });
       case BlockKind::kLandmarks:
-        return AddLandmarks(DecodeLandmarkBlock(bytes, entry, directory, what));
-      case BlockKind::kAppearance: {
-        CAIRN_ASSIGN_OR_RETURN(AppearanceBlock part, DecodeAppearanceBlock(bytes, entry, directory, what));
-        std::move(part.nodes.begin(), part.nodes.end(), std::back_inserter(rows_.appearance));
-        return Ok();
-      }
+        return Take(DecodeLandmarkBlock(bytes, entry, directory, what),
+                    [&](LandmarkBlock block) { return AddLandmarks(block); });
+      case BlockKind::kAppearance:
+        return Take(DecodeAppearanceBlock(bytes, entry, directory, what), [&](AppearanceBlock part) {
+          std::move(part.nodes.begin(), part.nodes.end(), std::back_inserter(rows_.appearance));
+          return Ok();
+        });
       case BlockKind::kAmbiguity:  // stands after the nodes
-        return AddAmbiguity(DecodeAmbiguityBlock(bytes, entry, directory, what));
-      case BlockKind::kFloorPlan: {
-        CAIRN_ASSIGN_OR_RETURN(rows_.views.plan, DecodeFloorPlan(bytes, entry, directory, what));
-        return Ok();
-      }
-      case BlockKind::kViewRegions: {
-        CAIRN_ASSIGN_OR_RETURN(const ViewBlock regions, DecodeViewBlock(bytes, entry, directory, what));
-        return AppendRegions(regions, what, &rows_.views);
-      }
-      case BlockKind::kLandmarkModels: {
-        CAIRN_ASSIGN_OR_RETURN(const VisualBlock models, DecodeVisualBlock(bytes, entry, directory, what));
-        return AppendModels(models, what, &rows_.visual_map);
-      }
+        return Take(DecodeAmbiguityBlock(bytes, entry, directory, what),
+                    [&](AmbiguityBlock block) { return AddAmbiguity(std::move(block)); });
+      case BlockKind::kFloorPlan:
+        return Take(DecodeFloorPlan(bytes, entry, directory, what), [&](FloorPlan plan) {
+          rows_.views.plan = std::move(plan);
+          return Ok();
+        });
+      case BlockKind::kViewRegions:
+        return Take(DecodeViewBlock(bytes, entry, directory, what),
+                    [&](const ViewBlock& regions) { return AppendRegions(regions, what, &rows_.views); });
+      case BlockKind::kLandmarkModels:
+        return Take(DecodeVisualBlock(bytes, entry, directory, what),
+                    [&](const VisualBlock& models) { return AppendModels(models, what, &rows_.visual_map); });
     }
     return Ok();  // of a later minor version
+  }
+
+  // Lets `add` have a decoded block, if there is memory left for it: a few bytes of a block can stand for
+  // lists of millions.
+  template <typename Block, typename Add>
+  Status Take(Result<Block> block, Add&& add) {
+    CAIRN_RETURN_IF_ERROR(block);
+    num_bytes_left_ -= NumBytes(*block);
+    if (num_bytes_left_ < 0) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "{}: its blocks unfold to more than {} times its size: no map that cairn wrote",
+                       file_.path(), kMostUnfolding);
+    }
+    return add(*std::move(block));
   }
 
   // Postings name images in a file, documents in rows.
@@ -101,37 +125,29 @@ class RowsReader {
     return Ok();
   }
 
-  template <typename T>
-  static Status ToStatus(const Result<T>& result) {
-    return result.ok() ? Ok() : Status(result.error());
-  }
-
-  Status AddStations(const Result<StationBlock>& block) {
-    CAIRN_RETURN_IF_ERROR(block);
-    for (size_t i = 0; i < block->stations.size(); ++i) {
-      const auto station = static_cast<StationIdx>(block->first + i);
-      rows_.stations.push_back(block->stations[i]);
-      for (const StationIdx neighbour : block->neighbours[i])
+  Status AddStations(const StationBlock& block) {
+    for (size_t i = 0; i < block.stations.size(); ++i) {
+      const auto station = static_cast<StationIdx>(block.first + i);
+      rows_.stations.push_back(block.stations[i]);
+      for (const StationIdx neighbour : block.neighbours[i])
         rows_.station_edges.emplace_back(station, neighbour);
-      for (const RegionIdx region : block->regions[i]) rows_.regions[region].stations.push_back(station);
+      for (const RegionIdx region : block.regions[i]) rows_.regions[region].stations.push_back(station);
     }
     return Ok();
   }
 
-  Status AddAmbiguity(Result<AmbiguityBlock> block) {
-    CAIRN_RETURN_IF_ERROR(block);
-    for (size_t i = 0; i < block->nodes.size() && block->first + i < rows_.appearance.size(); ++i) {
-      rows_.appearance[block->first + i].entropy = block->nodes[i].entropy;
-      rows_.appearance[block->first + i].look_alikes = std::move(block->nodes[i].look_alikes);
+  Status AddAmbiguity(AmbiguityBlock block) {
+    for (size_t i = 0; i < block.nodes.size() && block.first + i < rows_.appearance.size(); ++i) {
+      rows_.appearance[block.first + i].entropy = block.nodes[i].entropy;
+      rows_.appearance[block.first + i].look_alikes = std::move(block.nodes[i].look_alikes);
     }
     return Ok();
   }
 
-  Status AddLandmarks(const Result<LandmarkBlock>& block) {
-    CAIRN_RETURN_IF_ERROR(block);
-    rows_.landmarks.insert(rows_.landmarks.end(), block->landmarks.begin(), block->landmarks.end());
-    rows_.descriptors.middleRows(block->first, block->descriptors.rows()) = block->descriptors;
-    for (const auto& [region, landmarks] : block->regions) {
+  Status AddLandmarks(const LandmarkBlock& block) {
+    rows_.landmarks.insert(rows_.landmarks.end(), block.landmarks.begin(), block.landmarks.end());
+    rows_.descriptors.middleRows(block.first, block.descriptors.rows()) = block.descriptors;
+    for (const auto& [region, landmarks] : block.regions) {
       std::vector<LandmarkIdx>& of_region = rows_.regions[region].landmarks;
       of_region.insert(of_region.end(), landmarks.begin(), landmarks.end());
     }
@@ -140,6 +156,7 @@ class RowsReader {
 
   const MapFile& file_;
   MapRows& rows_;
+  int64_t num_bytes_left_;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/appearance.h"
 #include "core/map_documents.h"
@@ -32,13 +33,13 @@ bool IsAscending(const std::vector<int32_t>& values, size_t limit) {
 }
 
 Status CheckImages(const MapRows& rows) {
+  std::set<CameraId> camera_ids;
+  for (const Camera& camera : rows.cameras) camera_ids.insert(camera.camera_id);
   for (size_t i = 0; i < rows.images.size(); ++i) {
     const MapImage& image = rows.images[i];
     if (i > 0 && image.image_id <= rows.images[i - 1].image_id)
       return Invalid("image {} is out of order", image.image_id);
-    bool has_camera = false;
-    for (const Camera& camera : rows.cameras) has_camera |= camera.camera_id == image.camera_id;
-    if (!has_camera)
+    if (!camera_ids.contains(image.camera_id))
       return Invalid("image {} has camera {}, which the map lacks", image.image_id, image.camera_id);
     if (!IsPose(image.cam_from_world) || image.cam_from_world.translation.cwiseAbs().maxCoeff() > kMaxExtentM)
       return Invalid("image {}: its pose is none", image.image_id);
@@ -78,7 +79,14 @@ Status CheckRegions(const MapRows& rows) {
     return Invalid("{} regions with a lower bound of {}, {} stations uncovered", rows.regions.size(),
                    rows.lower_bound.value_or(0), rows.uncovered_limit);
   }
+  // Each region has a station that no other one before it has.
+  if (rows.regions.size() > rows.stations.size())
+    return Invalid("{} regions of {} stations", rows.regions.size(), rows.stations.size());
   for (size_t i = 0; i < rows.regions.size(); ++i) {
+    if (rows.regions[i].stations.empty() || rows.regions[i].landmarks.empty()) {
+      return Invalid("region {}: {} stations and {} landmarks, expected one or more of each", i,
+                     rows.regions[i].stations.size(), rows.regions[i].landmarks.size());
+    }
     if (!IsAscending(rows.regions[i].stations, rows.stations.size()) ||
         !IsAscending(rows.regions[i].landmarks, rows.landmarks.size())) {
       return Invalid("region {}: its stations or landmarks are not ascending below {} and {}", i,
@@ -163,6 +171,8 @@ std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
 
 Status CheckMapHead(const MapHead& head) {
   CAIRN_RETURN_IF_ERROR(CheckCaptureFrame(head.frame));
+  if (head.sessions.size() > kMaxNumSessions)
+    return Invalid("{} sessions, at most {} are stored", head.sessions.size(), kMaxNumSessions);
   for (size_t i = 0; i < head.sessions.size(); ++i) {
     if (!IsSessionName(head.sessions[i])) return Invalid("session '{}' has no valid name", head.sessions[i]);
     const auto place = head.sessions.begin() + static_cast<std::ptrdiff_t>(i);

@@ -7,9 +7,6 @@
 namespace cairn {
 namespace {
 
-// Steps between two looks at what is left.
-constexpr int kStepsPerLook = 1000;
-
 StoredValue ValueOf(const SQLite::Column& column) {
   switch (column.getType()) {
     case SQLITE_INTEGER:
@@ -63,12 +60,6 @@ void AddTables(const StoredRows& rows, Hasher* hasher) {
     }
     hasher->Add(uint64_t{0});
   }
-}
-
-int CountDown(void* num_left) {
-  auto& left = *static_cast<int64_t*>(num_left);
-  left -= kStepsPerLook;
-  return left <= 0 ? 1 : 0;
 }
 
 }  // namespace
@@ -173,13 +164,6 @@ Hash RootHash(const StoredRows& head, std::string_view directory) {
   AddBytes(directory, &hasher);
   return hasher.Finish();
 }
-
-StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)
-    : handle_(database.getHandle()), num_left_(max_num_steps) {
-  sqlite3_progress_handler(handle_, kStepsPerLook, CountDown, &num_left_);
-}
-
-StepLimit::~StepLimit() { sqlite3_progress_handler(handle_, 0, nullptr, nullptr); }
 
 int64_t MaxStepsFor(int64_t num_bytes) { return 1'000'000 + num_bytes; }
 

@@ -75,22 +75,7 @@ Hash RootHash(const StoredRows& head, std::string_view directory);
 // of whoever made the file.  Errors: Corrupt.
 Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
 
-// Ends what SQLite does on a connection after so many steps of its machine, with SQLITE_INTERRUPT: the pages
-// of a hostile file may lead to one another, so that few bytes show more rows than anybody can read.
-class StepLimit {
- public:
-  StepLimit(SQLite::Database& database, int64_t max_num_steps);
-  ~StepLimit();
-  StepLimit(const StepLimit&) = delete;
-  StepLimit& operator=(const StepLimit&) = delete;
-  bool is_reached() const { return num_left_ <= 0; }
-
- private:
-  sqlite3* handle_;
-  int64_t num_left_;
-};
-
-// More steps than reading a whole file of this size in any order of its tables can take.
+// More steps than it takes to read the head, the findings or a block of a map of this size.
 int64_t MaxStepsFor(int64_t num_bytes);
 
 }  // namespace cairn

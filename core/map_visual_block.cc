@@ -57,9 +57,9 @@ Status CheckModel(const HeadingModel& model, size_t landmark, int64_t num_images
   }
   if (!model.sigma.allFinite() || (model.sigma.array() < 0).any())
     return Invalid("landmark {}: its errors are no valid numbers", landmark);
-  if (model.sights.size() < kMinNumSights)
-    return Invalid("landmark {}: a model of {} sights, at least {} are needed", landmark, model.sights.size(),
-                   kMinNumSights);
+  if (model.sights.size() < kMinNumSights || model.sights.size() > kMaxNumSights)
+    return Invalid("landmark {}: a model of {} sights, expected {} to {}", landmark, model.sights.size(),
+                   kMinNumSights, kMaxNumSights);
   int64_t before = -1;
   for (const LandmarkSight& sight : model.sights) {
     if (sight.image <= before || sight.image >= num_images)
@@ -94,7 +94,7 @@ void ReadModel(BlobReader* reader, int64_t num_images, int64_t* max_num_values, 
   for (double& sigma : model->sigma) sigma = DecodeSize(reader->UInt8());
   std::vector<int32_t> images;
   if (!ReadRuns(reader, num_images, max_num_values, &images)) return reader->Fail();
-  if (images.size() * 5 > reader->num_left()) return reader->Fail();
+  if (images.size() > kMaxNumSights || images.size() * 5 > reader->num_left()) return reader->Fail();
   for (const int32_t image : images) {
     LandmarkSight& sight = model->sights.emplace_back();
     sight.image = image;

@@ -30,6 +30,10 @@ Result<std::vector<std::string>> ReadSessionsText(const std::string& path) {
     }
     if (std::find(sessions.begin(), sessions.end(), words[0]) != sessions.end())
       return MakeError(ErrorCode::kCorrupt, "{}:{}: session '{}' stands twice", path, line_number, words[0]);
+    if (sessions.size() == kMaxNumSessions) {
+      return MakeError(ErrorCode::kCorrupt, "{}: more than {} sessions; join the later ones to another map",
+                       path, kMaxNumSessions);
+    }
     sessions.push_back(words[0]);
   }
   return sessions;

@@ -12,18 +12,6 @@
 namespace cairn {
 namespace {
 
-// Nothing in the file may run while it is changed.
-SQLite::Database OpenToChange(const std::string& path) {
-  SQLite::Database database(path, SQLite::OPEN_READWRITE);
-  sqlite3* const handle = database.getHandle();
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  database.exec("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; PRAGMA cell_size_check = ON;");
-  return database;
-}
-
 // Of all that a robot reads at opening but the epoch.
 Hash HashWithoutEpoch(StoredRows rows) {
   std::erase_if(rows.at("meta"), [](const StoredRow& row) {
@@ -38,7 +26,9 @@ Result<Hash> SetEpoch(const std::string& path, uint64_t epoch) {
   return WithDatabaseErrors(path, [&]() -> Result<Hash> {
     std::error_code error;
     const auto num_bytes = static_cast<int64_t>(std::filesystem::file_size(path, error));
-    SQLite::Database database = OpenToChange(path);
+    SQLite::Database database(path, SQLite::OPEN_READWRITE);
+    Harden(database, num_bytes);
+    database.exec("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF;");
     const StepLimit steps(database, MaxStepsFor(num_bytes));
     CAIRN_ASSIGN_OR_RETURN(const StoredRows before, ReadStoredRows(database, path, HeadTables(), num_bytes));
     SQLite::Statement insert(database, "INSERT OR REPLACE INTO meta VALUES (?, ?)");

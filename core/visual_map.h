@@ -11,6 +11,9 @@
 
 namespace cairn {
 
+// Most sights of one model: what a query solves grows with their cube.
+inline constexpr int kMaxNumSights = 512;
+
 // What a map stores of its visual map [Sala06 §VI-C]: the sights of which LandmarkModel makes the generative
 // model of every landmark, and how well it predicts.  schemas/FORMAT.md, block 12.
 
@@ -28,7 +31,7 @@ struct HeadingModel {
   // Standard deviations of errors of left-out sights: x px, y px, octaves of scale.
   Eigen::Vector3d sigma = Eigen::Vector3d::Zero();
   bool predicts_badly = false;        // counts less
-  std::vector<LandmarkSight> sights;  // ascending image, at least kMinNumSights
+  std::vector<LandmarkSight> sights;  // ascending image, kMinNumSights to kMaxNumSights
 };
 
 // What the survey's own images say about how good its visual map is: they are placed by models that were

@@ -4,7 +4,10 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <utility>
+
+#include <fmt/ranges.h>
 
 #include "core/map_epoch.h"
 #include "runtime/no_throw.h"
@@ -16,6 +19,9 @@ namespace {
 constexpr int64_t kAllLandmarks = -1;
 constexpr int64_t kWholeAppearance = -2;
 constexpr int64_t kWholeViews = -3;
+
+// Image sizes that a message names.
+constexpr size_t kMaxNumSizesNamed = 10;
 
 int64_t NumBytes(const LandmarkSet& set) {
   return static_cast<int64_t>(set.idx.size() * (sizeof(LandmarkIdx) + sizeof(MapLandmark))) +
@@ -234,9 +240,9 @@ Result<std::shared_ptr<const LandmarkSet>> Map::AllLandmarks() const {
 Result<Camera> Map::CameraForSize(int width, int height) const {
   const Camera* found = nullptr;
   int num_found = 0;
-  std::string sizes;
+  std::set<std::string> sizes;
   for (const Camera& camera : head_.cameras) {
-    sizes += fmt::format("{}{} x {}", sizes.empty() ? "" : ", ", camera.width, camera.height);
+    if (sizes.size() < kMaxNumSizesNamed) sizes.insert(fmt::format("{} x {}", camera.width, camera.height));
     if (camera.width != width || camera.height != height) continue;
     found = &camera;
     ++num_found;
@@ -244,7 +250,7 @@ Result<Camera> Map::CameraForSize(int width, int height) const {
   if (num_found == 1) return *found;
   return MakeError(ErrorCode::kNotFound,
                    "{} cameras of map '{}' take images of {} x {} px (its cameras: {}); give the camera",
-                   num_found, head_.name, width, height, sizes);
+                   num_found, head_.name, width, height, fmt::join(sizes, ", "));
 }
 
 }  // namespace cairn

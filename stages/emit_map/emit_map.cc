@@ -297,7 +297,7 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->max_num_sights,
        .help = "most sights of a landmark that its models store",
        .min = 16,
-       .max = 512},
+       .max = kMaxNumSights},
       {.name = "bad_model_px",
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",

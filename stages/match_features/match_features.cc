@@ -180,8 +180,9 @@ Status WriteMatches(const std::string& matches_path, MatchRun* run) {
     return WithDatabaseErrors(temporary, [&]() -> Status {
       CopyColmapDatabase(run->features, temporary);
       SQLite::Database database(temporary, SQLite::OPEN_READWRITE);
-      database.exec(
-          "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN; DELETE FROM two_view_geometries");
+      database.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
+      Harden(database, UINT64_MAX);  // it has the triggers and views of the features' database, if any
+      database.exec("BEGIN; DELETE FROM two_view_geometries");
       ReplaceDroppedItems(run->images, database);
       if (run->summary.pairs == "frustum") {
         CAIRN_RETURN_IF_ERROR(MatchFrustum(database, run));

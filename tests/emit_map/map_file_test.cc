@@ -377,5 +377,24 @@ TEST(GoldenMap, Version2_3IsRead) {
   EXPECT_EQ(rows->vocabulary.inverted_files, Rows2_3().vocabulary.inverted_files);
 }
 
+// Version 2.4 as the program of that version wrote it: findings that no hash but the file's covers.
+TEST(GoldenMap, Version2_4IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.4.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->epoch, 0u);
+  EXPECT_EQ(rows->findings_hash, "");
+  EXPECT_EQ(rows->findings.drops.size(), 1u);
+  EXPECT_EQ(rows->findings.self_test_regions.size(), 2u);
+  const VisualMapData visual_map = MakeExampleVisualMap();
+  EXPECT_EQ(rows->visual_map.focal_px, visual_map.focal_px);
+  EXPECT_EQ(rows->visual_map.landmarks[2][1].sights, visual_map.landmarks[2][1].sights);
+  // A changed finding is seen all the same.
+  std::filesystem::copy_file(GOLDEN_DIR "/map_2.4.cairn", MapPath("changed_2.4.cairn"),
+                             std::filesystem::copy_options::overwrite_existing);
+  SQLite::Database(MapPath("changed_2.4.cairn"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE drop_reasons SET num_dropped = 199");
+  EXPECT_EQ(ReadMapRows(MapPath("changed_2.4.cairn")).error().code, ErrorCode::kCorrupt);
+}
+
 }  // namespace
 }  // namespace cairn

@@ -117,7 +117,7 @@ TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
 }
 
 TEST_F(SealedMap, InspectStatesTheFormatOfTheFile) {
-  for (const std::string version : {"2.0", "2.1", "2.2", "2.3"}) {
+  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4"}) {
     const ProgramRun run = RunShell("cairn inspect --json " GOLDEN_DIR "/map_" + version + ".cairn");
     EXPECT_THAT(run.out, HasSubstr("\"format\": \"" + version + "\"")) << run.err;
   }

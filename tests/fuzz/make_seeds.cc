@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <string>
 
+#include "core/blob.h"
 #include "core/file.h"
 #include "core/map_file.h"
 #include "stages/emit_map/emit_map.h"
@@ -37,6 +38,14 @@ int main(int argc, char** argv) {
       }
       const std::string seed = std::string(1, static_cast<char>(entry.kind)) + counts + *file->ReadBlock(i);
       if (!WriteFileAtomically(fmt::format("{}/block_{}", folder, entry.kind), seed).ok()) return 1;
+      BlobWriter replaced;  // by itself
+      replaced.UInt8(15);
+      replaced.UInt8(entry.kind);
+      replaced.Varint(entry.count);
+      replaced.Varint(entry.num_bytes);
+      replaced.Bytes(*file->ReadBlock(static_cast<int64_t>(i)));
+      if (!WriteFileAtomically(fmt::format("{}/replaced_{}", folder, entry.kind), replaced.Take()).ok())
+        return 1;
     }
     if (!WriteFileAtomically(folder + "/directory", "\x0d" + file->directory().Encode()).ok()) return 1;
     if (!WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok()) return 1;

@@ -1,19 +1,22 @@
 // What a robot reads, fed with any bytes: libFuzzer's entry.  The first byte chooses: 0 a whole map file,
 // opened, read and asked for a place and a way; 1 to 12 a block of that kind, the next 13 bytes being
-// the counts that its directory states; 13 a directory; 14 a map of format 1.  Built with the preset `fuzz`,
-// hashes are not compared, so that what lies behind them is reached.
+// the counts that its directory states; 13 a directory; 14 a map of format 1; 15 a whole map some of whose
+// blocks are replaced, each by a kind, a count, a length and bytes, and sealed again.  Built with the preset
+// `fuzz`, hashes are not compared, so that what lies behind them is reached.
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
+#include "core/blob.h"
 #include "core/map_blocks.h"
 #include "core/map_file.h"
 #include "core/random.h"
 #include "runtime/localizer.h"
 #include "runtime/route.h"
 #include "runtime/visual_estimate.h"
+#include "tests/emit_map/sealed_blocks.h"
 
 namespace cairn {
 namespace {
@@ -49,8 +52,7 @@ std::string WriteTemporary(std::string_view bytes) {
   return path;
 }
 
-void TryFile(std::string_view bytes) {
-  const std::string path = WriteTemporary(bytes);
+void TryMap(const std::string& path) {
   (void)ReadMapRows(path).ok();
   const auto map = Map::Open(path, {.memory_budget_bytes = 1 << 20});
   if (!map.ok()) return;
@@ -64,6 +66,31 @@ void TryFile(std::string_view bytes) {
   if (const auto visual = VisualMap::Load(**map); visual.ok())
     (void)EstimateVisualPose(**visual, {{0, {10, 20, 1}}, {2, {90, 40, 2}}}).ok();
   (void)PlanRoute(**map, 0, static_cast<int32_t>((*map)->num_images()) - 1).ok();
+}
+
+void TryFile(std::string_view bytes) { TryMap(WriteTemporary(bytes)); }
+
+// Blocks that fit their directory, and lie.
+void TryReplacedBlocks(std::string_view bytes) {
+  static const std::string base = ReadFile(FUZZ_BASE).value().substr(1);
+  static const std::vector<BlockContents> blocks_of_base =
+      BlocksOf(MapFile::Open(WriteTemporary(base), {}).value());
+  std::vector<BlockContents> blocks = blocks_of_base;
+  BlobReader reader(bytes);
+  for (int i = 0; i < 4 && reader.num_left() > 0 && reader.ok(); ++i) {
+    const auto kind = static_cast<BlockKind>(reader.UInt8());
+    const auto count = static_cast<uint32_t>(reader.Varint());
+    const size_t num_bytes = std::min<uint64_t>(reader.Varint(), reader.num_left());
+    for (BlockContents& block : blocks) {
+      if (block.kind != kind) continue;
+      block.count = count;
+      block.bytes = reader.Bytes(num_bytes);
+      break;
+    }
+  }
+  static const std::string path = WriteTemporary("") + "_sealed";
+  if (!WriteSealedBlocks(base, blocks, path).ok()) return;
+  TryMap(path);
 }
 
 // Counts as the directory of a small map would state them: from the bytes.
@@ -157,13 +184,15 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   if (size == 0) return 0;
   const std::string_view rest(reinterpret_cast<const char*>(bytes) + 1, size - 1);
-  const int choice = bytes[0] % 15;
+  const int choice = bytes[0] % 16;
   if (choice == 0) {
     cairn::TryFile(rest);
   } else if (choice < cairn::kNumBlockKinds) {
     cairn::TryBlock(static_cast<cairn::BlockKind>(choice), rest);
   } else if (choice == 13) {
     (void)cairn::MapDirectory::Decode(rest, 1 << 20).ok();
+  } else if (choice == 15) {
+    cairn::TryReplacedBlocks(rest);
   } else {
     (void)cairn::ReadMapRowsVersion1(cairn::WriteTemporary(rest)).ok();
   }
