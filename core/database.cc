@@ -1,10 +1,14 @@
 #include "core/database.h"
 
+#include <fcntl.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <climits>
 #include <filesystem>
 #include <fstream>
 
+#include "core/file_descriptor.h"
 #include "core/input_file.h"
 
 namespace cairn {
@@ -114,6 +118,8 @@ bool IsSqliteFile(const std::string& path) {
 Status CheckSqliteFile(const std::string& path) {
   std::error_code error;
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
+  if (const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); file.get() < 0)
+    return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
   if (!IsSqliteFile(path)) {
     return MakeError(
         ErrorCode::kCorrupt,

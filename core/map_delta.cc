@@ -1,6 +1,5 @@
 #include "core/map_delta.h"
 
-#include <sodium.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "core/blob.h"
 #include "core/database.h"
 #include "core/file.h"
+#include "core/map_epoch.h"
 #include "core/map_file.h"
 #include "core/signature.h"
 
@@ -112,11 +112,9 @@ Result<std::string> Decompress(const std::string& from, const std::string& paylo
   return to;
 }
 
-// A whole map's bytes.
-Result<std::string> ReadWholeMap(const std::string& path, std::string* name) {
-  CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(path, {}));
+// A map's bytes, all of which its seal states.
+Result<std::string> ReadWholeMap(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
-  if (name != nullptr) *name = map.head().name;
   CAIRN_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
   if (bytes.size() > static_cast<size_t>(MapDelta::kMaxMapBytes)) {
     return MakeError(ErrorCode::kUnsupported, "{}: {} bytes, deltas are of maps of at most {}; send it whole",
@@ -144,10 +142,17 @@ std::string SignedHead(const MapDelta& delta) {
 }  // namespace
 
 Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& new_path,
-                              const std::optional<SecretKey>& key) {
+                              const std::optional<SecretKey>& key, bool allow_older) {
+  CAIRN_ASSIGN_OR_RETURN(const MapFile old_map, MapFile::Open(old_path, {}));
+  CAIRN_ASSIGN_OR_RETURN(const MapFile new_map, MapFile::Open(new_path, {}));
+  const bool is_same = old_map.seal().file == new_map.seal().file;
+  if (old_map.seal().is_signed() && new_map.seal().is_signed() && !is_same) {
+    CAIRN_RETURN_IF_ERROR(CheckFollows(new_map.head(), new_path, old_map.head(), old_path, allow_older));
+  }
   MapDelta delta;
-  CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadWholeMap(old_path, nullptr));
-  CAIRN_ASSIGN_OR_RETURN(const std::string new_bytes, ReadWholeMap(new_path, &delta.map_name));
+  delta.map_name = new_map.head().name;
+  CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadWholeMap(old_path));
+  CAIRN_ASSIGN_OR_RETURN(const std::string new_bytes, ReadWholeMap(new_path));
   delta.old_hash = HashOf(old_bytes);
   delta.new_hash = HashOf(new_bytes);
   delta.old_num_bytes = old_bytes.size();
@@ -157,11 +162,8 @@ Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& ne
   CAIRN_ASSIGN_OR_RETURN(delta.payload, Compress(UnlinkPages(old_bytes, delta.old_page_size),
                                                  UnlinkPages(new_bytes, delta.new_page_size), new_path));
   if (key) {
-    std::copy(key->end() - static_cast<std::ptrdiff_t>(delta.public_key.size()), key->end(),
-              delta.public_key.begin());
-    const std::string head = SignedHead(delta);
-    crypto_sign_detached(delta.signature.data(), nullptr, reinterpret_cast<const uint8_t*>(head.data()),
-                         head.size(), key->data());
+    CAIRN_ASSIGN_OR_RETURN(delta.public_key, PublicKeyOf(*key));
+    CAIRN_ASSIGN_OR_RETURN(delta.signature, SignBytes(SignedHead(delta), *key));
   }
   return delta;
 }

@@ -41,9 +41,10 @@ struct MapDelta {
 };
 
 // Both are whole maps.  With a key, signed.  Same maps, same key and same version of libzstd, same bytes.
-// Errors: as MapFile::Open and CheckFileHash; Unsupported (a map of more than kMaxMapBytes).
+// Errors: as MapFile::Open and CheckFileHash; Unsupported (a map of more than kMaxMapBytes); of two signed
+// maps what a robot would say (CheckFollows); Corrupt (the key: PublicKeyOf).
 Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& new_path,
-                              const std::optional<SecretKey>& key);
+                              const std::optional<SecretKey>& key, bool allow_older = false);
 
 std::string EncodeMapDelta(const MapDelta& delta);
 // Reads a delta and checks every byte of it, and its signature: that of `required`, or, without it, of the

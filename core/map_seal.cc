@@ -1,31 +1,25 @@
 #include "core/map_seal.h"
 
+#include <fcntl.h>
 #include <sodium.h>
-#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <cerrno>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <memory>
+#include <utility>
 
 #include "core/blob.h"
 #include "core/database.h"
-#include "core/file.h"
 #include "core/input_file.h"
-#include "core/map_file.h"
 #include "core/signature.h"
 #include "core/write_error.h"
 
 namespace cairn {
 namespace {
 
-namespace fs = std::filesystem;
-
 static_assert(sizeof(crypto_generichash_state) <= 384);
-static_assert(crypto_sign_PUBLICKEYBYTES == 32 && crypto_sign_SECRETKEYBYTES == 64 &&
-              crypto_sign_BYTES == 64);
 
 constexpr std::string_view kMagic("cairn map seal 2", 16);
 constexpr size_t kRootOffset = 16;
@@ -36,17 +30,20 @@ crypto_generichash_state* StateOf(std::array<uint8_t, 384>* bytes) {
   return reinterpret_cast<crypto_generichash_state*>(bytes->data());
 }
 
+// What a signature is of.
+std::string SignedBytes(const Seal& seal) { return EncodeSeal(seal).substr(0, kSignedBytes); }
+
 // A map file open for its seal.
 class SealedFile {
  public:
-  static Result<SealedFile> Open(const std::string& path, const char* mode) {
-    SealedFile file;
+  // `flags`: O_RDONLY or O_RDWR.
+  static Result<SealedFile> Open(const std::string& path, int flags) {
     CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
-    file.path_ = path;
-    file.file_.reset(std::fopen(path.c_str(), mode));
-    if (!file.file_) return MakeError(ErrorCode::kIo, "{}: cannot be opened: {}", path, std::strerror(errno));
+    SealedFile file(path, open(path.c_str(), flags | O_NONBLOCK | O_CLOEXEC));
+    if (file.descriptor_->get() < 0) return file.ReadError();
     std::string head(131072, '\0');
-    head.resize(std::fread(head.data(), 1, head.size(), file.file_.get()));
+    CAIRN_ASSIGN_OR_RETURN(const size_t num_read, file.ReadAt(0, &head));
+    head.resize(num_read);
     const size_t page_size = ParseSqliteHeader(head).page_size;
     const std::string_view page =
         std::string_view(head).substr(std::min(page_size, head.size())).substr(0, page_size);
@@ -64,65 +61,62 @@ class SealedFile {
 
   Status Write(const Seal& seal) {
     const std::string bytes = EncodeSeal(seal);
-    if (std::fseek(file_.get(), static_cast<long>(offset_), SEEK_SET) != 0 ||
-        std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size() ||
-        std::fflush(file_.get()) != 0) {
-      return WriteError(path_, "its seal cannot be written", errno);
+    size_t num_written = 0;
+    while (num_written < bytes.size()) {
+      const ssize_t more = pwrite(descriptor_->get(), bytes.data() + num_written, bytes.size() - num_written,
+                                  static_cast<off_t>(offset_ + num_written));
+      if (more < 0 && errno == EINTR) continue;
+      if (more < 0) return WriteError(path_, "its seal cannot be written", errno);
+      num_written += static_cast<size_t>(more);
     }
     return Ok();
   }
 
   // Of all bytes, those from the file hash to the end of the seal taken as zero; the seal's head as `head`.
-  Result<Hash> HashFile(const Seal& seal) {
+  Result<Hash> HashFile(const Seal& seal) const {
     const std::string head =
         EncodeSeal(seal).substr(0, kFileOffset) + std::string(Seal::kNumBytes - kFileOffset, '\0');
     Hasher hasher;
     std::string chunk(1 << 20, '\0');
-    std::rewind(file_.get());
     size_t position = 0;
-    for (size_t num_read; (num_read = std::fread(chunk.data(), 1, chunk.size(), file_.get())) > 0;) {
+    while (true) {
+      CAIRN_ASSIGN_OR_RETURN(const size_t num_read, ReadAt(position, &chunk));
+      if (num_read == 0) return hasher.Finish();
       const size_t begin = std::max(position, offset_);
       const size_t end = std::min(position + num_read, offset_ + head.size());
       if (begin < end) chunk.replace(begin - position, end - begin, head, begin - offset_, end - begin);
       hasher.Add(std::string_view(chunk).substr(0, num_read));
       position += num_read;
     }
-    if (std::ferror(file_.get()) != 0) return MakeError(ErrorCode::kIo, "{}: reading failed", path_);
-    return hasher.Finish();
   }
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
+  SealedFile(std::string path, int descriptor)
+      : path_(std::move(path)), descriptor_(std::make_unique<FileDescriptor>(descriptor)) {}
+
+  Error ReadError() const {
+    return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path_, std::strerror(errno));
+  }
+
+  // Fills `chunk` from there on, as far as the file goes; returns how far.
+  Result<size_t> ReadAt(size_t position, std::string* chunk) const {
+    size_t num_read = 0;
+    while (num_read < chunk->size()) {
+      const ssize_t more = pread(descriptor_->get(), chunk->data() + num_read, chunk->size() - num_read,
+                                 static_cast<off_t>(position + num_read));
+      if (more < 0 && errno == EINTR) continue;
+      if (more < 0) return ReadError();
+      if (more == 0) break;
+      num_read += static_cast<size_t>(more);
+    }
+    return num_read;
+  }
+
   std::string path_;
-  std::unique_ptr<std::FILE, Close> file_;
+  std::unique_ptr<FileDescriptor> descriptor_;
   size_t offset_ = 0;
   std::string bytes_;
 };
-
-template <size_t kSize>
-std::string Hex(const std::array<uint8_t, kSize>& bytes) {
-  std::string text;
-  for (const uint8_t byte : bytes) text += fmt::format("{:02x}", byte);
-  return text;
-}
-
-template <size_t kSize>
-Result<std::array<uint8_t, kSize>> ReadHex(const std::string& path, const char* what) {
-  CAIRN_ASSIGN_OR_RETURN(std::string text, ReadFile(path));
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
-  std::array<uint8_t, kSize> bytes;
-  size_t num_bytes = 0;
-  const char* end = nullptr;
-  if (text.size() != 2 * kSize ||
-      sodium_hex2bin(bytes.data(), kSize, text.data(), text.size(), nullptr, &num_bytes, &end) != 0 ||
-      num_bytes != kSize) {
-    return MakeError(ErrorCode::kCorrupt, "{}: not a {}: {} characters, expected {} hexadecimal digits", path,
-                     what, text.size(), 2 * kSize);
-  }
-  return bytes;
-}
 
 }  // namespace
 
@@ -181,78 +175,40 @@ Result<Seal> DecodeSeal(std::string_view bytes) {
 }
 
 Status SealFile(const std::string& path, const Hash& root) {
-  CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(path, "r+b"));
+  CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(path, O_RDWR));
   Seal seal{.root = root};
   CAIRN_ASSIGN_OR_RETURN(seal.file, file.HashFile(seal));
   return file.Write(seal);
 }
 
+Status SignFile(const std::string& path, const Hash& root, const SecretKey& key) {
+  CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(path, O_RDWR));
+  Seal seal{.root = root};
+  CAIRN_ASSIGN_OR_RETURN(seal.public_key, PublicKeyOf(key));
+  CAIRN_ASSIGN_OR_RETURN(seal.file, file.HashFile(seal));
+  CAIRN_ASSIGN_OR_RETURN(seal.signature, SignBytes(SignedBytes(seal), key));
+  return file.Write(seal);
+}
+
 Result<Seal> ReadSeal(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(const SealedFile file, SealedFile::Open(path, "rb"));
+  CAIRN_ASSIGN_OR_RETURN(const SealedFile file, SealedFile::Open(path, O_RDONLY));
   return DecodeSeal(file.bytes());
 }
 
 Status CheckFileHash(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(path, "rb"));
+  CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(path, O_RDONLY));
   CAIRN_ASSIGN_OR_RETURN(const Seal seal, DecodeSeal(file.bytes()));
   CAIRN_ASSIGN_OR_RETURN(const Hash found, file.HashFile(seal));
   if (found == seal.file) return Ok();
   return MakeError(
       ErrorCode::kCorrupt,
       "{}: its bytes have the hash {}, but {} is sealed: it was damaged or changed; copy it again", path,
-      Hex(found), Hex(seal.file));
+      HexOf(found), HexOf(seal.file));
 }
 
 Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required) {
-  return CheckSignatureOf(EncodeSeal(seal).substr(0, kSignedBytes), seal.public_key, seal.signature, path,
-                          required, "sign it with `cairn sign`");
-}
-
-KeyPair MakeKeyPair() {
-  const Hasher initializes_sodium;
-  KeyPair keys;
-  crypto_sign_keypair(keys.public_key.data(), keys.secret_key.data());
-  return keys;
-}
-
-Status WriteKeyPair(const KeyPair& keys, const std::string& path) {
-  for (const std::string& file : {path, path + ".pub"}) {
-    std::error_code error;
-    if (!fs::exists(file, error)) continue;
-    return MakeError(ErrorCode::kInvalidArgument, "{}: exists already; keys are not overwritten", file);
-  }
-  CAIRN_RETURN_IF_ERROR(ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
-    const mode_t mask = umask(0077);
-    const Status status = WriteFileAtomically(temporary, Hex(keys.secret_key) + "\n");
-    umask(mask);
-    return status;
-  }));
-  return WriteFileAtomically(path + ".pub", HexOf(keys.public_key) + "\n");
-}
-
-Result<SecretKey> ReadSecretKey(const std::string& path) { return ReadHex<64>(path, "secret key"); }
-
-Result<PublicKey> ReadPublicKey(const std::string& path) { return ReadHex<32>(path, "public key"); }
-
-std::string HexOf(const PublicKey& key) { return Hex(key); }
-
-Status SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path) {
-  CAIRN_RETURN_IF_ERROR(MapFile::Open(path, {}));
-  CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
-  CAIRN_ASSIGN_OR_RETURN(Seal seal, ReadSeal(path));
-  std::copy(key.end() - 32, key.end(), seal.public_key.begin());
-  const std::string bytes = EncodeSeal(seal);
-  crypto_sign_detached(seal.signature.data(), nullptr, reinterpret_cast<const uint8_t*>(bytes.data()),
-                       kSignedBytes, key.data());
-  return ReplaceFileAtomically(signed_path, [&](const std::string& temporary) -> Status {
-    std::error_code error;
-    if (!fs::copy_file(path, temporary, error)) {
-      return WriteError(signed_path, "cannot be written", error.value());
-    }
-    fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);
-    CAIRN_ASSIGN_OR_RETURN(SealedFile file, SealedFile::Open(temporary, "r+b"));
-    return file.Write(seal);
-  });
+  return CheckSignatureOf(SignedBytes(seal), seal.public_key, seal.signature, path, required,
+                          "sign it with `cairn sign`");
 }
 
 }  // namespace cairn

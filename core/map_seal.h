@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/map_blocks.h"
+#include "core/signing_key.h"
 
 namespace cairn {
 
@@ -20,10 +21,6 @@ namespace cairn {
 // hash of every block: whoever has checked root and signature can check a block when it is loaded.  file:
 // BLAKE2b over all bytes of the file, those of `file` to `signature` taken as zero.  signature: Ed25519 over
 // magic, root and file; key and signature are zero in a map that nobody has signed.
-using PublicKey = std::array<uint8_t, 32>;
-using SecretKey = std::array<uint8_t, 64>;  // libsodium's: seed and public key
-using Signature = std::array<uint8_t, 64>;
-
 struct Seal {
   static constexpr size_t kNumBytes = 176;
   Hash root = {};
@@ -54,6 +51,8 @@ Result<Seal> DecodeSeal(std::string_view bytes);
 // Writes root and file hash into a map file whose seal has the magic only.  Errors: Io, Corrupt (no place for
 // a seal in page 2).
 Status SealFile(const std::string& path, const Hash& root);
+// The same with a signature.  Errors: also those of SignBytes.
+Status SignFile(const std::string& path, const Hash& root, const SecretKey& key);
 // The seal of a map file.  Errors: NotFound, Corrupt.
 Result<Seal> ReadSeal(const std::string& path);
 // Errors: Corrupt when the bytes of the file do not have the hash that its seal states.
@@ -62,21 +61,11 @@ Status CheckFileHash(const std::string& path);
 // Errors: NotSigned (required only), WrongKey.
 Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required);
 
-// Keys as hexadecimal text in files of one line.  A new pair, from the system's random numbers.
-struct KeyPair {
-  PublicKey public_key;
-  SecretKey secret_key;
-};
-KeyPair MakeKeyPair();
-// Writes `path` (only its owner may read it) and `path`.pub.  Errors: InvalidArgument when one exists; Io.
-Status WriteKeyPair(const KeyPair& keys, const std::string& path);
-// Errors: NotFound, Corrupt.
-Result<SecretKey> ReadSecretKey(const std::string& path);
-Result<PublicKey> ReadPublicKey(const std::string& path);
-std::string HexOf(const PublicKey& key);
-
-// Writes a signed copy of a map; the old file stays.  Errors: as MapFile::Open; Corrupt (the map's own hash
-// is wrong: what nobody has checked is not signed); Io.
-Status SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path);
+// Writes a signed copy of a map, of this epoch; the old file stays.  Without an epoch: of the map's own, or 1
+// where it was never counted.  Returns the epoch.  What is put in place was opened with the key before; same
+// map, epoch and key, same bytes.  Errors: as MapFile::Open; InvalidArgument (epoch 0); Corrupt (the map's
+// own hash is wrong: what nobody has checked is not signed; or the key: PublicKeyOf); as Replacement::Finish.
+Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path,
+                         std::optional<uint64_t> epoch = std::nullopt);
 
 }  // namespace cairn

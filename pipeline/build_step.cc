@@ -67,16 +67,13 @@ Result<BuildStep> BuildStep::Begin(const std::string& stamp) {
   }
   const std::string folder = fs::absolute(stamp).parent_path().string();
   CAIRN_ASSIGN_OR_RETURN(FolderLock lock, FolderLock::Acquire(folder, BuildSession()));
-  BuildStep step(std::move(lock), stamp);
-  const int fd = open(step.temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0)
-    return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", step.temporary_, std::strerror(errno));
-  close(fd);
-  return step;
+  CAIRN_ASSIGN_OR_RETURN(const TemporaryFile temporary, CreateTemporary(stamp, 0666));
+  close(temporary.descriptor);
+  return BuildStep(std::move(lock), stamp, temporary.path);
 }
 
-BuildStep::BuildStep(FolderLock lock, std::string stamp)
-    : lock_(std::move(lock)), stamp_(std::move(stamp)), temporary_(TemporaryPath(stamp_)) {}
+BuildStep::BuildStep(FolderLock lock, std::string stamp, std::string temporary)
+    : lock_(std::move(lock)), stamp_(std::move(stamp)), temporary_(std::move(temporary)) {}
 
 BuildStep::BuildStep(BuildStep&& other) noexcept
     : lock_(std::move(other.lock_)),

@@ -31,7 +31,7 @@ class BuildStep {
   Status End();
 
  private:
-  BuildStep(FolderLock lock, std::string stamp);
+  BuildStep(FolderLock lock, std::string stamp, std::string temporary);
   FolderLock lock_;
   std::string stamp_;
   std::string temporary_;  // empty once it is in place

@@ -1,6 +1,7 @@
 #include "pipeline/delta_commands.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <set>
@@ -9,6 +10,7 @@
 #include "core/file.h"
 #include "core/map_delta.h"
 #include "core/map_file.h"
+#include "pipeline/epoch_argument.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/update_map.h"
 
@@ -20,6 +22,9 @@ struct Arguments {
   std::string new_path;
   std::string delta_path;
   std::string key_path;
+  std::string name;
+  uint64_t min_epoch = 0;
+  bool allow_older = false;
   bool in_place = false;
 };
 
@@ -36,26 +41,29 @@ Status MakeDelta(const Arguments& arguments, const CommandEnvironment& environme
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(key, ReadSecretKey(arguments.key_path));
   }
-  CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, MakeMapDelta(arguments.old_path, arguments.new_path, key));
+  CAIRN_ASSIGN_OR_RETURN(const MapDelta delta,
+                         MakeMapDelta(arguments.old_path, arguments.new_path, key, arguments.allow_older));
   const std::string bytes = EncodeMapDelta(delta);
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.delta_path, bytes));
   CAIRN_ASSIGN_OR_RETURN(const MapFile old_map, MapFile::Open(arguments.old_path, {}));
   CAIRN_ASSIGN_OR_RETURN(const MapFile new_map, MapFile::Open(arguments.new_path, {}));
   CAIRN_ASSIGN_OR_RETURN(const MapRows old_rows, ReadMapRows(old_map));
   CAIRN_ASSIGN_OR_RETURN(const MapRows new_rows, ReadMapRows(new_map));
   const size_t num_blocks = new_map.directory().blocks().size();
-  *environment.out << fmt::format(
-      "{}: {} bytes, {:.2f} % of {}'s {}; {} of {} regions and {} of {} blocks differ{}\n",
-      arguments.delta_path, bytes.size(),
-      100.0 * static_cast<double>(bytes.size()) / static_cast<double>(delta.new_num_bytes),
-      arguments.new_path, delta.new_num_bytes, NumChangedRegions(CompareMaps(old_rows, new_rows)),
-      new_rows.regions.size(), num_blocks - NumSharedBlocks(new_map, old_map), num_blocks,
-      delta.is_signed() ? "" : "; not signed");
+  const std::string told =
+      fmt::format("{}: {} bytes, {:.2f} % of {}'s {}; {} of {} regions and {} of {} blocks differ{}\n",
+                  arguments.delta_path, bytes.size(),
+                  100.0 * static_cast<double>(bytes.size()) / static_cast<double>(delta.new_num_bytes),
+                  arguments.new_path, delta.new_num_bytes, NumChangedRegions(CompareMaps(old_rows, new_rows)),
+                  new_rows.regions.size(), num_blocks - NumSharedBlocks(new_map, old_map), num_blocks,
+                  delta.is_signed() ? "" : "; not signed");
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.delta_path, bytes));
+  *environment.out << told;
   return Ok();
 }
 
 Result<UpdateOptions> ReadUpdateOptions(const Arguments& arguments) {
-  UpdateOptions options;
+  UpdateOptions options = {
+      .allow_older = arguments.allow_older, .name = arguments.name, .min_epoch = arguments.min_epoch};
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
   }
@@ -89,8 +97,11 @@ Status Rollback(const Arguments& arguments, const CommandEnvironment& environmen
   return Ok();
 }
 
-void AddPublicKey(CLI::App& app, Arguments* arguments, const char* help) {
-  app.add_option("--public-key", arguments->key_path, help)->type_name("KEY.pub");
+void AddDemands(CLI::App& app, Arguments* arguments, const char* key_help) {
+  app.add_option("--public-key", arguments->key_path, key_help)->type_name("KEY.pub");
+  app.add_option("--name", arguments->name, "What the map that takes the place must be called")
+      ->type_name("NAME");
+  AddEpochArgument(app, "--min-epoch", &arguments->min_epoch, 0, "Least epoch that it may have");
 }
 
 }  // namespace
@@ -113,6 +124,8 @@ Command DeltaCommand() {
                 ->type_name("D");
             app.add_option("--key", arguments->key_path, "Secret key from keygen, to sign the delta with")
                 ->type_name("KEY");
+            app.add_flag("--allow-older", arguments->allow_older,
+                         "Also to a map of an earlier or the same epoch, which robots refuse unless told so");
           },
       .run =
           [arguments](const CommandEnvironment& environment) { return MakeDelta(*arguments, environment); },
@@ -135,10 +148,12 @@ Command ApplyCommand() {
             app.add_option("-o,--output", arguments->new_path, "Map to write")->type_name("NEW");
             app.add_flag("--in-place", arguments->in_place,
                          "Replace OLD in one step and keep it as OLD.previous, for cairn rollback");
-            AddPublicKey(app, arguments.get(), "Key whose signature the delta and the new map must have");
+            app.add_flag("--allow-older", arguments->allow_older,
+                         "Let a map of an earlier or the same epoch take a signed map's place");
+            AddDemands(app, arguments.get(), "Key whose signature the delta and the new map must have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Apply(*arguments, environment); },
-      .may_be_output = {"old"},  // it says what to do instead
+      .may_be_output = {"old", "--name"},  // of the map, it says what to do instead
   };
 }
 
@@ -152,7 +167,7 @@ Command RollbackCommand() {
             app.add_option("map", arguments->old_path, "Map; MAP.previous takes its place")
                 ->required()
                 ->type_name("MAP");
-            AddPublicKey(app, arguments.get(), "Key whose signature the previous map must have");
+            AddDemands(app, arguments.get(), "Key whose signature the previous map must have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Rollback(*arguments, environment); },
   };

@@ -4,11 +4,12 @@
 
 namespace cairn {
 
-// cairn delta OLD NEW -o D [--key KEY]
+// cairn delta OLD NEW -o D [--key KEY] [--allow-older]
 Command DeltaCommand();
-// cairn apply OLD D -o NEW [--public-key KEY.pub]; cairn apply MAP D --in-place
+// cairn apply OLD D -o NEW [--public-key KEY.pub] [--name NAME] [--min-epoch N] [--allow-older]
+// cairn apply MAP D --in-place, likewise
 Command ApplyCommand();
-// cairn rollback MAP
+// cairn rollback MAP [--public-key KEY.pub] [--name NAME] [--min-epoch N]
 Command RollbackCommand();
 
 }  // namespace cairn

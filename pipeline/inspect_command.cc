@@ -249,6 +249,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   auto json =
       MapJson(file, rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
+  if (file.head().epoch != 0) json["epoch"] = file.head().epoch;
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
   *environment.out << (arguments.json ? JsonText(json, 2) + "\n" : MapText(json, rows));
   if (!arguments.ambiguity_svg_path.empty()) {

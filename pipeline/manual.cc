@@ -79,7 +79,8 @@ std::string ProgramPage(const CLI::App& program, const std::string& version) {
     page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", Escaped(command->get_name()),
                         Escaped(command->get_description()));
   page += ".SH EXIT STATUS\n.TP\n0\ndone\n";
-  for (int code = static_cast<int>(ErrorCode::kFailed); code <= static_cast<int>(ErrorCode::kOtherMap); ++code)
+  for (int code = static_cast<int>(ErrorCode::kFailed); code <= static_cast<int>(ErrorCode::kOtherMap);
+       ++code)
     page += fmt::format(".TP\n{}\n{}\n", code, Escaped(ErrorCodeName(static_cast<ErrorCode>(code))));
   return page;
 }

@@ -231,7 +231,9 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
   if (status.ok()) status = RunCommand(*command, arguments, environment, out, err);
   out.flush();
   if (status.ok() && !out)
-    status = MakeError(ErrorCode::kIo, "standard output cannot be written; is it full?");
+    status = MakeError(ErrorCode::kIo,
+                       "all is done, and files that were asked for are written; but standard output cannot "
+                       "be written: is it full?");
   if (!status.ok()) return Report(name, arguments, status.error(), err);
   return 0;
 }

@@ -1,12 +1,15 @@
 #include "pipeline/seal_commands.h"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "core/map_epoch.h"
 #include "core/map_file.h"
 #include "core/map_rows.h"
 #include "core/map_seal.h"
+#include "pipeline/epoch_argument.h"
 
 namespace cairn {
 namespace {
@@ -15,7 +18,15 @@ struct Arguments {
   std::string input_path;
   std::string key_path;
   std::string output_path;
+  std::string previous_path;
+  std::string name;
+  uint64_t epoch = 0;  // 0: not given; of verify, the least
 };
+
+// " of epoch 3", where it was counted.
+std::string EpochText(const MapHead& head) {
+  return head.epoch == 0 ? "" : fmt::format(" of epoch {}", head.epoch);
+}
 
 // Every byte by the file's hash, the signature, then every block and every row.
 Status Verify(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -24,9 +35,10 @@ Status Verify(const Arguments& arguments, const CommandEnvironment& environment)
     CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
   }
   CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.input_path, options));
+  CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), arguments.input_path, arguments.name, arguments.epoch));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(arguments.input_path));
   CAIRN_RETURN_IF_ERROR(ReadMapRows(file));
-  *environment.out << fmt::format("{}: whole, {}\n", arguments.input_path,
+  *environment.out << fmt::format("{}: whole{}, {}\n", arguments.input_path, EpochText(file.head()),
                                   file.seal().is_signed()
                                       ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),
                                                     options.public_key ? "" : ", which nobody asked for")
@@ -42,9 +54,26 @@ Status Keygen(const Arguments& arguments, const CommandEnvironment& environment)
   return Ok();
 }
 
-Status Sign(const Arguments& arguments, const CommandEnvironment&) {
+Status Sign(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const SecretKey key, ReadSecretKey(arguments.key_path));
-  return SignMap(arguments.input_path, key, arguments.output_path);
+  std::string name;
+  {
+    CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(arguments.input_path, {}));
+    name = map.head().name;
+  }
+  std::optional<uint64_t> wanted;
+  if (arguments.epoch > 0) wanted = arguments.epoch;
+  if (!arguments.previous_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(wanted, EpochAfter(arguments.previous_path, name, key));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const PublicKey public_key, PublicKeyOf(key));
+  CAIRN_ASSIGN_OR_RETURN(const uint64_t epoch,
+                         SignMap(arguments.input_path, key, arguments.output_path, wanted));
+  *environment.out << fmt::format(
+      "{}: map '{}', epoch {}, signed with key {}; robots that have a signed map of it take only a later "
+      "epoch\n",
+      arguments.output_path, name, epoch, HexOf(public_key));
+  return Ok();
 }
 
 Status Migrate(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -67,6 +96,8 @@ Command VerifyCommand() {
             app.add_option("map", arguments->input_path, "Map")->required()->type_name("MAP");
             app.add_option("--public-key", arguments->key_path, "Key whose signature the map must have")
                 ->type_name("KEY.pub");
+            app.add_option("--name", arguments->name, "What the map must be called")->type_name("NAME");
+            AddEpochArgument(app, "--min-epoch", &arguments->epoch, 0, "Least epoch that the map may have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Verify(*arguments, environment); },
   };
@@ -101,6 +132,12 @@ Command SignCommand() {
             app.add_option("-o,--output", arguments->output_path, "Signed map to write")
                 ->required()
                 ->type_name("SIGNED");
+            CLI::Option* const epoch = AddEpochArgument(app, "--epoch", &arguments->epoch, 1,
+                                                        "Epoch of the map [that of the map, or 1]");
+            app.add_option("--after", arguments->previous_path,
+                           "Map that this one follows, signed with the same key: the epoch after its one")
+                ->excludes(epoch)
+                ->type_name("PREVIOUS");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Sign(*arguments, environment); },
   };

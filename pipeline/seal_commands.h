@@ -4,11 +4,11 @@
 
 namespace cairn {
 
-// cairn verify MAP [--public-key KEY.pub]
+// cairn verify MAP [--public-key KEY.pub] [--name NAME] [--min-epoch N]
 Command VerifyCommand();
 // cairn keygen KEY
 Command KeygenCommand();
-// cairn sign MAP --key KEY -o SIGNED
+// cairn sign MAP --key KEY -o SIGNED [--epoch N | --after PREVIOUS]
 Command SignCommand();
 // cairn migrate OLD -o NEW
 Command MigrateCommand();

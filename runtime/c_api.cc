@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -89,18 +90,34 @@ void CopyText(const std::string& text, char (&to)[kNumBytes]) {
   to[length] = 0;
 }
 
-// The caller's options; NULL: the defaults.
-Result<MapOptions> MapOptionsOf(const cairn_map_options* options) {
-  MapOptions given;
+// What a map that is opened, or one that an update brings, is asked to be.
+struct GivenOptions {
+  MapOptions map;
+  UpdateOptions update;
+};
+
+// The caller's options; NULL: the defaults.  Of callers built with an earlier release, what that had.
+Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
+  GivenOptions given;
   if (options == nullptr) return given;
-  CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options"));
-  if (options->memory_budget_bytes < 0)
-    return Misuse("options->memory_budget_bytes is {}; must not be negative", options->memory_budget_bytes);
-  if (options->memory_budget_bytes > 0) given.memory_budget_bytes = options->memory_budget_bytes;
-  if (options->public_key != nullptr) {
-    given.public_key.emplace();
-    std::copy_n(options->public_key, given.public_key->size(), given.public_key->begin());
+  CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options", offsetof(cairn_map_options, name)));
+  cairn_map_options asked = CAIRN_MAP_OPTIONS_INIT;
+  std::memcpy(&asked, options, std::min(options->size, sizeof(asked)));
+  if (asked.memory_budget_bytes < 0)
+    return Misuse("options->memory_budget_bytes is {}; must not be negative", asked.memory_budget_bytes);
+  if (asked.memory_budget_bytes > 0) given.map.memory_budget_bytes = asked.memory_budget_bytes;
+  if (asked.public_key != nullptr) {
+    PublicKey& key = given.map.public_key.emplace();
+    std::copy_n(asked.public_key, key.size(), key.begin());
   }
+  if (asked.name != nullptr) given.map.name = asked.name;
+  given.map.min_epoch = asked.min_epoch;
+  if (asked.allow_older != 0 && asked.allow_older != 1)
+    return Misuse("options->allow_older is {}; expected 0 or 1", asked.allow_older);
+  given.update = {.public_key = given.map.public_key,
+                  .allow_older = asked.allow_older == 1,
+                  .name = given.map.name,
+                  .min_epoch = given.map.min_epoch};
   return given;
 }
 
@@ -247,9 +264,8 @@ int32_t cairn_map_update(const char* map_path, const char* delta_path, const cai
   return Call("cairn_map_update", [&]() -> Status {
     if (map_path == nullptr || delta_path == nullptr)
       return Misuse("{} is NULL", map_path == nullptr ? "map_path" : "delta_path");
-    CAIRN_ASSIGN_OR_RETURN(const MapOptions given, MapOptionsOf(options));
-    CAIRN_ASSIGN_OR_RETURN(const bool updated,
-                           UpdateMap(map_path, delta_path, {.public_key = given.public_key}));
+    CAIRN_ASSIGN_OR_RETURN(const GivenOptions given, OptionsOf(options));
+    CAIRN_ASSIGN_OR_RETURN(const bool updated, UpdateMap(map_path, delta_path, given.update));
     if (was_updated != nullptr) *was_updated = updated ? 1 : 0;
     return Ok();
   });
@@ -258,8 +274,8 @@ int32_t cairn_map_update(const char* map_path, const char* delta_path, const cai
 int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options) {
   return Call("cairn_map_roll_back", [&]() -> Status {
     if (map_path == nullptr) return Misuse("map_path is NULL");
-    CAIRN_ASSIGN_OR_RETURN(const MapOptions given, MapOptionsOf(options));
-    return RollBackMap(map_path, {.public_key = given.public_key});
+    CAIRN_ASSIGN_OR_RETURN(const GivenOptions given, OptionsOf(options));
+    return RollBackMap(map_path, given.update);
   });
 }
 
@@ -268,8 +284,8 @@ int32_t cairn_map_open(const char* path, const cairn_map_options* options, cairn
   return Call("cairn_map_open", [&]() -> Status {
     if (path == nullptr) return Misuse("path is NULL");
     if (map == nullptr) return Misuse("map is NULL: there is no place for the handle");
-    CAIRN_ASSIGN_OR_RETURN(const MapOptions opened, MapOptionsOf(options));
-    CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Map> open, Map::Open(path, opened));
+    CAIRN_ASSIGN_OR_RETURN(const GivenOptions given, OptionsOf(options));
+    CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Map> open, Map::Open(path, given.map));
     *map = Maps().Add(std::move(open));
     return Ok();
   });
@@ -278,7 +294,7 @@ int32_t cairn_map_open(const char* path, const cairn_map_options* options, cairn
 int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* description) {
   return Call("cairn_map_describe", [&]() -> Status {
     CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> open, FindMap(map));
-    CAIRN_RETURN_IF_ERROR(CheckStruct(description, "description"));
+    CAIRN_RETURN_IF_ERROR(CheckStruct(description, "description", offsetof(cairn_map_description, epoch)));
     cairn_map_description said = CAIRN_MAP_DESCRIPTION_INIT;
     said.num_landmarks = open->num_landmarks();
     said.num_images = open->num_images();
@@ -286,6 +302,7 @@ int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* descript
     said.has_visual_map = open->has_visual_map();
     said.is_metric = open->head().frame.unit == "metre";
     CopyText(open->head().name, said.name);
+    said.epoch = open->head().epoch;
     Return(said, description);
     return Ok();
   });

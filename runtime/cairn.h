@@ -83,9 +83,14 @@ typedef struct cairn_map_options {
   size_t size;
   int64_t memory_budget_bytes; /* what is loaded of the map and kept, at most; 0: the default, 256 MiB */
   const uint8_t* public_key;   /* 32 bytes: maps that this key has not signed are refused; NULL: any map */
+  /* To be trusted only with a key: without one, anybody can write a map that says so. */
+  const char* name;    /* maps of another name are refused (CAIRN_OTHER_MAP); NULL or "": any name */
+  uint64_t min_epoch;  /* maps of an earlier epoch are refused (CAIRN_NOT_NEWER); 0: any */
+  int32_t allow_older; /* 1: cairn_map_update takes an earlier or the same epoch, too; never another map */
+  int32_t reserved;    /* 0 */
 } cairn_map_options;
 #define CAIRN_MAP_OPTIONS_INIT \
-  { sizeof(cairn_map_options), 0, NULL }
+  { sizeof(cairn_map_options), 0, NULL, NULL, 0, 0, 0 }
 
 /* What a map says of itself. */
 typedef struct cairn_map_description {
@@ -96,11 +101,10 @@ typedef struct cairn_map_description {
   int32_t has_visual_map; /* 1: cairn_localize_on_floor works */
   int32_t is_metric;      /* 0: nothing gave the survey its scale, "metres" are of arbitrary length */
   char name[128];         /* as the recipe calls it, cut to fit, always with a NUL */
+  uint64_t epoch;         /* counts the signed releases of a map of this name; 0: never counted */
 } cairn_map_description;
-#define CAIRN_MAP_DESCRIPTION_INIT                      \
-  {                                                     \
-    sizeof(cairn_map_description), 0, 0, 0, 0, 0, { 0 } \
-  }
+#define CAIRN_MAP_DESCRIPTION_INIT \
+  { sizeof(cairn_map_description), 0, 0, 0, 0, 0, {0}, 0 }
 
 /* Intrinsics: COLMAP's models by their numbers, with its parameters in its order (0 SIMPLE_PINHOLE: f, cx,
  * cy; 1 PINHOLE: fx, fy, cx, cy; 2 SIMPLE_RADIAL: f, cx, cy, k; 4 OPENCV: fx, fy, cx, cy, k1, k2, p1, p2;
@@ -213,13 +217,15 @@ CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cair
 
 /* Maps sent as what changed (`cairn delta`).  Brings the file at `map_path` to the map that the delta leads
  * to: at any instant it is the whole old or the whole new one, and the old one stays beside it, for
- * cairn_map_roll_back.  Who has the map open keeps the old one; open it again.  Of `options`, which may be
- * NULL, the public key counts: delta and new map must be signed with it.  *was_updated (may be NULL): 0 where
- * the map is the new one already.  CAIRN_INVALID_ARGUMENT: the delta leads from another map; CAIRN_BUSY:
- * another update is at work in the folder. */
+ * cairn_map_roll_back.  Who has the map open keeps the old one; open it again.  `options`, which may be NULL:
+ * delta and new map must be signed with the public key; name, min_epoch, allow_older.  *was_updated (may be
+ * NULL): 0 where the map is the new one already.  CAIRN_INVALID_ARGUMENT: the delta leads from another map;
+ * CAIRN_NOT_NEWER, CAIRN_OTHER_MAP: a key is required, or the map in place is signed, and the new map does
+ * not follow it; CAIRN_BUSY: another update is at work in the folder. */
 CAIRN_API int32_t cairn_map_update(const char* map_path, const char* delta_path,
                                    const cairn_map_options* options, int32_t* was_updated);
-/* Exchanges the map and the one before the last update; a second time exchanges them back. */
+/* Exchanges the map and the one before the last update; a second time exchanges them back.  min_epoch holds
+ * here too; allow_older does not matter. */
 CAIRN_API int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options);
 
 #ifdef __cplusplus

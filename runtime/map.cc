@@ -9,6 +9,7 @@
 
 #include <fmt/ranges.h>
 
+#include "core/map_epoch.h"
 #include "runtime/no_throw.h"
 
 namespace cairn {
@@ -41,6 +42,7 @@ int64_t NumBytes(const AppearanceMap& appearance) {
 Result<std::shared_ptr<const Map>> Map::Open(const std::string& path, const MapOptions& options) {
   return WithoutExceptions(path.c_str(), [&]() -> Result<std::shared_ptr<const Map>> {
     CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {.public_key = options.public_key}));
+    CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), path, options.name, options.min_epoch));
     return std::shared_ptr<const Map>(new Map(std::move(file), options.memory_budget_bytes));
   });
 }

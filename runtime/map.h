@@ -35,6 +35,11 @@ struct MapOptions {
   int64_t memory_budget_bytes = int64_t{256} << 20;
   // Maps without a signature of this key are refused.
   std::optional<PublicKey> public_key;
+  // What the map must be called (empty: anything), and the least epoch that it may have (0: any): of this
+  // site, and not older than what the robot knew before.  Only with a key can they be trusted: without one,
+  // anybody can write a map that says so.
+  std::string name = {};
+  uint64_t min_epoch = 0;
 };
 
 // An open map: immutable, shareable between threads, one Localizer per thread.  The first header to read;
@@ -43,7 +48,7 @@ struct MapOptions {
 class Map {
  public:
   // Opens a map file read-only; it must not change while the map is open.  Errors: as MapFile::Open
-  // (core/map_file.h).
+  // (core/map_file.h); OtherMap, NotNewer (not what the options ask for).
   static Result<std::shared_ptr<const Map>> Open(const std::string& path, const MapOptions& options = {});
   // A map that was never a file: its numbers are not rounded.  Errors: InvalidArgument (CheckMapRows).
   static Result<std::shared_ptr<const Map>> FromRows(MapRows rows);

@@ -2,18 +2,21 @@
 
 #include <fcntl.h>
 #include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 
 #include "core/file.h"
+#include "core/file_descriptor.h"
 #include "core/file_lock.h"
 #include "core/map_delta.h"
+#include "core/map_epoch.h"
 #include "core/map_file.h"
 #include "core/output_path.h"
+#include "core/replacement.h"
 #include "core/temporary.h"
 #include "core/write_error.h"
 #include "runtime/no_throw.h"
@@ -55,36 +58,121 @@ void RemoveStale(const std::string& map_path) {
   }
 }
 
-// Writes `bytes`, a map made by a delta, to `path`; `before_replacing` runs when nothing but the last step is
-// left.
-Status WriteMap(const std::string& bytes, const std::string& path, const std::string& delta_path,
-                const UpdateOptions& options, const std::function<Status()>& before_replacing) {
-  return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
-    std::ofstream file(temporary, std::ios::binary);
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) return WriteError(path, "cannot be written", errno);
-    // What robots would refuse to open must not take the place of what they can.
-    if (const Result<MapFile> map = MapFile::Open(temporary, {.public_key = options.public_key}); !map.ok()) {
-      return MakeError(map.error().code, "{}: leads to a map that cannot be opened: {}", delta_path,
-                       map.error().message);
-    }
-    return before_replacing();
-  });
+// Whether `next` may follow the map at `old_path`.
+Status CheckMayFollow(const MapFile& next, const std::string& next_name, const std::string& old_path,
+                      const UpdateOptions& options) {
+  CAIRN_RETURN_IF_ERROR(CheckAskedFor(next.head(), next_name, options.name, options.min_epoch));
+  const Result<MapFile> old = MapFile::Open(old_path, {.public_key = options.public_key});
+  if (!old.ok()) {
+    const ErrorCode code = old.error().code;
+    if (code == ErrorCode::kNotSigned || code == ErrorCode::kWrongKey) return Ok();
+    return old.error();
+  }
+  if (!old->seal().is_signed() || old->seal().file == next.seal().file) return Ok();
+  return CheckFollows(next.head(), next_name, old->head(), old_path, options.allow_older);
 }
 
-// A second name for the file, or, where the file system has none, a copy.
-Status KeepPrevious(const std::string& map_path) {
-  std::error_code ignored;
-  if (fs::is_symlink(PreviousMapPath(map_path), ignored)) fs::remove(PreviousMapPath(map_path), ignored);
-  return ReplaceFileAtomically(PreviousMapPath(map_path), [&](const std::string& temporary) -> Status {
-    std::error_code error;
-    fs::create_hard_link(map_path, temporary, error);
-    if (error) fs::copy_file(map_path, temporary, error);
-    if (error) return WriteError(PreviousMapPath(map_path), "cannot be written", error.value());
-    return Ok();
-  });
+// The file that is to be `path`: a map made by a delta from the one at `old_path`, written and opened as a
+// robot would; what robots would refuse must not take the place of what they can open.
+Result<Replacement> WriteMap(const std::string& bytes, const std::string& path, const std::string& old_path,
+                             const std::string& delta_path, const UpdateOptions& options) {
+  CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
+  CAIRN_RETURN_IF_ERROR(file.Write(bytes));
+  const Result<MapFile> map = MapFile::Open(file.temporary(), {.public_key = options.public_key});
+  if (!map.ok()) {
+    return MakeError(map.error().code, "{}: leads to a map that cannot be opened: {}", delta_path,
+                     map.error().message);
+  }
+  CAIRN_RETURN_IF_ERROR(
+      CheckMayFollow(*map, fmt::format("{}: the map that it leads to", delta_path), old_path, options));
+  return file;
 }
+
+int Exchange(const std::string& path1, const std::string& path2) {
+  return renameat2(AT_FDCWD, path1.c_str(), AT_FDCWD, path2.c_str(), RENAME_EXCHANGE);
+}
+
+// The map in place kept as the previous one, until it is known whether another takes its place: then Confirm
+// drops what was the previous one before, else that comes back.
+class KeptMap {
+ public:
+  KeptMap(const std::string& map_path, int folder)
+      : map_path_(map_path), previous_(PreviousMapPath(map_path)), folder_(folder) {}
+  KeptMap(const KeptMap&) = delete;
+  KeptMap& operator=(const KeptMap&) = delete;
+  ~KeptMap() {
+    if (!is_kept_) return;
+    if (aside_.empty()) {
+      unlink(previous_.c_str());
+    } else if (Exchange(aside_, previous_) == 0) {
+      unlink(aside_.c_str());
+    } else {
+      rename(aside_.c_str(), previous_.c_str());
+    }
+  }
+
+  // Errors: Io, ReadOnly, DiskFull.
+  Status Keep() {
+    struct stat before = {};
+    const bool is_there = lstat(previous_.c_str(), &before) == 0;
+    if (is_there && !S_ISREG(before.st_mode) && !S_ISLNK(before.st_mode))
+      return MakeError(ErrorCode::kIo, "{}: is no file, and the map before cannot be kept there; remove it",
+                       previous_);
+    CAIRN_ASSIGN_OR_RETURN(const std::string second, SecondName());
+    if (is_there && Exchange(second, previous_) == 0) {
+      aside_ = second;
+    } else {
+      // There is nothing to keep, or the file system cannot exchange: the older one steps aside first.
+      if (is_there) {
+        const std::string aside = RandomTemporaryPath(previous_);
+        if (rename(previous_.c_str(), aside.c_str()) != 0) return CannotKeep(second, errno);
+        aside_ = aside;
+      }
+      if (rename(second.c_str(), previous_.c_str()) != 0) {
+        const int error = errno;
+        if (is_there) rename(aside_.c_str(), previous_.c_str());
+        return CannotKeep(second, error);
+      }
+    }
+    is_kept_ = true;
+    if (fsync(folder_) == 0 || errno == EINVAL) return Ok();  // EINVAL: there is nothing to sync
+    return WriteError(map_path_, "its folder cannot be synced; the map stays as it is", errno);
+  }
+
+  void Confirm() {
+    if (!aside_.empty()) unlink(aside_.c_str());  // else it only takes room, and the next update removes it
+    is_kept_ = false;
+  }
+
+ private:
+  // A second name for the map's file, or, where there can be none, a copy.
+  Result<std::string> SecondName() {
+    const std::string second = RandomTemporaryPath(previous_);
+    if (link(map_path_.c_str(), second.c_str()) == 0) return second;
+    CAIRN_ASSIGN_OR_RETURN(Replacement copy, Replacement::Begin(second, 0600));
+    CAIRN_RETURN_IF_ERROR(copy.CopyFrom(map_path_));
+    Status status = copy.FinishNew();
+    if (status.ok()) {
+      const FileDescriptor file(open(second.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+      struct stat map = {};
+      if (file.get() < 0 || stat(map_path_.c_str(), &map) != 0) return CannotKeep(second, errno);
+      status = GiveAttributes(file.get(), map, previous_);
+    }
+    if (status.ok()) return second;
+    unlink(second.c_str());
+    return status.error();
+  }
+
+  Error CannotKeep(const std::string& second, int error) const {
+    unlink(second.c_str());
+    return WriteError(previous_, "the map before cannot be kept there", error);
+  }
+
+  std::string map_path_, previous_;
+  std::string aside_;  // the previous map before this one
+  int folder_;
+  bool is_kept_ = false;
+};
 
 }  // namespace
 
@@ -102,7 +190,8 @@ Status ApplyDelta(const std::string& old_path, const std::string& delta_path, co
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
-    return WriteMap(bytes, new_path, delta_path, options, [] { return Ok(); });
+    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, new_path, old_path, delta_path, options));
+    return file.Finish();
   });
 }
 
@@ -115,10 +204,19 @@ Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_p
     RemoveStale(map_path);
     CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
     CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
-    if (HashOf(old_bytes) == delta.new_hash) return false;
+    if (HashOf(old_bytes) == delta.new_hash) {
+      CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(map_path, {.public_key = options.public_key}));
+      CAIRN_RETURN_IF_ERROR(CheckAskedFor(map.head(), map_path, options.name, options.min_epoch));
+      CAIRN_RETURN_IF_ERROR(SyncFolderOf(map_path, lock.descriptor()));
+      return false;
+    }
     CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, map_path, delta_path));
-    CAIRN_RETURN_IF_ERROR(
-        WriteMap(bytes, map_path, delta_path, options, [&] { return KeepPrevious(map_path); }));
+    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, map_path, map_path, delta_path, options));
+    KeptMap previous(map_path, lock.descriptor());
+    CAIRN_RETURN_IF_ERROR(previous.Keep());
+    const Status status = file.Finish();
+    if (file.is_in_place()) previous.Confirm();
+    if (!status.ok()) return status.error();
     return true;
   });
 }
@@ -130,17 +228,30 @@ Status RollBackMap(const std::string& given_path, const UpdateOptions& options) 
     const std::string map_path = FileOf(given_path);
     CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
     const std::string previous = PreviousMapPath(map_path);
-    std::error_code error;
-    if (!fs::exists(previous, error)) {
+    struct stat status = {};
+    if (lstat(previous.c_str(), &status) != 0) {
+      if (errno != ENOENT) return WriteError(previous, "cannot be opened", errno);
       return MakeError(
           ErrorCode::kNotFound,
           "{}: no such file; there is a previous map only where `cairn apply --in-place` made one", previous);
     }
-    CAIRN_RETURN_IF_ERROR(MapFile::Open(previous, {.public_key = options.public_key}));
+    // A link would take the map's place.
+    if (!S_ISREG(status.st_mode))
+      return MakeError(ErrorCode::kIo, "{}: is no regular file; no update has put it there", previous);
+    CAIRN_ASSIGN_OR_RETURN(const MapFile before, MapFile::Open(previous, {.public_key = options.public_key}));
     CAIRN_RETURN_IF_ERROR(CheckFileHash(previous));
-    if (renameat2(AT_FDCWD, previous.c_str(), AT_FDCWD, map_path.c_str(), RENAME_EXCHANGE) == 0) return Ok();
-    if (errno == ENOENT) return MakeError(ErrorCode::kNotFound, "{}: no such file", map_path);
-    return WriteError(map_path, fmt::format("cannot be exchanged with {}", previous), errno);
+    CAIRN_RETURN_IF_ERROR(CheckAskedFor(before.head(), previous, options.name, options.min_epoch));
+    // The map in place may be what is wrong: one that cannot be opened is no reason to stay with it.
+    const Result<MapFile> map = MapFile::Open(map_path, {.public_key = options.public_key});
+    if (map.ok() && (map->seal().is_signed() || before.seal().is_signed())) {
+      CAIRN_RETURN_IF_ERROR(
+          CheckFollows(before.head(), previous, map->head(), map_path, /*allow_older=*/true));
+    }
+    if (Exchange(previous, map_path) != 0) {
+      if (errno == ENOENT) return MakeError(ErrorCode::kNotFound, "{}: no such file", map_path);
+      return WriteError(map_path, fmt::format("cannot be exchanged with {}", previous), errno);
+    }
+    return SyncFolderOf(map_path, lock.descriptor());
   });
 }
 

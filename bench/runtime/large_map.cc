@@ -123,7 +123,8 @@ Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree)
   std::filesystem::remove(path + ".key");
   std::filesystem::remove(path + ".key.pub");
   CAIRN_RETURN_IF_ERROR(WriteKeyPair(keys, path + ".key"));
-  return SignMap(path, keys.secret_key, path);
+  CAIRN_RETURN_IF_ERROR(SignMap(path, keys.secret_key, path));
+  return Ok();
 }
 
 double ResidentMib() {

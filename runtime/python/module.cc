@@ -42,13 +42,16 @@ std::optional<PublicKey> KeyOf(const std::optional<py::bytes>& given) {
   return key;
 }
 
-PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes,
-              const std::optional<py::bytes>& public_key) {
+PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::optional<py::bytes>& public_key,
+              const std::string& required_name, uint64_t min_epoch) {
   const std::string name = PathOf(path);
   if (memory_budget_bytes < 0)
     throw py::value_error(
         fmt::format("memory_budget_bytes is {}; must not be negative", memory_budget_bytes));
-  const MapOptions options = {.memory_budget_bytes = memory_budget_bytes, .public_key = KeyOf(public_key)};
+  const MapOptions options = {.memory_budget_bytes = memory_budget_bytes,
+                              .public_key = KeyOf(public_key),
+                              .name = required_name,
+                              .min_epoch = min_epoch};
   const py::gil_scoped_release release;
   return {ValueOrThrow(Map::Open(name, options)), name};
 }
@@ -128,29 +131,36 @@ Camera MakeCamera(const std::string& model, int width, int height, std::vector<d
 void BindUpdates(py::module_& module) {
   module.def(
       "update_map",
-      [](const py::object& map, const py::object& delta, const std::optional<py::bytes>& public_key) {
+      [](const py::object& map, const py::object& delta, const std::optional<py::bytes>& public_key,
+         const std::string& name, uint64_t min_epoch, bool allow_older) {
         const std::string map_path = PathOf(map), delta_path = PathOf(delta);
-        const UpdateOptions options = {.public_key = KeyOf(public_key)};
+        const UpdateOptions options = {.public_key = KeyOf(public_key),
+                                       .allow_older = allow_older,
+                                       .name = name,
+                                       .min_epoch = min_epoch};
         const py::gil_scoped_release release;
         return ValueOrThrow(UpdateMap(map_path, delta_path, options));
       },
-      py::arg("map"), py::arg("delta"), py::kw_only(), py::arg("public_key") = py::none());
+      py::arg("map"), py::arg("delta"), py::kw_only(), py::arg("public_key") = py::none(),
+      py::arg("name") = "", py::arg("min_epoch") = 0, py::arg("allow_older") = false);
   module.def(
       "roll_back_map",
-      [](const py::object& map, const std::optional<py::bytes>& public_key) {
+      [](const py::object& map, const std::optional<py::bytes>& public_key, const std::string& name,
+         uint64_t min_epoch) {
         const std::string map_path = PathOf(map);
-        const UpdateOptions options = {.public_key = KeyOf(public_key)};
+        const UpdateOptions options = {.public_key = KeyOf(public_key), .name = name, .min_epoch = min_epoch};
         const py::gil_scoped_release release;
         ThrowIfError(RollBackMap(map_path, options));
       },
-      py::arg("map"), py::kw_only(), py::arg("public_key") = py::none());
+      py::arg("map"), py::kw_only(), py::arg("public_key") = py::none(), py::arg("name") = "",
+      py::arg("min_epoch") = 0);
 }
 
 void BindMap(py::module_& module) {
   py::class_<PyMap>(module, "Map")
       .def_static("open", &OpenMap, py::arg("path"), py::kw_only(),
                   py::arg("memory_budget_bytes") = MapOptions().memory_budget_bytes,
-                  py::arg("public_key") = py::none())
+                  py::arg("public_key") = py::none(), py::arg("name") = "", py::arg("min_epoch") = 0)
       .def(
           "camera_for_size",
           [](const PyMap& self, int width, int height) {
@@ -158,6 +168,7 @@ void BindMap(py::module_& module) {
           },
           py::arg("width"), py::arg("height"))
       .def_property_readonly("name", [](const PyMap& self) { return self.map->head().name; })
+      .def_property_readonly("epoch", [](const PyMap& self) { return self.map->head().epoch; })
       .def_property_readonly("num_landmarks", [](const PyMap& self) { return self.map->num_landmarks(); })
       .def_property_readonly("num_images", [](const PyMap& self) { return self.map->num_images(); })
       .def_property_readonly(

@@ -1,12 +1,17 @@
 #include "core/map_seal.h"
 
 #include <filesystem>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/database.h"
 #include "core/file.h"
+#include "core/map_delta.h"
+#include "core/map_epoch.h"
 #include "core/map_file.h"
+#include "core/map_tables.h"
 #include "core/random.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/emit_map/example.h"
@@ -28,6 +33,21 @@ std::string WriteExample(const std::string& name) {
   rows.writer = "cairn test";
   EXPECT_TRUE(WriteMapRows(rows, InFolder(name)).ok());
   return InFolder(name);
+}
+
+// Changes a map's tables, and seals what they have become.
+void Reseal(const std::string& path, const std::string& sql) {
+  Hash root = {};
+  {
+    SQLite::Database database(path, SQLite::OPEN_READWRITE);
+    database.exec("PRAGMA journal_mode = OFF");
+    database.exec(sql);
+    const StoredRows rows = *ReadStoredRows(database, path, HeadTables(), int64_t{1} << 40);
+    SQLite::Statement directory(database, "SELECT entries FROM directory");
+    ASSERT_TRUE(directory.executeStep());
+    root = RootHash(rows, directory.getColumn(0).getString());
+  }
+  ASSERT_TRUE(SealFile(path, root).ok());
 }
 
 Status Verify(const std::string& path, const std::optional<PublicKey>& key = std::nullopt) {
@@ -103,18 +123,117 @@ TEST(MapSeal, DamagedMapIsNotSigned) {
   EXPECT_FALSE(fs::exists(InFolder("no.cairn")));
 }
 
-TEST(MapSeal, KeysAreKeptInFilesOfTheirOwn) {
-  const std::string path = InFolder("key");
-  fs::remove(path);
-  fs::remove(path + ".pub");
+TEST(MapSeal, DamagedKeySignsNoMap) {
+  const std::string path = WriteExample("to_sign.cairn"), signed_path = InFolder("by_damaged.cairn");
   const KeyPair keys = MakeKeyPair();
-  ASSERT_TRUE(WriteKeyPair(keys, path).ok());
-  EXPECT_EQ(*ReadSecretKey(path), keys.secret_key);
-  EXPECT_EQ(*ReadPublicKey(path + ".pub"), keys.public_key);
-  EXPECT_EQ(fs::status(path).permissions() & (fs::perms::group_all | fs::perms::others_all), fs::perms::none);
-  EXPECT_EQ(WriteKeyPair(keys, path).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(ReadPublicKey(path).error().code, ErrorCode::kCorrupt);  // a secret key is no public one
-  EXPECT_EQ(ReadSecretKey(InFolder("none")).error().code, ErrorCode::kNotFound);
+  for (const size_t byte : {size_t{0}, size_t{31}, size_t{32}, size_t{63}}) {
+    SecretKey damaged = keys.secret_key;
+    damaged[byte] ^= 0x10;
+    EXPECT_EQ(SignMap(path, damaged, signed_path).error().code, ErrorCode::kCorrupt) << byte;
+    EXPECT_EQ(MakeMapDelta(path, path, damaged).error().code, ErrorCode::kCorrupt) << byte;
+    EXPECT_FALSE(fs::exists(signed_path));
+  }
+}
+
+TEST(MapSeal, EpochIsSignedAndNothingElseChanges) {
+  const std::string path = WriteExample("uncounted.cairn");
+  const KeyPair keys = MakeKeyPair();
+  const auto epoch_of = [&](const std::string& map) {
+    EXPECT_TRUE(Verify(map, keys.public_key).ok());
+    return ReadMapRows(map)->epoch;
+  };
+  EXPECT_EQ(ReadMapRows(path)->epoch, 0U);
+  const std::string first = InFolder("first.cairn"), later = InFolder("later.cairn");
+  EXPECT_EQ(*SignMap(path, keys.secret_key, first), 1U);
+  EXPECT_EQ(epoch_of(first), 1U);
+  EXPECT_EQ(*SignMap(path, keys.secret_key, later, 41), 41U);
+  EXPECT_EQ(epoch_of(later), 41U);
+  // A map that was counted keeps its epoch, and then its bytes, unless it is told another.
+  EXPECT_EQ(*SignMap(later, keys.secret_key, InFolder("again.cairn")), 41U);
+  EXPECT_EQ(*ReadFile(InFolder("again.cairn")), *ReadFile(later));
+  EXPECT_EQ(*SignMap(later, keys.secret_key, InFolder("next.cairn"), 42), 42U);
+  EXPECT_EQ(epoch_of(InFolder("next.cairn")), 42U);
+  EXPECT_EQ(*SignMap(path, keys.secret_key, InFolder("same.cairn"), 41), 41U);
+  EXPECT_EQ(*ReadFile(InFolder("same.cairn")), *ReadFile(later));
+  EXPECT_EQ(SignMap(path, keys.secret_key, InFolder("zero.cairn"), 0).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_FALSE(fs::exists(InFolder("zero.cairn")));
+  // All else is as it was: with the epoch taken out, the rows make the same file.
+  MapRows rows = *ReadMapRows(later);
+  rows.epoch = 0;
+  ASSERT_TRUE(WriteMapRows(rows, InFolder("back.cairn")).ok());
+  EXPECT_EQ(*ReadFile(InFolder("back.cairn")), *ReadFile(path));
+}
+
+TEST(MapSeal, NextEpochFollowsASignedMapOfThatNameAndKey) {
+  const std::string path = WriteExample("base.cairn");
+  const KeyPair keys = MakeKeyPair(), others = MakeKeyPair();
+  const std::string counted = InFolder("counted.cairn"), last = InFolder("last.cairn");
+  ASSERT_TRUE(SignMap(path, keys.secret_key, counted, 6).ok());
+  EXPECT_EQ(*EpochAfter(counted, "example", keys.secret_key), 7U);
+  EXPECT_EQ(EpochAfter(counted, "other", keys.secret_key).error().code, ErrorCode::kOtherMap);
+  EXPECT_EQ(EpochAfter(counted, "example", others.secret_key).error().code, ErrorCode::kWrongKey);
+  EXPECT_EQ(EpochAfter(path, "example", keys.secret_key).error().code, ErrorCode::kNotSigned);
+  EXPECT_EQ(EpochAfter(InFolder("no such"), "example", keys.secret_key).error().code, ErrorCode::kNotFound);
+  constexpr uint64_t kLast = std::numeric_limits<uint64_t>::max();
+  ASSERT_EQ(*SignMap(path, keys.secret_key, last, kLast - 1), kLast - 1);
+  EXPECT_EQ(*EpochAfter(last, "example", keys.secret_key), kLast);
+  ASSERT_EQ(*SignMap(path, keys.secret_key, last, kLast), kLast);
+  EXPECT_TRUE(Verify(last, keys.public_key).ok());
+  EXPECT_EQ(EpochAfter(last, "example", keys.secret_key).error().code, ErrorCode::kInvalidArgument);
+}
+
+// What it takes for a later map to follow, and the one that is asked for.
+TEST(MapSeal, OnlyALaterEpochOfTheSameNameFollows) {
+  MapHead old;
+  old.name = "kitchen";
+  old.epoch = 5;
+  const auto code = [&](const std::string& name, uint64_t epoch, bool allow_older) {
+    MapHead next;
+    next.name = name;
+    next.epoch = epoch;
+    const Status status = CheckFollows(next, "next", old, "old", allow_older);
+    return status.ok() ? ErrorCode{} : status.error().code;
+  };
+  EXPECT_EQ(code("kitchen", 6, false), ErrorCode{});
+  EXPECT_EQ(code("kitchen", 5, false), ErrorCode::kNotNewer);
+  EXPECT_EQ(code("kitchen", 4, false), ErrorCode::kNotNewer);
+  EXPECT_EQ(code("kitchen", 0, false), ErrorCode::kNotNewer);
+  EXPECT_EQ(code("kitchen", 4, true), ErrorCode{});
+  EXPECT_EQ(code("cellar", 6, false), ErrorCode::kOtherMap);
+  EXPECT_EQ(code("cellar", 6, true), ErrorCode::kOtherMap);
+  EXPECT_TRUE(CheckAskedFor(old, "old", "", 0).ok());
+  EXPECT_TRUE(CheckAskedFor(old, "old", "kitchen", 5).ok());
+  EXPECT_EQ(CheckAskedFor(old, "old", "kitchen", 6).error().code, ErrorCode::kNotNewer);
+  EXPECT_EQ(CheckAskedFor(old, "old", "cellar", 5).error().code, ErrorCode::kOtherMap);
+}
+
+// An epoch that is no number of 64 bits, in a map that is otherwise right.
+TEST(MapSeal, EpochThatIsNoNumberIsRefused) {
+  for (const char* epoch : {"-1", "18446744073709551616", "three", "", "1 "}) {
+    const std::string path = WriteExample("odd.cairn");
+    Reseal(path, fmt::format("INSERT INTO meta VALUES ('epoch', '{}')", epoch));
+    EXPECT_EQ(MapFile::Open(path, {}).error().code, ErrorCode::kCorrupt) << "'" << epoch << "'";
+  }
+}
+
+// Who signs a map that somebody else made signs what it says, not what it does.
+TEST(MapSeal, NothingInAMapRunsWhileItIsSigned) {
+  const KeyPair keys = MakeKeyPair();
+  const std::string path = WriteExample("trigger.cairn");
+  Reseal(path,
+         "CREATE TRIGGER t AFTER INSERT ON meta BEGIN UPDATE meta SET value = 'theirs' WHERE key = "
+         "'name'; END");
+  ASSERT_TRUE(SignMap(path, keys.secret_key, InFolder("of_trigger.cairn")).ok());
+  EXPECT_EQ(ReadMapRows(InFolder("of_trigger.cairn"))->name, "example");
+  // The epoch would take the place of another row.
+  const std::string unique = WriteExample("unique.cairn");
+  Reseal(unique,
+         "UPDATE meta SET value = '77' WHERE key = 'writer'; CREATE UNIQUE INDEX u ON meta (value) "
+         "WHERE value = '77'");
+  EXPECT_EQ(SignMap(unique, keys.secret_key, InFolder("of_unique.cairn"), 77).error().code,
+            ErrorCode::kCorrupt);
+  EXPECT_FALSE(fs::exists(InFolder("of_unique.cairn")));
 }
 
 TEST(MapSeal, BlockIsCheckedWhenItIsRead) {

@@ -1,4 +1,6 @@
 #include <atomic>
+#include <cstddef>
+#include <cstring>
 #include <thread>
 #include <vector>
 
@@ -159,6 +161,74 @@ TEST_F(CApi, MapIsUpdatedByADeltaAndRolledBack) {
   EXPECT_EQ(cairn_map_update(map.c_str(), nullptr, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_map_roll_back(nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_map_roll_back("nowhere.cairn", nullptr), CAIRN_NOT_FOUND);
+}
+
+// The poster's map signed in epochs 2 and 3.
+TEST_F(CApi, UpdatesGoForwardAndOpeningAsksForNameAndEpoch) {
+  const std::string folder = testing::TempDir(), map = folder + "/c_api_epoch.cairn";
+  const std::string second = folder + "/c_api_2.cairn", third = folder + "/c_api_3.cairn";
+  const KeyPair keys = MakeKeyPair();
+  ASSERT_TRUE(SignMap(path_, keys.secret_key, second, 2).ok());
+  ASSERT_TRUE(SignMap(path_, keys.secret_key, third, 3).ok());
+  const auto made = MakeMapDelta(third, second, keys.secret_key, /*allow_older=*/true);
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  const std::string delta = folder + "/c_api_epoch.delta";
+  ASSERT_TRUE(WriteFileAtomically(delta, EncodeMapDelta(*made)).ok());
+  ASSERT_TRUE(WriteFileAtomically(map, *ReadFile(third)).ok());
+
+  cairn_map_options options = CAIRN_MAP_OPTIONS_INIT;
+  options.public_key = keys.public_key.data();
+  options.name = "poster";
+  options.min_epoch = 3;
+  cairn_map* open = nullptr;
+  ASSERT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_OK) << cairn_last_error();
+  cairn_map_description description = CAIRN_MAP_DESCRIPTION_INIT;
+  ASSERT_EQ(cairn_map_describe(open, &description), CAIRN_OK);
+  EXPECT_EQ(description.epoch, 3U);
+  EXPECT_EQ(cairn_map_close(open), CAIRN_OK);
+  options.min_epoch = 4;
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_NOT_NEWER);
+  options.min_epoch = 0;
+  options.name = "wall";
+  EXPECT_EQ(cairn_map_open(map.c_str(), &options, &open), CAIRN_OTHER_MAP);
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_OTHER_MAP);
+  options.name = nullptr;
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_NOT_NEWER);
+  options.allow_older = 2;
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_INVALID_ARGUMENT);
+  options.allow_older = 1;
+  options.min_epoch = 3;
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_NOT_NEWER);
+  options.min_epoch = 2;
+  EXPECT_EQ(cairn_map_update(map.c_str(), delta.c_str(), &options, nullptr), CAIRN_OK) << cairn_last_error();
+  options.min_epoch = 4;
+  EXPECT_EQ(cairn_map_roll_back(map.c_str(), &options), CAIRN_NOT_NEWER);
+  options.min_epoch = 3;
+  EXPECT_EQ(cairn_map_roll_back(map.c_str(), &options), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(*ReadFile(map), *ReadFile(third));
+}
+
+// A program built with the first release knows neither name and epochs nor that there is more of a struct.
+TEST_F(CApi, ShorterStructsOfEarlierReleasesAreEnough) {
+  cairn_map_options options;
+  std::memset(&options, 0xff, sizeof(options));  // what lies behind it is not looked at
+  options.size = offsetof(cairn_map_options, name);
+  options.memory_budget_bytes = 0;
+  options.public_key = nullptr;
+  cairn_map* open = nullptr;
+  ASSERT_EQ(cairn_map_open(path_.c_str(), &options, &open), CAIRN_OK) << cairn_last_error();
+  options.size = offsetof(cairn_map_options, name) - 1;
+  cairn_map* none = nullptr;
+  EXPECT_EQ(cairn_map_open(path_.c_str(), &options, &none), CAIRN_INVALID_ARGUMENT);
+  cairn_map_description description;
+  std::memset(&description, 0xff, sizeof(description));
+  description.size = offsetof(cairn_map_description, epoch);
+  ASSERT_EQ(cairn_map_describe(open, &description), CAIRN_OK) << cairn_last_error();
+  EXPECT_STREQ(description.name, "poster");
+  EXPECT_EQ(description.epoch, UINT64_MAX);  // nor written
+  description.size = offsetof(cairn_map_description, epoch) - 1;
+  EXPECT_EQ(cairn_map_describe(open, &description), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_map_close(open), CAIRN_OK);
 }
 
 }  // namespace

@@ -218,9 +218,39 @@ class Updates(Poster):
             self.assertIn(caught.exception.name, ["not_signed", "wrong_key"])
             with self.assertRaises(ValueError):
                 cairn.update_map(old, delta, public_key=b"short")
+            with self.assertRaises(TypeError):
+                cairn.update_map(old, delta, min_epoch=-1)
             with self.assertRaises(cairn.Error) as caught:
                 cairn.roll_back_map(delta)
             self.assertEqual(caught.exception.name, "not_found")
+
+    def test_signed_maps_go_forward_unless_told_otherwise(self):
+        with tempfile.TemporaryDirectory() as folder:
+            first, second, delta, key = (pathlib.Path(folder) / name for name in ["1.cairn", "2.cairn", "delta", "key"])
+            map = POSTER / "poster.cairn"
+            for words in [["keygen", key], ["sign", map, "--key", key, "-o", first],
+                          ["sign", map, "--key", key, "--after", first, "-o", second],
+                          ["delta", second, first, "-o", delta, "--key", key, "--allow-older"]]:
+                run = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
+                self.assertEqual(run.returncode, 0, run.stderr)
+            public_key = bytes.fromhex(pathlib.Path(str(key) + ".pub").read_text())
+            self.assertEqual(cairn.Map.open(second, public_key=public_key, name="poster", min_epoch=2).epoch, 2)
+            for call, name in [
+                (lambda: cairn.Map.open(second, min_epoch=3), "not_newer"),
+                (lambda: cairn.Map.open(second, name="wall"), "other_map"),
+                (lambda: cairn.update_map(second, delta, public_key=public_key), "not_newer"),
+                (lambda: cairn.update_map(second, delta, name="wall", allow_older=True), "other_map"),
+            ]:
+                with self.assertRaises(cairn.Error) as caught:
+                    call()
+                self.assertEqual(caught.exception.name, name)
+            self.assertTrue(cairn.update_map(second, delta, public_key=public_key, allow_older=True))
+            self.assertEqual(cairn.Map.open(second).epoch, 1)
+            with self.assertRaises(cairn.Error) as caught:
+                cairn.roll_back_map(second, public_key=public_key, min_epoch=3)
+            self.assertEqual(caught.exception.name, "not_newer")
+            cairn.roll_back_map(second, public_key=public_key, min_epoch=2)
+            self.assertEqual(cairn.Map.open(second).epoch, 2)
 
 
 class Facts(Poster):

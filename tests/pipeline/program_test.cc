@@ -1,5 +1,6 @@
 #include "pipeline/program.h"
 
+#include <sys/mount.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,7 +21,6 @@
 
 #include "core/database.h"
 #include "core/file.h"
-#include "core/temporary.h"
 #include "pipeline/build_step.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/json_text.h"
@@ -331,12 +331,17 @@ TEST_F(StampTest, StageOfAnotherBuildIsRefusedWithTheOthersName) {
 }
 
 TEST_F(StampTest, FullDiskStillLetsAReservedErrorFileSayWhy) {
-  ASSERT_TRUE(ReserveErrorFile(folder_.string()).ok());
-  EXPECT_FALSE(ReadErrorFile(folder_.string()).has_value());
-  // A folder in the place of the temporary stands for a disk without room for it.
-  fs::create_directories(TemporaryPath(Path("error.json")) + "/in the way");
-  ASSERT_TRUE(WriteErrorFile(folder_.string(), "stage", {ErrorCode::kIo, "full"}).ok());
-  const auto failure = ReadErrorFile(folder_.string());
+  const std::string disk = Path("disk");
+  fs::create_directories(disk);
+  // Room for the folder and one file.
+  if (mount("none", disk.c_str(), "tmpfs", 0, "nr_inodes=2") != 0)
+    GTEST_SKIP() << "only root can mount a small tmpfs";
+  EXPECT_TRUE(ReserveErrorFile(disk).ok());
+  EXPECT_FALSE(ReadErrorFile(disk).has_value());
+  EXPECT_EQ(WriteFileAtomically(disk + "/other", "").error().code, ErrorCode::kDiskFull);
+  EXPECT_TRUE(WriteErrorFile(disk, "stage", {ErrorCode::kIo, "full"}).ok());
+  const auto failure = ReadErrorFile(disk);
+  umount2(disk.c_str(), MNT_DETACH);
   ASSERT_TRUE(failure.has_value());
   EXPECT_EQ(failure->code, ErrorCode::kIo);
   EXPECT_EQ(failure->message, "full");

@@ -32,13 +32,21 @@ class Map:
 
     @staticmethod
     def open(
-        path: str | PathLike[str], *, memory_budget_bytes: int = ..., public_key: bytes | None = None
+        path: str | PathLike[str], *, memory_budget_bytes: int = ..., public_key: bytes | None = None,
+        name: str = "", min_epoch: int = 0
     ) -> Map:
-        """Raises Error.  `public_key`: 32 bytes; maps that this key has not signed are refused."""
+        """Raises Error.  `public_key`: 32 bytes; maps that this key has not signed are refused.
+
+        So are maps of another `name` (other_map) and of an earlier epoch than `min_epoch` (not_newer): to be
+        trusted only with a key, since without one anybody can write a map that says so.
+        """
     def camera_for_size(self, width: int, height: int) -> Camera:
         """The survey's camera of this image size.  Raises Error (not_found) when none or more than one has it."""
     @property
     def name(self) -> str: ...
+    @property
+    def epoch(self) -> int:
+        """Counts the signed releases of a map of this name; 0: never counted."""
     @property
     def num_landmarks(self) -> int: ...
     @property
@@ -116,11 +124,21 @@ class Localizer:
         `camera` None: the survey's of the image's size.  Releases the interpreter's lock meanwhile.
         """
 
-def update_map(map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None) -> bool:
+def update_map(
+    map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None, name: str = "",
+    min_epoch: int = 0, allow_older: bool = False
+) -> bool:
     """Brings the map's file to the one that a delta (`cairn delta`) leads to; the old one stays beside it.  False: it is the new one already.
 
-    Raises Error: invalid_argument (the delta leads from another map), not_signed and wrong_key (with `public_key`), busy.
+    Raises Error: invalid_argument (the delta leads from another map), not_signed and wrong_key (with `public_key`), busy;
+    not_newer and other_map (with `public_key`, or where the map is signed: the new one must have its name and a later epoch,
+    unless `allow_older`; also what `name` and `min_epoch` refuse).
     """
 
-def roll_back_map(map: str | PathLike[str], *, public_key: bytes | None = None) -> None:
-    """Exchanges the map and the one before the last update; a second time exchanges them back.  Raises Error (not_found)."""
+def roll_back_map(
+    map: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0
+) -> None:
+    """Exchanges the map and the one before the last update; a second time exchanges them back.
+
+    Raises Error: not_found, other_map (the one before is another map), not_newer (before `min_epoch`).
+    """

@@ -1,0 +1,214 @@
+// What commands that write maps leave behind when any one of their calls of the system fails.
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/map_delta.h"
+#include "core/map_file.h"
+#include "tests/end_to_end/program_run.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+struct Kind {
+  const char* name;
+  std::vector<int> errors;
+};
+// What each kind of call says when it fails.
+const std::vector<Kind>& Kinds() {
+  static const std::vector<Kind> kinds = {
+      {"open", {EMFILE, EACCES}}, {"read", {EIO}}, {"write", {ENOSPC, EIO}}, {"sync", {EIO}},
+      {"rename", {EIO}},          {"link", {EIO}}, {"unlink", {EIO}},        {"close", {EIO}}};
+  return kinds;
+}
+
+// The files of a folder, by name.
+using Contents = std::map<std::string, std::string>;
+
+Contents ContentsOf(const fs::path& folder) {
+  Contents contents;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    contents[entry.path().filename().string()] = ReadFile(entry.path().string()).value();
+  return contents;
+}
+
+// Epochs 1, 2 and 3 of a small map, a delta from the second to the third, keys.
+class Faults : public testing::Test {
+ protected:
+  Faults() : folder_("faults_test"), work_(folder_ / "work") {
+    fs::create_directories(work_);
+    Run("cairn migrate " GOLDEN_DIR "/map_1.0.cairn -o " + folder_ / "unsigned");
+    Run("cairn keygen " + folder_ / "key");
+    for (const std::string epoch : {"1", "2", "3"})
+      Run("cairn sign " + folder_ / "unsigned" + " --key " + folder_ / "key" + " --epoch " + epoch + " -o " +
+          folder_ / epoch);
+    Run("cairn delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
+        folder_ / "delta");
+  }
+
+  static void Run(const std::string& command) {
+    const ProgramRun run = RunShell(command);
+    EXPECT_EQ(run.exit_code, 0) << command << ": " << run.err;
+  }
+
+  std::string Bytes(const std::string& name) const { return ReadFile(folder_ / name).value(); }
+
+  // Runs a command on a fresh folder with `before` in it, and lets one call after the other fail, for all
+  // kinds, until there is none left.  `check`: the run and what is in the folder then, less what is
+  // temporary.
+  void ForEachFault(const std::string& command, const Contents& before,
+                    const std::function<void(const ProgramRun&, const Contents&)>& check) {
+    int num_sites = 0, num_runs = 0;
+    for (const Kind& kind : Kinds()) {
+      for (const int& error : kind.errors) {
+        for (int at = 1;; ++at) {
+          ASSERT_LT(at, 2000);
+          fs::remove_all(work_);
+          fs::create_directories(work_);
+          for (const auto& [name, bytes] : before) WriteFile(work_ + "/" + name, bytes);
+          const std::string log = folder_ / "log";
+          fs::remove(log);
+          const ProgramRun run = RunShell(fmt::format(
+              "LD_PRELOAD='{}' FAULT_KIND={} FAULT_ERROR={} FAULT_AT={} FAULT_FOLDER='{}' FAULT_LOG='{}' {}",
+              CAIRN_FAULT_LIBRARY, kind.name, error, at, Scope(), log, command));
+          if (!fs::exists(log)) {
+            EXPECT_EQ(run.exit_code, 0) << run.err;
+            if (&error == &kind.errors.front()) num_sites += at - 1;
+            break;
+          }
+          ++num_runs;
+          const std::string what =
+              fmt::format("{}, {} {} of {}", command, std::strerror(error), at, ReadFile(log).value());
+          SCOPED_TRACE(what);
+          Contents after = ContentsOf(work_);
+          std::erase_if(after,
+                        [](const auto& file) { return file.first.find(".tmp-") != std::string::npos; });
+          check(run, after);
+          EXPECT_LT(run.exit_code, 64) << run.err;  // no crash
+          if (run.exit_code != 0) {
+            EXPECT_THAT(run.err, HasSubstr(folder_.string()));  // which file it was
+          }
+        }
+      }
+    }
+    std::printf("%s: %d calls, %d runs\n", command.c_str(), num_sites, num_runs);
+    EXPECT_GT(num_sites, 10);
+  }
+
+  // Calls that may fail: those on the test's own files; all of the program's, where somebody asks for it.
+  std::string Scope() const {
+    return std::getenv("CAIRN_FAULTS_EVERYWHERE") != nullptr ? "" : folder_.string();
+  }
+
+  static void WriteFile(const std::string& path, const std::string& bytes) {
+    std::FILE* const file = std::fopen(path.c_str(), "wb");
+    std::fwrite(bytes.data(), 1, bytes.size(), file);
+    std::fclose(file);
+    chmod(path.c_str(), 0600);
+  }
+
+  TemporaryFolder folder_;
+  std::string work_;
+};
+
+TEST_F(Faults, UpdateInPlaceLeavesTheOldOrTheNewMapAndTheRightOneBefore) {
+  const std::string older = Bytes("1"), old_map = Bytes("2"), new_map = Bytes("3");
+  const std::string command = "cairn apply " + work_ + "/map " + folder_ / "delta" +
+                              " --in-place --public-key " + folder_ / "key.pub";
+  ForEachFault(command, {{"map", old_map}, {"map.previous", older}},
+               [&](const ProgramRun& run, const Contents& after) {
+                 const bool is_new = after.at("map") == new_map;
+                 EXPECT_TRUE(is_new || after.at("map") == old_map);
+                 EXPECT_TRUE(is_new || run.exit_code != 0);
+                 EXPECT_EQ(after.size(), 2U);
+                 // A failed exchange back leaves the map itself as the one before.
+                 EXPECT_TRUE(after.at("map.previous") == (is_new ? old_map : older));
+                 if (is_new && run.exit_code != 0) {
+                   EXPECT_THAT(run.err, HasSubstr("is in place; but"));
+                 }
+               });
+}
+
+TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
+  const std::string command = "cairn apply " + work_ + "/map " + folder_ / "delta" + " --in-place";
+  ForEachFault(command, {{"map", Bytes("2")}}, [&](const ProgramRun& run, const Contents& after) {
+    const bool is_new = after.at("map") == Bytes("3");
+    EXPECT_TRUE(is_new || (after.at("map") == Bytes("2") && run.exit_code != 0));
+    EXPECT_EQ(after.count("map.previous"), is_new ? 1U : 0U);
+    if (is_new) {
+      EXPECT_TRUE(after.at("map.previous") == Bytes("2"));
+    }
+  });
+}
+
+// What stands there has the size of what is to be written: for maps and keys of one place it mostly does.
+TEST_F(Faults, OutputIsTheOldOneOrTheWholeNewOne) {
+  const std::string one = folder_ / "unsigned", key = " --key " + folder_ / "key";
+  struct Case {
+    std::string command, expected;
+  };
+  for (const Case& each : {Case{"cairn apply " + folder_ / "2" + " " + folder_ / "delta", "3"},
+                           Case{"cairn sign " + one + key + " --epoch 3", "3"},
+                           Case{"cairn sign " + one + key + " --after " + folder_ / "2", "3"},
+                           Case{"cairn delta " + folder_ / "2" + " " + folder_ / "3" + key, "delta"}}) {
+    const std::string expected = Bytes(each.expected), old_bytes(expected.size(), 'x');
+    ForEachFault(each.command + " -o " + work_ + "/out", {{"out", old_bytes}},
+                 [&](const ProgramRun& run, const Contents& after) {
+                   const bool is_new = after.at("out") == expected;
+                   EXPECT_TRUE(is_new || (after.at("out") == old_bytes && run.exit_code != 0));
+                   if (is_new && run.exit_code != 0) {
+                     EXPECT_THAT(run.err, HasSubstr("is in place; but"));
+                   }
+                 });
+  }
+}
+
+TEST_F(Faults, RollbackExchangesBothMapsOrNone) {
+  const std::string command = "cairn rollback " + work_ + "/map --public-key " + folder_ / "key.pub";
+  ForEachFault(command, {{"map", Bytes("2")}, {"map.previous", Bytes("1")}},
+               [&](const ProgramRun& run, const Contents& after) {
+                 const bool is_back = after.at("map") == Bytes("1");
+                 EXPECT_TRUE(is_back || run.exit_code != 0);
+                 EXPECT_TRUE(after.at("map") == Bytes(is_back ? "1" : "2"));
+                 EXPECT_TRUE(after.at("map.previous") == Bytes(is_back ? "2" : "1"));
+                 if (is_back && run.exit_code != 0) {
+                   EXPECT_THAT(run.err, HasSubstr("is in place; but"));
+                 }
+               });
+}
+
+TEST_F(Faults, KeysAreAPairOrNotThere) {
+  ForEachFault("cairn keygen " + work_ + "/key", {}, [&](const ProgramRun& run, const Contents& after) {
+    EXPECT_EQ(after.count("key"), after.count("key.pub"));
+    EXPECT_TRUE(run.exit_code != 0 || after.count("key") == 1);
+    if (after.count("key") == 1) {
+      EXPECT_EQ(after.at("key").size(), 129U);
+      EXPECT_EQ(after.at("key").substr(64, 64), after.at("key.pub").substr(0, 64));
+    }
+  });
+}
+
+// The last thing that can fail is to say so.
+TEST_F(Faults, FullStandardOutputIsSaidWithWhatIsDone) {
+  fs::copy_file(folder_ / "2", work_ + "/map");
+  const ProgramRun run =
+      RunShell("cairn apply " + work_ + "/map " + folder_ / "delta" + " --in-place >/dev/full");
+  EXPECT_EQ(run.exit_code, static_cast<int>(ErrorCode::kIo));
+  EXPECT_THAT(run.err, HasSubstr("standard output cannot be written"));
+  EXPECT_THAT(run.err, HasSubstr("files that were asked for are written"));
+  EXPECT_EQ(ReadFile(work_ + "/map").value(), Bytes("3"));
+}
+
+}  // namespace
+}  // namespace cairn
