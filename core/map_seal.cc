@@ -12,6 +12,7 @@
 
 #include "core/blob.h"
 #include "core/database.h"
+#include "core/file_descriptor.h"
 #include "core/input_file.h"
 #include "core/signature.h"
 #include "core/write_error.h"

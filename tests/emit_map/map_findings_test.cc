@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/database.h"
+#include "core/map_file.h"
 #include "core/map_rows.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/emit_map/example.h"
@@ -101,13 +102,22 @@ TEST(GoldenMap, Version2_1IsRead) {
   EXPECT_EQ(rows->vocabulary.num_words(), 1);
 }
 
-TEST(MapFindings, MapWithoutTheTablesHasNone) {
-  ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("older.cairn")).ok());
-  SQLite::Database(MapPath("older.cairn"), SQLite::OPEN_READWRITE)
-      .exec("DROP TABLE self_test_regions; DROP TABLE region_entropies; DROP TABLE drop_reasons");
-  const Result<MapRows> read = ReadMapRows(MapPath("older.cairn"));
+TEST(MapFindings, MapOfAFormatWithoutTheTablesHasNone) {
+  const Result<MapRows> read = ReadMapRows(GOLDEN_DIR "/map_2.0.cairn");
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->findings, MapFindings());
+}
+
+TEST(MapFindings, ChangedOrMissingFindingsAreRefused) {
+  for (const char* const sql :
+       {"DROP TABLE self_test_regions", "DROP TABLE region_entropies; DROP TABLE drop_reasons",
+        "UPDATE drop_reasons SET num_dropped = num_dropped + 1"}) {
+    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("changed.cairn")).ok());
+    SQLite::Database(MapPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapFile> file = MapFile::Open(MapPath("changed.cairn"), {});  // which does not read them
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    EXPECT_EQ(file->ReadFindings().error().code, ErrorCode::kCorrupt) << sql;
+  }
 }
 
 }  // namespace
