@@ -77,9 +77,8 @@ Result<std::pair<int, int>> ChosenScans(const Arguments& arguments, int num_scan
   if (!arguments.has_scan) return std::pair(0, num_scans);
   int scan = 0;
   if (ParseNumber(arguments.scan, &scan) && scan >= 0 && scan < num_scans) return std::pair(scan, scan + 1);
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: --scan '{}' is none of its {} scans; they have the numbers 0 to {}", arguments.scans,
-                   arguments.scan, num_scans, num_scans - 1);
+  return MakeError(ErrorCode::kInvalidArgument, "{}: --scan '{}': it has {} scan(s), numbered 0 to {}",
+                   arguments.scans, arguments.scan, num_scans, num_scans - 1);
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {

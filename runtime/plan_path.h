@@ -32,7 +32,7 @@ struct PlanPath {
 
 // The shortest path [Simsarian96 §4 plans over the adjacency graph of regions; there ways go from border to
 // border, which finds no shortest one, and none where a border's middle is too near to a wall].  Exact for a
-// point; for a disc at most 2 % longer.  From a place to itself: this one point, no links.
+// point; plan_roadmap.h says how near to it for a disc.  From a place to itself: this one point, no links.
 // Errors: InvalidArgument (options, a place outside of the domain), NoData (no way for this radius, a place
 // nearer to a wall than it, or on a wall).
 Result<PlanPath> FindPath(const PlanSpace& space, const Eigen::Vector2d& from, const Eigen::Vector2d& to,

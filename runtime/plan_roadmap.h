@@ -11,8 +11,8 @@ namespace cairn {
 
 // Nodes of a plan joined by free straight links: places that are asked for, and points around the corners of
 // walls where a robot of one radius turns.  It is the visibility graph of the walls grown by the robot
-// [Lozano-Perez79]: if there is a way at all, there is one over these nodes, and the shortest is among them.
-// All kinds of paths are planned over it, so that they agree whether there is a way.
+// [Lozano-Perez & Wesley, CACM 1979]: if there is a way at all, there is one over these nodes, and the
+// shortest is among them. All kinds of paths are planned over it, so that they agree whether there is a way.
 //
 // A point robot (radius 0) turns at the corners themselves.  It may touch walls and walk along them, but
 // passes no joint: a link that ends at a corner ends on one side of the walls there.  Exact.

@@ -54,7 +54,16 @@ TEST(Options, ValueOutsideItsRangeIsAnError) {
   Fields fields;
   EXPECT_THAT(SetOption(Describe(&fields)[1], "0").error().message,
               testing::HasSubstr("must be in [1, 100]"));
-  EXPECT_FALSE(SetOption(Describe(&fields)[2], "nan").ok());
+  for (const char* text : {"nan", "inf", "-inf", "1e999"})
+    EXPECT_FALSE(SetOption(Describe(&fields)[2], text).ok()) << text;
+  // Also where the range has no end.
+  double open = 1;
+  for (const char* text : {"inf", "-inf", "nan"}) {
+    EXPECT_THAT(SetOption({.name = "open", .value = &open, .min = 0}, text).error().message,
+                testing::HasSubstr("must be a finite number, at least 0"));
+    EXPECT_THAT(SetOption({.name = "open", .value = &open}, text).error().message,
+                testing::HasSubstr("must be a finite number"));
+  }
   EXPECT_THAT(SetOption(Describe(&fields)[3], "all").error().message, testing::HasSubstr("auto, frustum"));
 }
 

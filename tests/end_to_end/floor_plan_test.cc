@@ -58,6 +58,24 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   const ProgramRun apart = Run("tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
   ASSERT_EQ(apart.exit_code, 0) << apart.err;
   EXPECT_GT(json::parse(apart.out)["case"].get<int>(), 0);
+  EXPECT_EQ(json::parse(apart.out)["outcome"], "found");
+}
+
+TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
+  ASSERT_TRUE(WriteFileAtomically(Path("twins.txt"),
+                                  "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n"
+                                  "10,0,13,0\n13,0,13,3\n13,3,10,3\n10,3,10,0\n10,2,12,2\n")
+                  .ok());
+  ASSERT_EQ(Run("decompose-views twins.txt -o twins.db").exit_code, 0);
+  const std::string poses = "tell-apart twins.db --a 1,1,0 --b 11,1,0 ";
+  const ProgramRun alike = Run(poses);
+  EXPECT_EQ(alike.exit_code, 0) << alike.err;
+  EXPECT_EQ(json::parse(alike.out)["outcome"], "alike");
+  const ProgramRun gave_up = Run(poses + "--max-num-regions 2 --svg apart.svg");
+  EXPECT_EQ(gave_up.exit_code, 1);
+  EXPECT_EQ(json::parse(gave_up.out)["outcome"], "gave_up");
+  EXPECT_THAT(gave_up.err, HasSubstr("--max-num-regions"));
+  EXPECT_THAT(*ReadFile(Path("apart.svg")), HasSubstr("gave up after 2 regions"));
 }
 
 TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
@@ -70,6 +88,11 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   write("open.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[1,0],[1,1],[0,1]]]}");
   write("crossing.json", "{\"type\": \"Polygon\", \"coordinates\": [[[0,0],[2,2],[2,0],[0,2],[0,0]]]}");
   write("one.txt", "1,-1,1,1\n");
+  write("scan.txt", "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n");
+  write(
+      "twins.txt",
+      "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n10,0,13,0\n13,0,13,3\n13,3,10,3\n10,3,10,0\n10,2,12,2\n");
+  ASSERT_EQ(Run("decompose-views twins.txt -o twins.db").exit_code, 0);
   struct Case {
     std::string arguments;
     int exit_code;
@@ -84,7 +107,25 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"decompose-views plan.txt -o out.db --grid-m 1", 2, "grid_m"},
            Case{"locate-scan views.db one.txt", 6, "at least two"},
            Case{"locate-scan plan.txt one.txt", 4, "plan.txt"},
+           Case{"locate-scan views.db scan.txt --scan -5", 2, "'-5': it has 1 scan(s), numbered 0 to 0"},
+           Case{"locate-scan views.db scan.txt --scan 1", 2, "1 scan(s)"},
+           Case{"locate-scan views.db scan.txt --scan nan", 2, "1 scan(s)"},
+           Case{"locate-scan views.db scan.txt --scan ''", 2, "1 scan(s)"},
+           Case{"locate-scan views.db scan.txt --scan 0.5", 2, "1 scan(s)"},
+           Case{"locate-scan views.db scan.txt --scan 99999999999", 2, "1 scan(s)"},
+           Case{"locate-scan views.db scan.txt --split-m inf", 2, "split_m"},
+           Case{"locate-scan views.db scan.txt --max-null-ratio nan", 2, "max_null_ratio"},
            Case{"plan-path views.db --from 1,1", 2, "--to"},
+           Case{"plan-path views.db --from 1,1 --to 3.5,1", 6, "does not fit at (3.5, 1): a wall is 0.000 m"},
+           Case{"plan-path views.db --from 1,1 --to 3.5,1 --radius-m 0", 6, "lies on a wall"},
+           Case{"plan-path views.db --from nan,1 --to 1,1", 2, "no region"},
+           Case{"plan-path views.db --from 1,1 --to 5,1 --radius-m nan", 2, "radius_m"},
+           Case{"plan-path views.db --from 1,1 --to 5,1 --kind search", 2, "takes no --to"},
+           Case{"tell-apart views.db --a 1,2,0 --b 5,2,nan", 2, "--b 5,2,nan: the heading"},
+           Case{"tell-apart views.db --a 1,2,361 --b 5,2,0", 2, "--a 1,2,361: the heading"},
+           Case{"tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},
+           Case{"tell-apart views.db --a 1,2,0 --b 5,2,0 --max-num-regions 0", 2, "max_num_regions"},
+           Case{"tell-apart twins.db --a 1,1,0 --b 11,1,0 --max-num-regions 2", 1, "gave up"},
            Case{"plan-path views.db --from 1,1 --to 50,1", 2, "no region"},
        }) {
     const ProgramRun run = Run(arguments);
