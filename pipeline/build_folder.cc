@@ -152,7 +152,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string capture = CaptureFolder(recipe, paths.build_dir);
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   const std::string floor_plan = FloorPlanPath(recipe, capture);
-  CAIRN_ASSIGN_OR_RETURN(const SessionWords sessions, JoinedSessions(recipe));
+  const SessionWords sessions = JoinedSessions(recipe);
   if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
