@@ -45,6 +45,14 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
     return MakeError(ErrorCode::kInvalidArgument,
                      "--kind search ends where the last of the plan is seen: it takes no --to");
   }
+  if (arguments.kind != "search") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"seen_ratio"}, "is for --kind search; leave it out, or change the kind"));
+  }
+  if (arguments.kind == "short") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"max_num_places"}, "is for --kind min-link and search; leave it out, or change the kind"));
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
   const PlanSpace space(views);
