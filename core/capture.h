@@ -48,9 +48,10 @@ Result<Capture> ReadCapture(const std::string& root);
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
 // may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;
-// smaller differences are normalised away.
+// smaller differences are normalised away.  Names with a control character go to `rejects` too.
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects);
-// REQUIRES: every image has a pose.  Ids are 1, 2, ... in the given order.
+// REQUIRES: every image has a pose.  Ids are 1, 2, ... in the given order.  Errors: InvalidArgument (a name
+// with a control character: CheckListedName), Io.
 Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>& images);
 Result<std::map<CameraId, Camera>> ReadCamerasText(const std::string& path);
 Status WriteCamerasText(const std::string& path, const std::map<CameraId, Camera>& cameras);

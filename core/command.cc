@@ -48,7 +48,21 @@ Status OptionArguments::Apply() const {
   for (size_t i = 0; i < table_.size(); ++i) {
     if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(SetOption(table_[i], texts_[i]));
   }
-  return CheckOptions(table_);
+  CAIRN_RETURN_IF_ERROR(CheckOptions(table_));
+  for (size_t i = 0; i < table_.size(); ++i) {
+    if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(CheckIsRead(table_[i], table_));
+  }
+  return Ok();
+}
+
+Status OptionArguments::RefuseGiven(const std::vector<std::string>& names, const std::string& reason) const {
+  for (size_t i = 0; i < table_.size(); ++i) {
+    const bool is_named = std::find(names.begin(), names.end(), table_[i].name) != names.end();
+    if (is_named && arguments_[i]->count() > 0) {
+      return MakeError(ErrorCode::kInvalidArgument, "--{}: {}", Dashed(table_[i].name), reason);
+    }
+  }
+  return Ok();
 }
 
 }  // namespace cairn

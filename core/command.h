@@ -50,7 +50,13 @@ class OptionArguments {
  public:
   // `table` points into an options struct that outlives this object.
   void Add(CLI::App& app, OptionTable table);
+  // Errors: those of ReadOptionsFile, SetOption and CheckOptions; InvalidArgument for an option of the
+  // command line that nothing reads beside the others (CheckIsRead): one in the file may be meant for other
+  // runs.
   Status Apply() const;
+  // Refuses options of these names that are on the command line.  Errors: InvalidArgument: "--NAME:
+  // `reason`".
+  Status RefuseGiven(const std::vector<std::string>& names, const std::string& reason) const;
 
  private:
   OptionTable table_;

@@ -10,6 +10,8 @@
 namespace cairn {
 namespace {
 
+constexpr std::string_view kNot = "not ";
+
 std::string RangeText(const Option& option) {
   if (std::isinf(option.max)) return fmt::format("at least {:g}", option.min);
   if (std::isinf(option.min)) return fmt::format("at most {:g}", option.max);
@@ -76,6 +78,41 @@ Status CheckOptions(const OptionTable& table) {
         std::find(option.choices.begin(), option.choices.end(), **text) == option.choices.end()) {
       return MakeError(ErrorCode::kInvalidArgument, "option {} = '{}': must be one of {}", option.name,
                        **text, fmt::join(option.choices, ", "));
+    }
+  }
+  return Ok();
+}
+
+std::vector<std::string> NamesOf(const OptionTable& table) {
+  std::vector<std::string> names;
+  for (const Option& option : table) names.push_back(option.name);
+  return names;
+}
+
+void AddCondition(const OptionCondition& condition, const std::vector<std::string>& names,
+                  OptionTable* table) {
+  for (const std::string& name : names) {
+    const auto is_named = [&](const Option& option) { return option.name == name; };
+    std::find_if(table->begin(), table->end(), is_named)->only_where.push_back(condition);
+  }
+}
+
+Status CheckIsRead(const Option& option, const OptionTable& table) {
+  const auto shown = [](const std::string& value) { return value.empty() ? "empty" : value; };
+  for (const OptionCondition& condition : option.only_where) {
+    for (const Option& other : table) {
+      if (other.name != condition.option) continue;
+      const std::string value = OptionValueText(other);
+      const auto holds = [&](const std::string& allowed) {
+        return allowed.starts_with(kNot) ? value != allowed.substr(kNot.size()) : value == allowed;
+      };
+      if (std::any_of(condition.values.begin(), condition.values.end(), holds)) continue;
+      std::string allowed;
+      for (const std::string& text : condition.values)
+        allowed += (allowed.empty() ? "" : " or ") + shown(text);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{} is only read where {} is {}, and it is {}; leave {} out, or change {}",
+                       option.name, other.name, allowed, shown(value), option.name, other.name);
     }
   }
   return Ok();

@@ -193,6 +193,11 @@ Status Clean(const Arguments& arguments, std::ostream& out) {
     return CleanBuildFolder(build_dir.string(), target, arguments, out);
   }
   if (fs::is_directory(target, error)) {
+    if (!arguments.build_dir.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{} is a folder, and --build-dir names another; leave one of them out",
+                       arguments.target);
+    }
     return CleanBuildFolder(target.string(), ConfiguredMap(target.string()), arguments, out);
   }
   if (!fs::exists(target, error))

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
@@ -152,12 +153,21 @@ Status TellOfRun(const BuildRun& run, const BuildPaths& paths, std::ostream& out
   return Ok();
 }
 
+// Keys that the recipe has and nothing reads.
+void WarnOfUnreadKeys(const Recipe& recipe) {
+  std::vector<std::pair<std::string, std::string>> skipped;
+  if (!IsReconstructed(recipe)) skipped.emplace_back("reconstruct", "the capture has poses of its own");
+  if (!HasFloorPlan(recipe)) skipped.emplace_back("decompose_views", "the recipe names no floor plan");
+  for (const std::string& line : UnreadKeys(recipe, skipped)) spdlog::warn("{}", line);
+}
+
 Status Compile(Arguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   const auto begin = std::chrono::steady_clock::now();
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
   CAIRN_ASSIGN_OR_RETURN(const std::string goal, MakeGoal(arguments.until, recipe, paths));
+  WarnOfUnreadKeys(recipe);
   CAIRN_ASSIGN_OR_RETURN(const std::string rules, RulesPath(paths.program));
   const std::string session = NewBuildSession();
   CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, session));
@@ -207,6 +217,7 @@ Status Compile(Arguments arguments, const CommandEnvironment& environment) {
 Status Configure(Arguments arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
+  WarnOfUnreadKeys(recipe);
   CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, BuildSession()));
   return WriteBuildFolder(recipe, paths);
 }

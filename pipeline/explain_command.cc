@@ -145,6 +145,13 @@ Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const Comma
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  if (!arguments.build_dir.empty() && !arguments.image) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--build-dir {}: is where --image is looked for among the rejected; give --image, or leave it "
+        "out",
+        arguments.build_dir);
+  }
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
   if (arguments.image) return ExplainImage(arguments, rows, environment);
   if (arguments.place) return ExplainPlace(arguments, rows, environment);

@@ -88,6 +88,28 @@ class CameraChoice {
   std::map<CameraId, Camera> cameras_;
 };
 
+// What only another estimator or a sequence reads is refused.
+Status CheckWhatIsRead(const Arguments& arguments) {
+  if (!arguments.camera.empty() && !arguments.cameras_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--camera is the camera of all images, --cameras has one for each size; leave one out");
+  }
+  if (!arguments.is_sequence) {
+    RegionTrackerOptions of_tracker;
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        NamesOf(DescribeOptions(&of_tracker)), "is for frames in order; give --sequence, or leave it out"));
+  }
+  if (arguments.estimator == "pnp") {
+    VisualMapOptions of_map;
+    VisualEstimateOptions of_estimate;
+    for (const OptionTable& table : {DescribeOptions(&of_map), DescribeOptions(&of_estimate)}) {
+      CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+          NamesOf(table), "is for --estimator visual-map or both; give one of them, or leave it out"));
+    }
+  }
+  return Ok();
+}
+
 Status CheckEstimator(const Arguments& arguments) {
   if (arguments.estimator != "pnp" && arguments.is_sequence) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -245,6 +267,7 @@ class ImageNames {
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
+  CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
   cv::setNumThreads(1);  // images in parallel, each on one thread
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   std::shared_ptr<const VisualMap> visual;

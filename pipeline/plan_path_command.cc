@@ -40,6 +40,14 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   if (arguments.kind != "search" && arguments.to.empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "--kind {} needs --to X,Y", arguments.kind);
   }
+  if (arguments.kind == "search" && !arguments.to.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--kind search sees all of the plan and goes to no place; leave --to out");
+  }
+  if (arguments.kind != "search") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"max_num_places", "seen_ratio"}, "is for --kind search; leave it out, or change the kind"));
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
   const PlanSpace space(views);

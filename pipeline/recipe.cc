@@ -121,7 +121,14 @@ class RecipeReader {
     for (const StageOptions& stage : recipe_.stages) {
       if (stage.stage != "filter_visibility") continue;
       for (const Option& option : stage.table) {
-        if (option.name == "up") return SetOption(option, recipe_.up);
+        if (option.name != "up") continue;
+        if (const std::string stated = OptionValueText(option); stated != "auto" && stated != recipe_.up) {
+          return MakeError(
+              ErrorCode::kInvalidArgument,
+              "{}: up of a [[capture]] is {} and that of [filter_visibility] {}; keep one of them", path_,
+              recipe_.up, stated);
+        }
+        return SetOption(option, recipe_.up);
       }
     }
     return Ok();
@@ -146,6 +153,8 @@ class RecipeReader {
       return UnknownKey(path_, key, node.is_table() ? "table" : "key", valid);
     }
     if (!node.is_table()) return WrongType(path_, node, name, "a table of the stage's options");
+    for (const auto& [option, value] : *node.as_table())
+      recipe_.stage_keys.push_back({TomlPlace(path_, value), name, std::string(option.str())});
     if (name == "simulate") return ReadSimulate(*node.as_table(), stage->table);
     return SetOptionsFromToml(*node.as_table(), path_, stage->table);
   }
@@ -312,6 +321,29 @@ void AppendOptions(std::string* page, const OptionTable& table) {
 }
 
 }  // namespace
+
+std::vector<std::string> UnreadKeys(const Recipe& recipe,
+                                    const std::vector<std::pair<std::string, std::string>>& skipped) {
+  std::vector<std::string> lines;
+  for (const Recipe::Key& key : recipe.stage_keys) {
+    const auto skip = std::find_if(skipped.begin(), skipped.end(),
+                                   [&](const auto& stage) { return stage.first == key.stage; });
+    if (skip != skipped.end()) {
+      lines.push_back(
+          fmt::format("{}: [{}] {} is not read: {}", key.place, key.stage, key.name, skip->second));
+      continue;
+    }
+    for (const StageOptions& stage : recipe.stages) {
+      if (stage.stage != key.stage) continue;
+      for (const Option& option : stage.table) {
+        if (option.name != key.name) continue;
+        if (const Status status = CheckIsRead(option, stage.table); !status.ok())
+          lines.push_back(fmt::format("{}: [{}] {}", key.place, key.stage, status.error().message));
+      }
+    }
+  }
+  return lines;
+}
 
 std::string NameOfFolder(const std::string& path) {
   fs::path folder(path);

@@ -32,6 +32,13 @@ struct Recipe {
   // [simulate] floor_plan: a file of the rendered capture, relative to it; empty = none.
   std::string simulated_floor_plan;
   std::vector<StageOptions> stages;  // in the order of the line, defaults overridden by the recipe's tables
+  // Keys of stages' tables that the recipe has, in its order.
+  struct Key {
+    std::string place;  // "FILE:LINE"
+    std::string stage;
+    std::string name;
+  };
+  std::vector<Key> stage_keys;
 };
 
 // Reads a recipe.  `stages` are the stages with their defaults (AllStageOptions()).
@@ -39,6 +46,12 @@ struct Recipe {
 // valid one), a wrong type or a value outside its range, two captures of one name or folder, or of different
 // up directions.  Each names the file and the line.
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages);
+
+// Keys of the recipe that no stage reads beside its others: a line for each, with its place and the reason.
+// One recipe may serve several captures, so that they are told and not refused.  `skipped`: stages that do
+// not run, and why.
+std::vector<std::string> UnreadKeys(const Recipe& recipe,
+                                    const std::vector<std::pair<std::string, std::string>>& skipped);
 
 // The name that a map or a session has by its folder: what a name cannot have becomes '_'.
 std::string NameOfFolder(const std::string& path);

@@ -146,6 +146,11 @@ Status WritePictures(const std::string& folder, const MapRows& rows) {
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  if (arguments.print && !(arguments.drive_path.empty() && arguments.compare_path.empty())) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--print has no room for --drive and --compare, which live by being clicked; leave one out");
+  }
   const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
   const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
   const std::string pareto_path = Beside(arguments, "", ".pareto.csv");

@@ -92,7 +92,7 @@ const char* NoFixName(NoFix reason) {
 }
 
 OptionTable DescribeOptions(AcceptOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "min_num_features",
        .value = &o->min_num_features,
        .help = "least features of the image",
@@ -150,6 +150,9 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .help = "poses this far apart are different, degrees",
        .min = 1e-6},
   };
+  AddCondition({"max_second_pose_ratio", {"not 0"}},
+               {"num_second_pose_iterations", "second_pose_distance_m", "second_pose_angle_deg"}, &table);
+  return table;
 }
 
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,

@@ -127,6 +127,7 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
                    .value = &options->fall_back_max_num_landmarks,
                    .help = "but not in maps of more landmarks than this",
                    .min = 0});
+  AddCondition({"fall_back_to_all", {"true"}}, {"fall_back_max_num_landmarks"}, &table);
   return table;
 }
 

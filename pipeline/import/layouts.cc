@@ -103,6 +103,22 @@ Status ReplaceCameras(const std::string& text, ImportedSurvey* survey) {
   return Ok();
 }
 
+// What only other layouts read is refused.
+Status CheckIsRead(const std::string& layout, const ImportOptions& options) {
+  const auto check = [&](bool is_given, const char* option,
+                         const std::vector<std::string>& layouts) -> Status {
+    if (!is_given || std::find(layouts.begin(), layouts.end(), layout) != layouts.end()) return Ok();
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} is for {}, and the data set's layout is {}; leave it out", option,
+                     fmt::join(layouts, ", "), layout);
+  };
+  CAIRN_RETURN_IF_ERROR(check(!options.images_folder.empty(), "--images", {"colmap"}));
+  CAIRN_RETURN_IF_ERROR(check(!options.sequence.empty(), "--sequence", {"kitti"}));
+  CAIRN_RETURN_IF_ERROR(check(!options.sensors.empty(), "--sensors", {"kitti", "euroc", "kapture"}));
+  return check(options.max_time_gap_s != ImportOptions().max_time_gap_s, "--max-time-gap-s",
+               {"tum", "euroc"});
+}
+
 }  // namespace
 
 Result<std::string> DetectLayout(const std::string& source) {
@@ -129,6 +145,7 @@ Result<ImportedSurvey> ReadSurvey(const std::string& source, const ImportOptions
     return MakeError(ErrorCode::kInvalidArgument,
                      "format '{}' is none of auto, colmap, tum, 7scenes, kitti, euroc, kapture", name);
   }
+  CAIRN_RETURN_IF_ERROR(CheckIsRead(name, options));
   CAIRN_ASSIGN_OR_RETURN(ImportedSurvey survey, layout->read(source, options));
   if (!options.camera.empty()) CAIRN_RETURN_IF_ERROR(ReplaceCameras(options.camera, &survey));
   LeaveOutMissing(&survey);

@@ -67,7 +67,7 @@ void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_d
 }  // namespace
 
 OptionTable DescribeOptions(BuildVocabularyOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "branching",
        .value = &o->tree.branching,
        .help = "most children of a node [Mariottini11: 10]",
@@ -105,6 +105,12 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
                "the recipe; "
                "empty: words are learnt"},
   };
+  AddCondition({"depth", {"0"}}, {"descriptors_per_word"}, &table);
+  AddCondition({"tree_from", {""}},
+               {"branching", "depth", "descriptors_per_word", "min_num_descriptors_to_split",
+                "max_num_training_descriptors", "max_num_iterations"},
+               &table);
+  return table;
 }
 
 Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,

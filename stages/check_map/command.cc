@@ -141,8 +141,35 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
                          environment.num_threads, *environment.progress, &report->figures);
 }
 
+// What is for held-out images or scans, and there are none, is refused.
+Status CheckWhatIsRead(const Arguments& arguments) {
+  if (arguments.queries_path.empty() && !arguments.capture_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--capture {}: is where the images of --queries are; give --queries, or leave it out",
+                     arguments.capture_path);
+  }
+  if (arguments.queries_path.empty() && !arguments.scans_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--scans {}: scan i was taken with held-out image i; give --queries, or leave it out",
+                     arguments.scans_path);
+  }
+  if (arguments.queries_path.empty() && arguments.output_path.empty()) {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"min_localized_ratio", "min_precision_ratio", "min_region_localized_ratio",
+         "min_region_precision_ratio", "min_region_held_out", "plan_must_fit"},
+        "is a gate for held-out images or for a map to seal; give --queries or -o, or leave it out"));
+  }
+  if (arguments.scans_path.empty()) {
+    CAIRN_RETURN_IF_ERROR(
+        arguments.option_arguments.RefuseGiven({"scan_x_m", "scan_y_m", "scan_heading_deg"},
+                                               "says where the laser of --scans stands; give --scans"));
+  }
+  return Ok();
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
   for (const std::string& path : {arguments.output_path, arguments.details_path}) {
     if (!path.empty()) CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(path));
   }

@@ -161,7 +161,7 @@ class Chooser {
 }  // namespace
 
 OptionTable DescribeOptions(ChooseFeaturesOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "feature_choice",
        .value = &o->feature_choice,
        .help =
@@ -200,6 +200,11 @@ OptionTable DescribeOptions(ChooseFeaturesOptions* o) {
        .min = 1e-2,
        .max = 1e3},
   };
+  AddCondition({"feature_choice", {"pose"}},
+               {"min_kept_ratio", "keypoint_sigma_px", "keypoint_sigma_per_scale", "confusion_angle_rad",
+                "rough_sigma_m", "rough_sigma_deg"},
+               &table);
+  return table;
 }
 
 Result<Decomposition> ChooseFeatures(const World& world, const Classes& classes,

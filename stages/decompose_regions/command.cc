@@ -38,6 +38,12 @@ void WarnIfDisconnected(const World& world) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  if (arguments.classes.empty()) {
+    ChooseFeaturesOptions of_choice;
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        NamesOf(DescribeOptions(&of_choice)),
+        "features are chosen among those of the classes; give --classes, or leave it out"));
+  }
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("decomposing the world", arguments.world, kMemoryPerWorldByte,
                                            environment.memory_mib));
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("choosing landmarks by the classes", arguments.classes,
@@ -56,7 +62,13 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     }
   }
   const Decomposition& decomposition = *result;
-  if (arguments.options.algorithm == "best" && world.num_stations() > arguments.options.best_max_stations) {
+  const bool is_large = world.num_stations() > arguments.options.best_max_stations;
+  if (is_large && arguments.options.algorithm != "best" && arguments.options.lower_bound == "certified") {
+    spdlog::warn(
+        "{} stations are more than best_max_stations = {}: the lower bound is counted, not certified",
+        world.num_stations(), arguments.options.best_max_stations);
+  }
+  if (is_large && arguments.options.algorithm == "best") {
     spdlog::warn(
         "{} stations are more than best_max_stations = {}: the regions are those of b2, the lower bound is "
         "counted",

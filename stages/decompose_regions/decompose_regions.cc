@@ -140,6 +140,8 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
   };
   const OptionTable choose_features = DescribeOptions(&o->choose_features);
   table.insert(table.end(), choose_features.begin(), choose_features.end());
+  AddCondition({"algorithm", {"c"}}, {"alpha"}, &table);
+  AddCondition({"algorithm", {"best"}}, {"best_exchanges_per_station", "best_num_repairs"}, &table);
   return table;
 }
 
@@ -190,6 +192,8 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
                                    .num_repairs = options.best_num_repairs},
                                   seed, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while decomposing regions");
+    if (options.lower_bound == "counted")
+      decomposition.lower_bound = CountingBound(reduced, decomposition.uncovered_limit);
   } else if (options.lower_bound == "certified" && is_small) {
     decomposition.lower_bound = CertifiedLowerBound(world, decomposition);
   } else if (options.lower_bound != "none") {

@@ -247,7 +247,7 @@ void AddRegionEntropies(MapRows* rows) {
 }  // namespace
 
 OptionTable DescribeOptions(EmitMapOptions* options) {
-  return {
+  OptionTable table = {
       {.name = "landmarks",
        .value = &options->landmarks,
        .help = "classes that become landmarks: those that regions keep, or all",
@@ -302,6 +302,9 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",
        .min = 0}};
+  AddCondition({"max_bytes", {"not 0"}}, {"left_out_max_error_m", "left_out_max_error_deg"}, &table);
+  AddCondition({"visual_map", {"true"}}, {"max_num_sights", "bad_model_px"}, &table);
+  return table;
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,

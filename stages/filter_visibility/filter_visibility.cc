@@ -83,7 +83,7 @@ Result<std::vector<StationIdx>> AreaOfClass(const FeatureClass& feature_class, c
 }  // namespace
 
 OptionTable DescribeOptions(FilterVisibilityOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "survey",
        .value = &o->survey,
        .help = "how the survey was taken",
@@ -139,6 +139,14 @@ OptionTable DescribeOptions(FilterVisibilityOptions* o) {
        .help = "least number of connected stations that see a class (driven)",
        .min = 1},
   };
+  AddCondition({"up", {"auto"}}, {"up_snap_deg"}, &table);
+  AddCondition({"survey", {"auto", "lattice"}},
+               {"same_place_m", "min_num_stations", "max_hole_stations", "max_num_holes", "min_block_side",
+                "min_num_neighbours"},
+               &table);
+  AddCondition({"survey", {"auto", "driven"}}, {"cell_size_m", "heading_bin_deg", "min_num_stations_driven"},
+               &table);
+  return table;
 }
 
 Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,

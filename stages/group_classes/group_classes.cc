@@ -176,7 +176,7 @@ void MeasurePoseNoise(Classes* classes) {
 OptionTable DescribeOptions(GroupClassesOptions* o) {
   TriangulateOptions& t = o->triangulation;
   RefinePosesOptions& r = o->refinement;
-  return {
+  OptionTable table = {
       {.name = "min_num_observations",
        .value = &t.min_num_observations,
        .help = "fewest keypoints of a class",
@@ -253,6 +253,14 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
        .help = "look-alikes closer than this are one scene feature found twice, metres",
        .min = 0},
   };
+  AddCondition({"refine_poses", {"auto"}}, {"auto_refine_error_px"}, &table);
+  AddCondition({"refine_poses", {"auto", "always"}},
+               {"num_rounds", "pose_sigma_m", "pose_sigma_deg", "refine_camera_offset", "offset_sigma_m",
+                "offset_sigma_deg", "refine_focal", "focal_sigma_ratio", "max_num_iterations"},
+               &table);
+  AddCondition({"refine_camera_offset", {"true"}}, {"offset_sigma_m", "offset_sigma_deg"}, &table);
+  AddCondition({"refine_focal", {"true"}}, {"focal_sigma_ratio"}, &table);
+  return table;
 }
 
 Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {

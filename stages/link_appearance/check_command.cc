@@ -1,4 +1,5 @@
 #include <optional>
+#include <set>
 
 #include "core/capture.h"
 #include "core/file.h"
@@ -17,6 +18,27 @@ struct Arguments {
   CheckAppearanceOptions check_options;
   OptionArguments option_arguments;
 };
+
+// The options of link_appearance that choose links, nodes and sets: what the line's own set is made by
+// otherwise (its algorithm, cycles and bound) and what is told of places that look alike has no part in this
+// check.
+OptionTable LinkOptionsRead(LinkAppearanceOptions* options) {
+  static const std::set<std::string> kRead = {"min_num_inliers",
+                                              "max_link_distance_m",
+                                              "max_link_turn_deg",
+                                              "fuse",
+                                              "same_place_m",
+                                              "max_num_dropped",
+                                              "num_dominators",
+                                              "strong_num_inliers",
+                                              "min_component_nodes",
+                                              "num_kept",
+                                              "num_tries"};
+  OptionTable table = DescribeOptions(options);
+  std::erase_if(table, [](const Option& option) { return !kRead.contains(option.name); });
+  AddCondition({"num_kept", {"not 0"}}, {"num_dominators", "strong_num_inliers"}, &table);
+  return table;
+}
 
 // Names of one a line, or of COLMAP's images.txt, where they end every line of ten words.
 Result<std::vector<std::string>> ReadNames(const std::string& path) {
@@ -69,7 +91,16 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
   const LinkAppearanceOptions& options = arguments.options;
-  CAIRN_ASSIGN_OR_RETURN(const ImageLinks images, ReadImageLinks(arguments.matches, options.min_num_inliers));
+  if (capture && options.fuse != "place" && options.max_link_distance_m == 0 &&
+      options.max_link_turn_deg == 180) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--capture {}: poses are for --fuse place, --max-link-distance-m and --max-link-turn-deg; give "
+        "one of them, or leave the capture out",
+        arguments.capture);
+  }
+  CAIRN_ASSIGN_OR_RETURN(ImageLinks images, ReadImageLinks(arguments.matches, options.min_num_inliers));
+  CAIRN_ASSIGN_OR_RETURN(images.links, NearLinks(images, capture ? &*capture : nullptr, options));
   HeldOutSplit split{.survey = images};
   if (!arguments.held_out.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<std::string> names, ReadNames(arguments.held_out));
@@ -110,19 +141,17 @@ Command CheckAppearanceCommand() {
                 app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
                     ->required()
                     ->type_name("matches.db");
-                app.add_option("--capture", arguments->capture,
-                               "Capture folder with the survey's poses, for fuse = place");
+                app.add_option(
+                    "--capture", arguments->capture,
+                    "Capture folder with the survey's poses, for fuse = place, max_link_distance_m "
+                    "and max_link_turn_deg");
                 app.add_option("--held-out", arguments->held_out,
                                "Images of the database that are no survey: names, folders (ending in /) or "
                                "queries.txt; these are left out "
                                "together, instead of each image in turn")
                     ->type_name("FILE");
-                OptionTable table = DescribeOptions(&arguments->options);
-                for (Option& option : DescribeOptions(&arguments->check_options)) {
-                  // One name stands for one option on the command line.
-                  if (option.name == "max_num_dominators") option.help += " (num_dominators is not read)";
-                  table.push_back(option);
-                }
+                OptionTable table = LinkOptionsRead(&arguments->options);
+                for (Option& option : DescribeOptions(&arguments->check_options)) table.push_back(option);
                 arguments->option_arguments.Add(app, std::move(table));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};

@@ -41,6 +41,12 @@ std::string KeptText(const LinkAppearanceResult& result) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  if (arguments.vocabulary.empty()) {
+    AmbiguityOptions of_ambiguity;
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        NamesOf(DescribeOptions(&of_ambiguity)),
+        "places look alike by the words of vocabulary.db; give it, or leave this out"));
+  }
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
@@ -97,8 +103,8 @@ Command LinkAppearanceCommand() {
                 ->type_name("vocabulary.db");
             app.add_option("--capture", arguments->capture,
                            "Capture folder: only images of its survey count, and its poses are there for "
-                           "fuse = place and "
-                           "for the picture [all images]");
+                           "fuse = place, for max_link_distance_m and max_link_turn_deg, and for the picture "
+                           "[all images]");
             app.add_option("-o,--output", arguments->output, "File to write")
                 ->required()
                 ->type_name("appearance.db");

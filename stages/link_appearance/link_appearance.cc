@@ -144,12 +144,23 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
   }
 }
 
-// Those of images that stand no farther apart and are turned by no more, and of images without pose.
-std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& capture,
-                                      const LinkAppearanceOptions& options) {
+}  // namespace
+
+Result<std::vector<AppearanceLink>> NearLinks(const ImageLinks& images, const Capture* capture,
+                                              const LinkAppearanceOptions& options) {
+  const bool is_limited = options.max_link_distance_m > 0 || options.max_link_turn_deg < 180;
+  if (!is_limited) return images.links;
   std::map<std::string, Pose> poses;
-  for (const CaptureImage& image : capture.images) {
-    if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
+  if (capture != nullptr) {
+    for (const CaptureImage& image : capture->images) {
+      if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
+    }
+  }
+  if (poses.empty()) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "max_link_distance_m and max_link_turn_deg go by the capture's poses, and there are none: "
+        "give --capture with poses, or leave them out");
   }
   std::vector<std::optional<Pose>> pose_of;
   for (const DatabaseImage& image : images.images) pose_of.push_back(FindPose(poses, image.name));
@@ -164,8 +175,6 @@ std::vector<AppearanceLink> NearLinks(const ImageLinks& images, const Capture& c
   }
   return near;
 }
-
-}  // namespace
 
 OptionTable DescribeOptions(LinkAppearanceOptions* options) {
   ConnectedBoundOptions& bound = options->bound;
@@ -214,6 +223,14 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
   };
   const OptionTable ambiguity = DescribeOptions(&options->ambiguity);
   table.insert(table.end(), ambiguity.begin(), ambiguity.end());
+  AddCondition({"fuse", {"place"}}, {"same_place_m"}, &table);
+  AddCondition({"algorithm", {"online"}}, {"max_num_dropped"}, &table);
+  AddCondition({"algorithm", {"greedy"}}, {"num_tries"}, &table);
+  AddCondition({"num_kept", {"0"}}, {"max_detour_links"}, &table);
+  AddCondition({"lower_bound", {"auto"}}, {"max_num_program_links"}, &table);
+  AddCondition({"lower_bound", {"auto", "program"}}, {"max_num_cut_rounds", "max_num_branches"}, &table);
+  AddCondition({"max_num_confusable", {"not 0"}}, {"confusable_score_ratio", "confusable_distance_m"},
+               &table);
   return table;
 }
 
@@ -251,7 +268,8 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
                          FuseImages(images.images, options.fuse, options.same_place_m, capture));
   LinkAppearanceResult result;
   Appearance& appearance = result.appearance;
-  appearance.graph = FusedGraph(capture ? NearLinks(images, *capture, options) : images.links, node_of_image);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<AppearanceLink> links, NearLinks(images, capture, options));
+  appearance.graph = FusedGraph(links, node_of_image);
   appearance.num_dominators = options.num_dominators;
   appearance.strong_num_inliers = options.strong_num_inliers;
   appearance.max_detour_links = options.num_kept == 0 ? options.max_detour_links : 0;

@@ -71,6 +71,12 @@ struct LinkAppearanceResult {
   std::vector<std::string> notes;    // what is out of the ordinary about the graph or the set, for people
 };
 
+// The links that max_link_distance_m and max_link_turn_deg leave: those of images that stand no farther apart
+// and are turned by no more, and of images without pose.  `capture` may be null where neither limits
+// anything. Errors: InvalidArgument (a limit, and no pose to go by).
+Result<std::vector<AppearanceLink>> NearLinks(const ImageLinks& images, const Capture* capture,
+                                              const LinkAppearanceOptions& options);
+
 // The kept nodes of a graph, by the options, without bound: what is done for a survey as well as for a
 // left-out image (check_appearance.h).  Roles per node.  `num_greedy` may be null.
 std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppearanceOptions& options,
@@ -78,7 +84,8 @@ std::vector<NodeRole> ChooseKept(const AppearanceGraph& graph, const LinkAppeara
 
 // Pure: no files, no clock; same result for the same seed.  `capture` is for fuse = "place",
 // max_link_distance_m and max_link_turn_deg, and may be null.
-// `progress` may be null.  Errors: InvalidArgument (an option), NoData (no image), Cancelled.
+// `progress` may be null.  Errors: InvalidArgument (an option; poses that an option goes by, and there are
+// none), NoData (no image), Cancelled.
 Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capture* capture,
                                             const LinkAppearanceOptions& options, uint64_t seed,
                                             Progress* progress = nullptr);

@@ -55,9 +55,33 @@ void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::
       summary.num_taken_over, summary.num_left_to_others);
 }
 
+// What says which pairs to match is read, or refused.
+Status CheckWhatChoosesPairs(const Arguments& arguments) {
+  const bool is_listed = !arguments.inputs.pair_list_path.empty();
+  if (is_listed) {
+    MatchFeaturesOptions options;
+    std::vector<std::string> names = NamesOf(DescribeOptions(&options));
+    MatchPairsOptions of_pairs;
+    const std::vector<std::string> for_pairs = NamesOf(DescribeOptions(&of_pairs));
+    std::erase_if(names, [&](const std::string& name) {
+      return std::find(for_pairs.begin(), for_pairs.end(), name) != for_pairs.end();
+    });
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        names, "--pair-list says which pairs are matched; leave one of them out"));
+  }
+  const std::string& pairs = arguments.options.pairs;
+  const bool reads_words = !is_listed && (pairs == "auto" || pairs == "retrieval" || pairs == "sequence");
+  if (reads_words || arguments.inputs.vocabulary_path.empty()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "--vocabulary {}: words are for --pairs retrieval, sequence or auto, and {}; leave it out",
+                   arguments.inputs.vocabulary_path,
+                   is_listed ? "the pairs are those of --pair-list" : "--pairs is " + pairs);
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
+  CAIRN_RETURN_IF_ERROR(CheckWhatChoosesPairs(arguments));
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));

@@ -67,11 +67,18 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .min = 1},
   };
   for (OptionTable::value_type& option : DescribeOptions(&o->matching)) table.push_back(std::move(option));
+  AddCondition({"pairs", {"auto"}}, {"max_num_exhaustive_images"}, &table);
+  AddCondition({"pairs", {"auto", "retrieval"}}, {"num_retrieved"}, &table);
+  AddCondition({"pairs", {"sequence"}}, {"sequence_window", "num_loop_candidates"}, &table);
+  AddCondition({"pairs", {"auto", "frustum"}},
+               {"frustum_near_m", "frustum_far_m", "min_overlap_ratio", "num_frustum_seeds",
+                "num_frustum_scouts", "min_num_expected_matches", "max_view_angle_deg", "max_scale_ratio"},
+               &table);
   return table;
 }
 
 OptionTable DescribeOptions(MatchPairsOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "max_ratio",
        .value = &o->matcher.max_ratio,
        .help = "largest ratio of the angles to the best and second best descriptor",
@@ -162,6 +169,10 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .min = 1e-3,
        .max = 180},
   };
+  AddCondition({"guided_matching", {"posed", "all"}},
+               {"guided_max_ratio", "guided_max_angle_rad", "guided_max_scale_ratio", "guided_max_turn_deg"},
+               &table);
+  return table;
 }
 
 }  // namespace cairn

@@ -255,6 +255,12 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
       return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
     }
   }
+  if (options.scale_from == "auto" && !options.control_points.empty() && !options.distances.empty()) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "control_points and distances are both given, and one of them gives the scale; say which "
+        "with scale_from, and leave the other out");
+  }
   if (options.hold_out_every == 1)
     return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
   return Ok();
@@ -263,7 +269,7 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
 }  // namespace
 
 OptionTable DescribeOptions(ReconstructOptions* o) {
-  return {
+  OptionTable table = {
       {.name = "max_hours",
        .value = &o->mapper.max_hours,
        .help = "longest time that COLMAP's mapper gets, hours",
@@ -325,6 +331,12 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .help = "every so many registered images one is kept out of the map, as a query; 0: none",
        .min = 0},
   };
+  AddCondition({"scale_from", {"auto", "control_points"}}, {"control_points", "control_point_sigma_m"},
+               &table);
+  AddCondition({"scale_from", {"auto", "distances"}}, {"distances", "distance_sigma_ratio"}, &table);
+  AddCondition({"scale_from", {"auto", "gps"}}, {"gps_sigma_m", "gps_altitude_sigma_m"}, &table);
+  AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
+  return table;
 }
 
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,

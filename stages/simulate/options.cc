@@ -3,7 +3,7 @@
 namespace cairn {
 
 OptionTable DescribeOptions(SimulateOptions* o) {
-  return {
+  OptionTable table = {
       {"width_m", &o->width_m, "Inner width (x) of the building, metres", 4, 200},
       {"depth_m", &o->depth_m, "Inner depth (y) of the building, metres", 4, 200},
       {"height_m", &o->height_m, "Ceiling above the floor, metres", 2.2, 6},
@@ -74,6 +74,13 @@ OptionTable DescribeOptions(SimulateOptions* o) {
       {"query_bias", &o->query_bias, "Queries' exposure bias is uniform in +- this, of 255", 0, 100},
       {"query_blur_px", &o->query_blur_px, "Longest motion blur of queries, pixels", 0, 50},
   };
+  AddCondition({"survey", {"lattice"}}, {"spacing_m", "num_headings", "survey_area_m", "query_headings"},
+               &table);
+  AddCondition({"survey", {"driven"}}, {"step_m"}, &table);
+  AddCondition({"camera_model", {"EQUIRECTANGULAR"}}, {"panorama_width_px"}, &table);
+  AddCondition({"camera_model", {"PINHOLE", "OPENCV_FISHEYE"}}, {"num_headings"}, &table);
+  AddCondition({"twin_wings", {"true"}}, {"back_corridor", "num_different_panels"}, &table);
+  return table;
 }
 
 Status CheckSimulateOptions(const SimulateOptions& options) {

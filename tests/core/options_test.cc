@@ -70,5 +70,30 @@ TEST(Options, BrokenTomlNamesTheLine) {
   EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
 }
 
+TEST(Options, ConditionsSayWhereAnOptionIsRead) {
+  Fields fields;
+  OptionTable table = Describe(&fields);
+  AddCondition({"pairs", {"frustum"}}, {"max_ratio", "min_count"}, &table);
+  AddCondition({"min_count", {"not 0"}}, {"max_ratio"}, &table);
+  const auto is_read = [&](size_t i) { return CheckIsRead(table[i], table); };
+  EXPECT_EQ(NamesOf(table), (std::vector<std::string>{"flag", "min_count", "max_ratio", "pairs", "up"}));
+  EXPECT_TRUE(is_read(0).ok());
+  EXPECT_EQ(
+      is_read(1).error().message,
+      "min_count is only read where pairs is frustum, and it is auto; leave min_count out, or change pairs");
+  EXPECT_FALSE(is_read(2).ok());
+  fields.pairs = "frustum";
+  EXPECT_TRUE(is_read(1).ok());
+  EXPECT_TRUE(is_read(2).ok());
+  fields.count = 0;  // both conditions have to hold
+  EXPECT_EQ(is_read(2).error().message,
+            "max_ratio is only read where min_count is not 0, and it is 0; leave max_ratio out, or change "
+            "min_count");
+  fields.pairs = "";
+  EXPECT_EQ(
+      is_read(1).error().message,
+      "min_count is only read where pairs is frustum, and it is empty; leave min_count out, or change pairs");
+}
+
 }  // namespace
 }  // namespace cairn

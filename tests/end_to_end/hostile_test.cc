@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/database.h"
 #include "core/file.h"
 #include "tests/end_to_end/program_run.h"
 
@@ -124,6 +125,18 @@ TEST_F(Hostile, NamesOfHeldOutImagesRunNothing) {
   const ProgramRun stamp =
       Run("make -k -f " CAIRN_MAP_RULES " BUILD=$PWD/a.build CAIRN=true $PWD/a.build/map.stamp");
   EXPECT_THAT(stamp.err, HasSubstr("map.cairn: not made yet")) << stamp.out;
+}
+
+// Bytes per table come from SQLite's own dbstat, in whose place a map could put a view.
+TEST_F(Hostile, InspectRunsNoViewOfAMap) {
+  fs::copy_file(GOLDEN_DIR "/map_2.3.cairn", folder_ / "a.cairn");
+  SQLite::Database(folder_ / "a.cairn", SQLite::OPEN_READWRITE)
+      .exec("CREATE VIEW dbstat AS SELECT 'PLANTED' AS name, 1 AS pgsize");
+  for (const char* command : {"cairn inspect a.cairn", "cairn inspect a.cairn --json"}) {
+    const ProgramRun run = Run(command);
+    EXPECT_NE(run.exit_code, 0);
+    EXPECT_EQ(run.out.find("PLANTED"), std::string::npos) << run.out;
+  }
 }
 
 }  // namespace
