@@ -170,8 +170,7 @@ Result<RegionBlock> DecodeRegionBlock(std::string_view bytes, const BlockEntry& 
   int64_t max_num_values = kMaxListElements;
   for (uint32_t i = 0; i < entry.count; ++i) {
     if (!ReadRuns(&reader, directory.NumBlocks(BlockKind::kLandmarks), &max_num_values,
-                  &block.landmark_blocks.emplace_back()) ||
-        block.landmark_blocks.back().empty()) {
+                  &block.landmark_blocks.emplace_back())) {
       return Corrupt(what, "the landmark blocks of region {} make no sense", entry.first + i);
     }
   }

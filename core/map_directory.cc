@@ -20,12 +20,12 @@ int64_t FewestBytes(BlockKind kind) {
     case BlockKind::kAppearance:
       return 4;
     case BlockKind::kAmbiguity:
-    case BlockKind::kRegions:
       return 2;
     case BlockKind::kViewRegions:
       return 26;
     case BlockKind::kFloorPlan:
       return 33;
+    case BlockKind::kRegions:
     case BlockKind::kWords:
     case BlockKind::kVocabularyTree:
     case BlockKind::kLandmarkModels:

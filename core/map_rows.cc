@@ -86,10 +86,7 @@ Status CheckRegions(const MapRows& rows) {
   if (rows.regions.size() > rows.stations.size())
     return Invalid("{} regions of {} stations", rows.regions.size(), rows.stations.size());
   for (size_t i = 0; i < rows.regions.size(); ++i) {
-    if (rows.regions[i].stations.empty() || rows.regions[i].landmarks.empty()) {
-      return Invalid("region {}: {} stations and {} landmarks, expected one or more of each", i,
-                     rows.regions[i].stations.size(), rows.regions[i].landmarks.size());
-    }
+    if (rows.regions[i].stations.empty()) return Invalid("region {}: is of no station", i);
     if (!IsAscending(rows.regions[i].stations, rows.stations.size()) ||
         !IsAscending(rows.regions[i].landmarks, rows.landmarks.size())) {
       return Invalid("region {}: its stations or landmarks are not ascending below {} and {}", i,

@@ -153,12 +153,6 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   const std::string floor_plan = FloorPlanPath(recipe, capture);
   const SessionWords sessions = JoinedSessions(recipe);
-  if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
-                     "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
-                     recipe.captures.front().queries_path, recipe.captures.front().path);
-  }
   const std::string seed = std::to_string(recipe.seed);
   std::vector<std::string> known_places;
   if (IsReconstructed(recipe)) {
@@ -183,6 +177,12 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
   CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
+  if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
+                     "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
+                     recipe.captures.front().queries_path, recipe.captures.front().path);
+  }
 
   const std::string options = paths.build_dir + "/options";
   CAIRN_RETURN_IF_ERROR(CreateFolder(options));

@@ -43,7 +43,7 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   }
   if (arguments.kind == "search" && !arguments.to.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "--kind search ends where the last of the plan is seen: it takes no --to");
+                     "--kind search ends where the last of the plan is seen; leave --to out");
   }
   if (arguments.kind != "search") {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(

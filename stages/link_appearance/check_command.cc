@@ -86,18 +86,18 @@ std::string Table(const AppearanceCheck& check) {
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
-  std::optional<Capture> capture;
-  if (!arguments.capture.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
-  }
   const LinkAppearanceOptions& options = arguments.options;
-  if (capture && options.fuse != "place" && options.max_link_distance_m == 0 &&
+  if (!arguments.capture.empty() && options.fuse != "place" && options.max_link_distance_m == 0 &&
       options.max_link_turn_deg == 180) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "--capture {}: poses are for --fuse place, --max-link-distance-m and --max-link-turn-deg; give "
         "one of them, or leave the capture out",
         arguments.capture);
+  }
+  std::optional<Capture> capture;
+  if (!arguments.capture.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images, ReadImageLinks(arguments.matches, options.min_num_inliers));
   CAIRN_ASSIGN_OR_RETURN(images.links, NearLinks(images, capture ? &*capture : nullptr, options));

@@ -224,7 +224,7 @@ TEST_F(ColmapDatabase, OtherFilesAreToldApart) {
   EXPECT_THAT(ReadAll(path_), HasSubstr("not a SQLite database (0 bytes"));
   std::ofstream(path_) << "# cameras\n1 PINHOLE 640 480 500 500 320 240\n";
   EXPECT_THAT(ReadAll(path_), HasSubstr("not a SQLite database"));
-  EXPECT_THAT(ReadAll(folder_), HasSubstr("not a SQLite database"));
+  EXPECT_THAT(ReadAll(folder_), HasSubstr("is a folder, expected a file"));
   Make("CREATE TABLE bookmarks (url TEXT); CREATE TABLE history (url TEXT)");
   EXPECT_THAT(ReadAll(path_),
               HasSubstr("not COLMAP's: expected the tables cameras, images, keypoints, descriptors "

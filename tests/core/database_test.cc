@@ -51,24 +51,29 @@ TEST_F(HardenedDatabase, ViewsAreNotRun) {
   }
 }
 
-// A program's own functions are what a schema would call to do harm.
+// A program's own functions are what a schema would call to do harm: here, of each connection when it is
+// opened.
 TEST_F(HardenedDatabase, FunctionsOfTheProgramAreNotCalledByTheSchema) {
-  const auto add_function = [](SQLite::Database& database) {
-    database.createFunction("harm", 1, true, nullptr, [](sqlite3_context* context, int, sqlite3_value**) {
-      sqlite3_result_int(context, 7);
-    });
+  const auto add_function = [](sqlite3* database, char**, const void*) {
+    return sqlite3_create_function(
+        database, "harm", 1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, nullptr,
+        [](sqlite3_context* context, int, sqlite3_value**) { sqlite3_result_int(context, 7); }, nullptr,
+        nullptr);
   };
+  int (*const entry)(sqlite3*, char**, const void*) = add_function;
+  sqlite3_auto_extension(reinterpret_cast<void (*)()>(entry));
   const std::string path = Write("CREATE TABLE t (x)");
-  SQLite::Database writer(path, SQLite::OPEN_READWRITE);
-  add_function(writer);
-  writer.exec("CREATE TABLE u (x, y AS (harm(x))); INSERT INTO u VALUES (1)");
-  EXPECT_EQ(writer.execAndGet("SELECT y FROM u").getInt(), 7);
+  {
+    SQLite::Database writer(path, SQLite::OPEN_READWRITE);
+    writer.exec("CREATE TABLE u (x, y AS (harm(x))); INSERT INTO u VALUES (1)");
+    EXPECT_EQ(writer.execAndGet("SELECT y FROM u").getInt(), 7);
+  }
   const Status status = WithDatabaseErrors(path, [&]() -> Status {
     SQLite::Database database = OpenImmutable(path);
-    add_function(database);
     database.execAndGet("SELECT y FROM u");
     return Ok();
   });
+  sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(entry));
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message, HasSubstr("unsafe use of harm"));
 }
@@ -140,8 +145,8 @@ TEST_F(HardenedDatabase, PipesAndDevicesAreNoDatabases) {
   for (const std::string& path : {pipe, std::string("/dev/zero")}) {
     const auto database = OpenDatabaseReadOnly(path);
     ASSERT_FALSE(database.ok());
-    EXPECT_EQ(database.error().code, ErrorCode::kCorrupt);
-    EXPECT_THAT(database.error().message, HasSubstr("not a regular file"));
+    EXPECT_EQ(database.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(database.error().message, HasSubstr(path == pipe ? "is a pipe" : "is a device"));
   }
 }
 

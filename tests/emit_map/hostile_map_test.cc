@@ -463,13 +463,10 @@ TEST_F(HostileMap, ModelsOfMoreSightsThanAreSolvedInTimeAreRefused) {
   EXPECT_TRUE(WriteMapRows(rows, path_).ok()) << WriteMapRows(rows, path_).error().message;
 }
 
-TEST_F(HostileMap, RegionsThatHoldNothingAreRefused) {
+TEST_F(HostileMap, RegionsOfNoStationAreRefused) {
   MapRows rows = FullRows();
   rows.regions[0].stations.clear();
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("0 stations and 2 landmarks"));
-  rows = FullRows();
-  rows.regions[1].landmarks.clear();
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("2 stations and 0 landmarks"));
+  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("region 0: is of no station"));
   rows = FullRows();
   while (rows.regions.size() <= rows.stations.size()) rows.regions.push_back(rows.regions[0]);
   EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("4 regions of 3 stations"));

@@ -120,7 +120,7 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
            Case{"plan-path views.db --from 1,1 --to 3.5,1 --radius-m 0", 6, "lies on a wall"},
            Case{"plan-path views.db --from nan,1 --to 1,1", 2, "no region"},
            Case{"plan-path views.db --from 1,1 --to 5,1 --radius-m nan", 2, "radius_m"},
-           Case{"plan-path views.db --from 1,1 --to 5,1 --kind search", 2, "takes no --to"},
+           Case{"plan-path views.db --from 1,1 --to 5,1 --kind search", 2, "leave --to out"},
            Case{"tell-apart views.db --a 1,2,0 --b 5,2,nan", 2, "--b 5,2,nan: the heading"},
            Case{"tell-apart views.db --a 1,2,361 --b 5,2,0", 2, "--a 1,2,361: the heading"},
            Case{"tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},

@@ -338,8 +338,10 @@ TEST(LinkAppearance, ImagesTurnedTooFarAgainstEachOtherAreNotLinked) {
   EXPECT_EQ(LinkAppearance(images, &capture, options, 0)->appearance.graph.num_links(), 2);
   options.max_link_turn_deg = 29;
   EXPECT_EQ(LinkAppearance(images, &capture, options, 0)->appearance.graph.num_links(), 0);
-  EXPECT_EQ(LinkAppearance(images, nullptr, options, 0)->appearance.graph.num_links(), 3)
+  EXPECT_EQ(LinkAppearance(images, nullptr, options, 0).error().code, ErrorCode::kInvalidArgument)
       << "without poses nothing is known of turns";
+  options.max_link_turn_deg = 180;
+  EXPECT_EQ(LinkAppearance(images, nullptr, options, 0)->appearance.graph.num_links(), 3);
 }
 
 TEST(SurveyImagesOf, LeavesOutImagesThatTheCaptureDoesNotList) {
@@ -381,7 +383,10 @@ TEST(LinkAppearance, DoesNotLinkTwinsThatStandFarApart) {
   EXPECT_THAT(links(0.49, &capture), ElementsAre(std::pair(3, 4)));
   EXPECT_THAT(links(10, &capture), all);
   EXPECT_THAT(links(0, &capture), all);
-  EXPECT_THAT(links(1, nullptr), all);  // nothing is known of where they stand
+  EXPECT_THAT(links(0, nullptr), all);
+  LinkAppearanceOptions limited;
+  limited.max_link_distance_m = 1;  // nothing is known of where they stand
+  EXPECT_EQ(LinkAppearance(images, nullptr, limited, 0).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
