@@ -28,10 +28,10 @@ class BuildFolderTest : public testing::Test {
     recipe_.name = "kitchen";
     recipe_.captures = {{.name = "survey", .path = (folder_ / "survey").string()}};
     recipe_.stages = TestStages();
-    paths_ = {.recipe = (folder_ / "kitchen.toml").string(),
-              .build_dir = (folder_ / "kitchen.build").string(),
+    paths_ = {.build_dir = (folder_ / "kitchen.build").string(),
               .map = (folder_ / "kitchen.cairn").string(),
-              .program = "/proc/self/exe"};
+              .program = "/proc/self/exe",
+              .recipe = (folder_ / "kitchen.toml").string()};
   }
   void TearDown() override { fs::remove_all(folder_); }
 
