@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/temporary.h"
 #include "core/text.h"
 
 namespace cairn {
@@ -100,6 +101,11 @@ Result<std::optional<std::string>> Describe(const fs::directory_entry& entry, co
   return std::optional(size + hash);
 }
 
+// The manifest, or what a kill leaves of one that was being written.
+bool IsOfManifest(const std::string& path) {
+  return path == kFolderManifestFile || IsTemporaryName(path, kFolderManifestFile);
+}
+
 // Visits all that a folder holds by its escaped path, and stops at the first error; its manifest is no part
 // of that.
 template <typename Visit>
@@ -108,7 +114,7 @@ Status VisitEntries(const std::string& folder, const Visit& visit) {
   fs::recursive_directory_iterator it(folder, error), end;
   for (; !error && it != end; it.increment(error)) {
     const std::string path = Escaped(it->path().lexically_relative(folder).generic_string());
-    if (path != kFolderManifestFile) CAIRN_RETURN_IF_ERROR(visit(path, *it));
+    if (!IsOfManifest(path)) CAIRN_RETURN_IF_ERROR(visit(path, *it));
   }
   if (!error) return Ok();
   return MakeError(ErrorCode::kIo, "{}: the folder cannot be read: {}", folder, error.message());
@@ -138,6 +144,27 @@ Status WriteManifest(const std::string& folder, const Manifest& manifest) {
   return WriteFileAtomically(folder + "/" + kFolderManifestFile, ManifestText(manifest));
 }
 
+// Whether there is nothing in a folder but, perhaps, its manifest.
+bool HoldsNothing(const std::string& folder) {
+  size_t num_left = 0;
+  const Status counted = VisitEntries(folder, [&](const std::string&, const fs::directory_entry&) {
+    ++num_left;
+    return Ok();
+  });
+  return counted.ok() && num_left == 0;
+}
+
+// REQUIRES: HoldsNothing(folder)
+bool RemoveWithManifest(const std::string& folder) {
+  std::error_code error;
+  std::vector<fs::path> of_manifest;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (IsOfManifest(entry.path().filename().string())) of_manifest.push_back(entry.path());
+  }
+  for (const fs::path& path : of_manifest) fs::remove(path, error);
+  return fs::remove(folder, error);
+}
+
 // The listed files, then the folders that they leave empty, each after what is inside of it.
 bool RemoveEntries(const std::string& folder, const Manifest& manifest) {
   std::vector<fs::path> paths;
@@ -148,19 +175,8 @@ bool RemoveEntries(const std::string& folder, const Manifest& manifest) {
       });
   std::error_code error;
   for (auto path = paths.rbegin(); path != paths.rend(); ++path) fs::remove(*path, error);
-  if (!visited.ok()) return false;
   // Its manifest goes last: until then the rest is known to be cairn's.
-  const auto holds_more = [&] {
-    size_t num_left = 0;
-    const Status counted = VisitEntries(folder, [&](const std::string&, const fs::directory_entry&) {
-      ++num_left;
-      return Ok();
-    });
-    return !counted.ok() || num_left > 0;
-  };
-  if (holds_more()) return false;
-  fs::remove(fs::path(folder) / kFolderManifestFile, error);
-  return fs::remove(folder, error);
+  return visited.ok() && HoldsNothing(folder) && RemoveWithManifest(folder);
 }
 
 }  // namespace
@@ -248,9 +264,11 @@ std::set<std::string> OwnFiles(const std::string& folder) {
 bool RemoveOwnFolder(const std::string& folder) {
   std::error_code error;
   if (!fs::is_directory(fs::symlink_status(folder, error))) return false;
-  if (fs::is_empty(folder, error)) return fs::remove(folder, error);
   const std::optional<Manifest> manifest = ReadManifest(folder);
-  if (!manifest) return false;
+  if (!manifest) {  // killed before it had one
+    const bool is_begun = !fs::exists(fs::symlink_status(fs::path(folder) / kFolderManifestFile, error));
+    return is_begun && HoldsNothing(folder) && RemoveWithManifest(folder);
+  }
   if (!manifest->is_finished) return fs::remove_all(folder, error) > 0 && !error;
   size_t num_found = 0;
   return CheckEntries(folder, *manifest, &num_found).ok() && RemoveEntries(folder, *manifest);

@@ -76,11 +76,12 @@ Result<RegionSelfTest> DecodeRegionSelfTest(const StoredRow& stored) {
   CAIRN_ASSIGN_OR_RETURN(row.num_localized, CountOf(stored, 2));
   CAIRN_ASSIGN_OR_RETURN(row.num_gross_errors, CountOf(stored, 3));
   if (stored.IsNull(4)) return row;
-  row.errors.emplace();
-  CAIRN_ASSIGN_OR_RETURN(row.errors->median_m, stored.Real(4));
-  CAIRN_ASSIGN_OR_RETURN(row.errors->median_deg, stored.Real(5));
-  CAIRN_ASSIGN_OR_RETURN(row.errors->p90_m, stored.Real(6));
-  CAIRN_ASSIGN_OR_RETURN(row.errors->p90_deg, stored.Real(7));
+  RegionSelfTest::Errors errors;
+  CAIRN_ASSIGN_OR_RETURN(errors.median_m, stored.Real(4));
+  CAIRN_ASSIGN_OR_RETURN(errors.median_deg, stored.Real(5));
+  CAIRN_ASSIGN_OR_RETURN(errors.p90_m, stored.Real(6));
+  CAIRN_ASSIGN_OR_RETURN(errors.p90_deg, stored.Real(7));
+  row.errors = errors;
   return row;
 }
 

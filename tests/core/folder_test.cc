@@ -283,11 +283,19 @@ TEST_F(FolderTest, LeftoversOfKilledProcessesGoIfTheyAreOurs) {
   fs::create_directory(Path(killed));
   ASSERT_TRUE(Replace("3").ok());
   EXPECT_FALSE(fs::exists(Path(killed)));
+  // Killed while it wrote the manifest: before there was one, and when the last was to take its place.
+  for (const bool has_manifest : {false, true}) {
+    Write(killed + "/.cairn-folder.tmp-12-0123456789abcdef", "cairn fol");
+    if (has_manifest) ASSERT_TRUE(BeginOwnFolder(Path(killed), "a capture").ok());
+    ASSERT_TRUE(Replace(has_manifest ? "4" : "5").ok());
+    EXPECT_FALSE(fs::exists(Path(killed))) << has_manifest;
+  }
 }
 
 TEST_F(FolderTest, OtherFoldersWithTheNameOfALeftoverStay) {
   const std::string dead = fmt::format("out.tmp-{}", DeadProcess());
   Write(dead + "/letter.txt", "mine");
+  Write(dead + "/.cairn-folder.tmp-12-0123456789abcdef", "cairn fol");
   Write("out.tmp-1/of-a-living-process", "its own");
   ASSERT_TRUE(BeginOwnFolder(Path("out.tmp-1"), "a capture").ok());
   Write("out.tmp-notes/letter.txt", "mine");
