@@ -57,16 +57,16 @@ Status DescribeAnew(SQLite::Database& database, const std::set<size_t>& affected
 void LeaveOutFeatures(const std::set<ClassId>& class_ids, World* world, Decomposition* decomposition) {
   constexpr FeatureIdx kGone = -1;
   std::vector<FeatureIdx> number_of(world->class_ids.size(), kGone);
-  FeatureIdx num_left = 0;
+  std::vector<ClassId> left_ids;
+  std::vector<std::vector<StationIdx>> left_areas;
   for (size_t feature = 0; feature < number_of.size(); ++feature) {
     if (!class_ids.contains(world->class_ids[feature])) continue;
-    number_of[feature] = num_left;
-    world->class_ids[num_left] = world->class_ids[feature];
-    world->areas[num_left] = std::move(world->areas[feature]);
-    ++num_left;
+    number_of[feature] = static_cast<FeatureIdx>(left_ids.size());
+    left_ids.push_back(world->class_ids[feature]);
+    left_areas.push_back(std::move(world->areas[feature]));
   }
-  world->class_ids.resize(num_left);
-  world->areas.resize(num_left);
+  world->class_ids = std::move(left_ids);
+  world->areas = std::move(left_areas);
   for (Region& region : decomposition->regions) {
     for (FeatureIdx& feature : region.features) feature = number_of[feature];
     std::erase(region.features, kGone);

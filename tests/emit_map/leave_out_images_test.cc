@@ -1,0 +1,86 @@
+#include "stages/emit_map/leave_out_images.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stages/emit_map/emit_map.h"
+#include "tests/emit_map/example.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+SurveyParts PartsOfExample(const EmitExample& example) {
+  return {.world = example.world, .decomposition = example.decomposition, .appearance = example.appearance};
+}
+
+// The example without image `left_out`, and without the classes that then have one observation.
+Classes Without(const EmitExample& example, ImageId left_out) {
+  Classes classes = example.classes;
+  std::erase_if(classes.images, [&](const SurveyImage& image) { return image.image_id == left_out; });
+  for (FeatureClass& feature_class : classes.classes) {
+    std::erase_if(feature_class.observations,
+                  [&](const Observation& observation) { return observation.image_id == left_out; });
+  }
+  std::erase_if(classes.classes, [](const FeatureClass& row) { return row.observations.size() < 2; });
+  return classes;
+}
+
+// Image 1 is all that saw classes 10 and 11 beside image 2: features 1 and 2 (classes 12, 13) become 0 and 1.
+TEST(PartsOf, FeaturesOfVanishedClassesGoAndTheRestAreNumberedAnew) {
+  const EmitExample example = MakeEmitExample();
+  const Classes classes = Without(example, 1);
+  ASSERT_EQ(classes.classes.size(), 2u);
+  const SurveyParts parts = PartsOf(classes, PartsOfExample(example));
+  EXPECT_THAT(parts.world.class_ids, ElementsAre(12, 13));
+  EXPECT_THAT(parts.world.areas, ElementsAre(ElementsAre(1, 2), ElementsAre(1, 2)));
+  ASSERT_EQ(parts.decomposition.regions.size(), 2u);
+  EXPECT_THAT(parts.decomposition.regions[0].features, ElementsAre(0, 1));
+  EXPECT_THAT(parts.decomposition.regions[1].features, ElementsAre(0));
+  EXPECT_THAT(parts.decomposition.regions[1].stations, ElementsAre(0, 1));
+  EXPECT_THAT(parts.world.station_images, ElementsAre(IsEmpty(), ElementsAre(2), ElementsAre(4)));
+  EXPECT_TRUE(CheckWorld(parts.world).ok());
+}
+
+TEST(PartsOf, AMapOfThemCanBeMadeAndOfTheWholeWorldNot) {
+  const EmitExample example = MakeEmitExample();
+  const Classes classes = Without(example, 1);
+  const SurveyParts parts = PartsOf(classes, PartsOfExample(example));
+  const std::vector<char> keep(classes.classes.size(), 1);
+  EXPECT_FALSE(
+      EmitMap(classes, parts.world, example.decomposition, example.vocabulary, {}, nullptr, &keep).ok());
+  const auto rows =
+      EmitMap(classes, parts.world, parts.decomposition, example.vocabulary, {}, &*parts.appearance, &keep);
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->landmarks.size(), 2u);
+}
+
+TEST(PartsOf, WholeSurveysStayAsTheyAre) {
+  const EmitExample example = MakeEmitExample();
+  const SurveyParts parts = PartsOf(example.classes, PartsOfExample(example));
+  EXPECT_EQ(parts.world.class_ids, example.world.class_ids);
+  EXPECT_EQ(parts.world.areas, example.world.areas);
+  EXPECT_EQ(parts.world.station_images, example.world.station_images);
+  for (size_t i = 0; i < parts.decomposition.regions.size(); ++i)
+    EXPECT_EQ(parts.decomposition.regions[i].features, example.decomposition.regions[i].features);
+  EXPECT_THAT(parts.appearance->Kept(), ElementsAre(1));
+}
+
+// Nodes 0 - 1 - 3 - 2 with images 1, 2, 4 and 3; node 1 is kept.
+TEST(PartsOf, NeighboursOfAKeptPlaceWithoutImagesAreKept) {
+  const EmitExample example = MakeEmitExample();
+  SurveyParts parts = PartsOf(Without(example, 2), PartsOfExample(example));
+  EXPECT_THAT(parts.appearance->Kept(), ElementsAre(0, 1, 3));
+  EXPECT_THAT(parts.appearance->nodes[1].images, IsEmpty());
+  EXPECT_EQ(parts.appearance->nodes[1].role, NodeRole::kDominating);
+  // A place that was not kept leaves nobody alone.
+  parts = PartsOf(Without(example, 4), PartsOfExample(example));
+  EXPECT_THAT(parts.appearance->Kept(), ElementsAre(1));
+  parts = PartsOf(Without(example, 1), {.world = example.world, .decomposition = example.decomposition});
+  EXPECT_FALSE(parts.appearance.has_value());
+}
+
+}  // namespace
+}  // namespace cairn
