@@ -98,6 +98,33 @@ TEST_F(MapSize, ParetoWritesTableAndPictureAndStopsWhereNothingFits) {
   EXPECT_EQ(Run("cairn pareto none.here -o none.cairn").exit_code, static_cast<int>(ErrorCode::kNotFound));
 }
 
+// A drive on which places are seen two or three times: with the images that are left out to try a size on,
+// classes vanish that the world and its regions name.
+TEST_F(MapSize, SurveyOfFewObservationsFitsItsBytesToo) {
+  std::string recipe =
+      "name = \"few\"\n[simulate]\nsurvey = \"driven\"\nwidth_m = 5.5\ndepth_m = 6\nnum_rooms = 2\n"
+      "step_m = 0.7\nimage_width_px = 320\nimage_height_px = 240\nhorizontal_fov_deg = 65\n"
+      "texel_m = 0.008\nnum_queries = 6\n" +
+      TinyStageOptions();
+  std::ofstream(Path("few.toml")) << recipe << "max_bytes = 60000\n";
+  ReplaceInFile(Path("few.toml"), "max_num_features = 300",
+                "max_num_features = 600\ncontrast_threshold = 0.01");
+  ReplaceInFile(Path("few.toml"), "cell_size_m = 0.7", "cell_size_m = 0.3");
+  ReplaceInFile(Path("few.toml"), "heading_bin_deg = 90", "heading_bin_deg = 45");
+  for (const std::string more :
+       {"", "documents = \"kept\"\n", "words = \"survey\"\n", "visual_map = true\n"}) {
+    std::ofstream(Path("few.toml"), std::ios::app) << more;
+    const ProgramRun run = Run("cairn compile few.toml -o few.cairn --progress none");
+    ASSERT_EQ(run.exit_code, 0) << more << run.err;
+    EXPECT_THAT(ReadFile(Path("few.report.json")).value(), HasSubstr("left-out survey images"));
+    EXPECT_LE(fs::file_size(Path("few.cairn")), size_t{60000});
+    if (!more.empty()) ReplaceInFile(Path("few.toml"), more, "");
+  }
+  const ProgramRun pareto = Run("cairn pareto few.toml -o few.cairn --sizes 50000 --progress none");
+  EXPECT_EQ(pareto.exit_code, 0) << pareto.err;
+  EXPECT_THAT(ReadFile(Path("few.pareto.csv")).value(), HasSubstr("\n50000,"));
+}
+
 TEST_F(MapSize, DeltaMakesTheSmallMapFromTheWholeOneAndRollsBack) {
   const std::string deploy =
       "cp tiny.cairn robot.cairn && cairn keygen k && cairn sign small.cairn --key k -o s.cairn && "

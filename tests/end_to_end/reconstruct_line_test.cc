@@ -131,6 +131,36 @@ TEST_F(ReconstructLine, SecondRunDoesNothingAndChangedControlPointsRunTheReconst
   EXPECT_EQ(HashFile(Path("flat.build/matches.db")).value(), matches);
 }
 
+TEST_F(ReconstructLine, EveryWayToChoosePairsThatNeedsNoPosesCompiles) {
+  const std::string recipe = ReadFile(Path("flat.toml")).value();
+  for (const std::string pairs : {"sequence", "retrieval", "exhaustive", "auto"}) {
+    std::ofstream(Path("pairs.toml")) << recipe << "[match_features]\npairs = \"" << pairs << "\"\n";
+    const ProgramRun run = RunShell("cairn compile " + Path("pairs.toml") + " -o " + Path(pairs + ".cairn") +
+                                    " --progress none --threads 2");
+    EXPECT_EQ(run.exit_code, 0) << pairs << ": " << run.err;
+    EXPECT_THAT(run.err, testing::Not(HasSubstr("Circular"))) << pairs;
+    EXPECT_TRUE(fs::exists(Path(pairs + ".cairn"))) << pairs;
+  }
+  std::ofstream(Path("pairs.toml")) << recipe << "[match_features]\npairs = \"frustum\"\n";
+  const ProgramRun run =
+      RunShell("cairn compile " + Path("pairs.toml") + " -o " + Path("frustum.cairn") + " --progress none");
+  EXPECT_EQ(run.exit_code, static_cast<int>(ErrorCode::kInvalidArgument));
+  EXPECT_THAT(run.err, HasSubstr("pairs = frustum needs a pose for every image"));
+}
+
+TEST_F(ReconstructLine, CamerasThatAreGivenAreTaken) {
+  fs::create_directories(Path("known/images"));
+  for (const auto& entry : fs::directory_iterator(Path("flat")))
+    fs::copy_file(entry.path(), Path("known/images") / entry.path().filename());
+  fs::copy_file(Path("posed/cameras.txt"), Path("known/cameras.txt"));
+  const ProgramRun run =
+      RunShell("cairn extract-features " + Path("known") + " -o " + Path("known.db") + " && sqlite3 " +
+               Path("known.db") + " 'SELECT count(*), min(prior_focal_length), min(width) FROM cameras'");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("1|1|320"));
+  EXPECT_THAT(run.err, testing::Not(HasSubstr("assumed")));
+}
+
 TEST_F(ReconstructLine, FailingColmapFailsTheCompileWithItsLastLines) {
   fs::create_directories(Path("fake"));
   std::ofstream(Path("fake/colmap")) << "#!/bin/sh\necho out of luck\nexit 9\n";
