@@ -99,6 +99,7 @@ TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) 
     EXPECT_THAT(status.error().message, HasSubstr(std::string("its ") + name + " would be overwritten"));
     fs::remove(paths_.build_dir + "/" + name);
   }
+  paths_.recipe = "/maps/kitchen.toml";
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/features.db", "").ok());
   EXPECT_TRUE(check().ok());
