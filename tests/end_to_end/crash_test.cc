@@ -274,7 +274,8 @@ ProgramRun RunBeside(const std::string& folder, const std::string& first,
   std::string script = fmt::format(
       "unset MAKEFLAGS MAKELEVEL; rm -f {0}/capture.stamp; {1} > {0}.out 2>&1 & until ls "
       "{0}/capture.stamp.tmp-*; do sleep "
-      "0.01; done > {0}.ls 2> /dev/null; stage=$(pgrep -f '[-]-stamp {0}/capture.stamp'); kill -STOP $stage\n",
+      "0.01; done > {0}.ls 2> /dev/null; stage=$(pgrep -f '[-]-stamp {0}/capture.stamp'); kill -STOP "
+      "$stage\n",
       folder, first);
   for (const std::string& other : others) script += other + " 2>&1; echo code $?\n";
   return RunShell(script + "kill -CONT $stage; wait $!; echo first $?");
