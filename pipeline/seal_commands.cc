@@ -25,7 +25,7 @@ struct Arguments {
 
 // " of epoch 3", where it was counted.
 std::string EpochText(const MapHead& head) {
-  return head.epoch == 0 ? "" : fmt::format(" of epoch {}", head.epoch);
+  return head.epoch == 0 ? "" : fmt::format(", of epoch {}", head.epoch);
 }
 
 // Every byte by the file's hash, the signature, then every block and every row.
@@ -77,7 +77,9 @@ Status Sign(const Arguments& arguments, const CommandEnvironment& environment) {
 }
 
 Status Migrate(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRowsVersion1(arguments.input_path));
+  Result<MapRows> read = ReadMapRowsVersion1(arguments.input_path);
+  if (!read.ok() && read.error().code == ErrorCode::kTooNew) read = ReadMapRows(arguments.input_path);
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, std::move(read));
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
   *environment.out << fmt::format("{}: map '{}' as version {}.{}, not signed\n", arguments.output_path,
                                   rows.name, kMapVersionMajor, kMapVersionMinor);
@@ -150,7 +152,9 @@ Command MigrateCommand() {
       .summary = "Writes a map of an earlier format in today's",
       .add_arguments =
           [arguments](CLI::App& app) {
-            app.add_option("map", arguments->input_path, "Map of format 1.x")->required()->type_name("OLD");
+            app.add_option("map", arguments->input_path, "Map of format 1.0 to today's")
+                ->required()
+                ->type_name("OLD");
             app.add_option("-o,--output", arguments->output_path, "Map to write")
                 ->required()
                 ->type_name("NEW");

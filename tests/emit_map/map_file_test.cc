@@ -396,5 +396,15 @@ TEST(GoldenMap, Version2_4IsRead) {
   EXPECT_EQ(ReadMapRows(MapPath("changed_2.4.cairn")).error().code, ErrorCode::kCorrupt);
 }
 
+// Version 2.5 as the program of that version wrote and signed it, of epoch 3.
+TEST(GoldenMap, Version2_5IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.5.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->epoch, 3u);
+  EXPECT_EQ(rows->findings_hash.size(), 64u);
+  EXPECT_EQ(rows->findings, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->findings);
+  EXPECT_EQ(rows->descriptors, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->descriptors);
+}
+
 }  // namespace
 }  // namespace cairn

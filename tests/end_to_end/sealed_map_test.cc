@@ -41,7 +41,7 @@ TEST_F(SealedMap, IsSignedAndVerified) {
   ASSERT_EQ(sign.exit_code, 0) << sign.err;
   const ProgramRun verify = RunShell("cairn verify " + Path("signed.cairn") + required);
   EXPECT_EQ(verify.exit_code, 0) << verify.err;
-  EXPECT_THAT(verify.out, HasSubstr("whole of epoch 1, signed with key"));
+  EXPECT_THAT(verify.out, HasSubstr("whole, of epoch 1, signed with key"));
   EXPECT_EQ(RunShell("cairn verify " + Path("signed.cairn") + " --public-key " + Path("other.pub")).exit_code,
             Code(ErrorCode::kWrongKey));
 }
@@ -56,7 +56,7 @@ TEST_F(SealedMap, SignedReleasesAreCounted) {
   ASSERT_EQ(second.exit_code, 0) << second.err;
   EXPECT_THAT(second.out, HasSubstr(", epoch 2, signed with key"));
   const std::string verify = "cairn verify " + Path("2.cairn") + " --public-key " + Path("key.pub");
-  EXPECT_THAT(RunShell(verify + " --min-epoch 2").out, HasSubstr("whole of epoch 2, signed"));
+  EXPECT_THAT(RunShell(verify + " --min-epoch 2").out, HasSubstr("whole, of epoch 2, signed"));
   EXPECT_EQ(RunShell(verify + " --min-epoch 3").exit_code, Code(ErrorCode::kNotNewer));
   EXPECT_EQ(RunShell(verify + " --name elsewhere").exit_code, Code(ErrorCode::kOtherMap));
   EXPECT_THAT(RunShell("cairn inspect " + Path("2.cairn")).out, HasSubstr("epoch"));
@@ -117,9 +117,20 @@ TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
 }
 
 TEST_F(SealedMap, InspectStatesTheFormatOfTheFile) {
-  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4"}) {
+  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4", "2.5"}) {
     const ProgramRun run = RunShell("cairn inspect --json " GOLDEN_DIR "/map_" + version + ".cairn");
     EXPECT_THAT(run.out, HasSubstr("\"format\": \"" + version + "\"")) << run.err;
+  }
+}
+
+TEST_F(SealedMap, EveryEarlierFormatIsMigratedToTodays) {
+  for (const std::string version : {"1.0", "2.0", "2.1", "2.2", "2.3", "2.4"}) {
+    const std::string migrated = Path("migrated_" + version + ".cairn");
+    const ProgramRun run = RunShell("cairn migrate " GOLDEN_DIR "/map_" + version + ".cairn -o " + migrated);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("as version 2.5, not signed"));
+    EXPECT_EQ(RunShell("cairn verify " + migrated).exit_code, 0) << version;
+    EXPECT_THAT(RunShell("cairn inspect --json " + migrated).out, HasSubstr("\"format\": \"2.5\""));
   }
 }
 
