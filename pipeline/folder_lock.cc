@@ -29,8 +29,9 @@ namespace fs = std::filesystem;
 constexpr const char* kLockFile = "/lock";
 // Others of the own session hold the folder alone only while they remove stale temporaries.
 constexpr std::chrono::seconds kWaitForOwnSession{30};
-// Another session may be on its way out, or look at the lock and be refused as well.
-constexpr std::chrono::milliseconds kWaitForOtherSession{300};
+// Another session may be on its way out, or look at the lock and be refused as well.  What was killed takes
+// long to die on a busy machine.
+constexpr std::chrono::seconds kWaitForOtherSession{3};
 
 using Claim = FileLock::Claim;
 
