@@ -116,7 +116,6 @@ bool IsSqliteFile(const std::string& path) {
 }
 
 Status CheckSqliteFile(const std::string& path) {
-  std::error_code error;
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
   if (const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); file.get() < 0)
     return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
