@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
+#include "core/capture/capture.h"
+#include "core/colmap/cameras_text.h"
+#include "core/colmap/colmap_database.h"
 
 namespace cairn {
 

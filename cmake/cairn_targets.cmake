@@ -1,11 +1,22 @@
 # One line per target: a stage library, a test program, a benchmark program.
 
-# cairn_stage(NAME SOURCES file... LIBS target...): the library cairn_NAME of stages/NAME.
-function(cairn_stage name)
+# cairn_precompile(TARGET): its sources begin with cmake/precompiled.h, which is parsed once for all such targets.
+function(cairn_precompile target)
+  target_precompile_headers(${target} REUSE_FROM cairn_robot_core)
+endfunction()
+
+# cairn_library(NAME SOURCES file... LIBS target...): the library cairn_NAME of what needs the compiler's core and arguments.
+function(cairn_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   add_library(cairn_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(cairn_${name} PUBLIC cairn_core cairn_command ${ARG_LIBS})
+  cairn_precompile(cairn_${name})
 endfunction()
+
+# cairn_stage(NAME SOURCES file... LIBS target...): the library cairn_NAME of stages/NAME.
+macro(cairn_stage)
+  cairn_library(${ARGN})
+endmacro()
 
 # cairn_test(NAME SOURCES file... LIBS target... [LABEL slow]): the test program NAME; its tests are found by ctest.
 function(cairn_test name)

@@ -1,8 +1,8 @@
 #include <iostream>
 
-#include "pipeline/commands.h"
-#include "pipeline/program.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/program/program.h"
 
 int main(int argc, char** argv) {
-  return cairn::RunProgram(cairn::AllCommands(), argc, argv, std::cout, std::cerr);
+  return cairn::pipeline::RunProgram(cairn::pipeline::AllCommands(), argc, argv, std::cout, std::cerr);
 }

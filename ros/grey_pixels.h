@@ -6,7 +6,7 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "core/error.h"
+#include "core/base/error.h"
 
 namespace cairn {
 

@@ -6,7 +6,7 @@
 
 #include "ros/grey_pixels.h"
 #include "ros/robot_pose.h"
-#include "runtime/region_tracker.h"
+#include "runtime/localize/region_tracker.h"
 
 namespace cairn_ros {
 namespace {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "runtime/localizer.h"
+#include "runtime/localize/localizer.h"
 
 namespace cairn {
 

@@ -9,27 +9,29 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/appearance/synthetic_graph.h"
-#include "stages/link_appearance/connected_bound.h"
-#include "stages/link_appearance/counting_bound.h"
-#include "stages/link_appearance/greedy_dominating_set.h"
-#include "stages/link_appearance/improve_dominating_set.h"
-#include "stages/link_appearance/restore_cycles.h"
+#include "stages/link_appearance/dominating_set/connected_bound.h"
+#include "stages/link_appearance/dominating_set/counting_bound.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
+#include "stages/link_appearance/dominating_set/improve_dominating_set.h"
+#include "stages/link_appearance/dominating_set/restore_cycles.h"
 
 namespace cairn {
 namespace {
 
 double Seconds(std::clock_t start) { return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC; }
 
-void MeasureGap(int size, double degree, uint64_t seed, int num_tries, const ConnectedBoundOptions& options) {
+void MeasureGap(int size, double degree, uint64_t seed, int num_tries,
+                const link_appearance::ConnectedBoundOptions& options) {
   const AppearanceGraph graph = LargestComponent(SyntheticGraph(size, degree, seed));
-  const Domination domination(graph, {});
-  const std::vector<NodeIdx> greedy = GreedyDominatingSet(domination);
+  const link_appearance::Domination domination(graph, {});
+  const std::vector<NodeIdx> greedy = link_appearance::GreedyDominatingSet(domination);
   std::clock_t start = std::clock();
   const std::vector<NodeIdx> improved =
-      ImproveDominatingSet(domination, greedy, {.num_tries = num_tries}, seed);
+      link_appearance::ImproveDominatingSet(domination, greedy, {.num_tries = num_tries}, seed);
   const double improve_seconds = Seconds(start);
   start = std::clock();
-  const ConnectedBound bound = BoundConnectedSet(domination, improved, options);
+  const link_appearance::ConnectedBound bound =
+      link_appearance::BoundConnectedSet(domination, improved, options);
   const double bound_seconds = Seconds(start);
   const size_t best = bound.smaller.empty() ? improved.size() : bound.smaller.size();
   const auto gap = [&](size_t kept) {
@@ -45,7 +47,7 @@ void MeasureGap(int size, double degree, uint64_t seed, int num_tries, const Con
 void MeasurePaths(const AppearanceGraph& graph, const std::vector<NodeIdx>& kept, int c) {
   std::vector<NodeIdx> all_kept = kept;
   if (c > 0) {
-    for (const NodeIdx node : RestoreCycles(graph, kept, c)) all_kept.push_back(node);
+    for (const NodeIdx node : link_appearance::RestoreCycles(graph, kept, c)) all_kept.push_back(node);
   }
   const std::vector<char> marks = NodeMarks(graph.num_nodes(), all_kept), all(graph.num_nodes(), 1);
   std::vector<double> ratios;
@@ -87,7 +89,7 @@ int main(int argc, char** argv) {
   std::vector<int> sizes = {100, 250};
   std::vector<double> degrees = {10, 20};
   int num_seeds = 3, num_tries = 5000, path_nodes = 600;
-  cairn::ConnectedBoundOptions options{.lower_bound = "program"};
+  cairn::link_appearance::ConnectedBoundOptions options{.lower_bound = "program"};
   app.add_option("--nodes", sizes)->delimiter(',')->capture_default_str();
   app.add_option("--degrees", degrees)->delimiter(',')->capture_default_str();
   app.add_option("--seeds", num_seeds)->capture_default_str();
@@ -110,9 +112,9 @@ int main(int argc, char** argv) {
   fmt::print("\n{:>4}{:>7}{:>10}{:>8}{:>8}{:>8}{:>12}{:>6}{:>6}{:>9}{:>8}\n", "c", "kept", "median", "90 %",
              "99 %", "most", "neighbours:", "90 %", "most", "allowed", "beyond");
   const cairn::AppearanceGraph graph = cairn::LargestComponent(cairn::SyntheticGraph(path_nodes, 8, 0));
-  const cairn::Domination domination(graph, {});
-  const std::vector<cairn::NodeIdx> kept = cairn::ImproveDominatingSet(
-      domination, cairn::GreedyDominatingSet(domination), {.num_tries = num_tries}, 0);
+  const cairn::link_appearance::Domination domination(graph, {});
+  const std::vector<cairn::NodeIdx> kept = cairn::link_appearance::ImproveDominatingSet(
+      domination, cairn::link_appearance::GreedyDominatingSet(domination), {.num_tries = num_tries}, 0);
   for (const int c : {0, 12, 8, 5, 3, 2}) cairn::MeasurePaths(graph, kept, c);
   return 0;
 }

@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/appearance/synthetic_graph.h"
-#include "stages/link_appearance/greedy_dominating_set.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Time and memory of the greedy connected dominating set, from few links to five million");
@@ -33,7 +33,9 @@ int main(int argc, char** argv) {
       std::vector<double> runs;
       for (int run = 0; run < num_runs; ++run) {
         const std::clock_t start = std::clock();
-        *num_kept = cairn::GreedyDominatingSet(cairn::Domination(graph, {.num_dominators = m})).size();
+        *num_kept = cairn::link_appearance::GreedyDominatingSet(
+                        cairn::link_appearance::Domination(graph, {.num_dominators = m}))
+                        .size();
         runs.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
       }
       std::sort(runs.begin(), runs.end());

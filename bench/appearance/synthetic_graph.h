@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/appearance_graph.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/world/appearance_graph.h"
 
 namespace cairn {
 

@@ -7,8 +7,8 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/image_file.h"
-#include "runtime/localizer.h"
+#include "core/capture/image_file.h"
+#include "runtime/localize/localizer.h"
 
 int main(int argc, char** argv) {
   const auto map =

@@ -21,9 +21,9 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/flann.hpp>
 
-#include "core/colmap_database.h"
-#include "core/deciles.h"
-#include "core/descriptor_matcher.h"
+#include "core/base/deciles.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_matcher.h"
 
 namespace cairn {
 namespace {

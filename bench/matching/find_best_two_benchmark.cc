@@ -3,8 +3,8 @@
 // included.  No data needed; compare_matchers.sh holds the kernels against their peers.
 #include <benchmark/benchmark.h>
 
-#include "core/descriptor_matcher.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/features/descriptor_matcher.h"
 
 namespace cairn {
 namespace {

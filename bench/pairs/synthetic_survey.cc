@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bench/survey_writer.h"
-#include "core/random.h"
+#include "core/base/random.h"
 
 namespace cairn {
 namespace {

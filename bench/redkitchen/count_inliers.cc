@@ -12,11 +12,11 @@
 #include <thread>
 #include <vector>
 
-#include "core/colmap_database.h"
-#include "core/estimate_two_view.h"
-#include "core/parallel.h"
-#include "core/relative_pose.h"
-#include "core/two_view_error.h"
+#include "core/base/parallel.h"
+#include "core/colmap/colmap_database.h"
+#include "core/geometry/estimate_two_view.h"
+#include "core/geometry/relative_pose.h"
+#include "core/geometry/two_view_error.h"
 
 namespace cairn {
 namespace {

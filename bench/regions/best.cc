@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "sim/worlds/simulate_worlds.h"
 #include "stages/decompose_regions/check_regions.h"
 #include "stages/decompose_regions/decompose_regions.h"
-#include "stages/simulate_worlds/simulate_worlds.h"
 
 namespace cairn {
 namespace {
@@ -26,17 +26,18 @@ struct Sums {
 
 // Both algorithms on one world.  False if the world cannot be made, or a result breaks a property (says
 // which).
-bool Add(int setting, uint64_t seed, DecomposeRegionsOptions options, Sums* sums) {
-  const Result<World> world = SimulateWorld({.setting = setting}, seed);
+bool Add(int setting, uint64_t seed, decompose_regions::DecomposeRegionsOptions options, Sums* sums) {
+  const Result<World> world = sim::SimulateWorld({.setting = setting}, seed);
   if (!world.ok()) return false;
   options.algorithm = "b2";
-  const Result<Decomposition> b2 = DecomposeRegions(*world, options, seed);
+  const Result<Decomposition> b2 = decompose_regions::DecomposeRegions(*world, options, seed);
   options.algorithm = "best";
   const std::clock_t start = std::clock();
-  const Result<Decomposition> best = DecomposeRegions(*world, options, seed);
+  const Result<Decomposition> best = decompose_regions::DecomposeRegions(*world, options, seed);
   const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   if (!b2.ok() || !best.ok()) return false;
-  const RegionCheck check = CheckRegions(*world, *best), b2_check = CheckRegions(*world, *b2);
+  const decompose_regions::RegionCheck check = decompose_regions::CheckRegions(*world, *best),
+                                       b2_check = decompose_regions::CheckRegions(*world, *b2);
   for (const std::string& violation : check.violations)
     std::cerr << "seed " << seed << ": " << violation << "\n";
   if (!check.violations.empty()) return false;
@@ -79,7 +80,7 @@ int main(int argc, char** argv) {
   int num_worlds = 50;
   std::vector<int> settings = {1, 2, 3, 4};
   uint64_t seed = 0;
-  cairn::DecomposeRegionsOptions options{.k = 4, .tau = 1, .rho = 9};
+  cairn::decompose_regions::DecomposeRegionsOptions options{.k = 4, .tau = 1, .rho = 9};
   app.add_option("--worlds", num_worlds, "worlds per setting")->capture_default_str();
   app.add_option("--settings", settings, "settings to run")->delimiter(',')->capture_default_str();
   app.add_option("--seed", seed, "seed of the first world")->capture_default_str();

@@ -20,8 +20,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "sim/worlds/simulate_worlds.h"
 #include "stages/decompose_regions/decompose_regions.h"
-#include "stages/simulate_worlds/simulate_worlds.h"
 
 namespace cairn {
 namespace {
@@ -40,14 +40,14 @@ double ProcessorSeconds(const rusage& usage) {
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-void MeasureSmallWorlds(const DecomposeRegionsOptions& options, int num_runs) {
+void MeasureSmallWorlds(const decompose_regions::DecomposeRegionsOptions& options, int num_runs) {
   fmt::print("{:>8}{:>10}{:>10}{:>9}{:>10}{:>14}{:>11}\n", "setting", "stations", "visible", "regions",
              "best, ms", "median, ms", "slowest");
   for (int setting = 1; setting <= 4; ++setting) {
     // Of the first worlds the one that is nearest to 5,000 stations.
     World nearest;
     for (uint64_t seed = 0; seed < 40; ++seed) {
-      Result<World> world = SimulateWorld({.setting = setting}, seed);
+      Result<World> world = sim::SimulateWorld({.setting = setting}, seed);
       if (!world.ok()) continue;
       const auto distance = [](const World& w) { return std::abs(w.num_stations() - 5000); };
       if (distance(*world) < distance(nearest)) nearest = std::move(*world);
@@ -56,7 +56,8 @@ void MeasureSmallWorlds(const DecomposeRegionsOptions& options, int num_runs) {
     size_t num_regions = 0;
     for (int run = 0; run < num_runs; ++run) {
       const std::clock_t start = std::clock();
-      const Result<Decomposition> result = DecomposeRegions(nearest, options, static_cast<uint64_t>(run));
+      const Result<Decomposition> result =
+          decompose_regions::DecomposeRegions(nearest, options, static_cast<uint64_t>(run));
       milliseconds.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
       if (result.ok()) num_regions = result->regions.size();
     }
@@ -88,22 +89,23 @@ rusage RunApart(const std::function<bool()>& body) {
 }
 
 bool WriteLargeWorld(int64_t num_stations, const std::string& path) {
-  const SimulateWorldsOptions options{.setting = 1,
-                                      .num_features = kFeaturesForHundredVisible,
-                                      .area_scale = static_cast<double>(num_stations) / kStationsPerScale};
-  const Result<World> world = SimulateWorld(options, 0);
+  const sim::SimulateWorldsOptions options{
+      .setting = 1,
+      .num_features = kFeaturesForHundredVisible,
+      .area_scale = static_cast<double>(num_stations) / kStationsPerScale};
+  const Result<World> world = sim::SimulateWorld(options, 0);
   const Status status = world.ok() ? WriteWorldDatabase(*world, path) : Status(world.error());
   if (!status.ok()) fmt::print(stderr, "{}\n", status.error().message);
   return status.ok();
 }
 
-bool DecomposeFile(const std::string& path, const DecomposeRegionsOptions& options) {
+bool DecomposeFile(const std::string& path, const decompose_regions::DecomposeRegionsOptions& options) {
   const auto start = Clock::now();
   const Result<World> world = ReadWorldDatabase(path);
   if (!world.ok()) return false;
   const double reading = SecondsSince(start);
   const auto read = Clock::now();
-  const Result<Decomposition> result = DecomposeRegions(*world, options, 0);
+  const Result<Decomposition> result = decompose_regions::DecomposeRegions(*world, options, 0);
   if (!result.ok()) return false;
   fmt::print("{:>10}{:>12.3g}{:>9}{:>12.2f}{:>14.2f}", world->num_stations(),
              static_cast<double>(world->num_incidences()), result->regions.size(), reading,
@@ -112,7 +114,7 @@ bool DecomposeFile(const std::string& path, const DecomposeRegionsOptions& optio
 }
 
 void MeasureLargeWorlds(const std::vector<int64_t>& sizes, const std::filesystem::path& folder,
-                        const DecomposeRegionsOptions& options) {
+                        const decompose_regions::DecomposeRegionsOptions& options) {
   fmt::print("\n{:>10}{:>12}{:>9}{:>12}{:>14}{:>16}{:>10}\n", "stations", "incidences", "regions",
              "reading, s", "regions, s", "processor, s", "GiB");
   std::vector<double> seconds;
@@ -136,7 +138,7 @@ void MeasureLargeWorlds(const std::vector<int64_t>& sizes, const std::filesystem
 
 int main(int argc, char** argv) {
   CLI::App app("Time and memory of algorithm B.2, from 5,000 stations to a million");
-  cairn::DecomposeRegionsOptions options{
+  cairn::decompose_regions::DecomposeRegionsOptions options{
       .algorithm = "b2", .k = 4, .tau = 1, .rho = 9, .lower_bound = "none"};
   std::vector<int64_t> sizes = {100000, 300000, 1000000};
   std::string folder = std::filesystem::temp_directory_path();

@@ -13,11 +13,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
+#include "sim/worlds/simulate_worlds.h"
 #include "stages/decompose_regions/check_regions.h"
+#include "stages/decompose_regions/cover/reduced_world.h"
 #include "stages/decompose_regions/decompose_regions.h"
-#include "stages/decompose_regions/reduced_world.h"
-#include "stages/simulate_worlds/simulate_worlds.h"
 
 namespace cairn {
 namespace {
@@ -47,10 +47,10 @@ struct WorldRow {
   std::array<Means, kAlgorithms.size()> means;
 };
 
-Means Measure(const World& world, const IndexLists& neighbours, const DecomposeRegionsOptions& options,
-              uint64_t seed) {
+Means Measure(const World& world, const decompose_regions::IndexLists& neighbours,
+              const decompose_regions::DecomposeRegionsOptions& options, uint64_t seed) {
   const auto start = std::chrono::steady_clock::now();
-  const Result<Decomposition> result = DecomposeRegions(world, options, seed);
+  const Result<Decomposition> result = decompose_regions::DecomposeRegions(world, options, seed);
   const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
   Means means{.milliseconds = elapsed.count()};
   if (!result.ok()) return means;
@@ -59,24 +59,28 @@ Means Measure(const World& world, const IndexLists& neighbours, const DecomposeR
     landmarks.insert(region.features.begin(), region.features.end());
     means.grown_poses +=
         static_cast<double>(region.stations.size()) / static_cast<double>(result->regions.size());
-    means.core_poses += static_cast<double>(ShrinkStations(neighbours, region.stations, options.tau).size()) /
-                        static_cast<double>(result->regions.size());
+    means.core_poses +=
+        static_cast<double>(
+            decompose_regions::ShrinkStations(neighbours, region.stations, options.tau).size()) /
+        static_cast<double>(result->regions.size());
   }
   means.num_regions = static_cast<double>(result->regions.size());
   means.num_landmarks = static_cast<double>(landmarks.size());
   means.num_uncovered = static_cast<double>(result->uncovered.size());
-  means.largest_hole = CheckRegions(world, *result).largest_hole;
+  means.largest_hole = decompose_regions::CheckRegions(world, *result).largest_hole;
   return means;
 }
 
-WorldRow RunWorld(const SimulateWorldsOptions& simulation, DecomposeRegionsOptions options, uint64_t seed) {
+WorldRow RunWorld(const sim::SimulateWorldsOptions& simulation,
+                  decompose_regions::DecomposeRegionsOptions options, uint64_t seed) {
   WorldRow row;
-  const Result<World> world = SimulateWorld(simulation, seed);
+  const Result<World> world = sim::SimulateWorld(simulation, seed);
   if (!world.ok()) return row;
-  const IndexLists neighbours = NeighbourLists(*world);
+  const decompose_regions::IndexLists neighbours = decompose_regions::NeighbourLists(*world);
   row.num_stations = world->num_stations();
   row.num_visible = static_cast<double>(world->num_incidences()) / world->num_stations();
-  row.num_coverable = static_cast<double>(CoverableStations(*world, options.k, options.tau).size());
+  row.num_coverable =
+      static_cast<double>(decompose_regions::CoverableStations(*world, options.k, options.tau).size());
   for (size_t a = 0; a < kAlgorithms.size(); ++a) {
     options.algorithm = kAlgorithms[a];
     row.means[a] = Measure(*world, neighbours, options, seed);
@@ -142,8 +146,8 @@ int main(int argc, char** argv) {
   int num_worlds = 300, num_threads = 0;
   std::vector<int> settings = {1, 2, 3, 4};
   uint64_t seed = 0;
-  cairn::DecomposeRegionsOptions options{.k = 4, .tau = 1, .rho = 9};  // [Sala06 §VI-A]
-  cairn::SimulateWorldsOptions simulation;
+  cairn::decompose_regions::DecomposeRegionsOptions options{.k = 4, .tau = 1, .rho = 9};  // [Sala06 §VI-A]
+  cairn::sim::SimulateWorldsOptions simulation;
   app.add_option("--worlds", num_worlds, "worlds per setting")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -8,10 +8,10 @@
 
 #include <unistd.h>
 
-#include "core/file.h"
-#include "core/map_seal.h"
-#include "core/random.h"
-#include "runtime/localizer.h"
+#include "core/base/random.h"
+#include "core/files/file.h"
+#include "core/seal/map_seal.h"
+#include "runtime/localize/localizer.h"
 
 namespace cairn {
 namespace {

@@ -14,12 +14,12 @@
 #include <fstream>
 #include <string>
 
-#include "core/grow_vocabulary.h"
-#include "core/map_seal.h"
-#include "runtime/localizer.h"
+#include "core/seal/map_seal.h"
+#include "core/vocabulary/grow_vocabulary.h"
+#include "runtime/localize/localizer.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
-#include "tests/runtime/synthetic_room.h"
+#include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {
 namespace {
@@ -92,7 +92,7 @@ DescriptorMatrix OldDescriptors(int num_rooms) {
   DescriptorMatrix descriptors(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
   for (int room = 0; room < num_rooms; ++room)
     descriptors.middleRows(room * kLandmarksPerRoom, kLandmarksPerRoom) = MakeRoom(room).descriptors;
-  QuantizeDescriptorValues(4, &descriptors);
+  emit_map::QuantizeDescriptorValues(4, &descriptors);
   return descriptors;
 }
 
@@ -108,7 +108,7 @@ Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree)
     AddRoom(room, is_new, &rows);
   }
   rows.descriptors.conservativeResize(static_cast<Eigen::Index>(rows.landmarks.size()), Eigen::NoChange);
-  QuantizeDescriptorValues(4, &rows.descriptors);
+  emit_map::QuantizeDescriptorValues(4, &rows.descriptors);
   const DescriptorMatrix all_training = same_tree ? OldDescriptors(num_rooms) : rows.descriptors;
   const Eigen::Index num_training = std::min<Eigen::Index>(all_training.rows(), 200'000);
   NoProgress progress;
@@ -116,8 +116,8 @@ Status Make(const std::string& path, int num_rooms, int num_new, bool same_tree)
                          GrowVocabulary(all_training.topRows(num_training), all_training.rows(),
                                         {.depth = 5, .min_num_descriptors_to_split = 8}, 0, 0, progress));
   const double landmarks_per_word = std::max(40.0, static_cast<double>(rows.descriptors.rows()) / 65536);
-  rows.vocabulary = CutVocabulary(tree, rows.descriptors, rows.images,
-                                  std::vector<char>(rows.images.size(), 1), landmarks_per_word);
+  rows.vocabulary = emit_map::CutVocabulary(tree, rows.descriptors, rows.images,
+                                            std::vector<char>(rows.images.size(), 1), landmarks_per_word);
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, path));
   const KeyPair keys = MakeKeyPair();
   std::filesystem::remove(path + ".key");

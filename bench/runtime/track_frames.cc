@@ -12,9 +12,9 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "core/capture.h"
-#include "core/image_file.h"
-#include "runtime/region_tracker.h"
+#include "core/capture/capture.h"
+#include "core/capture/image_file.h"
+#include "runtime/localize/region_tracker.h"
 
 namespace cairn {
 namespace {

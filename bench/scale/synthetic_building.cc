@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bench/survey_writer.h"
-#include "core/random.h"
+#include "core/base/random.h"
 
 namespace cairn {
 namespace {

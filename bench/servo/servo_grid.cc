@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "core/parallel.h"
-#include "core/pose.h"
-#include "core/svg.h"
-#include "tests/runtime/servo_scene.h"
+#include "core/base/parallel.h"
+#include "core/geometry/pose.h"
+#include "core/picture/svg.h"
+#include "tests/runtime/drive/servo_scene.h"
 
 namespace {
 

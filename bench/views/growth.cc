@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <cstring>
 
-#include "core/file.h"
-#include "core/memory.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/files/file.h"
+#include "core/line/memory.h"
 #include "stages/decompose_views/arrangement.h"
 #include "stages/decompose_views/decompose_views.h"
 
@@ -81,13 +81,13 @@ int Time() {
       if (holes) {
         for (auto& ring : Pillars(std::max(1, rooms / 4), length, rooms)) rings.push_back(ring);
       }
-      const auto input = ParsePlan(GeoJson(rings), "office");
+      const auto input = decompose_views::ParsePlan(GeoJson(rings), "office");
       NoProgress progress;
       double seconds = 1e9;
-      Result<DecomposeViewsResult> result = MakeError(ErrorCode::kFailed, "not run");
+      Result<decompose_views::DecomposeViewsResult> result = MakeError(ErrorCode::kFailed, "not run");
       for (int run = 0; run < 3; ++run) {
         const double start = Seconds();
-        result = DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress);
+        result = decompose_views::DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress);
         seconds = std::min(seconds, Seconds() - start);
       }
       if (!result.ok()) {

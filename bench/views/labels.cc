@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "core/memory.h"
-#include "core/parallel.h"
-#include "core/random.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/line/memory.h"
 #include "stages/decompose_views/decompose_views.h"
 #include "stages/decompose_views/label_faces.h"
 
@@ -25,7 +25,7 @@ struct Tally {
 // Points within the tolerance of a border may see either side of it.
 Tally Compare(const Views& views, int num_points, double tolerance_m) {
   const FloorPlan& plan = views.plan;
-  const WallRays rays(plan);
+  const decompose_views::WallRays rays(plan);
   const FaceLocator locator(views);
   enum Outcome : char { kRight, kNoRegion, kNear, kWrong, kWrongNear };
   std::vector<char> outcomes(num_points);
@@ -42,7 +42,8 @@ Tally Compare(const Views& views, int num_points, double tolerance_m) {
       if (face < 0 && plan.closed) continue;
       if (face < 0) return;
       std::vector<LabelIdx> seen;
-      for (const WindowChange& window : CountWindows(plan, rays, grid)) seen.push_back(window.label);
+      for (const decompose_views::WindowChange& window : decompose_views::CountWindows(plan, rays, grid))
+        seen.push_back(window.label);
       const bool near = locator.BorderDistance(face, place) < tolerance_m;
       const bool right = seen == views.LabelSet(face);
       outcomes[i] = near ? (right ? kNear : kWrongNear) : (right ? kRight : kWrong);
@@ -73,14 +74,14 @@ int main(int argc, char** argv) {
   std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (int i = 2; i < argc; ++i) {
     const std::string path = argv[i];
-    const auto input = ReadPlan(path);
+    const auto input = decompose_views::ReadPlan(path);
     if (!input.ok()) {
       std::fprintf(stderr, "%s\n", input.error().message.c_str());
       return 1;
     }
     NoProgress progress;
     const double start = Seconds();
-    const auto result = DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress);
+    const auto result = decompose_views::DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress);
     if (!result.ok()) {
       std::fprintf(stderr, "%s: %s\n", argv[i], result.error().message.c_str());
       return 1;

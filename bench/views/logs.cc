@@ -8,10 +8,10 @@
 
 #include <Eigen/LU>
 
-#include "core/memory.h"
-#include "core/parallel.h"
-#include "core/views_database.h"
-#include "runtime/interpretation_tree.h"
+#include "core/base/parallel.h"
+#include "core/line/memory.h"
+#include "core/plan/views_database.h"
+#include "runtime/laser/interpretation_tree.h"
 #include "stages/decompose_views/decompose_views.h"
 
 namespace {
@@ -77,18 +77,18 @@ int main(int argc, char** argv) {
       AddSegment((*scans)[i].pose.FloorFromRobot(segment.start), (*scans)[i].pose.FloorFromRobot(segment.end),
                  &walls);
   }
-  InputPlan input;
+  decompose_views::InputPlan input;
   for (const MapWall& wall : walls) {
     if (wall.num_scans < 3 || wall.high - wall.low < 0.4) continue;
     input.segments.push_back({wall.centre + wall.low * wall.along, wall.centre + wall.high * wall.along,
                               static_cast<int>(input.segments.size()) + 1});
   }
-  DecomposeViewsOptions options;
+  decompose_views::DecomposeViewsOptions options;
   options.clean.snap_m = 0.05;
   options.clean.simplify_m = 0.03;
   NoProgress progress;
   double start = Seconds();
-  const auto result = DecomposeViews(input, options, 0, DefaultMemoryMib(), progress);
+  const auto result = decompose_views::DecomposeViews(input, options, 0, DefaultMemoryMib(), progress);
   if (!result.ok()) {
     std::fprintf(stderr, "%s\n", result.error().message.c_str());
     return 1;

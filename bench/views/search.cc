@@ -9,11 +9,11 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "core/memory.h"
-#include "core/parallel.h"
-#include "runtime/interpretation_tree.h"
+#include "core/base/parallel.h"
+#include "core/line/memory.h"
+#include "runtime/laser/interpretation_tree.h"
 #include "stages/decompose_views/decompose_views.h"
-#include "tests/runtime/simulated_scan.h"
+#include "tests/runtime/scans/simulated_scan.h"
 
 namespace {
 
@@ -179,10 +179,11 @@ int main(int argc, char** argv) {
   std::vector<std::array<double, 4>> curve;
   for (int i = 3; i < argc; ++i) {
     const std::string path = argv[i];
-    const auto input = ReadPlan(path);
+    const auto input = decompose_views::ReadPlan(path);
     NoProgress progress;
-    const auto result = input.ok() ? DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress)
-                                   : Result<DecomposeViewsResult>(input.error());
+    const auto result = input.ok()
+                            ? decompose_views::DecomposeViews(*input, {}, 0, DefaultMemoryMib(), progress)
+                            : Result<decompose_views::DecomposeViewsResult>(input.error());
     if (!result.ok()) {
       std::fprintf(stderr, "%s: %s\n", argv[i], result.error().message.c_str());
       return 1;

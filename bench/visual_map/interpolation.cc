@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "core/floor_pose.h"
-#include "core/map_rows.h"
+#include "core/blocks/map_rows.h"
+#include "core/geometry/floor_pose.h"
 
 namespace {
 

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "core/deciles.h"
-#include "core/svg.h"
+#include "core/base/deciles.h"
+#include "core/picture/svg.h"
 
 namespace cairn {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "runtime/visual_estimate.h"
+#include "runtime/visual_map/visual_estimate.h"
 
 namespace cairn {
 

@@ -15,14 +15,14 @@
 #include <opencv2/core/utility.hpp>
 
 #include "bench/visual_map/pictures.h"
-#include "core/capture.h"
-#include "core/command.h"
-#include "core/deciles.h"
-#include "core/file.h"
-#include "core/floor_pose.h"
-#include "core/image_file.h"
-#include "runtime/localizer.h"
-#include "runtime/visual_estimate.h"
+#include "core/base/deciles.h"
+#include "core/capture/capture.h"
+#include "core/capture/image_file.h"
+#include "core/files/file.h"
+#include "core/geometry/floor_pose.h"
+#include "core/line/command.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/visual_map/visual_estimate.h"
 
 namespace cairn {
 namespace {

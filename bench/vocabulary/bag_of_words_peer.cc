@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
 namespace cairn {
 namespace {

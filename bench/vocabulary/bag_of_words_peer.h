@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/features.h"
+#include "core/features/features.h"
 
 namespace cairn {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/features.h"
+#include "core/features/features.h"
 
 namespace faiss {
 struct Index;

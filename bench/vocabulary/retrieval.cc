@@ -15,11 +15,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "core/colmap_database.h"
-#include "core/parallel.h"
-#include "core/random.h"
-#include "core/recognize_place.h"
-#include "core/rerank_places.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/colmap/colmap_database.h"
+#include "core/vocabulary/recognize_place.h"
+#include "core/vocabulary/rerank_places.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
 namespace cairn {
@@ -95,7 +95,7 @@ struct Arguments {
   int num_threads = 2;
   uint64_t seed = 0;
   bool is_verbose = false;
-  BuildVocabularyOptions options;
+  build_vocabulary::BuildVocabularyOptions options;
   PlaceOptions place;
   RerankOptions rerank;
 };
@@ -142,15 +142,16 @@ class Retrieval {
                survey_.images.size(), num_with_place_, num_without_place_, elsewhere_.images.size());
     fmt::print("{:>6}{:>7}{:>6}{:>12}{:>9}{:>9}{:>9}{:>9}{:>9}{:>10}{:>9}\n", "stop", "words", "depth",
                "descriptors", "verified", "right", "strict", "wrong", "none: ok", "elsewhere", "ms");
-    std::vector<ImageDescriptors> documents;
+    std::vector<build_vocabulary::ImageDescriptors> documents;
     for (const Image& image : survey_.images)
       documents.push_back({static_cast<ImageId>(documents.size() + 1), image.features.descriptors});
     for (const double stop_ratio : arguments_.stop_ratios) {
-      BuildVocabularyOptions options = arguments_.options;
+      build_vocabulary::BuildVocabularyOptions options = arguments_.options;
       options.max_document_ratio = stop_ratio;
       NoProgress progress;
-      CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, BuildVocabulary(documents, options, arguments_.seed,
-                                                                          arguments_.num_threads, progress));
+      CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary,
+                             build_vocabulary::BuildVocabulary(documents, options, arguments_.seed,
+                                                               arguments_.num_threads, progress));
       for (const int count : arguments_.counts) {
         for (const int num_verified : arguments_.num_verified) {
           const Figures f = Measure(vocabulary, count, num_verified);

@@ -15,8 +15,8 @@
 
 #include "bench/vocabulary/bag_of_words_peer.h"
 #include "bench/vocabulary/synthetic_places.h"
-#include "core/map_blocks.h"
-#include "core/parallel.h"
+#include "core/base/parallel.h"
+#include "core/blocks/map_blocks.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 #ifdef CAIRN_HAS_FAISS
 #include "bench/vocabulary/faiss_peer.h"
@@ -30,7 +30,7 @@ double Now() {
 }
 
 struct Survey {
-  std::vector<ImageDescriptors> images;
+  std::vector<build_vocabulary::ImageDescriptors> images;
   std::vector<DescriptorMatrix> queries;
   std::vector<int> places;  // of the queries
 };
@@ -129,11 +129,11 @@ void PrintBytes(const Vocabulary& vocabulary) {
       per_posting(word_bytes + norm_bytes + tree_bytes));
 }
 
-Vocabulary RunTree(const Survey& survey, const BuildVocabularyOptions& options, int num_threads,
-                   const std::string& name) {
+Vocabulary RunTree(const Survey& survey, const build_vocabulary::BuildVocabularyOptions& options,
+                   int num_threads, const std::string& name) {
   Times times;
   const double start = CpuSeconds(), start_elapsed = Now();
-  Vocabulary vocabulary = *BuildVocabulary(survey.images, options, 0, num_threads, times);
+  Vocabulary vocabulary = *build_vocabulary::BuildVocabulary(survey.images, options, 0, num_threads, times);
   const double end = CpuSeconds();
   Row row{.method = name, .num_words = vocabulary.num_words()};
   row.elapsed_s = Now() - start_elapsed;
@@ -149,11 +149,11 @@ Vocabulary RunTree(const Survey& survey, const BuildVocabularyOptions& options, 
 
 DescriptorMatrix Sample(const Survey& survey, int64_t count) {
   int64_t total = 0;
-  for (const ImageDescriptors& image : survey.images) total += image.descriptors.rows();
+  for (const build_vocabulary::ImageDescriptors& image : survey.images) total += image.descriptors.rows();
   const int64_t step = std::max<int64_t>(1, total / count);
   DescriptorMatrix sample((total + step - 1) / step, kDescriptorDim);
   int64_t first = 0;
-  for (const ImageDescriptors& image : survey.images) {
+  for (const build_vocabulary::ImageDescriptors& image : survey.images) {
     const int64_t num_rows = image.descriptors.rows();
     for (int64_t i = (first + step - 1) / step * step; i < first + num_rows; i += step) {
       sample.row(i / step) = image.descriptors.row(i - first);
@@ -171,7 +171,8 @@ void RunBagOfWords(const Survey& survey, const DescriptorMatrix& training, int d
   Row row{.method = "bags of words as in DBoW2 (one thread)", .num_words = peer.num_words()};
   row.train_s = CpuSeconds() - start;
   std::vector<const DescriptorMatrix*> documents;
-  for (const ImageDescriptors& image : survey.images) documents.push_back(&image.descriptors);
+  for (const build_vocabulary::ImageDescriptors& image : survey.images)
+    documents.push_back(&image.descriptors);
   start = CpuSeconds();
   peer.AddDocuments(documents);
   row.fill_s = CpuSeconds() - start;
@@ -207,7 +208,7 @@ void RunFaissWords(const Survey& survey, const DescriptorMatrix& training, int n
     std::sort(words.begin(), words.end());
     return words;
   };
-  for (const ImageDescriptors& image : survey.images) {
+  for (const build_vocabulary::ImageDescriptors& image : survey.images) {
     const auto document = static_cast<int32_t>(vocabulary.document_ids.size());
     vocabulary.document_ids.push_back(image.image_id);
     for (const WordIdx word : sorted_words(image.descriptors)) {
@@ -260,7 +261,7 @@ struct Arguments {
   bool train_with_all = false;
   bool bag_of_words = false;
   bool faiss = false;
-  BuildVocabularyOptions options;
+  build_vocabulary::BuildVocabularyOptions options;
 };
 
 void Run(const Arguments& arguments) {
@@ -271,7 +272,7 @@ void Run(const Arguments& arguments) {
              survey.images.size(), arguments.places.num_features, survey.queries.size(), Now() - start,
              arguments.num_threads);
   PrintHead();
-  BuildVocabularyOptions options = arguments.options;
+  build_vocabulary::BuildVocabularyOptions options = arguments.options;
   const Vocabulary tree =
       RunTree(survey, options, arguments.num_threads,
               fmt::format("cairn, trained with {} of them", options.max_num_training_descriptors));

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
 namespace cairn {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/features.h"
-#include "core/vocabulary_tree.h"
+#include "core/features/features.h"
+#include "core/vocabulary/vocabulary_tree.h"
 
 namespace cairn {
 

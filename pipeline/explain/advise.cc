@@ -9,11 +9,11 @@
 #include <set>
 #include <utility>
 
-#include "core/drop_reason.h"
+#include "core/world/drop_reason.h"
 #include "pipeline/explain/station_losses.h"
 #include "pipeline/explain/station_text.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 // A place that could as well be one other has this entropy; more is a place that looks like several.
@@ -411,4 +411,4 @@ std::string AdviceText(const std::vector<Advice>& advice) {
   return text;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

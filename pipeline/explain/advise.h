@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "core/map_rows.h"
-#include "pipeline/pareto_points.h"
+#include "core/blocks/map_rows.h"
+#include "pipeline/explain/pareto_points.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // What would make a map better, in plain words, most important first: uncovered places with the reason and
 // the images to take next, places that look like others, regions where held-out images were not localized,
@@ -60,4 +60,4 @@ void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>
 // A numbered line per advice, with the places of images to take under it.
 std::string AdviceText(const std::vector<Advice>& advice);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -1,6 +1,6 @@
 #include "pipeline/explain/block_bytes.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 std::map<std::string, int64_t> BytesPerBlockKind(const MapDirectory& directory) {
   std::map<std::string, int64_t> bytes;
@@ -9,4 +9,4 @@ std::map<std::string, int64_t> BytesPerBlockKind(const MapDirectory& directory) 
   return bytes;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -4,11 +4,11 @@
 #include <map>
 #include <string>
 
-#include "core/map_blocks.h"
+#include "core/blocks/map_blocks.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // Bytes of the blocks of each kind, by its name.
 std::map<std::string, int64_t> BytesPerBlockKind(const MapDirectory& directory);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

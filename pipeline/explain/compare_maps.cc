@@ -7,12 +7,12 @@
 #include <set>
 #include <tuple>
 
-#include "core/deciles.h"
-#include "core/descriptor_distance.h"
-#include "core/floor_pose.h"
-#include "core/pose.h"
+#include "core/base/deciles.h"
+#include "core/features/descriptor_distance.h"
+#include "core/geometry/floor_pose.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 using Cell = std::tuple<int64_t, int64_t, int64_t>;
@@ -240,4 +240,4 @@ int NumChangedRegions(const MapComparison& comparison) {
                                         [](const auto& change) { return !change.same; }));
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

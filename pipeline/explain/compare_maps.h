@@ -6,9 +6,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/map_rows.h"
+#include "core/blocks/map_rows.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // What changed between two maps of one place, A and B, whose world frames are the same.
 
@@ -64,4 +64,4 @@ std::string ComparisonText(const MapRows& a, const MapRows& b, int64_t bytes_a, 
 nlohmann::ordered_json ComparisonJson(const MapRows& a, const MapRows& b, int64_t bytes_a, int64_t bytes_b,
                                       const MapComparison& comparison);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -11,7 +11,7 @@
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/station_text.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 // "decompose_regions.k" -> "40" of all stages.
@@ -195,4 +195,4 @@ nlohmann::ordered_json ComparisonJson(const MapRows& a, const MapRows& b, int64_
   return json;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

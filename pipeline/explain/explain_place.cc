@@ -8,13 +8,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/deciles.h"
-#include "core/floor_pose.h"
-#include "core/pose.h"
+#include "core/base/deciles.h"
+#include "core/geometry/floor_pose.h"
+#include "core/geometry/pose.h"
 #include "pipeline/explain/station_losses.h"
 #include "pipeline/explain/station_text.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 // Closer together, stations are the headings of one place.
@@ -325,4 +325,4 @@ nlohmann::ordered_json ExplainImageJson(const MapRows& rows, int32_t image) {
   return json;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

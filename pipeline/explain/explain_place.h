@@ -7,10 +7,10 @@
 #include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/error.h"
-#include "core/map_rows.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // A place that somebody asks about: floor frame, metres; heading counter-clockwise from +x.
 struct AskedPlace {
@@ -36,4 +36,4 @@ std::string StationSummaryText(const MapRows& rows, const std::vector<StationIdx
 std::string ExplainImageText(const MapRows& rows, int32_t image);
 nlohmann::ordered_json ExplainImageJson(const MapRows& rows, int32_t image);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

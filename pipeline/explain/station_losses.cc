@@ -1,8 +1,8 @@
 #include "pipeline/explain/station_losses.h"
 
-#include "core/landmarks_seen.h"
+#include "core/blocks/landmarks_seen.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 namespace {
 
@@ -53,4 +53,4 @@ std::optional<DropReason> StationLosses::WhyUncovered(StationIdx station) const 
   return std::nullopt;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -3,12 +3,12 @@
 #include <optional>
 #include <vector>
 
-#include "core/drop_reason.h"
-#include "core/map_rows.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/drop_reason.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
-// What of the scene at every station became of it, from the map's own counts (core/map_findings.h).
+// What of the scene at every station became of it, from the map's own counts (core/blocks/map_findings.h).
 class StationLosses {
  public:
   explicit StationLosses(const MapRows& rows);
@@ -31,4 +31,4 @@ class StationLosses {
   std::vector<int> num_landmarks_, num_of_regions_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

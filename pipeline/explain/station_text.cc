@@ -1,6 +1,6 @@
 #include "pipeline/explain/station_text.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 std::string PlaceText(const MapStation& station) {
   const std::string place = fmt::format("{:.2f}, {:.2f}", station.position.x(), station.position.y());
@@ -11,4 +11,4 @@ std::string StationText(const MapRows& rows, StationIdx station) {
   return fmt::format("station {} ({})", station, PlaceText(rows.stations[station]));
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

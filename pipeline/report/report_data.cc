@@ -7,12 +7,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/floor_pose.h"
+#include "core/geometry/floor_pose.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/station_losses.h"
 #include "pipeline/report/report_inputs.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -385,4 +385,4 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   return json;
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -7,11 +7,11 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/map_rows.h"
+#include "core/blocks/map_rows.h"
 #include "pipeline/explain/advise.h"
-#include "pipeline/pareto_points.h"
+#include "pipeline/explain/pareto_points.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // Everything that the page of a report shows, as one JSON object; floor.js and the other scripts draw it.
 // Lists are by column and numbers rounded (places to 1 cm), so that a map of 100,000 landmarks makes a few
@@ -37,4 +37,4 @@ std::vector<Advice> ReportAdvice(const ReportInputs& inputs);
 // REQUIRES: IsBuildReport, IsCheckReport, IsDrive (report_inputs.h)
 nlohmann::ordered_json ReportData(const ReportInputs& inputs);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -100,4 +100,4 @@ bool IsDrive(const Json& drive) {
          });
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -2,9 +2,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/map_rows.h"
+#include "core/blocks/map_rows.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // Whether they have what a page shows of them, of the right types, and numbers that can be.
 bool IsBuildReport(const nlohmann::ordered_json& build);
@@ -14,4 +14,4 @@ bool IsCheckReport(const nlohmann::ordered_json& check);
 bool IsCheckOf(const nlohmann::ordered_json& check, const MapRows& rows);
 bool IsDrive(const nlohmann::ordered_json& drive);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

@@ -6,10 +6,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/svg.h"
-#include "pipeline/ambiguity_svg.h"
-#include "pipeline/floor_svg.h"
-#include "pipeline/inspect_drops.h"
+#include "core/picture/svg.h"
+#include "pipeline/explain/inspect_drops.h"
+#include "pipeline/report/ambiguity_svg.h"
+#include "pipeline/report/floor_svg.h"
 #include "report/chart_js.h"
 #include "report/chart_notice.h"
 #include "report/charts_js.h"
@@ -30,7 +30,7 @@
 #include "report/summary_js.h"
 #include "stages/check_map/report.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 namespace {
 
 constexpr int kMaxStationLines = 20;
@@ -131,11 +131,12 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
   std::string self_test;
   for (const auto& [name, value] : rows.self_test) self_test += fmt::format("{:<26} {:.4g}\n", name, value);
   html += block("Self-test", self_test);
-  html += block("Self-test by region", SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
+  html += block("Self-test by region",
+                check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
   html += block("Held-out images not localized, or wrong", FailedImagesText(data));
   html += block("What the stages dropped", DropsText(rows, kMaxStationLines));
   for (const auto& [stage, options] : rows.stage_options) html += block("Options of " + stage, options);
   return html + "</body></html>\n";
 }
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

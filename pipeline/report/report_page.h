@@ -6,7 +6,7 @@
 
 #include "pipeline/report/report_data.h"
 
-namespace cairn {
+namespace cairn::pipeline {
 
 // A report as one HTML file that needs no network: the data, the page that draws it (page.html, page.css and
 // the scripts), and the libraries that it draws with, which were embedded from the installed packages when
@@ -16,4 +16,4 @@ std::string ReportPage(const nlohmann::ordered_json& data);
 // The same for paper: pictures and tables, no scripts.
 std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordered_json& data);
 
-}  // namespace cairn
+}  // namespace cairn::pipeline

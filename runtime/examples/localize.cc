@@ -1,8 +1,8 @@
 // Where is this picture?  localize MAP IMAGE
 #include <cstdio>
 
-#include "core/image_file.h"
-#include "runtime/localizer.h"
+#include "core/capture/image_file.h"
+#include "runtime/localize/localizer.h"
 
 int main(int argc, char** argv) {
   const auto map = argc == 3 ? cairn::Map::Open(argv[1]) : cairn::Error{{}, "usage: localize MAP IMAGE"};

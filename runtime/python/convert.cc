@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
-#include "core/find_option.h"
+#include "core/options/find_option.h"
 
 namespace py = pybind11;
 

@@ -8,7 +8,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
-#include "runtime/localizer.h"
+#include "runtime/localize/localizer.h"
 
 // Between Python's values and the runtime's.
 namespace cairn {

@@ -8,9 +8,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "runtime/localizer.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/map/update_map.h"
 #include "runtime/python/convert.h"
-#include "runtime/update_map.h"
 
 namespace py = pybind11;
 

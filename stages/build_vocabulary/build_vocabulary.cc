@@ -4,10 +4,10 @@
 #include <numeric>
 #include <utility>
 
-#include "core/parallel.h"
-#include "core/random.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 // Stream of the seed; the others grow the tree.
@@ -149,4 +149,4 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
   return vocabulary;
 }
 
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -4,21 +4,21 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/features.h"
-#include "core/grow_vocabulary.h"
-#include "core/ids.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "core/vocabulary_tree.h"
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/base/progress.h"
+#include "core/features/features.h"
+#include "core/options/options.h"
+#include "core/vocabulary/grow_vocabulary.h"
+#include "core/vocabulary/vocabulary_tree.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 
 // Learns the visual words of a place, and notes which survey image shows which of them, so that the images
 // most like a robot's view are found in a few milliseconds.  Before: extract_features.  After: emit_map.
 // Implements [Mariottini11 §IV]: hierarchical k-means with branching k = 10; each leaf is a word with an
 // inverted file; documents are weighted by word count times inverse document frequency.  Differs from it
-// as core/grow_vocabulary.h says.
+// as core/vocabulary/grow_vocabulary.h says.
 struct BuildVocabularyOptions {
   GrowVocabularyOptions tree;
   // Most descriptors that train the tree, drawn evenly from all; the inverted files always cover all.
@@ -49,4 +49,4 @@ Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,
                                    Progress& progress, const Vocabulary* tree = nullptr);
 
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
-#include "core/memory.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/line/memory.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 // Bytes of memory for one of the input file.
@@ -88,4 +88,4 @@ Command BuildVocabularyCommand() {
   };
 }
 
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 
 // cairn build-vocabulary features.db -o vocabulary.db
 Command BuildVocabularyCommand();
 
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

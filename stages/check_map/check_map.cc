@@ -7,11 +7,11 @@
 
 #include <Eigen/LU>
 
-#include "core/image_file.h"
-#include "core/parallel.h"
-#include "core/sift.h"
+#include "core/base/parallel.h"
+#include "core/capture/image_file.h"
+#include "core/features/sift.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -266,4 +266,4 @@ Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
   return CheckRegionGate(report, options);
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

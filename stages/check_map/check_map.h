@@ -5,18 +5,18 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.h"
-#include "core/error.h"
-#include "core/ids.h"
-#include "core/map_findings.h"
-#include "core/options.h"
-#include "core/pose.h"
-#include "core/progress.h"
-#include "runtime/localizer.h"
-#include "runtime/map.h"
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/base/progress.h"
+#include "core/blocks/map_findings.h"
+#include "core/camera/camera.h"
+#include "core/geometry/pose.h"
+#include "core/options/options.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/map/map.h"
 #include "stages/check_map/plan_fit.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // Tries a map on images that it was not made from: how many are localized, how well, how sure the map is of
 // it, and whether images of another place are refused.  Before: emit_map.  The last stage: its figures are
@@ -116,4 +116,4 @@ void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse);
 // asked; also where something is asked and there was no image to find out.
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::check_map

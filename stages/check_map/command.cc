@@ -9,17 +9,17 @@
 #include <spdlog/spdlog.h>
 #include <opencv2/core/utility.hpp>
 
-#include "core/capture.h"
-#include "core/file.h"
-#include "core/map_documents.h"
-#include "core/output_path.h"
-#include "runtime/read_scans.h"
+#include "core/blocks/map_documents.h"
+#include "core/capture/capture.h"
+#include "core/files/file.h"
+#include "core/files/output_path.h"
+#include "runtime/scans/read_scans.h"
 #include "stages/check_map/check_map.h"
 #include "stages/check_map/plan_agreement.h"
 #include "stages/check_map/region_figures.h"
 #include "stages/check_map/report.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 namespace fs = std::filesystem;
@@ -252,4 +252,4 @@ Command CheckMapCommand() {
   };
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

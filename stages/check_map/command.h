@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // cairn check-map MAP [--queries QUERIES.txt] [--capture DIR] [--foreign DIR]... [-o SEALED] [--json]
 Command CheckMapCommand();
 
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -2,12 +2,12 @@
 
 #include <cmath>
 
-#include "core/floor_pose.h"
-#include "core/parallel.h"
-#include "runtime/interpretation_tree.h"
-#include "runtime/planar_pose.h"
+#include "core/base/parallel.h"
+#include "core/geometry/floor_pose.h"
+#include "core/geometry/planar_pose.h"
+#include "runtime/laser/interpretation_tree.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 // The camera's pose on the floor that a laser's pose means.
@@ -83,4 +83,4 @@ Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
   return Ok();
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

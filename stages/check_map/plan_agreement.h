@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/views.h"
-#include "runtime/scan_segments.h"
+#include "core/base/error.h"
+#include "core/plan/views.h"
+#include "runtime/scans/scan_segments.h"
 #include "stages/check_map/check_map.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // How the fixes of images and the floor plan agree; `scans` is empty, or scans[i] was taken with images[i] by
 // a laser where options.scan_..._ says.  Adds to the figures
@@ -27,4 +27,4 @@ Status CompareWithPlan(const Views& views, const Pose& floor_from_world,
                        const std::vector<std::vector<ScanSegment>>& scans, const CheckMapOptions& options,
                        int num_threads, Progress& progress, std::map<std::string, double>* figures);
 
-}  // namespace cairn
+}  // namespace cairn::check_map

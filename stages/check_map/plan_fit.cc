@@ -6,10 +6,10 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/deciles.h"
-#include "core/floor_pose.h"
+#include "core/base/deciles.h"
+#include "core/geometry/floor_pose.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -278,4 +278,4 @@ std::string PlanVerdict(const PlanFit& fit) {
       fit.center.y(), fit.shift.x(), fit.shift.y());
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

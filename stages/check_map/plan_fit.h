@@ -5,11 +5,11 @@
 
 #include <Eigen/Core>
 
-#include "core/error.h"
-#include "core/map_rows.h"
-#include "core/options.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
+#include "core/options/options.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // Where a map has both images and a floor plan, each checks the other: neither was made from the other.
 //
@@ -63,4 +63,4 @@ void AddPlanFigures(const PlanFit& fit, std::map<std::string, double>* figures);
 // In words: that the plan fits, or how it does not and what would help.
 std::string PlanVerdict(const PlanFit& fit);
 
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -8,9 +8,9 @@
 #include <tuple>
 #include <utility>
 
-#include "core/floor_pose.h"
+#include "core/geometry/floor_pose.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 RegionSelfTest Summarize(RegionIdx region, const std::vector<const HeldOutResult*>& results,
@@ -102,4 +102,4 @@ std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vec
   return summary;
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -3,11 +3,11 @@
 #include <optional>
 #include <vector>
 
-#include "core/map_findings.h"
-#include "core/map_rows.h"
+#include "core/blocks/map_findings.h"
+#include "core/blocks/map_rows.h"
 #include "stages/check_map/check_map.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // Median over the stations of the distance from a station's place to the next other place, metres; 0 where
 // all stations stand at one place.  O(n^1.5) for a lattice.
@@ -28,4 +28,4 @@ void FindStations(const MapRows& rows, const CheckMapOptions& options, std::vect
 std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutResult>& results,
                                              const CheckMapOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/decomposition.h"
-#include "core/floor_pose.h"
+#include "core/geometry/floor_pose.h"
+#include "core/world/decomposition.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 constexpr int kMaxRegionLines = 10;
@@ -231,4 +231,4 @@ nlohmann::ordered_json SelfTestRegionsJson(const std::vector<RegionSelfTest>& re
   return list;
 }
 
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -6,11 +6,11 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/map_findings.h"
-#include "core/map_rows.h"
+#include "core/blocks/map_findings.h"
+#include "core/blocks/map_rows.h"
 #include "stages/check_map/check_map.h"
 
-namespace cairn {
+namespace cairn::check_map {
 
 // What check-map prints: the figures of the held-out images and, if other places were tried, of the images
 // there.
@@ -34,4 +34,4 @@ std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int 
 // For programs: a list, ascending; "region" is null for images outside.
 nlohmann::ordered_json SelfTestRegionsJson(const std::vector<RegionSelfTest>& regions);
 
-}  // namespace cairn
+}  // namespace cairn::check_map

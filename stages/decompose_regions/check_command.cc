@@ -3,7 +3,7 @@
 #include "stages/decompose_regions/check_regions.h"
 #include "stages/decompose_regions/command.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 constexpr size_t kMaxShown = 20;
@@ -52,4 +52,4 @@ Command CheckRegionsCommand() {
   return command;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using StationSet = std::vector<StationIdx>;
@@ -209,4 +209,4 @@ RegionCheck CheckRegions(const World& world, const Decomposition& decomposition,
   return Checker(world, decomposition).Check(max_hole);
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

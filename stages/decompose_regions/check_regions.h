@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "core/decomposition.h"
-#include "core/world.h"
+#include "core/world/decomposition.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // Verdict on a decomposition, computed from the definitions [Sala06 §III] and from nothing that made it.
 struct RegionCheck {
@@ -26,4 +26,4 @@ struct RegionCheck {
 // CheckWorld(world) is ok.
 RegionCheck CheckRegions(const World& world, const Decomposition& decomposition, int max_hole = -1);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

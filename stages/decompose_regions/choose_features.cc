@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/descriptor_distance.h"
-#include "core/descriptor_matcher.h"
+#include "core/features/descriptor_distance.h"
+#include "core/features/descriptor_matcher.h"
+#include "stages/decompose_regions/cover/reduced_world.h"
 #include "stages/decompose_regions/pose_information.h"
-#include "stages/decompose_regions/reduced_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 // The stations that a region still has: as it takes features, those that see all of them.
@@ -247,4 +247,4 @@ Result<Decomposition> ChooseFeatures(const World& world, const Classes& classes,
   return chosen;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -2,13 +2,13 @@
 
 #include <string>
 
-#include "core/decomposition.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/options.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "core/world/decomposition.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // Chooses anew which features the regions of a decomposition keep as landmarks: those that together fix a
 // camera's pose best.  After any algorithm of decompose_regions: the regions stay as many, with as many
@@ -62,4 +62,4 @@ Result<Decomposition> ChooseFeatures(const World& world, const Classes& classes,
                                      const Decomposition& decomposition,
                                      const ChooseFeaturesOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

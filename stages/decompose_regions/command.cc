@@ -2,14 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/file.h"
-#include "core/memory.h"
+#include "core/files/file.h"
+#include "core/line/memory.h"
+#include "stages/decompose_regions/cover/reduced_world.h"
 #include "stages/decompose_regions/decompose_regions.h"
 #include "stages/decompose_regions/list_dropped.h"
 #include "stages/decompose_regions/picture.h"
-#include "stages/decompose_regions/reduced_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 // Bytes of memory for one of the world, and of the classes that landmarks are chosen by.
@@ -117,4 +117,4 @@ Command DecomposeRegionsCommand() {
   return command;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -1,12 +1,12 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // cairn decompose-regions WORLD -o OUT
 Command DecomposeRegionsCommand();
 // cairn check-regions WORLD REGIONS
 Command CheckRegionsCommand();
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
-#include "stages/decompose_regions/algorithm_best.h"
-#include "stages/decompose_regions/algorithms.h"
-#include "stages/decompose_regions/counting_bound.h"
-#include "stages/decompose_regions/cover.h"
-#include "stages/decompose_regions/reduced_world.h"
+#include "stages/decompose_regions/algorithms/algorithm_best.h"
+#include "stages/decompose_regions/algorithms/algorithms.h"
+#include "stages/decompose_regions/cover/counting_bound.h"
+#include "stages/decompose_regions/cover/cover.h"
+#include "stages/decompose_regions/cover/reduced_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 Error NothingCoverable(const World& world, const ReducedWorld& reduced,
@@ -212,4 +212,4 @@ std::vector<StationIdx> CoverableStations(const World& world, int k, int tau) {
   return stations;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

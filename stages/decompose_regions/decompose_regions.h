@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "core/decomposition.h"
-#include "core/error.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/options/options.h"
+#include "core/world/decomposition.h"
+#include "core/world/world.h"
 #include "stages/decompose_regions/choose_features.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // Divides a world into few large regions of stations, such that everywhere in a region the same k features
 // are visible: they are the landmarks that a robot needs there.  Before: filter_visibility.  After: emit_map.
@@ -75,4 +75,4 @@ Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegion
 // N_tau(v). Ascending.
 std::vector<StationIdx> CoverableStations(const World& world, int k, int tau);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

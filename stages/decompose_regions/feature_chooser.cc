@@ -2,9 +2,9 @@
 // it.
 #include <algorithm>
 
-#include "stages/decompose_regions/algorithms.h"
+#include "stages/decompose_regions/algorithms/algorithms.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 FeatureChooser::FeatureChooser(Cover* cover) : cover_(*cover), counts_(cover->world().areas.size(), 0) {}
 
@@ -74,4 +74,4 @@ CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
   return region;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

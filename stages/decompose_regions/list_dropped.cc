@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "stages/decompose_regions/reduced_world.h"
+#include "stages/decompose_regions/cover/reduced_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 // Features that some region keeps, as flags.
@@ -104,4 +104,4 @@ std::vector<DroppedItem> ListDropped(const World& world, const Decomposition& de
   return items;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

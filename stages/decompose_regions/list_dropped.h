@@ -2,11 +2,11 @@
 
 #include <vector>
 
-#include "core/decomposition.h"
-#include "core/dropped_items.h"
-#include "core/world.h"
+#include "core/world/decomposition.h"
+#include "core/world/dropped_items.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // The features of a world that no region of a decomposition keeps, and the stations whose tau-neighbourhood
 // lies in none, each with the reason:
@@ -20,4 +20,4 @@ namespace cairn {
 // REQUIRES: CheckWorld(world) is ok, and `decomposition` is valid for it (CheckRegions).
 std::vector<DroppedItem> ListDropped(const World& world, const Decomposition& decomposition);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -11,11 +11,11 @@
 
 #include <fmt/format.h>
 
-#include "core/deciles.h"
-#include "core/pose.h"
-#include "core/svg.h"
+#include "core/base/deciles.h"
+#include "core/geometry/pose.h"
+#include "core/picture/svg.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 // Okabe and Ito's colours without black and yellow, then Paul Tol's muted ones.
@@ -320,4 +320,4 @@ std::string DrawDecomposition(const World& world, const Decomposition& decomposi
   return Picture(world, decomposition).Draw();
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

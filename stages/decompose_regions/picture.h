@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include "core/decomposition.h"
-#include "core/world.h"
+#include "core/world/decomposition.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // A top view of a decomposition as SVG: every station in the colour of a region that contains it (the one
 // with the nearest centre), every region's outline with its number, coverable stations that no region covers
@@ -16,4 +16,4 @@ namespace cairn {
 // picture are in metres of the floor frame, y up.
 std::string DrawDecomposition(const World& world, const Decomposition& decomposition);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

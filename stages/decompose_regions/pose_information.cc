@@ -6,10 +6,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "core/camera.h"
-#include "core/vector_geometry.h"
+#include "core/camera/camera.h"
+#include "core/geometry/vector_geometry.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
@@ -93,4 +93,4 @@ void PoseInformation::Add(const std::vector<SightInformation>& sights) {
   }
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -5,10 +5,10 @@
 
 #include <Eigen/Core>
 
-#include "core/feature_class.h"
+#include "core/world/feature_class.h"
 #include "stages/decompose_regions/choose_features.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // A landmark as one survey image sees it.
 struct SightInformation {
@@ -38,4 +38,4 @@ class PoseInformation {
   std::vector<View> views_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

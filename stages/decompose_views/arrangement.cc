@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -177,4 +177,4 @@ Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, in
   return arrangement;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/error.h"
-#include "core/floor_plan.h"
-#include "core/progress.h"
-#include "stages/decompose_views/node_segments.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/plan/floor_plan.h"
+#include "stages/decompose_views/plan/node_segments.h"
 #include "stages/decompose_views/view_boundaries.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // The planar graph of walls and view boundaries, and its faces [Simsarian96 §2.2, steps II and IV].
 struct Arrangement {
@@ -51,4 +51,4 @@ std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
 Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
                             Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

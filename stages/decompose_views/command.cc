@@ -4,12 +4,12 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/file.h"
-#include "core/views_database.h"
+#include "core/files/file.h"
+#include "core/plan/views_database.h"
 #include "stages/decompose_views/decompose_views.h"
 #include "stages/decompose_views/picture.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 struct Arguments {
@@ -113,4 +113,4 @@ Command DecomposeViewsCommand() {
   return command;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // cairn decompose-views PLAN -o views.db [--svg FILE]
 Command DecomposeViewsCommand();
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

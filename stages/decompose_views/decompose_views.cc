@@ -5,16 +5,16 @@
 
 #include <Eigen/Geometry>
 
-#include "core/memory.h"
-#include "core/parallel.h"
-#include "core/pose.h"
-#include "core/visible_walls.h"
+#include "core/base/parallel.h"
+#include "core/geometry/pose.h"
+#include "core/line/memory.h"
+#include "core/plan/visible_walls.h"
 #include "stages/decompose_views/arrangement.h"
 #include "stages/decompose_views/label_faces.h"
 #include "stages/decompose_views/view_boundaries.h"
 #include "stages/decompose_views/wall_rays.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 // Bytes of memory for a boundary and for an edge of the arrangement, measured (bench/README.md).
@@ -197,4 +197,4 @@ Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const Decomp
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

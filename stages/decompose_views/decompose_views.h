@@ -3,15 +3,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/error.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "core/views.h"
-#include "stages/decompose_views/clean_plan.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/options/options.h"
+#include "core/plan/views.h"
 #include "stages/decompose_views/merge_regions.h"
-#include "stages/decompose_views/read_plan.h"
+#include "stages/decompose_views/plan/clean_plan.h"
+#include "stages/decompose_views/plan/read_plan.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // Divides a floor plan into the regions from all points of which a laser sees the same walls
 // (view-invariant regions, VIRs).  Before: a floor plan.  After: localization with laser scans (runtime).
@@ -54,4 +54,4 @@ struct DecomposeViewsResult {
 Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
                                             int num_threads, int64_t memory_mib, Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

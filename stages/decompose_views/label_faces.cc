@@ -6,9 +6,9 @@
 #include <numbers>
 #include <numeric>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -307,4 +307,4 @@ Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

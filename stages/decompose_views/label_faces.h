@@ -2,14 +2,14 @@
 
 #include <vector>
 
-#include "core/error.h"
-#include "core/progress.h"
-#include "core/views.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/plan/views.h"
 #include "stages/decompose_views/arrangement.h"
 #include "stages/decompose_views/view_boundaries.h"
 #include "stages/decompose_views/wall_rays.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // How many windows each label is seen through from a point, by looking between all vertices: labels
 // ascending.  The oracle for label sets, and their beginning.  `place`: grid coordinates.  O(n) rays.
@@ -30,4 +30,4 @@ Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
                                     const std::vector<ViewBoundary>& boundaries, Arrangement arrangement,
                                     Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -177,4 +177,4 @@ class Merger {
 
 MergeLoss MergeSmallRegions(double min_area_m2, Views* views) { return Merger(min_area_m2, views).Run(); }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

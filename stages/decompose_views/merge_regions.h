@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "core/views.h"
+#include "core/plan/views.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 struct MergeLoss {
   int64_t num_regions = 0;  // joined to others
@@ -19,4 +19,4 @@ struct MergeLoss {
 // Deterministic.
 MergeLoss MergeSmallRegions(double min_area_m2, Views* views);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

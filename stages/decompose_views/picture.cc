@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "core/svg.h"
+#include "core/picture/svg.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -216,4 +216,4 @@ std::string DrawViews(const Views& views, const ViewsOverlay& overlay, bool regi
   return Picture(views).Draw(overlay, regions);
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 
-#include "core/views.h"
+#include "core/plan/views.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // What is drawn over a plan, floor frame, metres.
 struct ViewsOverlay {
@@ -33,4 +33,4 @@ struct ViewsOverlay {
 // the walls are drawn.  Same views, same bytes.
 std::string DrawViews(const Views& views, const ViewsOverlay& overlay = {}, bool regions = true);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -6,9 +6,9 @@
 #include <limits>
 #include <map>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -283,4 +283,4 @@ Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, cons
   return boundaries;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

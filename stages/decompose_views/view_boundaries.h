@@ -3,12 +3,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/error.h"
-#include "core/floor_plan.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/plan/floor_plan.h"
 #include "stages/decompose_views/wall_rays.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // By how much the number of windows through which a label is seen changes.
 struct WindowChange {
@@ -43,4 +43,4 @@ struct ViewBoundary {
 Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays, int stride,
                                                      int64_t max_num, int num_threads, Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

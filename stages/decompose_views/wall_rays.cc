@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "core/vector_geometry.h"
+#include "core/geometry/vector_geometry.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -219,4 +219,4 @@ LabelIdx WallRays::Look(const Vec2& origin, const Vec2& direction, double* dista
   return label;
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

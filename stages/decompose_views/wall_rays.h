@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "core/floor_plan.h"
+#include "core/plan/floor_plan.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 // Asks what lies along a ray or between two vertices, exactly.  Pieces lie in the cells of a grid.
 class WallRays {
@@ -49,4 +49,4 @@ class WallRays {
   std::vector<int32_t> cell_offsets_, cell_pieces_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -5,10 +5,10 @@
 #include <queue>
 #include <unordered_map>
 
-#include "core/camera.h"
-#include "core/parallel.h"
+#include "core/base/parallel.h"
+#include "core/camera/camera.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 // An image looks at a class from about where it was seen: no farther than this many times the farthest image
@@ -134,4 +134,4 @@ std::vector<size_t> OrderByUse(const Classes& classes, const std::vector<size_t>
   return order;
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

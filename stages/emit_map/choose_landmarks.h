@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/feature_class.h"
+#include "core/world/feature_class.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Orders classes so that, for any n, the first n of them serve the survey's images best: what a map of few
 // bytes keeps.  Maximises
@@ -25,4 +25,4 @@ namespace cairn {
 std::vector<size_t> OrderByUse(const Classes& classes, const std::vector<size_t>& pool, double enough,
                                int num_threads);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -9,20 +9,21 @@
 #include <utility>
 #include <vector>
 
-#include "core/database.h"
-#include "core/dropped_items.h"
-#include "core/file.h"
-#include "core/sessions.h"
-#include "core/sift.h"
-#include "core/temporary.h"
-#include "core/views_database.h"
+#include "core/capture/sessions.h"
+#include "core/features/sift.h"
+#include "core/files/database.h"
+#include "core/files/file.h"
+#include "core/files/temporary.h"
+#include "core/line/program_version.h"
+#include "core/plan/views_database.h"
+#include "core/world/dropped_items.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
 #include "stages/emit_map/fit_size.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 struct Arguments {
@@ -55,7 +56,7 @@ Result<int64_t> CountRejects(const std::string& path) {
 Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   MapHead head;
   head.name = arguments.name;
-  head.writer = "cairn " CAIRN_VERSION;
+  head.writer = std::string("cairn ") + ProgramVersion();
   head.instruction_set = SiftInstructionSet();
   head.seed = seed;
   for (const auto& [name, path] :
@@ -288,4 +289,4 @@ Command EmitMapCommand() {
   };
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -1,12 +1,12 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // cairn emit-map --classes classes.db --world world.db --regions regions.db --vocabulary vocabulary.db --name
 // NAME
 //                -o unsealed.cairn
 Command EmitMapCommand();
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "core/colmap_database.h"
+#include "core/colmap/colmap_database.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 template <typename... Args>
@@ -138,4 +138,4 @@ Result<std::vector<DropCount>> CountDrops(const Classes& classes, const World& w
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

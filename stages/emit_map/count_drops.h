@@ -2,13 +2,13 @@
 
 #include <vector>
 
-#include "core/dropped_items.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/map_findings.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/blocks/map_findings.h"
+#include "core/world/dropped_items.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Counts what the stages dropped, by reason, ascending: how much in all, and how much of it at each station.
 // An item counts at a station where
@@ -24,4 +24,4 @@ namespace cairn {
 Result<std::vector<DropCount>> CountDrops(const Classes& classes, const World& world,
                                           const std::vector<DroppedItem>& items);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -5,12 +5,12 @@
 #include <map>
 #include <tuple>
 
-#include "core/map_documents.h"
-#include "core/pixel_ray.h"
+#include "core/blocks/map_documents.h"
+#include "core/camera/pixel_ray.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 constexpr RegionIdx kNoRegion = std::numeric_limits<RegionIdx>::max();
@@ -399,4 +399,4 @@ Status AddViews(Views views, MapRows* rows) {
   return Ok();
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -4,17 +4,17 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance.h"
-#include "core/decomposition.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/map_rows.h"
-#include "core/options.h"
-#include "core/views.h"
-#include "core/vocabulary_tree.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
+#include "core/options/options.h"
+#include "core/plan/views.h"
+#include "core/vocabulary/vocabulary_tree.h"
+#include "core/world/appearance.h"
+#include "core/world/decomposition.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Puts together what a robot needs to localize: the landmarks that the regions keep, which region and which
 // survey image has which of them, and the visual words that lead from a view to survey images.  Before:
@@ -41,12 +41,12 @@ struct EmitMapOptions {
   int max_num_words = 65536;
   // What a word's inverted file counts: "landmarks" that an image sees, or, "survey", all features of survey
   // images [Mariottini11 §IV]: a larger map that knows places better, for robots that find out where they are
-  // without a fix (runtime/place_model.h).
+  // without a fix (runtime/drive/place_model.h).
   std::string words = "landmarks";
   // Survey images that retrieval finds: "all", or "kept": those of the connected dominating set alone.
   std::string documents = "all";
   // Whether the map gets a model of how every landmark looks from where, for localization without 3-D points
-  // and calibration (runtime/visual_map.h).
+  // and calibration (runtime/visual_map/visual_map.h).
   bool visual_map = false;
   // Most sights of a landmark that its models store: 5 bytes each.  REQUIRES: in [16, 512]
   int max_num_sights = 96;
@@ -76,4 +76,4 @@ Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world
 // is not the metre, in which plans are.
 Status AddViews(Views views, MapRows* rows);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -6,10 +6,10 @@
 #include <limits>
 #include <set>
 
-#include "core/landmarks_seen.h"
+#include "core/blocks/landmarks_seen.h"
 #include "stages/emit_map/choose_landmarks.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 namespace fs = std::filesystem;
@@ -224,4 +224,4 @@ SizeGuarantee GuaranteeOf(const MapRows& rows) {
   return guarantee;
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

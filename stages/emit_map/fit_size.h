@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/map_rows.h"
-#include "core/progress.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 #include "stages/emit_map/leave_out_images.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Chooses what a map of at most so many bytes keeps: which classes, and in how many bits their descriptors,
 // so that survey images which the map does not know are localized as often as can be, then as well.
@@ -58,4 +58,4 @@ struct SizeGuarantee {
 };
 SizeGuarantee GuaranteeOf(const MapRows& rows);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -5,7 +5,7 @@
 
 #include <Eigen/LU>
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 constexpr double kErrorPx = 2;
@@ -102,4 +102,4 @@ double LearnFocal(const std::vector<std::vector<FloorSight>>& landmarks, int ima
   return at((low + high) / 2);
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // A keypoint as a bearing on the floor: from where, with which heading, how far to the right per how far
 // ahead. Each is a length in px plus a part of the focal length, which the camera's tilt mixes into it.
@@ -21,4 +21,4 @@ struct FloorSight {
 // 0 where fewer than 20 landmarks have four sights, or the best is at the edge of 0.2 to 5 image widths.
 double LearnFocal(const std::vector<std::vector<FloorSight>>& landmarks, int image_width_px);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

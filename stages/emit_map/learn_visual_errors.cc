@@ -6,12 +6,12 @@
 #include <map>
 #include <optional>
 
-#include "core/deciles.h"
-#include "core/floor_pose.h"
-#include "core/parallel.h"
-#include "runtime/visual_estimate.h"
+#include "core/base/deciles.h"
+#include "core/base/parallel.h"
+#include "core/geometry/floor_pose.h"
+#include "runtime/visual_map/visual_estimate.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 constexpr double kReachSpacings = 1.05;
@@ -205,4 +205,4 @@ Result<VisualErrors> LearnVisualErrors(const Classes& classes, const MapRows& ro
   return Learner(classes, rows, data).Run(num_threads);
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

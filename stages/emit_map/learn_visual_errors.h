@@ -1,11 +1,11 @@
 #pragma once
 
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/map_rows.h"
-#include "core/visual_map.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/feature_class.h"
+#include "core/world/visual_map.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Finds out how much to trust a visual map [cross-validation, as of the models themselves, but over places]:
 // images of the survey are placed by models that lack all sights from within 1.05 spacings around, and so are
@@ -16,4 +16,4 @@ namespace cairn {
 Result<VisualErrors> LearnVisualErrors(const Classes& classes, const MapRows& rows, const VisualMapData& data,
                                        int num_threads);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

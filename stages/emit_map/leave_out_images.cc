@@ -6,12 +6,12 @@
 #include <set>
 #include <unordered_map>
 
-#include "core/colmap_database.h"
-#include "core/deciles.h"
-#include "core/parallel.h"
-#include "runtime/localizer.h"
+#include "core/base/deciles.h"
+#include "core/base/parallel.h"
+#include "core/colmap/colmap_database.h"
+#include "runtime/localize/localizer.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 constexpr size_t kMinNumImages = 12;  // of which a run of four is left out
@@ -180,4 +180,4 @@ Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage
   return trial;
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance.h"
-#include "core/decomposition.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/features.h"
-#include "core/map_rows.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
+#include "core/features/features.h"
+#include "core/world/appearance.h"
+#include "core/world/decomposition.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // A survey image that plays the robot's: what it shows, and where it was.
 struct TrialImage {
@@ -66,4 +66,4 @@ struct LeftOutLimits {
 Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "core/map_documents.h"
+#include "core/blocks/map_documents.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 // Landmarks below every node.
@@ -75,4 +75,4 @@ Vocabulary SurveyVocabulary(const Vocabulary& vocabulary, const std::vector<MapI
   return survey;
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

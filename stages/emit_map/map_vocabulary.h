@@ -2,10 +2,10 @@
 
 #include <vector>
 
-#include "core/map_rows.h"
-#include "core/vocabulary_tree.h"
+#include "core/blocks/map_rows.h"
+#include "core/vocabulary/vocabulary_tree.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // `tree` cut down to what a map needs [Mariottini11 §IV: the tree]: a node with few landmarks below it
 // becomes a word, branches without any are left out, so that the depth follows the size of the map.  Inverted
@@ -21,4 +21,4 @@ Vocabulary CutVocabulary(const Vocabulary& tree, const DescriptorMatrix& landmar
 Vocabulary SurveyVocabulary(const Vocabulary& vocabulary, const std::vector<MapImage>& images,
                             const std::vector<char>& is_document);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

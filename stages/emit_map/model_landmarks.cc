@@ -6,13 +6,13 @@
 #include <map>
 #include <numeric>
 
-#include "core/camera_turn.h"
-#include "core/deciles.h"
-#include "core/floor_pose.h"
-#include "core/parallel.h"
+#include "core/base/deciles.h"
+#include "core/base/parallel.h"
+#include "core/camera/camera_turn.h"
+#include "core/geometry/floor_pose.h"
 #include "stages/emit_map/learn_focal.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 // Headings nearer than this are one, and at most so many are the survey's own.
@@ -278,4 +278,4 @@ Result<VisualMapData> ModelLandmarks(const Classes& classes, const MapRows& rows
   return Modeller(classes, rows, options).Run(num_threads);
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -1,12 +1,12 @@
 #pragma once
 
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/map_rows.h"
-#include "core/visual_map.h"
+#include "core/base/error.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/feature_class.h"
+#include "core/world/visual_map.h"
 #include "stages/emit_map/emit_map.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 
 // Makes the visual map [Sala06 §VI-C]: for every landmark of `rows` and every heading, the sights that a
 // model is made of, the kernel that predicts left-out sights best, and how good that is.  It takes poses on
@@ -19,4 +19,4 @@ namespace cairn {
 Result<VisualMapData> ModelLandmarks(const Classes& classes, const MapRows& rows,
                                      const EmitMapOptions& options, int num_threads);
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

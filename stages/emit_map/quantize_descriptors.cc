@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 using Histogram = std::array<int64_t, 256>;
@@ -65,4 +65,4 @@ void QuantizeDescriptorValues(int num_bits, DescriptorMatrix* descriptors) {
   }
 }
 
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -5,14 +5,14 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/disk_space.h"
-#include "core/file.h"
-#include "core/reuse_arguments.h"
+#include "core/files/disk_space.h"
+#include "core/files/file.h"
+#include "core/line/reuse_arguments.h"
 #include "stages/extract_features/dependency_file.h"
 #include "stages/extract_features/extract_features.h"
 #include "stages/extract_features/resources.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -99,4 +99,4 @@ Command ExtractFeaturesCommand() {
           .may_be_output = {"--reuse"}};
 }
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

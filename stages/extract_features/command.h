@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // cairn extract-features CAPTURE -o features.db [--depfile FILE.d]
 Command ExtractFeaturesCommand();
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -3,7 +3,7 @@
 #include <set>
 #include <string_view>
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 bool FitsInMakefile(const std::string& path) {
@@ -60,4 +60,4 @@ std::vector<std::string> FoldersOf(const std::vector<std::string>& files, const 
   return {folders.begin(), folders.end()};
 }
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // A fragment for GNU Make that adds every input to the variable CAPTURE_IMAGES, as words of a rule's
 // prerequisites: blanks, colons and the like are escaped.  Below each folder of `roots` a file that is gone
@@ -16,4 +16,4 @@ std::string DependencyFile(const std::vector<std::string>& inputs, const std::ve
 // changes the date of its folder.  REQUIRES: every file lies below the root; others are passed over.
 std::vector<std::string> FoldersOf(const std::vector<std::string>& files, const std::string& root);
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

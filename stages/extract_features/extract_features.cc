@@ -5,11 +5,11 @@
 
 #include <opencv2/core/utility.hpp>
 
-#include "core/colmap_database.h"
-#include "core/parallel.h"
+#include "core/base/parallel.h"
+#include "core/colmap/colmap_database.h"
 #include "stages/extract_features/extract_image.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -172,4 +172,4 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
   return std::move(run.summary);
 }
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -3,15 +3,15 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/error.h"
-#include "core/options.h"
-#include "core/panorama.h"
-#include "core/progress.h"
-#include "core/reuse.h"
-#include "core/sift.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/camera/panorama.h"
+#include "core/capture/capture.h"
+#include "core/features/sift.h"
+#include "core/line/reuse.h"
+#include "core/options/options.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // Finds the SIFT features of every survey image and writes them as a COLMAP database.  First stage of the
 // line; after it: match_features and build_vocabulary.
@@ -42,15 +42,15 @@ struct ExtractFeaturesSummary {
 };
 
 // Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
-// cairn_rejects; and its ReuseFile (core/reuse.h).  An image's features are taken over from `reuse` where an
-// earlier run of this program found them in the same image file, with the same mask, camera size and options
-// (the name does not matter): same bytes as without.  A shard has every n-th image, those that `reuse.files`
-// have left out; it may have none.  Memory: features of all images of one batch (64 images), and for each
-// thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads. Errors:
-// InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files` NotFound,
-// Corrupt.
+// cairn_rejects; and its ReuseFile (core/line/reuse.h).  An image's features are taken over from `reuse`
+// where an earlier run of this program found them in the same image file, with the same mask, camera size and
+// options (the name does not matter): same bytes as without.  A shard has every n-th image, those that
+// `reuse.files` have left out; it may have none.  Memory: features of all images of one batch (64 images),
+// and for each thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads.
+// Errors: InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files`
+// NotFound, Corrupt.
 Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
                                                const std::string& features_path, int num_threads,
                                                Progress& progress, const ReuseOptions& reuse = {});
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

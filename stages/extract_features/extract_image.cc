@@ -2,11 +2,12 @@
 
 #include <filesystem>
 
-#include "core/colmap_database.h"
-#include "core/file.h"
-#include "core/image_file.h"
+#include "core/capture/image_file.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/hash_features.h"
+#include "core/files/file.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -151,4 +152,4 @@ ReuseEntry EntryOf(const Extraction& extraction, ImageId first_view) {
           .count = static_cast<int64_t>(extraction.views.size())};
 }
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/features.h"
-#include "core/reuse.h"
+#include "core/capture/capture.h"
+#include "core/features/features.h"
+#include "core/line/reuse.h"
 #include "stages/extract_features/extract_features.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // One image of the database.
 struct View {
@@ -45,4 +45,4 @@ Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& imag
 // Where a later run finds this one: `row` is the id of the first view, `count` their number.
 ReuseEntry EntryOf(const Extraction& extraction, ImageId first_view);
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/features.h"
-#include "core/memory.h"
-#include "core/parallel.h"
+#include "core/base/parallel.h"
+#include "core/features/features.h"
+#include "core/line/memory.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 // SIFT doubles an image and keeps 6 blurred copies and 5 differences of each octave, of 4 bytes a pixel: 4 *
@@ -63,4 +63,4 @@ int64_t EstimateFeaturesBytes(const Capture& capture, const ExtractFeaturesOptio
   return num_bytes;
 }
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

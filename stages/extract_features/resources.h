@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
-#include "core/capture.h"
-#include "core/error.h"
+#include "core/base/error.h"
+#include "core/capture/capture.h"
 #include "stages/extract_features/extract_features.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // How many of `num_threads` threads (0: all cores) can each work on a capture's largest image within
 // `memory_mib`. Errors: Failed when not even one can: says what one takes.
@@ -16,4 +16,4 @@ Result<int> ThreadsThatFit(const Capture& capture, const ExtractFeaturesOptions&
 // Bytes of features.db, estimated: images mostly have fewer keypoints than they may.
 int64_t EstimateFeaturesBytes(const Capture& capture, const ExtractFeaturesOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -1,9 +1,9 @@
 #include "stages/filter_visibility/command.h"
 
-#include "core/memory.h"
+#include "core/line/memory.h"
 #include "stages/filter_visibility/filter_visibility.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 namespace {
 
 // Bytes of memory for one of the input file.
@@ -56,4 +56,4 @@ Command FilterVisibilityCommand() {
   return command;
 }
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

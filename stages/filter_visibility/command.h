@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 
 // cairn filter-visibility CLASSES -o WORLD
 Command FilterVisibilityCommand();
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

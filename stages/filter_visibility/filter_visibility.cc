@@ -6,7 +6,7 @@
 #include "stages/filter_visibility/lattice_area.h"
 #include "stages/filter_visibility/stations.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 namespace {
 
 // The largest connected part of an area; among equals the one with the smallest station.
@@ -194,4 +194,4 @@ Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

@@ -2,13 +2,13 @@
 
 #include <string>
 
-#include "core/dropped_items.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/options.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "core/world/dropped_items.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 
 // Turns a survey into a world instance: the stations at which the robot stood, which of them are next to each
 // other, and for each feature class that a robot can expect to see again (visible from enough stations, in
@@ -62,4 +62,4 @@ struct FilterVisibilityResult {
 Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
                                                 const FilterVisibilityOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace cairn {
+namespace cairn::filter_visibility {
 namespace {
 
 // The part of the lattice around an area, one cell wider on every side.
@@ -126,4 +126,4 @@ std::vector<StationIdx> TrimArea(const std::vector<StationIdx>& area, const Stat
   return kept;
 }
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "core/ids.h"
+#include "core/base/ids.h"
 #include "stages/filter_visibility/stations.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 
 // Sizes of the holes of an area on the lattice: stations outside of it that cannot be left over the 8
 // neighbours of cells without crossing it.  Cells without a station (a pillar) are no hole.
@@ -22,4 +22,4 @@ bool HasBlock(const std::vector<StationIdx>& area, const Stations& stations, int
 std::vector<StationIdx> TrimArea(const std::vector<StationIdx>& area, const Stations& stations,
                                  int min_num_neighbours);
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

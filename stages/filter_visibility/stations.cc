@@ -7,10 +7,10 @@
 #include <optional>
 #include <tuple>
 
-#include "core/deciles.h"
-#include "core/floor_pose.h"
+#include "core/base/deciles.h"
+#include "core/geometry/floor_pose.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 namespace {
 
 // Headings at one place that are this far apart mean that the robot turned there.
@@ -280,4 +280,4 @@ Result<Stations> FindStations(const std::vector<SurveyImage>& images,
   return stations;
 }
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

@@ -6,12 +6,12 @@
 
 #include <Eigen/Core>
 
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/world.h"
+#include "core/base/error.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 #include "stages/filter_visibility/filter_visibility.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 
 // A column and row of the floor: of the survey's lattice, or of the cells of a driven survey.
 using Cell = std::pair<int, int>;
@@ -31,4 +31,4 @@ Pose FloorFromUp(const Eigen::Vector3d& up);
 // Recognises the survey and groups its images into stations.  Errors: as FilterVisibility.
 Result<Stations> FindStations(const std::vector<SurveyImage>& images, const FilterVisibilityOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

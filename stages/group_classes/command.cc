@@ -1,9 +1,9 @@
 #include "stages/group_classes/command.h"
 
-#include "core/memory.h"
+#include "core/line/memory.h"
 #include "stages/group_classes/group_classes.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // Bytes of memory for one of the input file.
@@ -80,4 +80,4 @@ Command GroupClassesCommand() {
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // cairn group-classes matches.db --capture CAPTURE -o classes.db
 Command GroupClassesCommand();
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -5,11 +5,11 @@
 #include <numeric>
 #include <tuple>
 
-#include "core/descriptor_distance.h"
-#include "core/descriptor_matcher.h"
-#include "core/feature_class.h"
+#include "core/features/descriptor_distance.h"
+#include "core/features/descriptor_matcher.h"
+#include "core/world/feature_class.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // Sets of fewer pairs than this are compared one by one.
@@ -146,4 +146,4 @@ std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes
   return ambiguity;
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -5,9 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "core/features.h"
+#include "core/features/features.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // What the ambiguity rule knows of a class: centre of its descriptors, its radius (root mean square angle
 // between its descriptors and the centre, radians), its place, and how many keypoints it has.
@@ -39,8 +39,8 @@ enum class Ambiguity : uint8_t { kNone, kAmbiguous, kDuplicate };
 // nearest may be its duplicate, and another that lies within a wide class's radius may have nearer
 // neighbours.  Both classes of an ambiguous pair go [Sala06 §VI-B: all features of both classes], also where
 // only one's radius reaches the other.  Exact, whatever the order of the classes; O(n^2) dot products, by the
-// kernels of core/descriptor_matcher.h, and as many again as look-alikes are dense.
+// kernels of core/features/descriptor_matcher.h, and as many again as look-alikes are dense.
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
                                      const FindAmbiguousOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -5,14 +5,14 @@
 #include <optional>
 #include <set>
 
-#include "core/database.h"
-#include "core/panorama.h"
-#include "core/parallel.h"
-#include "core/pixel_ray.h"
+#include "core/base/parallel.h"
+#include "core/camera/panorama.h"
+#include "core/camera/pixel_ray.h"
+#include "core/files/database.h"
 #include "stages/group_classes/make_classes.h"
 #include "stages/group_classes/union_matches.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // The posed images, contiguous, and what triangulation needs of each.
@@ -379,4 +379,4 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

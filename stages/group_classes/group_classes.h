@@ -4,18 +4,18 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
-#include "core/dropped_items.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/options.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/options/options.h"
+#include "core/world/dropped_items.h"
+#include "core/world/feature_class.h"
 #include "stages/group_classes/find_ambiguous.h"
 #include "stages/group_classes/refine_poses.h"
 #include "stages/group_classes/triangulate.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // Turns keypoints that match into feature classes: one per scene feature, with its place in space and one
 // descriptor. Before: match_features.  After: filter_visibility, emit_map. Implements [Sala06 §VI-B]
@@ -68,4 +68,4 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // A track that triangulates, and may become a class.
@@ -98,4 +98,4 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
   }
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

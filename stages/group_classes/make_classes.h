@@ -2,13 +2,13 @@
 
 #include <vector>
 
-#include "core/dropped_items.h"
-#include "core/feature_class.h"
+#include "core/world/dropped_items.h"
+#include "core/world/feature_class.h"
 #include "stages/group_classes/group_classes.h"
 #include "stages/group_classes/triangulate.h"
 #include "stages/group_classes/union_matches.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // Classes from the tracks that triangulate, without the ambiguous ones, ascending by first observation;
 // counts what is dropped in classes->dropped and appends it to `dropped_items`: each track either becomes a
@@ -20,4 +20,4 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
                  const GroupClassesOptions& options, Classes* classes,
                  std::vector<DroppedItem>* dropped_items);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

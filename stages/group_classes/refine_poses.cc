@@ -5,7 +5,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // Reprojection of a point, in units of the keypoint's standard deviation.
@@ -154,4 +154,4 @@ RefinePosesSummary RefinePoses(const RefinePosesOptions& options, PoseProblem* p
   return summary;
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

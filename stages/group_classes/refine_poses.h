@@ -4,11 +4,11 @@
 
 #include <Eigen/Core>
 
-#include "core/error.h"
-#include "core/pixel_ray.h"
-#include "core/pose.h"
+#include "core/base/error.h"
+#include "core/camera/pixel_ray.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 struct RefinePosesOptions {
   // Standard deviation of the stated survey poses, metres and degrees: how far the images may move them.
@@ -57,12 +57,12 @@ struct RefinePosesSummary {
 };
 
 // Minimises over poses T_i, points X_j, offset O and focal ratios s_c
-//   sum_ij rho( |residual_ij(diag(s, s, 1) T_i X_j)|^2 / sigma_px^2 )   reprojection (core/pixel_ray.h),
-//   Cauchy loss
+//   sum_ij rho( |residual_ij(diag(s, s, 1) T_i X_j)|^2 / sigma_px^2 )   reprojection
+//   (core/camera/pixel_ray.h), Cauchy loss
 //   + sum_i |log(T_i (O G_i)^-1)|^2 weighted by the pose sigmas          stated poses G_i, trusted as far as
 //   they go
 //   + |log O|^2 weighted by the offset sigmas + ((s - 1) / sigma_s)^2.
 // One thread: bit-stable.  Ceres with a sparse Schur complement (Eigen's Cholesky).
 RefinePosesSummary RefinePoses(const RefinePosesOptions& options, PoseProblem* problem);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

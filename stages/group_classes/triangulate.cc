@@ -8,7 +8,7 @@
 
 #include <Eigen/Dense>
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 constexpr int kMaxHypotheses = 15;
@@ -138,4 +138,4 @@ Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOp
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

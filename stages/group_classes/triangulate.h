@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 
-#include "core/pixel_ray.h"
-#include "core/pose.h"
+#include "core/camera/pixel_ray.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // A ray to a scene point, from a posed camera of any model.
 struct PosedRay {
@@ -39,4 +39,4 @@ struct Triangulation {
 // reprojection error of its rays.  No randomness.  O(pairs * rays), at most 15 pairs.
 Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -4,7 +4,7 @@
 #include <numeric>
 #include <tuple>
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // Union-find whose sets know the images that their keypoints come from.
@@ -85,4 +85,4 @@ std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vect
   return sets.Tracks();
 }
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

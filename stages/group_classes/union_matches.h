@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/colmap_database.h"
-#include "core/features.h"
-#include "core/ids.h"
+#include "core/base/ids.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/features.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 
 // A keypoint of an image, by contiguous image index.
 struct TrackElement {
@@ -32,4 +32,4 @@ struct ScoredMatch {
 std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
                                 int64_t* num_conflicts);
 
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -5,12 +5,12 @@
 #include <limits>
 #include <map>
 
-#include "core/cancel_only.h"
-#include "core/parallel.h"
-#include "stages/link_appearance/domination.h"
-#include "stages/link_appearance/greedy_dominating_set.h"
+#include "core/base/cancel_only.h"
+#include "core/base/parallel.h"
+#include "stages/link_appearance/dominating_set/domination.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 // What is chosen: a set that meets its demands, or the order of a curve.
@@ -275,4 +275,4 @@ Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::st
   return split;
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/options.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/options/options.h"
 #include "stages/link_appearance/link_appearance.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // How many left-out images the kept ones of the rest locate [Booij06 §V]: an image is localized when it is
 // linked to a kept one.
@@ -71,4 +71,4 @@ struct HeldOutSplit {
 };
 Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::string>& names);
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

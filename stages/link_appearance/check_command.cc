@@ -1,13 +1,13 @@
 #include <optional>
 #include <set>
 
-#include "core/capture.h"
-#include "core/file.h"
-#include "core/text.h"
+#include "core/base/text.h"
+#include "core/capture/capture.h"
+#include "core/files/file.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/command.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 struct Arguments {
@@ -157,4 +157,4 @@ Command CheckAppearanceCommand() {
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -2,14 +2,14 @@
 
 #include <optional>
 
-#include "core/appearance.h"
-#include "core/capture.h"
-#include "core/file.h"
-#include "core/memory.h"
+#include "core/capture/capture.h"
+#include "core/files/file.h"
+#include "core/line/memory.h"
+#include "core/world/appearance.h"
 #include "stages/link_appearance/link_appearance.h"
 #include "stages/link_appearance/picture.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 // Bytes: links as read, of the survey, fused, and of the graph both ways.
@@ -116,4 +116,4 @@ Command LinkAppearanceCommand() {
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -1,12 +1,12 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // cairn link-appearance MATCHES -o APPEARANCE
 Command LinkAppearanceCommand();
 // cairn check-appearance MATCHES
 Command CheckAppearanceCommand();
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -7,10 +7,10 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/deciles.h"
-#include "core/parallel.h"
+#include "core/base/deciles.h"
+#include "core/base/parallel.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 // As stored: the last bits of sums may differ between machines.
@@ -255,4 +255,4 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
   return Ok();
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance.h"
-#include "core/document_scores.h"
-#include "core/floor_pose.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "core/vocabulary_tree.h"
+#include "core/base/progress.h"
+#include "core/geometry/floor_pose.h"
+#include "core/options/options.h"
+#include "core/vocabulary/document_scores.h"
+#include "core/vocabulary/vocabulary_tree.h"
+#include "core/world/appearance.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // Which places a robot can tell from others by looking, and which it takes for another.
 struct AmbiguityOptions {
@@ -44,4 +44,4 @@ Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::option
                      const AmbiguityOptions& options, int num_threads, Progress* progress,
                      Appearance* appearance);
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -6,10 +6,10 @@
 #include <set>
 #include <string>
 
-#include "core/panorama.h"
-#include "core/pose.h"
+#include "core/camera/panorama.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 // Number of an image in the list.  REQUIRES: ascending ids
@@ -145,4 +145,4 @@ AppearanceGraph FusedGraph(const std::vector<AppearanceLink>& links,
   return AppearanceGraph(num_nodes, std::move(fused));
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance_graph.h"
-#include "core/capture.h"
-#include "core/colmap_database.h"
-#include "core/error.h"
+#include "core/base/error.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/world/appearance_graph.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // The images of a survey and which of them see the same: a link per verified pair.
 struct ImageLinks {
@@ -46,4 +46,4 @@ Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images
 AppearanceGraph FusedGraph(const std::vector<AppearanceLink>& links,
                            const std::vector<NodeIdx>& node_of_image);
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -1,17 +1,17 @@
 #include "stages/link_appearance/link_appearance.h"
-#include "core/panorama.h"
-#include "core/pose.h"
+#include "core/camera/panorama.h"
+#include "core/geometry/pose.h"
 
 #include <algorithm>
 #include <map>
 #include <optional>
 
-#include "stages/link_appearance/domination.h"
-#include "stages/link_appearance/greedy_dominating_set.h"
-#include "stages/link_appearance/online_dominating_set.h"
-#include "stages/link_appearance/restore_cycles.h"
+#include "stages/link_appearance/dominating_set/domination.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
+#include "stages/link_appearance/dominating_set/online_dominating_set.h"
+#include "stages/link_appearance/dominating_set/restore_cycles.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 DominationOptions DominationOf(const LinkAppearanceOptions& options) {
@@ -307,4 +307,4 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

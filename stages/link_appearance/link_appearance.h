@@ -4,18 +4,18 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance.h"
-#include "core/appearance_graph.h"
-#include "core/error.h"
-#include "core/ids.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "stages/link_appearance/connected_bound.h"
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/base/progress.h"
+#include "core/options/options.h"
+#include "core/world/appearance.h"
+#include "core/world/appearance_graph.h"
+#include "stages/link_appearance/dominating_set/connected_bound.h"
+#include "stages/link_appearance/dominating_set/improve_dominating_set.h"
 #include "stages/link_appearance/find_ambiguity.h"
 #include "stages/link_appearance/fuse_images.h"
-#include "stages/link_appearance/improve_dominating_set.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // Finds the fewest images that still locate the robot: links images between which a relative pose can be
 // recovered, and keeps a set of them in which every image is kept or linked to a kept one, and which hangs
@@ -90,4 +90,4 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
                                             const LinkAppearanceOptions& options, uint64_t seed,
                                             Progress* progress = nullptr);
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -10,11 +10,11 @@
 
 #include <fmt/format.h>
 
-#include "core/panorama.h"
-#include "core/pose.h"
-#include "core/svg.h"
+#include "core/camera/panorama.h"
+#include "core/geometry/pose.h"
+#include "core/picture/svg.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 // Okabe and Ito's blue and vermilion, which people who see colours differently tell apart.
@@ -342,4 +342,4 @@ std::string DrawAppearance(const Appearance& appearance, const std::vector<std::
   return has_places ? picture.OverFloor(places) : picture.AsMatrix(names);
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

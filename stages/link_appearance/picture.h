@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/floor_pose.h"
+#include "core/capture/capture.h"
+#include "core/geometry/floor_pose.h"
 #include "stages/link_appearance/link_appearance.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // Where the nodes' images were taken on the floor, by the capture's poses: the mean place, and the heading
 // where a node is one image.  Up is the mean of the cameras' up.  None for nodes without poses.
@@ -28,4 +28,4 @@ std::vector<std::string> NodeNames(const Appearance& appearance, const std::vect
 std::string DrawAppearance(const Appearance& appearance, const std::vector<std::string>& names,
                            const std::vector<std::optional<FloorPose>>& places);
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -6,12 +6,12 @@
 
 #include <spdlog/spdlog.h>
 
-#include "core/disk_space.h"
-#include "core/memory.h"
-#include "core/reuse_arguments.h"
+#include "core/files/disk_space.h"
+#include "core/line/memory.h"
+#include "core/line/reuse_arguments.h"
 #include "stages/match_features/match_features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -149,4 +149,4 @@ Command MatchFeaturesCommand() {
           .may_be_output = {"--reuse"}};
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

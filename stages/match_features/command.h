@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // cairn match-features features.db [--capture CAPTURE] -o matches.db
 Command MatchFeaturesCommand();
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -7,13 +7,13 @@
 
 #include <Eigen/Dense>
 
-#include "core/deciles.h"
-#include "core/descriptor_distance.h"
-#include "core/pose.h"
-#include "core/two_view_error.h"
-#include "core/vector_geometry.h"
+#include "core/base/deciles.h"
+#include "core/features/descriptor_distance.h"
+#include "core/geometry/pose.h"
+#include "core/geometry/two_view_error.h"
+#include "core/geometry/vector_geometry.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 // The two best candidates seen so far; equal dot products go to the smaller index, whatever the order.
@@ -246,4 +246,4 @@ std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& 
   return std::move(matcher).Matches();
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

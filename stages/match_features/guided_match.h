@@ -4,9 +4,9 @@
 
 #include <Eigen/Core>
 
-#include "core/features.h"
+#include "core/features/features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 struct GuidedMatchOptions {
   // A match's angle to its best descriptor over that to its second best, among the keypoints that the
@@ -49,4 +49,4 @@ std::vector<Match> GuideByHomography(const GuidedView& view1, const GuidedView& 
                                      const Eigen::Matrix3d& H, double max_error_rad,
                                      const std::vector<Match>& inliers, const GuidedMatchOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

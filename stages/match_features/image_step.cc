@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 constexpr char kSchema[] = "CREATE TABLE cairn_image_steps (idx INTEGER PRIMARY KEY NOT NULL, numbers BLOB)";
@@ -91,4 +91,4 @@ Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageSte
   return std::optional<std::vector<std::vector<int>>>();
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "core/content_hash.h"
-#include "core/error.h"
+#include "core/base/content_hash.h"
+#include "core/base/error.h"
 #include "stages/match_features/match_run.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // Work on each image before there are pairs, of which a shard does its share: its result is a row of numbers.
 struct ImageStep {
@@ -27,4 +27,4 @@ Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageSte
                                                                   SQLite::Database* shard_database,
                                                                   MatchRun* run);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

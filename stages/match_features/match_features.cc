@@ -6,14 +6,14 @@
 
 #include <opencv2/core/utility.hpp>
 
-#include "core/colmap_database.h"
-#include "core/dropped_items.h"
-#include "core/file.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
+#include "core/world/dropped_items.h"
 #include "stages/match_features/match_round.h"
-#include "stages/match_features/pair_list.h"
+#include "stages/match_features/pairs/pair_list.h"
 #include "stages/match_features/partners_by_looks.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 // How pairs are chosen: options.pairs, "auto" resolved.
@@ -250,4 +250,4 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
   return std::move(summary);
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -3,16 +3,16 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/error.h"
-#include "core/feature_class.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "core/reuse.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/capture/capture.h"
+#include "core/line/reuse.h"
+#include "core/options/options.h"
+#include "core/world/feature_class.h"
 #include "stages/match_features/match_pairs.h"
-#include "stages/match_features/select_pairs.h"
+#include "stages/match_features/pairs/select_pairs.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // Finds which keypoints of different images show the same thing, and keeps what the geometry of two views
 // confirms [Booij06 §III: a link means that the local space can be reconstructed from the two images].
@@ -63,7 +63,7 @@ struct MatchFeaturesSummary {
   int64_t num_pairs_verified = 0;
   int64_t num_putative = 0;  // matches before verification
   int64_t num_inliers = 0;
-  DropCounts dropped_pairs;    // of those tried: why they were not verified (core/drop_reason.h)
+  DropCounts dropped_pairs;    // of those tried: why they were not verified (core/world/drop_reason.h)
   std::string pairs;           // how pairs were chosen
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
   int num_rounds = 0;          // of pairs; after a shard's last one the pairs of the next are not known yet
@@ -75,9 +75,10 @@ struct MatchFeaturesSummary {
 };
 
 // Reads a COLMAP database with features, writes `matches_path`: its contents and the verified pairs as
-// two_view_geometries; and its reuse file (core/reuse.h).  A pair is taken over from `reuse` where an earlier
-// run of this program matched images with the same features and cameras, in the same relative pose, with the
-// same options: same bytes as without.  Same bytes for any number of threads and any memory budget.  O(pairs
+// two_view_geometries; and its reuse file (core/line/reuse.h).  A pair is taken over from `reuse` where an
+// earlier run of this program matched images with the same features and cameras, in the same relative pose,
+// with the same options: same bytes as without.  Same bytes for any number of threads and any memory budget.
+// O(pairs
 // * features^2).
 //
 // A shard goes through the rounds of pairs with what `reuse.files` know (before these, where pairs are those
@@ -93,4 +94,4 @@ Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const std::string& matches_path, uint64_t seed, int num_threads,
                                            Progress& progress, const ReuseOptions& reuse = {});
 
-}  // namespace cairn
+}  // namespace cairn::match_features

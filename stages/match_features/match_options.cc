@@ -2,7 +2,7 @@
 
 #include "stages/match_features/match_features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 OptionTable DescribeOptions(MatchFeaturesOptions* o) {
   OptionTable table = {
@@ -175,4 +175,4 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
   return table;
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

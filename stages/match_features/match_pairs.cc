@@ -6,9 +6,9 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "core/parallel.h"
+#include "core/base/parallel.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 // Results that wait to be taken, pairs.
@@ -144,4 +144,4 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
   return Ok();
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -4,15 +4,15 @@
 #include <functional>
 #include <vector>
 
-#include "core/descriptor_matcher.h"
-#include "core/error.h"
-#include "core/options.h"
-#include "core/progress.h"
-#include "stages/match_features/image_features.h"
-#include "stages/match_features/select_pairs.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/features/descriptor_matcher.h"
+#include "core/options/options.h"
+#include "stages/match_features/pairs/image_features.h"
+#include "stages/match_features/pairs/select_pairs.h"
 #include "stages/match_features/verify_pair.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 struct MatchPairsOptions {
   // Most memory that the features of images may take at a time, MiB: beyond it they are read again when they
@@ -46,4 +46,4 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
                   const MatchPairsOptions& options, int num_threads, Progress& progress,
                   const TakeGeometry& take);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

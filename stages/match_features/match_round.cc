@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 Error Stopped() { return MakeError(ErrorCode::kCancelled, "stopped while taking over matches"); }
@@ -134,4 +134,4 @@ Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Data
   return false;
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

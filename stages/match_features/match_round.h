@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/error.h"
+#include "core/base/error.h"
 #include "stages/match_features/match_run.h"
-#include "stages/match_features/predict_pairs.h"
+#include "stages/match_features/pairs/predict_pairs.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // Matches the pairs of one round, or takes them over, writes the verified ones to the database in the order
 // in which MatchPairs gives them, and tells them to `predictor` (may be null).  Returns whether there may be
@@ -13,4 +13,4 @@ namespace cairn {
 Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Database& database,
                         MatchRun* run);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

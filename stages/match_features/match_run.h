@@ -2,14 +2,14 @@
 
 #include <vector>
 
-#include "core/dropped_items.h"
-#include "core/progress.h"
-#include "core/reuse.h"
-#include "stages/match_features/image_features.h"
+#include "core/base/progress.h"
+#include "core/line/reuse.h"
+#include "core/world/dropped_items.h"
 #include "stages/match_features/match_features.h"
 #include "stages/match_features/pair_reuse.h"
+#include "stages/match_features/pairs/image_features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // A run of the stage: what it reads, and how far it has come.
 struct MatchRun {
@@ -29,4 +29,4 @@ struct MatchRun {
   MatchFeaturesSummary summary;
 };
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -2,7 +2,9 @@
 
 #include <cstring>
 
-namespace cairn {
+#include "core/features/hash_features.h"
+
+namespace cairn::match_features {
 namespace {
 
 ContentHash HashCamera(const Camera& camera) {
@@ -110,4 +112,4 @@ ReuseEntry EntryOf(const ContentHash& key, const PairResult& result) {
           .count = result.num_putative};
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -4,14 +4,14 @@
 #include <utility>
 #include <vector>
 
-#include "core/colmap_database.h"
-#include "core/content_hash.h"
-#include "core/error.h"
-#include "core/reuse.h"
-#include "stages/match_features/image_features.h"
+#include "core/base/content_hash.h"
+#include "core/base/error.h"
+#include "core/colmap/colmap_database.h"
+#include "core/line/reuse.h"
 #include "stages/match_features/match_pairs.h"
+#include "stages/match_features/pairs/image_features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // What matching and verifying a pair gives.
 struct PairResult {
@@ -19,8 +19,9 @@ struct PairResult {
   int num_putative = 0;
 };
 
-// Keys of pairs: hashes of all that a pair's result depends on (core/reuse.h): the features and cameras of
-// both images, their relative pose as stated, and the options.  Not their names, ids, or places in the world.
+// Keys of pairs: hashes of all that a pair's result depends on (core/line/reuse.h): the features and cameras
+// of both images, their relative pose as stated, and the options.  Not their names, ids, or places in the
+// world.
 class PairKeys {
  public:
   PairKeys(SQLite::Database& features, const MatchImages& images, const MatchPairsOptions& options);
@@ -44,4 +45,4 @@ std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImag
 // that was not verified has no row: its contents are the zero hash, and `row` is the geometry's config.
 ReuseEntry EntryOf(const ContentHash& key, const PairResult& result);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -2,9 +2,10 @@
 
 #include <string_view>
 
+#include "core/features/hash_features.h"
 #include "stages/match_features/image_step.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 // Of what sorts descriptors into words.
@@ -58,4 +59,4 @@ Result<std::optional<std::vector<std::vector<int>>>> PartnersByLooks(const Looks
   return RunImageStep(PartnersStep(rule, *words, vocabulary.num_words()), shard_database, run);
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

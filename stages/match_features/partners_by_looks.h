@@ -4,12 +4,12 @@
 #include <optional>
 #include <vector>
 
-#include "core/content_hash.h"
-#include "core/error.h"
+#include "core/base/content_hash.h"
+#include "core/base/error.h"
 #include "stages/match_features/match_run.h"
-#include "stages/match_features/retrieve_pairs.h"
+#include "stages/match_features/pairs/retrieve_pairs.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // How images that look alike are made partners.
 struct LooksRule {
@@ -27,4 +27,4 @@ Result<std::optional<std::vector<std::vector<int>>>> PartnersByLooks(const Looks
                                                                      SQLite::Database* shard_database,
                                                                      MatchRun* run);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -5,12 +5,12 @@
 
 #include <Eigen/Dense>
 
-#include "core/deciles.h"
-#include "core/estimate_two_view.h"
-#include "core/relative_pose.h"
-#include "core/two_view_error.h"
+#include "core/base/deciles.h"
+#include "core/geometry/estimate_two_view.h"
+#include "core/geometry/relative_pose.h"
+#include "core/geometry/two_view_error.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 // Error limits of a pair as angles.
@@ -305,4 +305,4 @@ TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerifi
   return geometry;
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -6,13 +6,13 @@
 
 #include <Eigen/Core>
 
-#include "core/camera.h"
-#include "core/colmap_database.h"
-#include "core/features.h"
-#include "core/pose.h"
+#include "core/camera/camera.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/features.h"
+#include "core/geometry/pose.h"
 #include "stages/match_features/guided_match.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 struct VerifyPairOptions {
   // "five_point": by stated poses where there are any, else five points or seven; "eight_point": normalised
@@ -78,7 +78,8 @@ struct ViewForVerification {
 //   (src/estimators/two_view_geometry.cc there): kCalibrated, kUncalibrated (E explains too little of what F
 //   does), kPlanarOrPanoramic. Differs from it: inliers are those of E also where F has more, so that they
 //   obey the known intrinsics.
-// - two_view = "eight_point", in place of all that: eight points (core/estimate_two_view.h), poses not read;
+// - two_view = "eight_point", in place of all that: eight points (core/geometry/estimate_two_view.h), poses
+// not read;
 //   kCalibrated or, where a focal length is guessed, kUncalibrated.
 // - focal length guessed: fundamental matrix by USAC; kUncalibrated or kPlanarOrPanoramic.
 // Then guided matching adds what the geometry allows (guided_match.h).
@@ -91,4 +92,4 @@ struct ViewForVerification {
 TwoViewGeometry VerifyPair(const ViewForVerification& view1, const ViewForVerification& view2,
                            const std::vector<Match>& matches, const VerifyPairOptions& options);
 
-}  // namespace cairn
+}  // namespace cairn::match_features

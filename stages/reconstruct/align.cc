@@ -7,7 +7,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 constexpr double kMaxSigmas = 3;         // beyond, a target is off
@@ -264,4 +264,4 @@ double MedianStep(const std::vector<Pose>& cams_from_model) {
   return steps.empty() ? 0 : Median(steps);
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

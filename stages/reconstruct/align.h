@@ -5,10 +5,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/error.h"
-#include "core/pose.h"
+#include "core/base/error.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // world = scale * rotation * model + translation: takes the frame that a reconstruction came in to the map's.
 struct Similarity {
@@ -68,4 +68,4 @@ Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale)
 // Median distance of a camera to its nearest other; 0 with fewer than two cameras.  O(n^2).
 double MedianStep(const std::vector<Pose>& cams_from_model);
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -5,12 +5,13 @@
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
-#include "core/file.h"
-#include "core/folder.h"
-#include "core/write_error.h"
+#include "core/colmap/cameras_text.h"
+#include "core/files/file.h"
+#include "core/files/folder.h"
+#include "core/files/write_error.h"
 #include "stages/reconstruct/reconstruct.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 namespace fs = std::filesystem;
@@ -162,4 +163,4 @@ Command ReconstructCommand() {
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // cairn reconstruct matches.db --capture CAPTURE -o poses/
 Command ReconstructCommand();
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -5,11 +5,11 @@
 #include <functional>
 #include <set>
 
-#include "core/deciles.h"
-#include "core/file.h"
-#include "core/text.h"
+#include "core/base/deciles.h"
+#include "core/base/text.h"
+#include "core/files/file.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 std::set<std::string> NamesOf(const Capture& capture) {
@@ -117,4 +117,4 @@ GeodeticPosition MedianPosition(const std::map<std::string, ExifTags>& tags) {
           altitudes.empty() ? 0 : std::round(100 * Median(altitudes)) / 100};
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -6,11 +6,11 @@
 
 #include <Eigen/Core>
 
-#include "core/capture.h"
-#include "core/error.h"
-#include "core/exif.h"
+#include "core/base/error.h"
+#include "core/capture/capture.h"
+#include "core/capture/exif.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // What is known of the images of a capture beside their pixels: where some stand, or how far apart.
 
@@ -38,4 +38,4 @@ std::map<std::string, ExifTags> ReadGpsTags(const Capture& capture);
 // Longitudes are taken about the first one's, so that the 180th meridian may run through the capture.
 GeodeticPosition MedianPosition(const std::map<std::string, ExifTags>& tags);
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -4,10 +4,10 @@
 #include <charconv>
 #include <filesystem>
 
-#include "core/write_error.h"
+#include "core/files/write_error.h"
 #include "stages/reconstruct/run_program.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 namespace fs = std::filesystem;
@@ -208,4 +208,4 @@ Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::
   return models;
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

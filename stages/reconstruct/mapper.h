@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "core/colmap_database.h"
-#include "core/colmap_model.h"
-#include "core/error.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/colmap/colmap_database.h"
+#include "core/colmap/colmap_model.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // How COLMAP's incremental mapper is run [Schönberger, Frahm: Structure-from-Motion Revisited, CVPR 2016].
 struct MapperOptions {
@@ -48,4 +48,4 @@ Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::
                                            const MapperOptions& options, const std::string& work_folder,
                                            Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <set>
 
-#include "core/write_error.h"
+#include "core/files/write_error.h"
 #include "stages/reconstruct/align.h"
 #include "stages/reconstruct/known_places.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
@@ -361,4 +361,4 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
   return result;
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

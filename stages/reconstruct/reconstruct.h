@@ -5,14 +5,14 @@
 #include <utility>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/capture_frame.h"
-#include "core/error.h"
-#include "core/options.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/capture/capture.h"
+#include "core/capture/capture_frame.h"
+#include "core/options/options.h"
 #include "stages/reconstruct/mapper.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
 // (mapper.h), which GPS, known positions or known distances then fix (align.h).  Where too few images are
@@ -74,4 +74,4 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -12,9 +12,9 @@
 #include <cstring>
 #include <thread>
 
-#include "core/child_environment.h"
+#include "core/line/child_environment.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -146,4 +146,4 @@ Result<ProgramOutcome> RunProgram(const std::vector<std::string>& words, const R
   return outcome;
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

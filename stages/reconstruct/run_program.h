@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/progress.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // How a program of somebody else is run.
 struct RunProgramOptions {
-  // "NAME=VALUE", added to what programs get that cairn starts (core/child_environment.h).
+  // "NAME=VALUE", added to what programs get that cairn starts (core/line/child_environment.h).
   std::vector<std::string> environment;
   double max_seconds = 0;  // then it is ended; 0: no limit
   int num_last_lines = 12;
@@ -33,4 +33,4 @@ struct ProgramOutcome {
 Result<ProgramOutcome> RunProgram(const std::vector<std::string>& words, const RunProgramOptions& options,
                                   const Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

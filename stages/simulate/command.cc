@@ -6,17 +6,17 @@
 #include "stages/simulate/read_recipe.h"
 #include "stages/simulate/simulate.h"
 
-namespace cairn {
+namespace cairn::simulate {
 namespace {
 
 struct Arguments {
   std::string recipe_path;
   std::string output_path;
-  SimulateOptions options;
+  sim::SimulateOptions options;
   OptionArguments option_arguments;
 };
 
-Status Run(const Arguments& given, const CommandEnvironment& environment, SimulateOptions* options) {
+Status Run(const Arguments& given, const CommandEnvironment& environment, sim::SimulateOptions* options) {
   uint64_t seed = environment.seed;
   if (!given.recipe_path.empty())
     CAIRN_RETURN_IF_ERROR(ReadSimulateRecipe(given.recipe_path, options, &seed));
@@ -54,4 +54,4 @@ Command SimulateCommand() {
   };
 }
 
-}  // namespace cairn
+}  // namespace cairn::simulate

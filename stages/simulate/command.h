@@ -1,10 +1,10 @@
 #pragma once
 
-#include "core/command.h"
+#include "core/line/command.h"
 
-namespace cairn {
+namespace cairn::simulate {
 
 // `cairn simulate RECIPE.toml -o CAPTURE`
 Command SimulateCommand();
 
-}  // namespace cairn
+}  // namespace cairn::simulate

@@ -1,10 +1,10 @@
 #include "stages/simulate/read_recipe.h"
 
-#include "core/toml_options.h"
+#include "core/options/toml_options.h"
 
-namespace cairn {
+namespace cairn::simulate {
 
-Status ReadSimulateRecipe(const std::string& path, SimulateOptions* options, uint64_t* seed) {
+Status ReadSimulateRecipe(const std::string& path, sim::SimulateOptions* options, uint64_t* seed) {
   CAIRN_ASSIGN_OR_RETURN(const toml::table document, ReadTomlFile(path));
   const toml::node* node = document.get("simulate");
   if (node == nullptr && (document.contains("name") || document.contains("capture"))) {
@@ -34,4 +34,4 @@ Status ReadSimulateRecipe(const std::string& path, SimulateOptions* options, uin
   return SetOptionsFromToml(*node->as_table(), path, table);
 }
 
-}  // namespace cairn
+}  // namespace cairn::simulate

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <string>
 
-#include "core/error.h"
-#include "stages/simulate/options.h"
+#include "core/base/error.h"
+#include "sim/render/options.h"
 
-namespace cairn {
+namespace cairn::simulate {
 
 // The one key of [simulate] that is no option of the stage: which file of the rendered capture is the floor
 // plan of the map made from it.
@@ -20,6 +20,6 @@ struct SimulatedFloorPlanKey {
 // Takes options and seed from a recipe's [simulate] table, or the options from a file that holds only such a
 // table's keys.  Other tables are other stages'.  Errors: NotFound, Corrupt, InvalidArgument (a recipe
 // without the table; keys and values).
-Status ReadSimulateRecipe(const std::string& path, SimulateOptions* options, uint64_t* seed);
+Status ReadSimulateRecipe(const std::string& path, sim::SimulateOptions* options, uint64_t* seed);
 
-}  // namespace cairn
+}  // namespace cairn::simulate

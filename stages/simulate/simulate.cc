@@ -9,16 +9,17 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/capture.h"
-#include "core/folder.h"
-#include "core/parallel.h"
-#include "core/random.h"
-#include "core/write_error.h"
-#include "stages/simulate/building.h"
-#include "stages/simulate/floor_plan.h"
-#include "stages/simulate/survey.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/capture/capture.h"
+#include "core/colmap/cameras_text.h"
+#include "core/files/folder.h"
+#include "core/files/write_error.h"
+#include "sim/render/building.h"
+#include "sim/render/floor_plan.h"
+#include "sim/survey/survey.h"
 
-namespace cairn {
+namespace cairn::simulate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -36,13 +37,14 @@ Status WriteJpeg(const std::string& path, const cv::Mat& grey, int quality) {
 }
 
 // Renders and writes all images, of the survey and the queries.
-Status WriteImages(const Building& building, const Survey& survey, const SimulateOptions& options,
-                   uint64_t seed, const std::string& folder, int num_threads, Progress& progress) {
-  const Renderer survey_renderer(building, survey.camera);
+Status WriteImages(const sim::Building& building, const sim::Survey& survey,
+                   const sim::SimulateOptions& options, uint64_t seed, const std::string& folder,
+                   int num_threads, Progress& progress) {
+  const sim::Renderer survey_renderer(building, survey.camera);
   const bool same_camera = survey.query_camera.camera_id == survey.camera.camera_id;
-  const std::optional<Renderer> own_query_renderer =
-      same_camera ? std::nullopt : std::optional<Renderer>(std::in_place, building, survey.query_camera);
-  const Renderer& query_renderer = same_camera ? survey_renderer : *own_query_renderer;
+  const std::optional<sim::Renderer> own_query_renderer =
+      same_camera ? std::nullopt : std::optional<sim::Renderer>(std::in_place, building, survey.query_camera);
+  const sim::Renderer& query_renderer = same_camera ? survey_renderer : *own_query_renderer;
   const int64_t num_survey = static_cast<int64_t>(survey.images.size());
   const int64_t num_images = num_survey + static_cast<int64_t>(survey.queries.size());
   std::vector<Status> statuses(num_images);
@@ -52,9 +54,9 @@ Status WriteImages(const Building& building, const Survey& survey, const Simulat
       statuses[i] = MakeError(ErrorCode::kCancelled, "simulate: cancelled");
       return;
     }
-    const PlannedImage& image = i < num_survey ? survey.images[i] : survey.queries[i - num_survey];
-    const Renderer& renderer = i < num_survey ? survey_renderer : query_renderer;
-    const cv::Mat grey = TakeImage(renderer, image, MixSeed(MixSeed(seed, 20), i));
+    const sim::PlannedImage& image = i < num_survey ? survey.images[i] : survey.queries[i - num_survey];
+    const sim::Renderer& renderer = i < num_survey ? survey_renderer : query_renderer;
+    const cv::Mat grey = sim::TakeImage(renderer, image, MixSeed(MixSeed(seed, 20), i));
     statuses[i] = WriteJpeg(folder + "/" + image.name, grey, options.jpeg_quality);
     progress.Advance();
   });
@@ -63,20 +65,20 @@ Status WriteImages(const Building& building, const Survey& survey, const Simulat
   return Ok();
 }
 
-std::vector<CaptureImage> StatedImages(const std::vector<PlannedImage>& planned, CameraId camera_id) {
+std::vector<CaptureImage> StatedImages(const std::vector<sim::PlannedImage>& planned, CameraId camera_id) {
   std::vector<CaptureImage> images;
-  for (const PlannedImage& image : planned)
+  for (const sim::PlannedImage& image : planned)
     images.push_back({image.name, camera_id, image.stated_cam_from_world});
   return images;
 }
 
 }  // namespace
 
-Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std::string& path, uint64_t seed,
-                                       int num_threads, Progress& progress) {
-  CAIRN_ASSIGN_OR_RETURN(const Building building, MakeBuilding(options, seed, num_threads));
+Result<SimulateResult> SimulateCapture(const sim::SimulateOptions& options, const std::string& path,
+                                       uint64_t seed, int num_threads, Progress& progress) {
+  CAIRN_ASSIGN_OR_RETURN(const sim::Building building, sim::MakeBuilding(options, seed, num_threads));
   const uint64_t survey_seed = options.run == 0 ? seed : MixSeed(MixSeed(seed, 21), options.run);
-  CAIRN_ASSIGN_OR_RETURN(const Survey survey, PlanSurvey(building, options, survey_seed));
+  CAIRN_ASSIGN_OR_RETURN(const sim::Survey survey, sim::PlanSurvey(building, options, survey_seed));
 
   CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(path, "a capture", [&](const std::string& folder) -> Status {
     std::error_code error;
@@ -92,10 +94,10 @@ Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std
         WriteImagesText(folder + "/images.txt", StatedImages(survey.images, survey.camera.camera_id)));
     CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt",
                                           StatedImages(survey.queries, survey.query_camera.camera_id)));
-    return WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
+    return sim::WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
   }));
   return SimulateResult{static_cast<int>(survey.stations.size()), static_cast<int>(survey.images.size()),
                         static_cast<int>(survey.queries.size())};
 }
 
-}  // namespace cairn
+}  // namespace cairn::simulate

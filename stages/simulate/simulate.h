@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <string>
 
-#include "core/error.h"
-#include "core/progress.h"
-#include "stages/simulate/options.h"
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "sim/render/options.h"
 
-namespace cairn {
+namespace cairn::simulate {
 
 struct SimulateResult {
   int num_stations = 0;
@@ -21,7 +21,7 @@ struct SimulateResult {
 // stations, four headings each]. The folder is written beside its place and then exchanged with it: who looks
 // sees the old capture or the whole new one.  Same options, seed and program: same bytes, for any number of
 // threads. Errors: InvalidArgument or NoData (PlanSurvey), Io (names the path), Cancelled.
-Result<SimulateResult> SimulateCapture(const SimulateOptions& options, const std::string& path, uint64_t seed,
-                                       int num_threads, Progress& progress);
+Result<SimulateResult> SimulateCapture(const sim::SimulateOptions& options, const std::string& path,
+                                       uint64_t seed, int num_threads, Progress& progress);
 
-}  // namespace cairn
+}  // namespace cairn::simulate

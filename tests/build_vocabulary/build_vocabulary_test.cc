@@ -6,11 +6,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "core/random.h"
-#include "core/split_node.h"
+#include "core/base/random.h"
+#include "core/files/file.h"
+#include "core/vocabulary/split_node.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 // A random descriptor with squared norm near 512^2.
@@ -205,4 +205,4 @@ TEST(BuildVocabulary, SubsampledTrainingStillFilesEveryDescriptor) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -1,4 +1,4 @@
-#include "core/document_scores.h"
+#include "core/vocabulary/document_scores.h"
 
 #include <cmath>
 #include <numeric>
@@ -6,10 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 using testing::DoubleNear;
@@ -96,4 +96,4 @@ TEST(JeffreyDivergence, IsThatOfTheMixedDistributionsBothWays) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -1,12 +1,12 @@
-#include "core/recognize_place.h"
+#include "core/vocabulary/recognize_place.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 // Four documents of two words each, all their own: document i has words 2 i and 2 i + 1.  Word 8 is in all.
@@ -126,4 +126,4 @@ TEST(RecognizePlace, HoldsForAMillionDocuments) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -1,13 +1,13 @@
-#include "core/rerank_places.h"
+#include "core/vocabulary/rerank_places.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 Camera SceneCamera() {
@@ -160,4 +160,4 @@ TEST(RerankPlaces, TakesBlankImagesAndUndefinedBearings) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -1,4 +1,4 @@
-#include "core/vocabulary_tree.h"
+#include "core/vocabulary/vocabulary_tree.h"
 
 #include <cmath>
 #include <map>
@@ -6,11 +6,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/files/file.h"
 #include "stages/build_vocabulary/build_vocabulary.h"
 
-namespace cairn {
+namespace cairn::build_vocabulary {
 namespace {
 
 DescriptorMatrix RandomDescriptors(int count, uint64_t seed) {
@@ -176,4 +176,4 @@ TEST(VocabularyTree, DamagedTablesAreRefused) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::build_vocabulary

@@ -5,9 +5,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "stages/check_map/report.h"
-#include "tests/runtime/synthetic_room.h"
+#include "tests/runtime/localize/synthetic_room.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 using testing::HasSubstr;
@@ -66,4 +66,4 @@ TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::check_map

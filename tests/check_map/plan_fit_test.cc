@@ -5,11 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
-#include "runtime/interpretation_tree.h"
+#include "core/base/random.h"
+#include "runtime/laser/interpretation_tree.h"
 #include "stages/check_map/plan_agreement.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 using testing::HasSubstr;
@@ -194,4 +194,4 @@ TEST(PlanAgreement, ImagesAndScansOfOnePoseAgreeAndOthersDoNot) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::check_map

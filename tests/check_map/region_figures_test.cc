@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "stages/check_map/report.h"
-#include "tests/runtime/synthetic_room.h"
+#include "tests/runtime/localize/synthetic_room.h"
 
-namespace cairn {
+namespace cairn::check_map {
 namespace {
 
 using testing::ElementsAre;
@@ -176,4 +176,4 @@ TEST(RegionFigures, ReportListsTheWorstRegionsFirst) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::check_map

@@ -5,9 +5,9 @@
 #include <set>
 #include <vector>
 
-#include "core/world.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // Every region of a small world by the definitions [Sala06 §III] alone, by trying all sets of k features: the
 // oracle that bounds and decompositions are held against.  Sets of stations are bit masks.  REQUIRES: at most
@@ -93,4 +93,4 @@ class AllRegions {
   std::set<uint32_t> covers_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

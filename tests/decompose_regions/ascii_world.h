@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/random.h"
-#include "core/world.h"
+#include "core/base/random.h"
+#include "core/world/world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 
 // A lattice world from a drawing, one metre a cell: a letter or digit is a station, a blank or '.' none;
 // stations are numbered row by row, from the first row.  Features are drawings of the same shape in which '#'
@@ -63,4 +63,4 @@ inline World RandomWorld(int width, int height, int num_features, bool scattered
   return AsciiWorld(stations, features);
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

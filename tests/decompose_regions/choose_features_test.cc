@@ -10,7 +10,7 @@
 #include "stages/decompose_regions/decompose_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using testing::Contains;
@@ -341,4 +341,4 @@ TEST(ChooseFeatures, ErrorsNameTheElement) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

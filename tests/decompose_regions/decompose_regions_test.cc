@@ -6,7 +6,7 @@
 #include "stages/decompose_regions/check_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using testing::ElementsAre;
@@ -310,4 +310,4 @@ TEST(CheckRegions, NamesEachPropertyThatFails) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -8,7 +8,7 @@
 #include "stages/decompose_regions/decompose_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using testing::ElementsAre;
@@ -115,4 +115,4 @@ TEST(ListDropped, EveryFeatureAndStationOfRandomWorldsIsKeptOrDroppedOnceForTheR
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -1,18 +1,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
-#include "stages/decompose_regions/algorithm_best.h"
+#include "core/base/random.h"
+#include "stages/decompose_regions/algorithms/algorithm_best.h"
 #include "stages/decompose_regions/check_regions.h"
-#include "stages/decompose_regions/core_finder.h"
-#include "stages/decompose_regions/counting_bound.h"
-#include "stages/decompose_regions/cover_annealing.h"
+#include "stages/decompose_regions/cover/core_finder.h"
+#include "stages/decompose_regions/cover/counting_bound.h"
+#include "stages/decompose_regions/cover/cover_annealing.h"
+#include "stages/decompose_regions/cover/pricing.h"
 #include "stages/decompose_regions/decompose_regions.h"
-#include "stages/decompose_regions/pricing.h"
 #include "tests/decompose_regions/all_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using testing::IsEmpty;
@@ -232,4 +232,4 @@ TEST(Best, LargeWorldsGetB2AndTheCountedBound) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

@@ -5,7 +5,7 @@
 
 #include "tests/decompose_regions/ascii_world.h"
 
-namespace cairn {
+namespace cairn::decompose_regions {
 namespace {
 
 using testing::HasSubstr;
@@ -72,4 +72,4 @@ TEST(Picture, OneStationIsDrawn) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_regions

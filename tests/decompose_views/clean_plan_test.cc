@@ -1,11 +1,11 @@
-#include "stages/decompose_views/clean_plan.h"
+#include "stages/decompose_views/plan/clean_plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/decompose_views/plan_fixture.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using testing::HasSubstr;
@@ -121,4 +121,4 @@ TEST(CleanPlan, RefusesAPlanWithoutLength) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

@@ -7,13 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "core/random.h"
-#include "core/views_database.h"
+#include "core/base/random.h"
+#include "core/files/file.h"
+#include "core/plan/views_database.h"
 #include "stages/decompose_views/label_faces.h"
 #include "tests/decompose_views/plan_fixture.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -430,4 +430,4 @@ TEST(DecomposeViews, SmallRegionsAreJoinedOnRequestAndTheLossIsSaid) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

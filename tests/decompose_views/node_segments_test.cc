@@ -1,4 +1,4 @@
-#include "stages/decompose_views/node_segments.h"
+#include "stages/decompose_views/plan/node_segments.h"
 
 #include <algorithm>
 #include <memory>
@@ -12,9 +12,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -197,4 +197,4 @@ TEST(SegmentNoder, StopsWhenItIsCancelled) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

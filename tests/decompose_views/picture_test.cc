@@ -5,7 +5,7 @@
 
 #include "tests/decompose_views/plan_fixture.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using testing::HasSubstr;
@@ -26,4 +26,4 @@ TEST(ViewsPicture, HasTheWallsTheRegionsAndWhatIsLaidOverThem) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

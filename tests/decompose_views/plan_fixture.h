@@ -9,7 +9,7 @@
 
 #include "stages/decompose_views/decompose_views.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 
 inline InputPlan Parsed(const std::string& text) {
   auto input = ParsePlan(text, "plan");
@@ -37,4 +37,4 @@ inline std::string PolygonText(const std::vector<Corners>& rings) {
   return text + "]}";
 }
 
-}  // namespace cairn
+}  // namespace cairn::decompose_views

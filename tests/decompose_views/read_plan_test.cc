@@ -1,9 +1,9 @@
-#include "stages/decompose_views/read_plan.h"
+#include "stages/decompose_views/plan/read_plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using testing::HasSubstr;
@@ -94,4 +94,4 @@ TEST(ReadPlan, RefusesWhatIsNoPolygon) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

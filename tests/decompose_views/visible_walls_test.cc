@@ -1,10 +1,10 @@
-#include "core/visible_walls.h"
+#include "core/plan/visible_walls.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/decompose_views/plan_fixture.h"
 
-namespace cairn {
+namespace cairn::decompose_views {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -28,4 +28,4 @@ TEST(VisibleStretches, HideWhatIsBehindAndAreInOrder) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::decompose_views

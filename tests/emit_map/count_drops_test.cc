@@ -5,18 +5,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/colmap_database.h"
-#include "core/file.h"
-#include "tests/emit_map/example.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
+#include "tests/core/map/example.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// The example of tests/emit_map/example.h: images 1, 2 and 4 at stations 0, 1 and 2.
+// The example of tests/core/map/example.h: images 1, 2 and 4 at stations 0, 1 and 2.
 std::vector<DropCount> Count(const std::vector<DroppedItem>& items) {
   const EmitExample example = MakeEmitExample();
   const auto counts = CountDrops(example.classes, example.world, items);
@@ -124,4 +124,4 @@ TEST(DropReasons, StandInTheDocumentAsInTheProgram) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/map_documents.h"
-#include "tests/emit_map/example.h"
+#include "core/blocks/map_documents.h"
+#include "tests/core/map/example.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 using testing::ElementsAre;
@@ -200,4 +200,4 @@ TEST(EmitMap, PartsOfOneClassAreOneLandmark) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::emit_map

@@ -6,10 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 #include "stages/emit_map/choose_landmarks.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 using testing::ElementsAre;
@@ -118,4 +118,4 @@ TEST(GuaranteeOf, CountsCommonLandmarksAndPoorStations) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::emit_map

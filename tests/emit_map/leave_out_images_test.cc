@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "stages/emit_map/emit_map.h"
-#include "tests/emit_map/example.h"
+#include "tests/core/map/example.h"
 
-namespace cairn {
+namespace cairn::emit_map {
 namespace {
 
 using testing::ElementsAre;
@@ -83,4 +83,4 @@ TEST(PartsOf, NeighboursOfAKeptPlaceWithoutImagesAreKept) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::emit_map

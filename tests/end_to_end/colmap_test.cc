@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/capture.h"
-#include "core/colmap_database.h"
-#include "core/file.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {

@@ -8,13 +8,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "core/database.h"
-#include "core/decomposition.h"
-#include "core/dropped_items.h"
-#include "core/feature_class.h"
-#include "core/file.h"
-#include "core/map_rows.h"
-#include "core/world.h"
+#include "core/blocks/map_rows.h"
+#include "core/files/database.h"
+#include "core/files/file.h"
+#include "core/world/decomposition.h"
+#include "core/world/dropped_items.h"
+#include "core/world/feature_class.h"
+#include "core/world/world.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {

@@ -9,10 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/error.h"
-#include "core/file.h"
-#include "core/map_delta.h"
-#include "core/map_file.h"
+#include "core/base/error.h"
+#include "core/files/file.h"
+#include "core/map/map_delta.h"
+#include "core/map/map_file.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {

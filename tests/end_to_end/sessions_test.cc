@@ -5,8 +5,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "core/capture.h"
-#include "core/file.h"
+#include "core/capture/capture.h"
+#include "core/colmap/cameras_text.h"
+#include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "core/capture.h"
-#include "core/image_file.h"
-#include "runtime/cairn.h"
+#include "core/capture/capture.h"
+#include "core/capture/image_file.h"
+#include "runtime/c_api/cairn.h"
 #include "tests/end_to_end/program_run.h"
 
 namespace cairn {

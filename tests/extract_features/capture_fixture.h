@@ -8,11 +8,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/capture.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/capture/capture.h"
+#include "core/colmap/cameras_text.h"
 #include "stages/extract_features/extract_features.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 
 // Random blobs of several sizes on grey: plenty of SIFT features.
 inline cv::Mat BlobImage(uint64_t seed, int width = 320, int height = 240) {
@@ -66,4 +67,4 @@ class ExtractFeaturesTest : public testing::Test {
   std::vector<CaptureImage> images_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::extract_features

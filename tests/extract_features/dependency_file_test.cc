@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 using testing::ElementsAre;
@@ -30,4 +30,4 @@ TEST(DependencyFile, FoldersAreAllThoseBetweenTheRootAndTheFiles) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::extract_features

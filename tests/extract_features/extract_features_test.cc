@@ -5,11 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/colmap_database.h"
-#include "core/file.h"
+#include "core/colmap/cameras_text.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
 #include "tests/extract_features/capture_fixture.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -186,4 +187,4 @@ TEST_F(ExtractFeaturesTest, ColmapReadsTheDatabase) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::extract_features

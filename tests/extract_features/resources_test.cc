@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 using testing::HasSubstr;
@@ -57,4 +57,4 @@ TEST(Resources, FeaturesAreEstimatedAtThreeQuartersOfThoseAllowed) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::extract_features

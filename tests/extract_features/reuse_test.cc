@@ -4,12 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/colmap_database.h"
-#include "core/file.h"
-#include "core/program_identity.h"
+#include "core/colmap/cameras_text.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
+#include "core/line/program_identity.h"
 #include "tests/extract_features/capture_fixture.h"
 
-namespace cairn {
+namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -210,4 +211,4 @@ TEST_F(ExtractFeaturesReuse, NamedFilesMustBeDatabases) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::extract_features

@@ -7,11 +7,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 #include "stages/filter_visibility/lattice_area.h"
 #include "stages/filter_visibility/stations.h"
 
-namespace cairn {
+namespace cairn::filter_visibility {
 namespace {
 
 using testing::ElementsAre;
@@ -392,4 +392,4 @@ TEST(FilterVisibilityDrops, WhatStaysAndWhatIsDroppedAddUpToWhatWasSeenAtEverySt
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::filter_visibility

@@ -3,11 +3,11 @@
 #include <cstdio>
 #include <string>
 
-#include "core/blob.h"
-#include "core/file.h"
-#include "core/map_file.h"
+#include "core/base/blob.h"
+#include "core/files/file.h"
+#include "core/map/map_file.h"
 #include "stages/emit_map/emit_map.h"
-#include "tests/emit_map/example.h"
+#include "tests/core/map/example.h"
 
 int main(int argc, char** argv) {
   using namespace cairn;
@@ -15,12 +15,12 @@ int main(int argc, char** argv) {
   const std::string folder = argv[1];
   const EmitExample example = MakeEmitExample();
   for (const int min_num_landmarks_for_words : {0, 100}) {
-    auto rows = EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                        {.min_num_landmarks_for_words = min_num_landmarks_for_words,
-                         .landmarks_per_word = 1,
-                         .documents = "kept"},
-                        &example.appearance);
-    if (!rows.ok() || !AddViews(MakeExampleViews(), &*rows).ok()) return 1;
+    auto rows = emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                  {.min_num_landmarks_for_words = min_num_landmarks_for_words,
+                                   .landmarks_per_word = 1,
+                                   .documents = "kept"},
+                                  &example.appearance);
+    if (!rows.ok() || !emit_map::AddViews(MakeExampleViews(), &*rows).ok()) return 1;
     rows->visual_map = MakeExampleVisualMap();
     rows->findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                         {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};

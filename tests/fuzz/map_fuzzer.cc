@@ -9,14 +9,14 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/blob.h"
-#include "core/map_blocks.h"
-#include "core/map_file.h"
-#include "core/random.h"
-#include "runtime/localizer.h"
-#include "runtime/route.h"
-#include "runtime/visual_estimate.h"
-#include "tests/emit_map/sealed_blocks.h"
+#include "core/base/blob.h"
+#include "core/base/random.h"
+#include "core/blocks/map_blocks.h"
+#include "core/map/map_file.h"
+#include "runtime/drive/route.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/visual_map/visual_estimate.h"
+#include "tests/core/map/sealed_blocks.h"
 
 namespace cairn {
 namespace {

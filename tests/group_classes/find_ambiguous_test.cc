@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 using testing::ElementsAre;
@@ -173,4 +173,4 @@ TEST(DescribeClass, RadiusOfEqualDescriptorsIsZero) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::group_classes

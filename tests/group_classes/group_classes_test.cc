@@ -5,11 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/database.h"
-#include "core/dropped_items.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/files/database.h"
+#include "core/world/dropped_items.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 using testing::HasSubstr;
@@ -375,4 +375,4 @@ TEST(GroupClassesDrops, AreReadBackFromTheFileAsTheyWere) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 // Of a pinhole camera with f = 500 px.
@@ -118,4 +118,4 @@ TEST(Triangulate, CovarianceIsTheSpreadOfManyTrials) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::group_classes {
 namespace {
 
 using testing::ElementsAre;
@@ -51,4 +51,4 @@ TEST(UnionMatches, NoMatchesNoTracks) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::group_classes

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/cairn.h"
+#include "runtime/c_api/cairn.h"
 #include "runtime/examples/robot/pgm.h"
 
 static int num_failures = 0;

@@ -7,12 +7,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "core/map_delta.h"
-#include "core/map_rows.h"
-#include "runtime/cairn.h"
-#include "runtime/localizer.h"
-#include "tests/runtime/poster_scene.h"
+#include "core/blocks/map_rows.h"
+#include "core/files/file.h"
+#include "core/map/map_delta.h"
+#include "runtime/c_api/cairn.h"
+#include "runtime/localize/localizer.h"
+#include "tests/runtime/localize/poster_scene.h"
 
 namespace cairn {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/map_rows.h"
-#include "tests/runtime/poster_scene.h"
+#include "core/blocks/map_rows.h"
+#include "tests/runtime/localize/poster_scene.h"
 
 int main(int argc, char** argv) {
   using namespace cairn;

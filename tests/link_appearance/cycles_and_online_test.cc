@@ -4,12 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stages/link_appearance/greedy_dominating_set.h"
-#include "stages/link_appearance/online_dominating_set.h"
-#include "stages/link_appearance/restore_cycles.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
+#include "stages/link_appearance/dominating_set/online_dominating_set.h"
+#include "stages/link_appearance/dominating_set/restore_cycles.h"
 #include "tests/link_appearance/graphs.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 using testing::ElementsAre;
@@ -152,4 +152,4 @@ TEST(OnlineDominatingSet, AnArrivalJoinsTwoPlaces) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -2,12 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stages/link_appearance/connected_bound.h"
-#include "stages/link_appearance/greedy_dominating_set.h"
-#include "stages/link_appearance/improve_dominating_set.h"
+#include "stages/link_appearance/dominating_set/connected_bound.h"
+#include "stages/link_appearance/dominating_set/greedy_dominating_set.h"
+#include "stages/link_appearance/dominating_set/improve_dominating_set.h"
 #include "tests/link_appearance/graphs.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 using testing::ElementsAre;
@@ -222,4 +222,4 @@ TEST(BoundConnectedSet, KnowsPathsRingsAndStars) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::link_appearance

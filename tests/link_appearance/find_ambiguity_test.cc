@@ -7,7 +7,7 @@
 
 #include "tests/link_appearance/graphs.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 using testing::ElementsAre;
@@ -170,4 +170,4 @@ TEST(FindAmbiguity, OptionsThatCannotBeMeantAreErrors) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/random.h"
-#include "stages/link_appearance/domination.h"
+#include "core/base/random.h"
+#include "stages/link_appearance/dominating_set/domination.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 
 // A graph of links with 30 inliers each.
 inline AppearanceGraph GraphOf(int num_nodes, const std::vector<std::pair<NodeIdx, NodeIdx>>& pairs) {
@@ -61,4 +61,4 @@ inline int SmallestSize(const Domination& domination) {
   return smallest;
 }
 
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -5,14 +5,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/appearance.h"
-#include "core/file.h"
-#include "core/pose.h"
+#include "core/colmap/cameras_text.h"
+#include "core/files/file.h"
+#include "core/geometry/pose.h"
+#include "core/world/appearance.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/picture.h"
 #include "tests/link_appearance/graphs.h"
 
-namespace cairn {
+namespace cairn::link_appearance {
 namespace {
 
 using testing::ElementsAre;
@@ -411,4 +412,4 @@ TEST(DrawAppearance, MarksKeptNodesOverTheFloorOrInAMatrix) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::link_appearance

@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 
-#include "core/colmap_database.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/colmap/colmap_database.h"
 #include "stages/match_features/match_features.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // A features.db of `num_images` cameras side by side that see the same 80 points, each with its own
 // descriptor.
@@ -82,4 +82,4 @@ class MatchFeaturesTest : public testing::Test {
   uint64_t seed_ = 0;
 };
 
-}  // namespace cairn
+}  // namespace cairn::match_features

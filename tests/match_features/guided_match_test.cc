@@ -5,11 +5,11 @@
 
 #include <gtest/gtest.h>
 
-#include "core/relative_pose.h"
-#include "core/two_view_error.h"
+#include "core/geometry/relative_pose.h"
+#include "core/geometry/two_view_error.h"
 #include "tests/match_features/two_view_scene.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 constexpr double kMaxError = 2.0 / 500;
@@ -193,4 +193,4 @@ TEST(VerifyPair, GuidedMatchingAddsMatchesOfTheModelOnly) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

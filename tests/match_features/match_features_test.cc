@@ -6,14 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/colmap_database.h"
-#include "core/dropped_items.h"
-#include "core/file.h"
-#include "core/random.h"
-#include "core/vocabulary_tree.h"
+#include "core/base/random.h"
+#include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
+#include "core/vocabulary/vocabulary_tree.h"
+#include "core/world/dropped_items.h"
 #include "tests/match_features/features_fixture.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -297,4 +297,4 @@ TEST_F(MatchFeaturesTest, ColmapMapperReconstructsFromOurMatches) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

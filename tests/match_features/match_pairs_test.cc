@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 using testing::ElementsAre;
@@ -51,4 +51,4 @@ TEST(MatchPairs, FewImagesAreReadAgainForASmallBudget) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

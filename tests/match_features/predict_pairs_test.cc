@@ -1,4 +1,4 @@
-#include "stages/match_features/predict_pairs.h"
+#include "stages/match_features/pairs/predict_pairs.h"
 
 #include <algorithm>
 #include <tuple>
@@ -6,10 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/pose.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/geometry/pose.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 using testing::ElementsAre;
@@ -120,4 +120,4 @@ TEST(PredictPairs, LaterCallsFindWhatAllMatchesAtOncePredict) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

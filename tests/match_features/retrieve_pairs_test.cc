@@ -1,9 +1,9 @@
-#include "stages/match_features/retrieve_pairs.h"
+#include "stages/match_features/pairs/retrieve_pairs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 using testing::ElementsAre;
@@ -46,4 +46,4 @@ TEST(RetrievePairs, LoopCandidatesAreNoNeighbours) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "core/program_identity.h"
+#include "core/files/file.h"
+#include "core/line/program_identity.h"
 #include "tests/match_features/features_fixture.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 namespace fs = std::filesystem;
@@ -293,4 +293,4 @@ TEST_F(MatchFeaturesReuse, NamedFilesMustBeDatabases) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -1,4 +1,4 @@
-#include "stages/match_features/select_pairs.h"
+#include "stages/match_features/pairs/select_pairs.h"
 
 #include <cmath>
 #include <random>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 using testing::ElementsAre;
@@ -133,4 +133,4 @@ TEST(SelectPairs, OpposedViewsOfOneWallAreNotMatched) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/random.h"
+#include "core/base/random.h"
 #include "stages/match_features/verify_pair.h"
 
-namespace cairn {
+namespace cairn::match_features {
 
 // Two cameras that see the same points, with one match per point: first the true ones, then outliers whose
 // second keypoint lies anywhere.  Descriptors are random unless a test makes them alike.
@@ -96,4 +96,4 @@ inline int NumTrueInliers(const TwoViewGeometry& geometry, int num_points) {
   return num;
 }
 
-}  // namespace cairn
+}  // namespace cairn::match_features

@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "core/file.h"
+#include "core/files/file.h"
 #include "tests/match_features/two_view_scene.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 struct Case {
@@ -100,4 +100,4 @@ TEST(VerifyBesideColmap, ConfigurationsAndStoredMatricesAreTheSame) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

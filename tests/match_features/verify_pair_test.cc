@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "core/two_view_error.h"
+#include "core/geometry/two_view_error.h"
 #include "tests/match_features/two_view_scene.h"
 
-namespace cairn {
+namespace cairn::match_features {
 namespace {
 
 TwoViewGeometry Verify(const TwoViewScene& scene, std::optional<Pose> stated1, std::optional<Pose> stated2,
@@ -284,4 +284,4 @@ TEST(VerifyPair, MatchesOnOneLineOrOnOnePointDoNotCrash) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::match_features

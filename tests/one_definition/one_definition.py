@@ -6,7 +6,7 @@ usage: one_definition.py ROOT [FOLDER...]
 Two types of one name in one namespace are no error to the compiler, which sees one source file at a time, nor to the
 linker, which keeps one of their functions for both.  This reads the C++ sources as text, knows namespaces, classes and
 braces, and reports types and functions outside of unnamed namespaces that two places define.  Programs and libraries
-share the sources of core, runtime, stages and pipeline: they are looked at together, and with each folder of the tests
+share the sources of core, runtime, sim, stages and pipeline: they are looked at together, and with each folder of the tests
 and benchmarks in turn.
 """
 
@@ -15,7 +15,7 @@ import pathlib
 import re
 import sys
 
-SHARED = ("core", "runtime", "stages", "pipeline")
+SHARED = ("core", "runtime", "sim", "stages", "pipeline")
 APART = ("tests", "bench")  # programs of their own, a folder each
 
 LITERALS = re.compile(

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/random.h"
+#include "core/base/random.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 using testing::HasSubstr;
@@ -143,4 +143,4 @@ TEST(MedianStep, OfThreeOnALine) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "core/file.h"
+#include "core/files/file.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // A program named colmap first on PATH, for as long as the object lives.
 class FakeColmap {
@@ -27,4 +27,4 @@ class FakeColmap {
   std::string path_;
 };
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
+#include "core/files/file.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 using testing::HasSubstr;
@@ -79,4 +79,4 @@ TEST_F(KnownPlacesTest, AnchorIsTheMedianAlsoAcrossThe180thMeridian) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::reconstruct

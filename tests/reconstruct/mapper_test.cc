@@ -6,11 +6,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
+#include "core/files/file.h"
 #include "tests/reconstruct/fake_colmap.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST_F(MapperTest, SameBytesOnEveryRun) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -6,12 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
-#include "tests/core/exif_jpeg.h"
+#include "core/files/file.h"
+#include "tests/core/capture/exif_jpeg.h"
 #include "tests/reconstruct/fake_colmap.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 namespace fs = std::filesystem;
@@ -218,4 +218,4 @@ TEST_F(ReconstructTest, BadOptionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::reconstruct

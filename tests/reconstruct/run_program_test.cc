@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file.h"
+#include "core/files/file.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 namespace {
 
 using testing::ElementsAre;
@@ -87,4 +87,4 @@ TEST(RunProgram, StopsOnRequest) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -3,11 +3,11 @@
 #include <string>
 #include <vector>
 
-#include "core/capture.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/capture/capture.h"
 #include "stages/reconstruct/mapper.h"
 
-namespace cairn {
+namespace cairn::reconstruct {
 
 // A cloud of points seen by cameras that walk past it, with exact matches: what the mapper gets from
 // matches.db of a survey whose poses are known.
@@ -94,4 +94,4 @@ inline void AppendSurvey(const SyntheticSurvey& other, SyntheticSurvey* survey) 
   append(other.cams_from_world, &survey->cams_from_world);
 }
 
-}  // namespace cairn
+}  // namespace cairn::reconstruct

@@ -9,9 +9,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/drop_reason.h"
-#include "core/map_rows.h"
-#include "core/random.h"
+#include "core/base/random.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/drop_reason.h"
 
 namespace cairn {
 namespace {

@@ -34,5 +34,5 @@ RECIPE
 # Debian's Python, which has Debian's selenium.
 export PYTHONDONTWRITEBYTECODE=1
 /usr/bin/python3 "$source/tests/report/report_inputs_test.py" "$cairn" "$work/tiny.cairn"
-/usr/bin/python3 "$source/tests/report/report_test.py" "$cairn" "$source/tests/emit_map/golden" "$work/tiny.cairn" \
+/usr/bin/python3 "$source/tests/report/report_test.py" "$cairn" "$source/tests/core/map/golden" "$work/tiny.cairn" \
   "$work/screenshots" "$make_map"

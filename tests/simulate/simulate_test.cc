@@ -10,18 +10,18 @@
 #include <gtest/gtest.h>
 #include <CLI/CLI.hpp>
 
-#include "core/capture.h"
-#include "core/file.h"
+#include "core/capture/capture.h"
+#include "core/files/file.h"
 #include "stages/simulate/command.h"
 
-namespace cairn {
+namespace cairn::simulate {
 namespace {
 
 namespace fs = std::filesystem;
 
 // A few small images of a coarse building.
-SimulateOptions TinyOptions() {
-  SimulateOptions options;
+sim::SimulateOptions TinyOptions() {
+  sim::SimulateOptions options;
   options.texel_m = 0.04;
   options.image_width_px = 64;
   options.image_height_px = 48;
@@ -63,7 +63,7 @@ TEST_F(SimulateCaptureTest, WritesTheSameBytesForAnyNumberOfThreads) {
 }
 
 TEST_F(SimulateCaptureTest, WritesACaptureThatReadsBack) {
-  SimulateOptions options = TinyOptions();
+  sim::SimulateOptions options = TinyOptions();
   options.pose_noise_deg = 2;
   const Result<SimulateResult> result = SimulateCapture(options, Path("capture"), 0, 2, progress_);
   ASSERT_TRUE(result.ok());
@@ -87,7 +87,7 @@ TEST_F(SimulateCaptureTest, WritesACaptureThatReadsBack) {
 
 TEST_F(SimulateCaptureTest, ReplacesAnOldCaptureAsAWhole) {
   ASSERT_TRUE(SimulateCapture(TinyOptions(), Path("capture"), 0, 2, progress_).ok());
-  SimulateOptions fewer = TinyOptions();
+  sim::SimulateOptions fewer = TinyOptions();
   fewer.num_queries = 2;
   ASSERT_TRUE(SimulateCapture(fewer, Path("capture") + "/", 0, 2, progress_).ok());
   ASSERT_TRUE(SimulateCapture(fewer, Path("other"), 0, 2, progress_).ok());
@@ -183,4 +183,4 @@ TEST_F(SimulateCommandTest, NamesTheFileAndTheKeyOfABadRecipe) {
 }
 
 }  // namespace
-}  // namespace cairn
+}  // namespace cairn::simulate

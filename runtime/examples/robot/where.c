@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "pgm.h"
-#include "runtime/cairn.h"
+#include "runtime/c_api/cairn.h"
 
 int main(int argc, char** argv) {
   int width = 0, height = 0;

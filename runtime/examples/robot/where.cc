@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "pgm.h"
-#include "runtime/localizer.h"
+#include "runtime/localize/localizer.h"
 
 int main(int argc, char** argv) {
   int width = 0, height = 0;

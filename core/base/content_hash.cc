@@ -1,0 +1,30 @@
+#include "core/base/content_hash.h"
+
+#include <xxhash.h>
+
+namespace cairn {
+
+ContentHash HashContents(std::string_view bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return {hash.high64, hash.low64};
+}
+
+ContentHasher& ContentHasher::Text(std::string_view text) {
+  bytes_.UInt64(text.size());
+  bytes_.Bytes(text);
+  return *this;
+}
+
+ContentHasher& ContentHasher::Hash(const ContentHash& hash) { return UInt(hash.high).UInt(hash.low); }
+
+ContentHasher& ContentHasher::UInt(uint64_t value) {
+  bytes_.UInt64(value);
+  return *this;
+}
+
+ContentHasher& ContentHasher::Double(double value) {
+  bytes_.Float64(value);
+  return *this;
+}
+
+}  // namespace cairn

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "core/base/blob.h"
+
+namespace cairn {
+
+// XXH3, 128 bits.  Not cryptographic.
+struct ContentHash {
+  uint64_t high = 0;
+  uint64_t low = 0;
+  friend auto operator<=>(const ContentHash&, const ContentHash&) = default;
+};
+ContentHash HashContents(std::string_view bytes);
+
+// The hash of several things in turn.
+class ContentHasher {
+ public:
+  ContentHasher& Text(std::string_view text);  // its length too
+  ContentHasher& Hash(const ContentHash& hash);
+  ContentHasher& UInt(uint64_t value);
+  ContentHasher& Double(double value);  // its bits
+  ContentHash Finish() { return HashContents(bytes_.Take()); }
+
+ private:
+  BlobWriter bytes_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,173 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/blocks/map_findings.h"
+#include "core/camera/camera.h"
+#include "core/capture/capture_frame.h"
+#include "core/features/features.h"
+#include "core/geometry/pose.h"
+#include "core/plan/views.h"
+#include "core/vocabulary/vocabulary_tree.h"
+#include "core/world/visual_map.h"
+
+namespace cairn {
+
+using LandmarkIdx = int32_t;
+
+// The contents of a map file as plain values, the same for who writes and who reads it: schemas/FORMAT.md
+// says what each means on disk.
+
+struct MapLandmark {
+  ClassId class_id = 0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
+  double scale_m = 0;                                    // size (sigma) of the feature in space; 0: not known
+  int num_observations = 0;                              // survey images that see it
+};
+
+struct MapImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+  Pose cam_from_world;
+  StationIdx station = -1;             // -1: at no station
+  std::vector<LandmarkIdx> landmarks;  // seen in it, ascending
+};
+
+struct MapStation {
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  // floor frame, metres
+  std::optional<double> heading_deg;                   // counter-clockwise from +x; none: sees all around
+  bool is_covered = true;                              // false: its neighbourhood lies in no region
+};
+
+struct MapRegion {
+  std::vector<StationIdx> stations;    // ascending
+  std::vector<LandmarkIdx> landmarks;  // ascending
+};
+
+// A node of the appearance graph: images of one place between which, and those of linked nodes, the relative
+// pose can be recovered.
+struct MapAppearanceNode {
+  struct Link {
+    int32_t node = 0;
+    int32_t num_inliers = 0;  // verified matches, > 0
+    friend bool operator==(const Link&, const Link&) = default;
+  };
+  // A node that looks like this one and lies elsewhere.
+  struct LookAlike {
+    int32_t node = 0;
+    double score = 0;  // of one as a query for the other, in (0, 1]
+    friend bool operator==(const LookAlike&, const LookAlike&) = default;
+  };
+  std::vector<int32_t> images;  // by index, ascending; no image is of two nodes
+  bool is_kept = false;         // of the connected set that all other nodes are linked to
+  // To nodes of larger index, ascending; one of the two is kept.
+  std::vector<Link> links;
+  // Entropy of the places that it could be taken for, nats [Mariottini11 eq. 1]: of all nodes or of none.
+  std::optional<double> entropy;
+  std::vector<LookAlike> look_alikes;  // of larger index, ascending
+  friend bool operator==(const MapAppearanceNode&, const MapAppearanceNode&) = default;
+};
+
+// What a map says of itself as a whole.
+struct MapHead {
+  std::string name;
+  std::string writer;  // program and version, "cairn 0.1.0"
+  // Of the processor that found the features: another one's may differ in the last bits.
+  std::string instruction_set;
+  uint64_t seed = 0;    // of the compilation
+  bool sealed = false;  // checked, with its self-test figures
+  // Counts the releases of a map of this name: a robot takes no map of an epoch that is not later than what
+  // it has (docs/updates.md).  0: never counted.
+  uint64_t epoch = 0;
+  // Of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4 or earlier.
+  std::string findings_hash;
+  // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
+  std::string landmark_choice = "regions";
+  // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
+  std::string documents = "all";
+  // How the regions were made.
+  std::string algorithm;
+  int k = 0;
+  int tau = 0;
+  int rho = 0;
+  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable
+  // stations uncovered; nothing where none is known.
+  std::optional<int> lower_bound;
+  int uncovered_limit = 0;
+  std::map<std::string, std::string> stage_options;  // stage -> TOML
+  std::map<std::string, std::string> input_hashes;   // file -> XXH3
+  std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map
+
+  // What the world frame's coordinates mean: their unit, and where on the Earth they are.
+  CaptureFrame frame;
+  // The surveys that the map is made from, where it was several: the image SESSION/NAME is of one of them.
+  std::vector<std::string> sessions;
+  Pose floor_from_world;
+  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
+  // noise.
+  Pose camera_from_given;
+  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
+  double stated_pose_sigma_m = 0;
+  double stated_pose_sigma_deg = 0;
+
+  std::vector<Camera> cameras;  // ascending camera_id
+};
+
+struct MapRows : MapHead {
+  std::vector<MapImage> images;  // ascending image_id
+  std::vector<MapStation> stations;
+  std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
+  std::vector<MapRegion> regions;
+  std::vector<MapLandmark> landmarks;
+  DescriptorMatrix descriptors;               // row i: landmark i
+  std::vector<MapAppearanceNode> appearance;  // none: not known
+  // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
+  Vocabulary vocabulary;
+  // The place's floor plan and its view-invariant regions, floor frame; no walls: not known.  Vertices are
+  // numbered by use (NumberVerticesByUse).
+  Views views;
+  // How landmarks look from where; its images are indices in `images`.  No landmarks: not in the map.
+  VisualMapData visual_map;
+  MapFindings findings;
+};
+
+inline constexpr int kMapVersionMajor = 2;
+inline constexpr int kMapVersionMinor = 5;
+// Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
+inline constexpr int kMaxImageLandmarks = 1 << 18;
+inline constexpr int kMaxNameBytes = 4096;
+
+// Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
+// strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.
+Status CheckMapRows(const MapRows& rows);
+// The same for the head alone.
+Status CheckMapHead(const MapHead& head);
+
+// The surveys that see each landmark: positions in `sessions`, ascending.  Empty lists where the map is of
+// one survey.  O(observations).
+std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows);
+
+// Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io, DiskFull,
+// ReadOnly.
+Status WriteMapRows(const MapRows& rows, const std::string& path);
+
+// Reads a whole map file; every hash, length, index and number is checked, and nothing larger than the file
+// states is allocated.  Errors: as MapFile::Open (core/map/map_file.h).
+Result<MapRows> ReadMapRows(const std::string& path);
+
+// Reads a map of format 1.x, which today's runtime does not: for `cairn migrate`.  Errors: NotFound; Corrupt;
+// Unsupported (another version).
+Result<MapRows> ReadMapRowsVersion1(const std::string& path);
+
+}  // namespace cairn

@@ -1,0 +1,341 @@
+#include "core/capture/capture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <tuple>
+
+#include "core/base/printable.h"
+#include "core/base/text.h"
+#include "core/capture/exif.h"
+#include "core/capture/image_file.h"
+#include "core/capture/sessions.h"
+#include "core/colmap/cameras_text.h"
+#include "core/colmap/colmap_model.h"
+#include "core/colmap/image_list.h"
+#include "core/files/file.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Relative names of all image files below a folder, ascending.  Links to folders are followed where they are
+// a session's.
+std::vector<std::string> ListImages(const std::string& folder, const std::vector<std::string>& sessions) {
+  std::vector<std::string> names;
+  std::vector<std::string> starts = {folder};
+  for (const std::string& session : sessions) {
+    std::error_code link_error;
+    if (fs::is_symlink(folder + "/" + session, link_error)) starts.push_back(folder + "/" + session);
+  }
+  for (const std::string& start : starts) {
+    std::error_code error;
+    fs::recursive_directory_iterator it(start, fs::directory_options::skip_permission_denied, error), end;
+    for (; !error && it != end; it.increment(error)) {
+      std::error_code type_error;  // a broken link does not end the list
+      if (it->is_regular_file(type_error) && HasImageSuffix(it->path().string())) {
+        names.push_back(it->path().lexically_relative(folder).generic_string());
+      }
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+// Whether there is something of that name, be it a link to nothing: whoever put it there wants it read.
+bool IsThere(const std::string& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
+}
+
+// Cameras that a capture without poses gives: for all of its images, or for those of single sessions.
+struct KnownCameras {
+  struct List {
+    std::string path;
+    std::map<CameraId, Camera> cameras;
+  };
+  std::optional<List> of_all;
+  std::map<int, List> of_session;
+
+  // Those that may have taken a session's images (-1: of none); null where nothing is known of them.
+  const List* Of(int session) const {
+    if (const auto found = of_session.find(session); found != of_session.end()) return &found->second;
+    return of_all ? &*of_all : nullptr;
+  }
+};
+
+Result<KnownCameras> ReadKnownCameras(const std::string& root, const std::vector<std::string>& sessions) {
+  KnownCameras known;
+  if (const std::string path = root + "/cameras.txt"; IsThere(path)) {
+    CAIRN_ASSIGN_OR_RETURN(auto cameras, ReadCamerasText(path));
+    known.of_all = {path, std::move(cameras)};
+  }
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    const std::string path = SessionCamerasPath(root, sessions[i]);
+    if (!IsThere(path)) continue;
+    CAIRN_ASSIGN_OR_RETURN(auto cameras, ReadCamerasText(path));
+    known.of_session[static_cast<int>(i)] = {path, std::move(cameras)};
+  }
+  return known;
+}
+
+// The camera of an image of this size; null: none has it.  Errors: InvalidArgument (several have it and
+// differ).
+Result<const Camera*> CameraOfSize(const KnownCameras::List& list, const std::string& name, int width,
+                                   int height) {
+  const Camera* found = nullptr;
+  for (const auto& [camera_id, camera] : list.cameras) {
+    if (camera.width != width || camera.height != height) continue;
+    if (found == nullptr) found = &camera;
+    if (camera.model == found->model && camera.params == found->params) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: cameras {} and {} are both {} x {}, and without images.txt nothing tells which of "
+                     "them took {}; leave one camera of each size, or make each camera's images a capture of "
+                     "its own and name them all in the recipe",
+                     list.path, found->camera_id, camera_id, width, height, name);
+  }
+  return found;
+}
+
+// Gives the images of a capture without poses their cameras.
+class FlatFolderCameras {
+ public:
+  FlatFolderCameras(KnownCameras known, Capture* capture) : known_(std::move(known)), capture_(*capture) {
+    if (known_.of_all) capture_.cameras = known_.of_all->cameras;
+  }
+
+  // Appends the image, or a reject.
+  Status Add(const std::string& name, int session, const cv::Mat& image) {
+    const KnownCameras::List* list = known_.Of(session);
+    if (list == nullptr) {
+      AddGuessed(name, session, image);
+      return Ok();
+    }
+    CAIRN_ASSIGN_OR_RETURN(const Camera* camera, CameraOfSize(*list, name, image.cols, image.rows));
+    if (camera == nullptr) {
+      capture_.rejects.push_back({name, fmt::format("the image has {} x {} pixels, as no camera of {} has",
+                                                    image.cols, image.rows, list->path)});
+      return Ok();
+    }
+    CameraId camera_id = camera->camera_id;
+    if (list != (known_.of_all ? &*known_.of_all : nullptr))
+      camera_id = NewCamera(known_ids_, std::pair(session, camera_id), [&] { return *camera; });
+    capture_.images.push_back({name, camera_id, std::nullopt});
+    return Ok();
+  }
+
+ private:
+  // One camera for each session, image size and focal length in EXIF.
+  void AddGuessed(const std::string& name, int session, const cv::Mat& image) {
+    const double focal_mm = ReadExif(capture_.images_folder + "/" + name).focal_length_35mm_mm;
+    const CameraId camera_id =
+        NewCamera(guessed_ids_, std::tuple(session, image.cols, image.rows, focal_mm), [&] {
+          Camera camera = GuessCamera(0, image.cols, image.rows);
+          if (focal_mm > 0) {
+            // 36 mm: width of the film
+            camera.params[0] = focal_mm / 36.0 * std::max(image.cols, image.rows);
+            camera.has_focal_prior = true;
+          } else {
+            capture_.warnings.push_back(
+                fmt::format("{}: no cameras.txt and no focal length in EXIF: f = 1.2 max(w, h) = {:g} px "
+                            "assumed for {} x {} images",
+                            capture_.root, camera.params[0], camera.width, camera.height));
+          }
+          return camera;
+        });
+    capture_.images.push_back({name, camera_id, std::nullopt});
+  }
+
+  // The id of what `key` names; `make` tells the camera where it is new.
+  template <typename Key, typename Make>
+  CameraId NewCamera(std::map<Key, CameraId>& ids, const Key& key, const Make& make) {
+    const auto [entry, is_new] =
+        ids.emplace(key, capture_.cameras.empty() ? 1 : capture_.cameras.rbegin()->first + 1);
+    if (is_new) {
+      Camera camera = make();
+      camera.camera_id = entry->second;
+      capture_.cameras.emplace(entry->second, camera);
+    }
+    return entry->second;
+  }
+
+  KnownCameras known_;
+  Capture& capture_;
+  std::map<std::pair<int, CameraId>, CameraId> known_ids_;
+  std::map<std::tuple<int, int, int, double>, CameraId> guessed_ids_;
+};
+
+// Image files in the capture's folder itself, where it has one for images.
+size_t NumImagesBeside(const Capture& capture) {
+  if (capture.images_folder == capture.root) return 0;
+  size_t num_beside = 0;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(capture.root, error))
+    num_beside += HasImageSuffix(entry.path().string());
+  return num_beside;
+}
+
+// A capture without image lists.
+Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
+  const std::string queries = capture->root + "/queries.txt";
+  if (IsThere(queries)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: held-out images are given with their poses, but without images.txt the capture has "
+                     "none; add images.txt, or remove the list: [reconstruct] hold_out_every holds images "
+                     "out of a capture without poses",
+                     queries);
+  }
+  if (const std::string frame = capture->root + "/" + kCaptureFrameFile; IsThere(frame)) {
+    capture->warnings.push_back(
+        fmt::format("{}: not read: it says what poses mean, and without images.txt there are none", frame));
+  }
+  std::error_code error;
+  capture->images_folder =
+      fs::is_directory(capture->root + "/images", error) ? capture->root + "/images" : capture->root;
+  if (const size_t num_beside = NumImagesBeside(*capture); num_beside > 0) {
+    capture->warnings.push_back(
+        fmt::format("{}: {} images beside the folder images/ are left out", capture->root, num_beside));
+  }
+  CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions));
+  FlatFolderCameras cameras(std::move(known), capture);
+  for (const std::string& name : ListImages(capture->images_folder, sessions)) {
+    if (HasControlCharacter(name)) {
+      capture->rejects.push_back({name, "its name has a control character, such as a line's end; rename it"});
+      continue;
+    }
+    const Result<cv::Mat> image = ReadGreyImage(capture->images_folder + "/" + name);
+    if (!image.ok()) {
+      capture->rejects.push_back({name, image.error().message});
+      continue;
+    }
+    CAIRN_RETURN_IF_ERROR(cameras.Add(name, SessionOfImage(sessions, name), *image));
+  }
+  return Ok();
+}
+
+// Moves images without a file, or with a camera that cameras.txt lacks, to the rejects.
+void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
+  std::erase_if(*images, [&](const CaptureImage& image) {
+    std::string reason;
+    std::error_code error;
+    const std::string path = capture->ImagePath(image);
+    if (!fs::exists(path, error)) {
+      reason = fs::is_symlink(fs::symlink_status(path, error))
+                   ? fmt::format("{}: a link to a file that does not exist", path)
+                   : fmt::format("{}: no such file, but the image list names it", path);
+    } else if (!fs::is_regular_file(path, error)) {
+      reason = fmt::format("{}: not a file, but the image list names it", path);
+    } else if (capture->cameras.count(image.camera_id) == 0) {
+      reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
+    }
+    if (reason.empty()) return false;
+    capture->rejects.push_back({image.name, reason});
+    return true;
+  });
+}
+
+}  // namespace
+
+std::string SessionCamerasPath(const std::string& root, const std::string& session) {
+  return fmt::format("{}/cameras/{}.txt", root, session);
+}
+
+Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
+  std::vector<CaptureImage> images;
+  CAIRN_RETURN_IF_ERROR(VisitImageList(path, [&](ListedImage listed) {
+    ModelImage& image = listed.image;
+    if (const Status status = NormalizePose(&image.cam_from_world); !status.ok()) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: {}", path, listed.line_number, status.error().message)});
+    } else if (HasControlCharacter(image.name)) {
+      rejects->push_back(
+          {image.name, fmt::format("{}:{}: the image's name has a control character; rename it", path,
+                                   listed.line_number)});
+    } else {
+      images.push_back({std::move(image.name), image.camera_id, image.cam_from_world});
+    }
+  }));
+  const auto by_name = [](const auto& a, const auto& b) { return a.name < b.name; };
+  std::stable_sort(images.begin(), images.end(), by_name);
+  const auto twice = std::adjacent_find(images.begin(), images.end(),
+                                        [](const auto& a, const auto& b) { return a.name == b.name; });
+  if (twice != images.end()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: lists '{}' twice; which pose is right? remove one", path,
+                     twice->name);
+  }
+  return images;
+}
+
+Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>& images) {
+  std::string text =
+      "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME (cam_from_world, metres); second line empty\n";
+  for (size_t i = 0; i < images.size(); ++i) {
+    CAIRN_RETURN_IF_ERROR(CheckListedName(path, images[i].name));
+    const Pose& pose = *images[i].cam_from_world;
+    text +=
+        fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.6f} {:.6f} {:.6f} {} {}\n\n", i + 1, pose.rotation.w(),
+                    pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.translation.x(),
+                    pose.translation.y(), pose.translation.z(), images[i].camera_id, images[i].name);
+  }
+  return WriteFileAtomically(path, text);
+}
+
+Result<Capture> ReadCapture(const std::string& root) {
+  std::error_code error;
+  if (!fs::is_directory(root, error)) {
+    return MakeError(ErrorCode::kNotFound,
+                     "{}: no such folder; a capture is a folder with images/, cameras.txt and "
+                     "images.txt, or a flat folder of images",
+                     root);
+  }
+  Capture capture;
+  capture.root = root;
+  std::vector<std::string> sessions;
+  if (const std::string path = root + "/" + kSessionsFile; IsThere(path)) {
+    CAIRN_ASSIGN_OR_RETURN(sessions, ReadSessionsText(path));
+  }
+  if (!IsThere(root + "/images.txt")) {
+    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(sessions, &capture));
+  } else {
+    if (!IsThere(root + "/cameras.txt")) {
+      return MakeError(ErrorCode::kNotFound,
+                       "{}/cameras.txt: no such file, but images.txt names its cameras; write it, or remove "
+                       "images.txt: the capture then has no poses, and its cameras come from EXIF",
+                       root);
+    }
+    capture.has_poses = true;
+    capture.images_folder = root + "/images";
+    CAIRN_ASSIGN_OR_RETURN(capture.cameras, ReadCamerasText(root + "/cameras.txt"));
+    CAIRN_ASSIGN_OR_RETURN(capture.images, ReadImagesText(root + "/images.txt", &capture.rejects));
+    if (IsThere(root + "/queries.txt")) {
+      CAIRN_ASSIGN_OR_RETURN(capture.queries, ReadImagesText(root + "/queries.txt", &capture.rejects));
+    }
+    if (const std::string frame = root + "/" + kCaptureFrameFile; IsThere(frame)) {
+      CAIRN_ASSIGN_OR_RETURN(capture.frame, ReadCaptureFrame(frame));
+    }
+    const std::vector<std::string> names = ListImages(capture.images_folder, sessions);
+    std::set<std::string> unlisted(names.begin(), names.end());
+    for (const CaptureImage& image : capture.images) unlisted.erase(image.name);
+    for (const CaptureImage& image : capture.queries) unlisted.erase(image.name);
+    for (const Reject& reject : capture.rejects) unlisted.erase(reject.name);
+    for (const std::string& name : unlisted) {
+      capture.warnings.push_back(
+          fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture.images_folder, name));
+    }
+    RejectUnusable(&capture, &capture.images);
+    RejectUnusable(&capture, &capture.queries);
+  }
+  if (capture.images.empty()) {
+    const std::string first = capture.rejects.empty()
+                                  ? capture.has_poses ? "; images.txt lists none" : ""
+                                  : "; the first of " + std::to_string(capture.rejects.size()) +
+                                        " rejected: " + capture.rejects[0].reason;
+    return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);
+  }
+  return capture;
+}
+
+}  // namespace cairn

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/camera/camera.h"
+#include "core/capture/capture_frame.h"
+#include "core/geometry/pose.h"
+
+namespace cairn {
+
+// An image of a capture: its file is ROOT/images/NAME (in a flat folder ROOT/NAME).
+struct CaptureImage {
+  std::string name;
+  CameraId camera_id = 0;
+  std::optional<Pose> cam_from_world;  // none in a capture without poses
+};
+
+// Something of a capture that cannot be used: the image's name (or the file) and why.
+struct Reject {
+  std::string name;
+  std::string reason;
+};
+
+// Images + cameras + (usually) poses of one survey.
+struct Capture {
+  std::string root;
+  std::string images_folder;
+  std::map<CameraId, Camera> cameras;
+  std::vector<CaptureImage> images;   // the survey, ascending by name
+  std::vector<CaptureImage> queries;  // held out, never compiled; ascending by name
+  std::vector<Reject> rejects;        // named in images.txt, but missing or with a pose that is none
+  std::vector<std::string> warnings;  // e.g. image files that neither list names
+  bool has_poses = false;
+  std::optional<CaptureFrame> frame;  // of frame.json, if there is one
+
+  std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
+};
+
+// Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt and frame.json); image
+// files are looked for, not decoded.  Without images.txt the capture has no poses: its images are those of
+// images/, else of the folder itself.  Each then has the camera of cameras.txt that has its size; without
+// cameras.txt cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.
+// Errors: NotFound (no such folder; images.txt without cameras.txt), NoData (no image), Corrupt (a list that
+// cannot be parsed; file and line), Unsupported (camera model), InvalidArgument (without images.txt:
+// queries.txt, or different cameras of one image size).
+Result<Capture> ReadCapture(const std::string& root);
+
+// Where a capture of several sessions without poses has the cameras of one of them.
+std::string SessionCamerasPath(const std::string& root, const std::string& session);
+
+// One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
+// may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;
+// smaller differences are normalised away.  Names with a control character go to `rejects` too.
+Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects);
+// REQUIRES: every image has a pose.  Ids are 1, 2, ... in the given order.  Errors: InvalidArgument (a name
+// with a control character: CheckListedName), Io.
+Status WriteImagesText(const std::string& path, const std::vector<CaptureImage>& images);
+
+}  // namespace cairn

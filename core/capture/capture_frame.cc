@@ -1,0 +1,72 @@
+#include "core/capture/capture_frame.h"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "core/files/file.h"
+
+namespace cairn {
+
+Status CheckCaptureFrame(const CaptureFrame& frame) {
+  if (frame.unit != "metre" && frame.unit != "arbitrary") {
+    return MakeError(ErrorCode::kInvalidArgument, "unit '{}': expected 'metre' or 'arbitrary'", frame.unit);
+  }
+  if (!frame.anchor) return Ok();
+  const GeodeticPosition& a = *frame.anchor;
+  const bool is_valid =
+      std::abs(a.latitude_deg) <= 90 && std::abs(a.longitude_deg) <= 180 && std::isfinite(a.altitude_m);
+  if (!is_valid) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "anchor {}, {}, {}: expected a latitude in [-90, 90], a longitude in [-180, 180] and an "
+                     "altitude in metres",
+                     a.latitude_deg, a.longitude_deg, a.altitude_m);
+  }
+  if (frame.unit != "metre") {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "a frame of arbitrary unit has an anchor: expected the unit metre");
+  }
+  return Ok();
+}
+
+std::string CaptureFrameJson(const CaptureFrame& frame) {
+  nlohmann::ordered_json document = {
+      {"unit", frame.unit}, {"source", frame.source}, {"is_reconstructed", frame.is_reconstructed}};
+  if (frame.anchor) {
+    document["anchor"] = {{"latitude_deg", frame.anchor->latitude_deg},
+                          {"longitude_deg", frame.anchor->longitude_deg},
+                          {"altitude_m", frame.anchor->altitude_m}};
+  }
+  return document.dump(2) + "\n";
+}
+
+Result<CaptureFrame> ReadCaptureFrame(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  const auto document = nlohmann::json::parse(text, nullptr, false);
+  const auto has = [&](const nlohmann::json& object, const char* key, bool is_number) {
+    return object.is_object() && object.contains(key) &&
+           (is_number ? object[key].is_number() : object[key].is_string());
+  };
+  if (!has(document, "unit", false) || !has(document, "source", false)) {
+    return MakeError(ErrorCode::kCorrupt, "{}: expected a JSON object with the texts 'unit' and 'source'",
+                     path);
+  }
+  CaptureFrame frame{.unit = document["unit"].get<std::string>(),
+                     .source = document["source"].get<std::string>(),
+                     .is_reconstructed = document.value("is_reconstructed", nlohmann::json()) == true};
+  if (document.contains("anchor")) {
+    const nlohmann::json& anchor = document["anchor"];
+    for (const char* key : {"latitude_deg", "longitude_deg", "altitude_m"}) {
+      if (!has(anchor, key, true))
+        return MakeError(ErrorCode::kCorrupt, "{}: anchor: expected the number '{}'", path, key);
+    }
+    frame.anchor =
+        GeodeticPosition{anchor["latitude_deg"].get<double>(), anchor["longitude_deg"].get<double>(),
+                         anchor["altitude_m"].get<double>()};
+  }
+  if (const Status status = CheckCaptureFrame(frame); !status.ok())
+    return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);
+  return frame;
+}
+
+}  // namespace cairn

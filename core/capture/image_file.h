@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <opencv2/core/mat.hpp>
+
+#include "core/base/error.h"
+
+namespace cairn {
+
+// Whether a file's name ends as those of images do (.jpg, .PNG, ...).
+bool HasImageSuffix(const std::string& path);
+
+// Decodes an image file's bytes to 8-bit grey, CV_8UC1.  EXIF rotation is not applied, whatever its value;
+// 16-bit images lose their low byte; colour and CMYK become grey; alpha is ignored; of an animated PNG the
+// first frame is read.  `path` is for messages only.  Errors: Corrupt, naming the file and what was found:
+// zero bytes, not an image that OpenCV reads, a JPEG, PNG or WebP that stops before its end (OpenCV would
+// fill the rest with grey and say nothing), GIF, animated WebP, more than 2^30 pixels or 2^31 - 1 bytes.
+// Memory: one byte a pixel, and the decoder's.
+Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path);
+
+// The same from a file.  Errors: also NotFound, Io.
+Result<cv::Mat> ReadGreyImage(const std::string& path);
+
+}  // namespace cairn

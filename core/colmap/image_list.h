@@ -1,0 +1,26 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/colmap/colmap_model.h"
+
+namespace cairn {
+
+// An image as a list in COLMAP's images.txt form has it.
+struct ListedImage {
+  int line_number = 0;    // from 1 on
+  std::string pose_text;  // "QW QX QY QZ TX TY TZ", as they stand there
+  ModelImage image;       // as ParseImageLine gives it, without keypoints
+};
+
+// Calls `visit` for each image of such a list, in its order.  The line after an image's, with its keypoints
+// or empty, may be missing.  Errors: those of ReadFile and ParseImageLine, the latter with file and line.
+Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit);
+
+// Whether an image of this name can stand in a list of one image per line, `path`.  Errors: InvalidArgument
+// (a control character, such as a line's end, which would make two lines of one).
+Status CheckListedName(const std::string& path, const std::string& name);
+
+}  // namespace cairn

@@ -1,0 +1,197 @@
+#include "core/features/packed_descriptors.h"
+
+#include <algorithm>
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#elif defined(__aarch64__)
+#include <asm/hwcap.h>
+#include <sys/auxv.h>
+#endif
+
+#include "core/features/best_two_kernel.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kNumChunks = kDescriptorDim / 4;
+constexpr int kNumSubsets = 8;   // sets of values whose products are summed in one 16-bit lane
+constexpr int kSubsetSize = 16;  // in pairs that one instruction multiplies and adds
+
+// Which value of a descriptor is k-th of a subset.  SIFT's values are 4 x 4 cells of 8 directions.  A subset
+// has one value of each cell, every direction twice; a pair is of cells far apart.
+constexpr int DimOf(int subset, int k) {
+  const int half = k % 2, cell = k / 2;
+  const int x = (cell % 4 + 2 * half) % 4, y = cell / 4 + 2 * half;
+  const int direction = (subset + 6 * x + 5 * y) % 8;
+  return (4 * y + x) * 8 + direction;
+}
+
+// Values in packed order: word `chunk` of a descriptor holds a pair of each of two subsets.
+constexpr std::array<int, kDescriptorDim> PackedOrder() {
+  std::array<int, kDescriptorDim> order{};
+  for (int i = 0; i < kDescriptorDim; ++i) {
+    const int chunk = i / 4, pair = i % 4 / 2;
+    const int subset = chunk / kBestTwoPartialChunks * 2 + pair;
+    order[i] = DimOf(subset, chunk % kBestTwoPartialChunks * 2 + i % 2);
+  }
+  return order;
+}
+constexpr std::array<int, kDescriptorDim> kPackedOrder = PackedOrder();
+
+using Values = std::array<uint8_t, kDescriptorDim>;
+
+Values Reorder(const uint8_t* values) {
+  Values reordered;
+  for (int i = 0; i < kDescriptorDim; ++i) reordered[i] = values[kPackedOrder[i]];
+  return reordered;
+}
+
+// Whether the kernels for small values are exact for this descriptor with any other of which that holds.  By
+// Cauchy and Schwarz it suffices to bound the norms of what is multiplied: of pairs, one of them less the row
+// offset of 64 in signed 8 bits (signed 16-bit sums), and of subsets (unsigned 16-bit sums).
+bool FitsIn16Bits(const Values& values) {
+  std::array<int, kNumSubsets> subset_norms{};
+  for (int i = 0; i < kDescriptorDim; i += 2) {
+    const int a = values[i], b = values[i + 1];
+    const int norm = a * a + b * b;
+    if (a > 191 || b > 191 || norm > 32767 || (a - 64) * (a - 64) + (b - 64) * (b - 64) > 32767) return false;
+    subset_norms[i / 4 / kBestTwoPartialChunks * 2 + i % 4 / 2] += norm;
+  }
+  return *std::max_element(subset_norms.begin(), subset_norms.end()) <= 65535;
+}
+
+// Makes up for the row offset: of the whole sum, or of each subset's, less 2^15 there.
+void SetBias(const Values& values, const BestTwoKernel& kernel, uint32_t* bias) {
+  std::array<uint32_t, kNumSubsets> sums{};
+  for (int i = 0; i < kDescriptorDim; ++i)
+    sums[i / 4 / kBestTwoPartialChunks * 2 + i % 4 / 2] += kernel.row_offset * values[i];
+  if (kernel.num_bias == 1) {
+    for (const uint32_t sum : sums) *bias += sum;
+  } else {
+    for (int i = 0; i < kernel.num_bias; ++i) {
+      bias[i * kernel.lanes] = ((sums[2 * i] - 32768) & 0xFFFF) | ((sums[2 * i + 1] - 32768) & 0xFFFF) << 16;
+    }
+  }
+}
+
+void Pack(const DescriptorMatrix& descriptors, const BestTwoKernel& kernel, DescriptorBlock* block) {
+  const int lanes = kernel.lanes, num = static_cast<int>(block->idx.size());
+  block->num_groups = (num + lanes - 1) / lanes;
+  block->words.Resize(static_cast<int64_t>(block->num_groups) * kNumChunks * lanes);
+  block->bias.Resize(static_cast<int64_t>(block->num_groups) * kernel.num_bias * lanes);
+  for (int i = 0; i < block->num_groups * lanes; ++i) {
+    Values values{};
+    if (i < num) values = Reorder(descriptors.row(block->idx[i]).data());
+    uint32_t* words = block->words.data() + static_cast<int64_t>(i / lanes) * kNumChunks * lanes + i % lanes;
+    int64_t squared_norm = 0;
+    for (int chunk = 0; chunk < kNumChunks; ++chunk) {
+      uint32_t word = 0;
+      for (int byte = 0; byte < 4; ++byte) {
+        const uint32_t value = values[4 * chunk + byte];
+        word |= value << (8 * byte);
+        squared_norm += value * value;
+      }
+      words[chunk * lanes] = word;
+    }
+    block->max_squared_norm = std::max(block->max_squared_norm, squared_norm);
+    if (kernel.num_bias > 0) {
+      SetBias(values, kernel,
+              block->bias.data() + static_cast<int64_t>(i / lanes) * kernel.num_bias * lanes + i % lanes);
+    }
+  }
+}
+
+#if defined(__x86_64__)
+bool HasAvxVnni() {
+  unsigned eax = 0, ebx = 0, ecx = 0, edx = 0;
+  return __builtin_cpu_supports("avx2") && __get_cpuid_count(7, 1, &eax, &ebx, &ecx, &edx) != 0 &&
+         (eax & (1u << 4)) != 0;
+}
+#endif
+
+}  // namespace
+
+std::string_view NameOf(MatchKernel kernel) {
+  switch (kernel) {
+    case MatchKernel::kPortable:
+      return "portable";
+    case MatchKernel::kAvx2:
+      return "avx2";
+    case MatchKernel::kAvxVnni:
+      return "avx_vnni";
+    case MatchKernel::kAvx512Vnni:
+      return "avx512_vnni";
+    case MatchKernel::kNeonDot:
+      return "neon_dot";
+  }
+  return "";
+}
+
+bool IsKernelSupported(MatchKernel kernel) {
+  if (kernel == MatchKernel::kPortable) return true;
+#if defined(__x86_64__)
+  if (kernel == MatchKernel::kAvx2) return __builtin_cpu_supports("avx2");
+  if (kernel == MatchKernel::kAvxVnni) return HasAvxVnni();
+  if (kernel == MatchKernel::kAvx512Vnni) {
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni");
+  }
+#elif defined(__aarch64__)
+  if (kernel == MatchKernel::kNeonDot) return (getauxval(AT_HWCAP) & HWCAP_ASIMDDP) != 0;
+#endif
+  return false;
+}
+
+MatchKernel FastestKernel() {
+  static const MatchKernel fastest = [] {
+    for (const MatchKernel kernel :
+         {MatchKernel::kAvx512Vnni, MatchKernel::kAvxVnni, MatchKernel::kAvx2, MatchKernel::kNeonDot}) {
+      if (IsKernelSupported(kernel)) return kernel;
+    }
+    return MatchKernel::kPortable;
+  }();
+  return fastest;
+}
+
+const BestTwoKernel& KernelForAll(MatchKernel kernel) {
+#if defined(__x86_64__)
+  if (kernel == MatchKernel::kAvx512Vnni) return kBestTwoAvx512Vnni;
+  if (kernel == MatchKernel::kAvxVnni) return kBestTwoAvxVnni;
+  if (kernel == MatchKernel::kAvx2) return kBestTwoAvx2;
+#elif defined(__aarch64__)
+  if (kernel == MatchKernel::kNeonDot) return kBestTwoNeonDot;
+#endif
+  return kBestTwoPortable;
+}
+
+const BestTwoKernel* KernelForSmall(MatchKernel kernel) {
+#if defined(__x86_64__)
+  if (kernel == MatchKernel::kAvx2) return &kBestTwoAvx2Small;
+#endif
+  return kernel == MatchKernel::kPortable ? &kBestTwoPortableSmall : nullptr;
+}
+
+PackedDescriptors::PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel)
+    : kernel_(kernel) {
+  const BestTwoKernel* for_small = KernelForSmall(kernel);
+  for (int32_t i = 0; i < descriptors.rows(); ++i) {
+    const bool is_small = for_small != nullptr && FitsIn16Bits(Reorder(descriptors.row(i).data()));
+    (is_small ? small_ : other_).idx.push_back(i);
+  }
+  small_.idx.shrink_to_fit();
+  other_.idx.shrink_to_fit();
+  if (for_small != nullptr) Pack(descriptors, *for_small, &small_);
+  Pack(descriptors, KernelForAll(kernel), &other_);
+}
+
+int64_t PackedDescriptors::num_bytes() const {
+  int64_t num_bytes = sizeof(*this);
+  for (const DescriptorBlock* block : {&small_, &other_}) {
+    num_bytes += static_cast<int64_t>(block->idx.capacity() * sizeof(int32_t)) + block->words.num_bytes() +
+                 block->bias.num_bytes();
+  }
+  return num_bytes;
+}
+
+}  // namespace cairn

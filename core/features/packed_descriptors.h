@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "core/features/features.h"
+
+namespace cairn {
+
+struct BestTwoKernel;
+
+// Instruction sets that have a kernel for dot products of descriptors.
+enum class MatchKernel { kPortable, kAvx2, kAvxVnni, kAvx512Vnni, kNeonDot };
+inline constexpr std::array kMatchKernels = {MatchKernel::kPortable, MatchKernel::kAvx2,
+                                             MatchKernel::kAvxVnni, MatchKernel::kAvx512Vnni,
+                                             MatchKernel::kNeonDot};
+// "portable", "avx2", "avx_vnni", "avx512_vnni", "neon_dot".
+std::string_view NameOf(MatchKernel kernel);
+// Whether this program has it and this processor runs it.
+bool IsKernelSupported(MatchKernel kernel);
+// The fastest one that is supported.
+MatchKernel FastestKernel();
+
+// Words that vector loads find aligned, in whole cache lines.
+class AlignedWords {
+ public:
+  // All zero.
+  void Resize(int64_t num_words) { lines_.resize((num_words + 15) / 16); }
+  uint32_t* data() { return lines_.empty() ? nullptr : lines_.front().words; }
+  const uint32_t* data() const { return lines_.empty() ? nullptr : lines_.front().words; }
+  int64_t num_bytes() const { return static_cast<int64_t>(lines_.capacity() * sizeof(Line)); }
+
+ private:
+  struct alignas(64) Line {
+    uint32_t words[16];
+  };
+  std::vector<Line> lines_;
+};
+
+// Descriptors in the layout of core/features/best_two_kernel.h, values in an order that mixes the cells and
+// directions of SIFT: 16-bit sums of the products of neighbours are then exact for nearly all RootSIFT
+// descriptors.
+struct DescriptorBlock {
+  std::vector<int32_t> idx;  // of each descriptor in its image, ascending
+  AlignedWords words;
+  AlignedWords bias;
+  int num_groups = 0;
+  int64_t max_squared_norm = 0;
+};
+
+// The descriptors of one image (any 8-bit values) in the layout of a kernel: packed once, matched with many
+// others.  Immutable, may be shared between threads.
+class PackedDescriptors {
+ public:
+  PackedDescriptors() = default;
+  // REQUIRES: IsKernelSupported(kernel)
+  explicit PackedDescriptors(const DescriptorMatrix& descriptors, MatchKernel kernel = FastestKernel());
+
+  // Number of descriptors.
+  int size() const { return static_cast<int>(small_.idx.size() + other_.idx.size()); }
+  MatchKernel kernel() const { return kernel_; }
+  // Memory that it holds.
+  int64_t num_bytes() const;
+  // At most what `num_descriptors` descriptors take once packed, by any kernel: for memory budgets.
+  static int64_t NumBytes(int64_t num_descriptors) { return 160 * num_descriptors + 16384; }
+
+  // Those that the kernel for small values may take (none if there is no such kernel), and the others.
+  const DescriptorBlock& small() const { return small_; }
+  const DescriptorBlock& other() const { return other_; }
+
+ private:
+  MatchKernel kernel_ = MatchKernel::kPortable;
+  DescriptorBlock small_;
+  DescriptorBlock other_;
+};
+
+// The kernel for any values, and the one for small ones, null where the first is as fast.
+const BestTwoKernel& KernelForAll(MatchKernel kernel);
+const BestTwoKernel* KernelForSmall(MatchKernel kernel);
+
+}  // namespace cairn

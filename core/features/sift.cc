@@ -1,0 +1,152 @@
+#include "core/features/sift.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <vector>
+
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace cairn {
+namespace {
+
+// OpenCV's SIFT keeps 5 pixels of the doubled image away from its border.
+constexpr int kMinImageSide = 6;
+
+// RootSIFT [Arandjelovic & Zisserman 2012], quantised as COLMAP's FeatureDescriptorsToUnsignedByte.
+void RootSiftRow(const float* sift, uint8_t* row) {
+  float l1 = 0;
+  for (int d = 0; d < kDescriptorDim; ++d) l1 += sift[d];
+  const float scale = l1 > 0 ? 1.0f / l1 : 0.0f;
+  for (int d = 0; d < kDescriptorDim; ++d) {
+    row[d] = static_cast<uint8_t>(std::min(255.0f, std::round(512.0f * std::sqrt(sift[d] * scale))));
+  }
+}
+
+// Features of the image made smaller by `ratio`, in the pixels of the whole one.  With pixels counted from
+// the image's corner, a position in one is a multiple of that in the other.
+Result<Features> ExtractFromSmaller(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask,
+                                    double ratio) {
+  const cv::Size size(std::max(1, cvRound(ratio * grey.cols)), std::max(1, cvRound(ratio * grey.rows)));
+  cv::Mat small, small_mask;
+  cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
+  if (!mask.empty()) cv::resize(mask, small_mask, size, 0, 0, cv::INTER_NEAREST);
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(small, options, small_mask));
+  const float x_scale = static_cast<float>(grey.cols) / static_cast<float>(size.width);
+  const float y_scale = static_cast<float>(grey.rows) / static_cast<float>(size.height);
+  for (Keypoint& keypoint : features.keypoints) {
+    keypoint.x *= x_scale;
+    keypoint.y *= y_scale;
+    keypoint.scale *= std::sqrt(x_scale * y_scale);
+  }
+  return features;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(SiftOptions* options) {
+  return {{.name = "max_num_features",
+           .value = &options->max_num_features,
+           .help = "most features per image; the strongest are kept",
+           .min = 1,
+           .max = 1000000},
+          {.name = "max_image_side_px",
+           .value = &options->max_image_side_px,
+           .help = "images with a longer side are made smaller before features are sought, pixels",
+           .min = 64,
+           .max = 65536},
+          {.name = "contrast_threshold",
+           .value = &options->contrast_threshold,
+           .help = "least contrast of an extremum, grey levels / 255",
+           .min = 0,
+           .max = 1},
+          {.name = "edge_threshold",
+           .value = &options->edge_threshold,
+           .help = "largest ratio of principal curvatures, which rejects points on edges",
+           .min = 1}};
+}
+
+Keypoint KeypointFromOpenCv(float x, float y, float size, float angle_deg) {
+  // OpenCV puts the centre of the first pixel at (0, 0).  Its SIFT finds extrema in the doubled image, whose
+  // pixel (i, j) it takes for (i / 2, j / 2) of the original, although resizing puts it at ((i - 0.5) / 2, (j
+  // - 0.5) / 2): a quarter pixel too much.  Its size is a diameter, twice sigma; its angle is in degrees,
+  // clockwise in the image as COLMAP's.
+  constexpr float kCentreOffset = 0.5f;
+  constexpr float kDoublingOffset = 0.25f;
+  const float rad = angle_deg * static_cast<float>(M_PI / 180.0);
+  return {x + kCentreOffset - kDoublingOffset, y + kCentreOffset - kDoublingOffset, 0.5f * size, rad};
+}
+
+Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, const cv::Mat& mask) {
+  if (grey.empty() || grey.type() != CV_8UC1) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "SIFT needs an 8-bit grey image, found {} x {} of OpenCV type {}", grey.cols, grey.rows,
+                     grey.type());
+  }
+  if (!mask.empty() && (mask.size() != grey.size() || mask.type() != CV_8UC1)) {
+    return MakeError(ErrorCode::kInvalidArgument, "a mask of {} x {} px does not fit the image of {} x {} px",
+                     mask.cols, mask.rows, grey.cols, grey.rows);
+  }
+  Features features;
+  features.descriptors.resize(0, kDescriptorDim);
+  if (std::min(grey.cols, grey.rows) < kMinImageSide) return features;
+  const int longer_side = std::max(grey.cols, grey.rows);
+  if (longer_side > options.max_image_side_px) {
+    return ExtractFromSmaller(grey, options, mask,
+                              static_cast<double>(options.max_image_side_px) / longer_side);
+  }
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  try {
+    // OpenCV's own cap keeps all that are as strong as the weakest kept: ours follows, in an order to rely
+    // on, but the rest is spared its descriptors.  OpenCV caps before it masks, so not with a mask.
+    const int cap = mask.empty() ? options.max_num_features : 0;
+    cv::SIFT::create(cap, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
+        ->detectAndCompute(grey, mask, keypoints, descriptors);
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();  // not the image's fault
+    return MakeError(ErrorCode::kFailed, "SIFT failed on an image of {} x {} px: {}", grey.cols, grey.rows,
+                     exception.err);
+  }
+  const auto place = [&](int i) {
+    const cv::KeyPoint& k = keypoints[i];
+    return std::tuple(k.pt.y, k.pt.x, k.size, k.angle, i);
+  };
+  std::vector<int> order(keypoints.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (order.size() > static_cast<size_t>(options.max_num_features)) {
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+      const float response_a = keypoints[a].response, response_b = keypoints[b].response;
+      return response_a != response_b ? response_a > response_b : place(a) < place(b);
+    });
+    order.resize(options.max_num_features);
+  }
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
+
+  features.descriptors.resize(static_cast<Eigen::Index>(order.size()), kDescriptorDim);
+  features.keypoints.reserve(order.size());
+  for (const int i : order) {
+    const cv::KeyPoint& k = keypoints[i];
+    RootSiftRow(descriptors.ptr<float>(i),
+                features.descriptors.row(static_cast<Eigen::Index>(features.keypoints.size())).data());
+    features.keypoints.push_back(KeypointFromOpenCv(k.pt.x, k.pt.y, k.size, k.angle));
+  }
+  return features;
+}
+
+std::string SiftInstructionSet() {
+#if defined(__x86_64__)
+  const char* const best = cv::checkHardwareSupport(CV_CPU_AVX512_SKX) ? " avx512"
+                           : cv::checkHardwareSupport(CV_CPU_AVX2)     ? " avx2"
+                                                                       : " sse2";
+  return std::string("x86-64") + best;
+#elif defined(__aarch64__)
+  return "aarch64";
+#else
+  return "other";
+#endif
+}
+
+}  // namespace cairn

@@ -1,0 +1,182 @@
+#include "core/files/database.h"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <filesystem>
+#include <fstream>
+
+#include "core/files/file_descriptor.h"
+#include "core/files/input_file.h"
+
+namespace cairn {
+namespace {
+
+constexpr char kMagic[] = "SQLite format 3";  // 16 bytes with the terminating zero
+
+uint64_t BigEndian(std::string_view bytes) {
+  uint64_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<uint8_t>(byte);
+  return value;
+}
+
+// Steps between two looks at what is left.
+constexpr int kStepsPerLook = 1000;
+// Some 3000 tables and indices.
+constexpr int64_t kMaxSchemaSteps = 20'000;
+
+int CountDown(void* num_left) {
+  auto& left = *static_cast<int64_t*>(num_left);
+  left -= kStepsPerLook;
+  return left <= 0 ? 1 : 0;
+}
+
+// 0 where there is none.
+uint64_t NumBytes(const std::string& path) {
+  std::error_code error;
+  const uintmax_t num_bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : num_bytes;
+}
+
+}  // namespace
+
+SqliteHeader ParseSqliteHeader(std::string_view head) {
+  SqliteHeader header;
+  if (head.size() >= 18) header.page_size = BigEndian(head.substr(16, 2));
+  if (header.page_size == 1) header.page_size = 65536;
+  if (head.size() >= 32) header.num_pages = BigEndian(head.substr(28, 4));
+  return header;
+}
+
+SqliteHeader ReadSqliteHeader(const std::string& path) {
+  char head[32] = {};
+  if (!CheckInputFile(path).ok()) return {};
+  std::ifstream file(path, std::ios::binary);
+  file.read(head, sizeof(head));
+  return ParseSqliteHeader({head, static_cast<size_t>(file.gcount())});
+}
+
+std::string DatabaseUri(const std::string& path) {
+  std::string uri = "file:";
+  for (const unsigned char c : path) {  // percent-encodes what has a meaning in a URI's path
+    if (c == '%' || c == '?' || c == '#') {
+      uri += fmt::format("%{:02x}", c);
+    } else {
+      uri += static_cast<char>(c);
+    }
+  }
+  return uri;
+}
+
+void Harden(SQLite::Database& database, uint64_t num_bytes) {
+  sqlite3* const handle = database.getHandle();
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
+                static_cast<int>(std::clamp<uint64_t>(num_bytes, 100'000, 1'000'000'000)));
+  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;");
+}
+
+void LimitSteps(SQLite::Database& database, uint64_t num_bytes) {
+  // A row takes five bytes or more, and about one step for each of its values.
+  const uint64_t max_num_steps = 10'000'000 + 16 * num_bytes;
+  if (max_num_steps > INT_MAX) return;
+  sqlite3_progress_handler(
+      database.getHandle(), static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
+}
+
+StepLimit::StepLimit(SQLite::Database& database, int64_t max_num_steps)
+    : handle_(database.getHandle()), num_left_(max_num_steps) {
+  sqlite3_progress_handler(handle_, kStepsPerLook, CountDown, &num_left_);
+}
+
+StepLimit::~StepLimit() { sqlite3_progress_handler(handle_, 0, nullptr, nullptr); }
+
+void ReadSchema(SQLite::Database& database) {
+  const StepLimit steps(database, kMaxSchemaSteps);
+  database.execAndGet("SELECT count(*) FROM sqlite_schema WHERE name = ''");
+}
+
+SQLite::Database OpenImmutable(const std::string& path) {
+  SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  Harden(database, NumBytes(path));
+  ReadSchema(database);
+  return database;
+}
+
+bool IsSqliteFile(const std::string& path) {
+  char head[sizeof(kMagic)] = {};
+  if (!CheckInputFile(path).ok()) return false;
+  std::ifstream file(path, std::ios::binary);
+  return file.read(head, sizeof(head)) && std::memcmp(head, kMagic, sizeof(kMagic)) == 0;
+}
+
+Status CheckSqliteFile(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
+  if (const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); file.get() < 0)
+    return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, std::strerror(errno));
+  if (!IsSqliteFile(path)) {
+    return MakeError(
+        ErrorCode::kCorrupt,
+        "{}: not a SQLite database ({} bytes, expected the magic bytes 'SQLite format 3'); is it truncated "
+        "or another kind of file?",
+        path, NumBytes(path));
+  }
+  const uint64_t page_size = ReadSqliteHeader(path).page_size;
+  const uint64_t num_bytes = NumBytes(path);
+  if (page_size == 0 || num_bytes % page_size == 0) return Ok();
+  return MakeError(
+      ErrorCode::kCorrupt,
+      "{}: a truncated SQLite database: {} bytes, which are not whole pages of {}; copy it again", path,
+      num_bytes, page_size);
+}
+
+Result<SQLite::Database> OpenDatabaseReadOnly(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckSqliteFile(path));
+  return WithDatabaseErrors(path, [&]() -> Result<SQLite::Database> {
+    SQLite::Database database = OpenImmutable(path);
+    LimitSteps(database, NumBytes(path));
+    return database;
+  });
+}
+
+Status WriteDatabase(const std::string& path, const std::string& schema,
+                     const std::function<Status(SQLite::Database&)>& fill) {
+  return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
+    return WithDatabaseErrors(path, [&]() -> Status {
+      SQLite::Database database(temporary, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+      database.exec("PRAGMA page_size = 4096; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;");
+      database.exec("BEGIN");
+      database.exec(schema);
+      if (Status status = fill(database); !status.ok()) return status;
+      database.exec("COMMIT");
+      return Ok();
+    });
+  });
+}
+
+std::string DatabasePath(const SQLite::Database& database) {
+  const char* const path = sqlite3_db_filename(database.getHandle(), "main");
+  return path != nullptr ? path : "";
+}
+
+bool HasTable(SQLite::Database& database, const std::string& table) {
+  SQLite::Statement query(database, "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?");
+  query.bind(1, table);
+  query.executeStep();
+  return query.getColumn(0).getInt() > 0;
+}
+
+bool HasColumn(SQLite::Database& database, const std::string& table, const std::string& column) {
+  SQLite::Statement query(database, "SELECT count(*) FROM pragma_table_info(?) WHERE name = ?");
+  query.bind(1, table);
+  query.bind(2, column);
+  query.executeStep();
+  return query.getColumn(0).getInt() > 0;
+}
+
+}  // namespace cairn

@@ -1,0 +1,33 @@
+#include "core/files/file_lock.h"
+
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <utility>
+
+namespace cairn {
+
+FileLock::FileLock(FileLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+FileLock& FileLock::operator=(FileLock&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+FileLock::~FileLock() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+FileLock::Claim FileLock::Try(Kind kind) {
+  if (flock(descriptor_, (kind == Kind::kShared ? LOCK_SH : LOCK_EX) | LOCK_NB) == 0) return Claim::kHeld;
+  return errno == EWOULDBLOCK || errno == EINTR ? Claim::kTaken : Claim::kNoLocks;
+}
+
+void FileLock::Share() {
+  while (flock(descriptor_, LOCK_SH) != 0 && errno == EINTR) continue;
+}
+
+void FileLock::Release() { flock(descriptor_, LOCK_UN); }
+
+}  // namespace cairn

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace cairn {
+
+// Whether two paths lead to one file, under whichever names; of files that do not exist, by the names alone.
+bool IsSameFile(const std::string& path1, const std::string& path2);
+
+// The folder that a file is in, or is to be in: "." where the path names none.
+std::string FolderOf(const std::string& path);
+
+// Whether a file can be written there, by a new one that takes its name: asked before long work, and again
+// when it is done.  Errors: InvalidArgument (no path), Io (no such folder, or there is no file but a folder,
+// a device or a pipe), ReadOnly (the folder may not be written).
+Status CheckCanBeReplaced(const std::string& path);
+
+// Errors: InvalidArgument when an output is one of the inputs, under whichever name: it would be lost. Inputs
+// that are empty or do not exist do not matter.
+Status CheckOutputIsNoInput(const std::string& output, const std::vector<std::string>& inputs);
+
+}  // namespace cairn

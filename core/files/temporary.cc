@@ -1,0 +1,57 @@
+#include "core/files/temporary.h"
+
+#include <fcntl.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "core/files/write_error.h"
+
+namespace cairn {
+namespace {
+
+constexpr std::string_view kTemporaryMark = ".tmp-";
+// Names that are taken, one after the other, before giving up: more than chance can bring.
+constexpr int kMaxNumTries = 100;
+
+}  // namespace
+
+std::string TemporaryPath(const std::string& target) {
+  return fmt::format("{}{}{}", target, kTemporaryMark, getpid());
+}
+
+std::string RandomTemporaryPath(const std::string& target) {
+  uint64_t number = 0;  // should the system have none: whoever finds the name taken tries again, or fails
+  (void)!getrandom(&number, sizeof(number), 0);
+  return fmt::format("{}-{:016x}", TemporaryPath(target), number);
+}
+
+bool IsTemporaryName(const std::string& name, const std::string& target) {
+  const size_t mark = target.empty() ? name.rfind(kTemporaryMark) : target.size();
+  if (mark == std::string::npos || name.compare(0, target.size(), target) != 0 ||
+      name.compare(mark, kTemporaryMark.size(), kTemporaryMark) != 0) {
+    return false;
+  }
+  const size_t digits = mark + kTemporaryMark.size();
+  const size_t end = std::min(name.find_first_not_of("0123456789", digits), name.size());
+  return end > digits && (end == name.size() || name[end] == '-' ||
+                          name.compare(end, kTemporaryMark.size(), kTemporaryMark) == 0);
+}
+
+Result<TemporaryFile> CreateTemporary(const std::string& target, mode_t mode) {
+  for (int i = 0; i < kMaxNumTries; ++i) {
+    TemporaryFile file{.path = RandomTemporaryPath(target)};
+    file.descriptor = open(file.path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode);
+    if (file.descriptor >= 0) return file;
+    if (errno != EEXIST) break;
+  }
+  return WriteError(target, "cannot be written: no file can be created beside it", errno);
+}
+
+}  // namespace cairn

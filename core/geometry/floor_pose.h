@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+
+namespace cairn {
+
+// Where a camera stands on the floor and whereto it looks.
+struct FloorPose {
+  Eigen::Vector2d position;  // floor frame, metres
+  double heading_deg;        // counter-clockwise from +x, [0, 360)
+};
+
+inline double AngleBetweenDeg(double a, double b) { return std::abs(std::remainder(a - b, 360.0)); }
+
+// A camera that looks straight up or down heads where its image's top points.
+FloorPose FloorPoseOf(const Pose& cam_from_world, const Pose& floor_from_world);
+
+}  // namespace cairn

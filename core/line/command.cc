@@ -1,0 +1,68 @@
+#include "core/line/command.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cairn {
+namespace {
+
+std::string Dashed(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+const char* TypeText(const Option& option) {
+  static constexpr const char* kTypes[] = {"true|false", "INT", "FLOAT", "TEXT", "LIST"};
+  return kTypes[option.value.index()];
+}
+
+std::string HelpText(const Option& option) {
+  std::string help = option.help;
+  if (!option.choices.empty()) help += fmt::format("; one of {}", fmt::join(option.choices, "|"));
+  if (!std::isinf(option.min) && !std::isinf(option.max)) {
+    help += fmt::format("; {:g} to {:g}", option.min, option.max);
+  } else if (!std::isinf(option.min)) {
+    help += fmt::format("; at least {:g}", option.min);
+  }
+  const std::string value = OptionValueText(option);
+  return value.empty() ? help : help + " [" + value + "]";
+}
+
+}  // namespace
+
+void OptionArguments::Add(CLI::App& app, OptionTable table) {
+  table_ = std::move(table);
+  texts_.resize(table_.size());
+  app.add_option("--options", options_file_,
+                 "TOML file with this stage's options; the command line goes before it")
+      ->type_name("FILE.toml");
+  for (size_t i = 0; i < table_.size(); ++i) {
+    arguments_.push_back(app.add_option("--" + Dashed(table_[i].name), texts_[i], HelpText(table_[i]))
+                             ->type_name(TypeText(table_[i]))
+                             ->group("Stage options"));
+  }
+}
+
+Status OptionArguments::Apply() const {
+  if (!options_file_.empty()) CAIRN_RETURN_IF_ERROR(ReadOptionsFile(options_file_, table_));
+  for (size_t i = 0; i < table_.size(); ++i) {
+    if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(SetOption(table_[i], texts_[i]));
+  }
+  CAIRN_RETURN_IF_ERROR(CheckOptions(table_));
+  for (size_t i = 0; i < table_.size(); ++i) {
+    if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(CheckIsRead(table_[i], table_));
+  }
+  return Ok();
+}
+
+Status OptionArguments::RefuseGiven(const std::vector<std::string>& names, const std::string& reason) const {
+  for (size_t i = 0; i < table_.size(); ++i) {
+    const bool is_named = std::find(names.begin(), names.end(), table_[i].name) != names.end();
+    if (is_named && arguments_[i]->count() > 0) {
+      return MakeError(ErrorCode::kInvalidArgument, "--{}: {}", Dashed(table_[i].name), reason);
+    }
+  }
+  return Ok();
+}
+
+}  // namespace cairn

@@ -1,0 +1,36 @@
+#include "core/line/reuse_arguments.h"
+
+#include "core/files/output_path.h"
+
+namespace cairn {
+
+void ReuseArguments::Add(CLI::App& app, const std::string& results) {
+  CLI::Option* const reuse =
+      app.add_option("--reuse", files_,
+                     "Earlier output of this command: unchanged " + results +
+                         " are taken over from it, as from the file at -o; may be given more than once")
+          ->type_name("FILE")
+          ->allow_extra_args(false);
+  app.add_flag("--no-reuse", no_reuse_, "Compute everything anew")->excludes(reuse);
+  app.add_option("--shard", shard_,
+                 "Compute only the I-th of N shares of the " + results +
+                     " that no --reuse file has, and write only these; a run without --shard merges")
+      ->type_name("I/N");
+}
+
+Result<ReuseOptions> ReuseArguments::Apply(const std::string& output_path) const {
+  ReuseOptions options{.previous = !no_reuse_, .files = files_};
+  if (shard_.empty()) return options;
+  CAIRN_ASSIGN_OR_RETURN(options.shard, ParseShard(shard_));
+  for (const std::string& file : files_) {
+    if (!IsSameFile(file, output_path)) continue;
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--reuse {} is also the output: a shard holds only its own share, the rest of the file would "
+        "be lost; choose another -o",
+        file);
+  }
+  return options;
+}
+
+}  // namespace cairn

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "core/base/error.h"
+#include "core/line/reuse.h"
+
+namespace cairn {
+
+// `--reuse FILE`, `--no-reuse` and `--shard I/N` of a stage that takes over what did not change.
+class ReuseArguments {
+ public:
+  // `results`: what the stage takes over, for --help ("images", "pairs").
+  void Add(CLI::App& app, const std::string& results);
+  // Errors: InvalidArgument (a shard that is none, or that would replace a file it reads).
+  Result<ReuseOptions> Apply(const std::string& output_path) const;
+
+ private:
+  std::vector<std::string> files_;
+  bool no_reuse_ = false;
+  std::string shard_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/capture/capture.h"
+#include "core/world/feature_class.h"
+
+namespace cairn {
+
+// What a stage tells about its run beside its result: for the table that ends `cairn compile` and for the
+// build report (docs/build_report.md).  No stage reads it, nothing of it enters a map.
+struct StageReport {
+  // How many of what (a plural noun), in the order in which it is shown.
+  using Counts = std::vector<std::pair<std::string, int64_t>>;
+
+  // Things left out of the result for one reason.
+  struct Rejected {
+    std::string what;  // "images", "classes"
+    std::string reason;
+    int64_t count = 0;
+    std::vector<std::string> names;  // of all of them, or empty where they have none
+  };
+
+  Counts in;          // what the stage was given
+  Counts out;         // what it made of it
+  Counts taken_over;  // what of its result stood in its previous one already and was not computed again
+  std::vector<Rejected> rejected;
+};
+
+// Adds rejects grouped by reason, in the order of the first of each.  A reason that starts with the thing's
+// own name or path ("PATH/NAME: ") is shown without it.
+void AddRejects(const std::string& what, const std::vector<Reject>& rejects, StageReport* report);
+void AddDropped(const std::string& what, const DropCounts& dropped, StageReport* report);
+
+}  // namespace cairn

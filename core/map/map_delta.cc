@@ -1,0 +1,260 @@
+#include "core/map/map_delta.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+#include "core/base/blob.h"
+#include "core/files/database.h"
+#include "core/files/file.h"
+#include "core/map/map_epoch.h"
+#include "core/map/map_file.h"
+#include "core/seal/signature.h"
+
+namespace cairn {
+namespace {
+
+constexpr std::string_view kMagic("cairn map delta1", 16);
+constexpr size_t kLinkBytes = 4;
+constexpr uint32_t kMaxPageSize = 65536;
+// Strong enough to find what is the same; levels beyond it take several times as long for about a percent.
+constexpr int kCompressionLevel = 12;
+
+std::string ShortHex(const Hash& hash) {
+  std::string text;
+  for (size_t i = 0; i < 8; ++i) text += fmt::format("{:02x}", hash[i]);
+  return text;
+}
+
+uint32_t BigEndian32(const char* bytes) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < kLinkBytes; ++i) value = value << 8 | static_cast<uint8_t>(bytes[i]);
+  return value;
+}
+
+bool IsPageSize(uint64_t size) { return size >= 512 && size <= kMaxPageSize && std::has_single_bit(size); }
+
+// The pages' contents, then what links them.  REQUIRES: whole pages
+std::string UnlinkPages(std::string_view file, size_t page_size) {
+  std::string contents(file.substr(0, std::min(page_size, file.size())));
+  contents.reserve(file.size());
+  BlobWriter links;
+  for (size_t page = 1; page * page_size < file.size(); ++page) {
+    const std::string_view bytes = file.substr(page * page_size, page_size);
+    contents += bytes.substr(kLinkBytes);
+    links.UInt32(BigEndian32(bytes.data()) - static_cast<uint32_t>(page + 1));
+  }
+  return contents + links.Take();
+}
+
+// And back.  REQUIRES: whole pages
+std::string LinkPages(std::string_view unlinked, size_t page_size) {
+  const size_t num_pages = unlinked.size() / page_size;
+  std::string file(unlinked.substr(0, page_size));
+  file.reserve(unlinked.size());
+  BlobReader links(unlinked.substr(unlinked.size() - (num_pages - 1) * kLinkBytes));
+  for (size_t page = 1; page < num_pages; ++page) {
+    const uint32_t link = links.UInt32() + static_cast<uint32_t>(page + 1);
+    for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(link >> shift & 0xff);
+    file += unlinked.substr(page_size + (page - 1) * (page_size - kLinkBytes), page_size - kLinkBytes);
+  }
+  return file;
+}
+
+// Looking back from the last byte of the new map to the first of the old one.
+int WindowLog(size_t num_bytes) {
+  const ZSTD_bounds bounds = ZSTD_cParam_getBounds(ZSTD_c_windowLog);
+  return std::clamp<int>(std::bit_width(num_bytes), bounds.lowerBound, bounds.upperBound);
+}
+
+Error ZstdError(const std::string& what, size_t code) {
+  return MakeError(ErrorCode::kFailed, "{}: Zstandard says: {}", what, ZSTD_getErrorName(code));
+}
+
+Result<std::string> Compress(const std::string& from, const std::string& to, const std::string& what) {
+  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
+  for (const auto& [parameter, value] : {std::pair(ZSTD_c_compressionLevel, kCompressionLevel),
+                                         std::pair(ZSTD_c_windowLog, WindowLog(from.size() + to.size())),
+                                         std::pair(ZSTD_c_enableLongDistanceMatching, 1)}) {
+    const size_t code = ZSTD_CCtx_setParameter(context.get(), parameter, value);
+    if (ZSTD_isError(code)) return ZstdError(what, code);
+  }
+  ZSTD_CCtx_refPrefix(context.get(), from.data(), from.size());
+  std::string payload(ZSTD_compressBound(to.size()), '\0');
+  const size_t num_bytes =
+      ZSTD_compress2(context.get(), payload.data(), payload.size(), to.data(), to.size());
+  if (ZSTD_isError(num_bytes)) return ZstdError(what, num_bytes);
+  payload.resize(num_bytes);
+  return payload;
+}
+
+Result<std::string> Decompress(const std::string& from, const std::string& payload, size_t num_bytes,
+                               const std::string& what) {
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax,
+                         ZSTD_dParam_getBounds(ZSTD_d_windowLogMax).upperBound);
+  ZSTD_DCtx_refPrefix(context.get(), from.data(), from.size());
+  std::string to(num_bytes, '\0');
+  const size_t found =
+      ZSTD_decompressDCtx(context.get(), to.data(), to.size(), payload.data(), payload.size());
+  if (ZSTD_isError(found)) {
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload cannot be unpacked: {}", what,
+                     ZSTD_getErrorName(found));
+  }
+  if (found != num_bytes) {
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, stated are {}", what, found,
+                     num_bytes);
+  }
+  return to;
+}
+
+// A map's bytes, all of which its seal states.
+Result<std::string> ReadWholeMap(const std::string& path) {
+  CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
+  CAIRN_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
+  if (bytes.size() > static_cast<size_t>(MapDelta::kMaxMapBytes)) {
+    return MakeError(ErrorCode::kUnsupported, "{}: {} bytes, deltas are of maps of at most {}; send it whole",
+                     path, bytes.size(), MapDelta::kMaxMapBytes);
+  }
+  return bytes;
+}
+
+// What the signature is of.
+std::string SignedHead(const MapDelta& delta) {
+  BlobWriter writer;
+  writer.Bytes(kMagic);
+  writer.Bytes(delta.old_hash.data(), delta.old_hash.size());
+  writer.Bytes(delta.new_hash.data(), delta.new_hash.size());
+  writer.UInt64(delta.old_num_bytes);
+  writer.UInt64(delta.new_num_bytes);
+  writer.UInt32(delta.old_page_size);
+  writer.UInt32(delta.new_page_size);
+  const Hash hash = HashOf(delta.map_name + '\0' + delta.payload);
+  writer.Bytes(hash.data(), hash.size());
+  writer.Bytes(delta.public_key.data(), delta.public_key.size());
+  return writer.Take();
+}
+
+}  // namespace
+
+Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& new_path,
+                              const std::optional<SecretKey>& key, bool allow_older) {
+  CAIRN_ASSIGN_OR_RETURN(const MapFile old_map, MapFile::Open(old_path, {}));
+  CAIRN_ASSIGN_OR_RETURN(const MapFile new_map, MapFile::Open(new_path, {}));
+  const bool is_same = old_map.seal().file == new_map.seal().file;
+  if (old_map.seal().is_signed() && new_map.seal().is_signed() && !is_same) {
+    CAIRN_RETURN_IF_ERROR(CheckFollows(new_map.head(), new_path, old_map.head(), old_path, allow_older));
+  }
+  MapDelta delta;
+  delta.map_name = new_map.head().name;
+  CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadWholeMap(old_path));
+  CAIRN_ASSIGN_OR_RETURN(const std::string new_bytes, ReadWholeMap(new_path));
+  delta.old_hash = HashOf(old_bytes);
+  delta.new_hash = HashOf(new_bytes);
+  delta.old_num_bytes = old_bytes.size();
+  delta.new_num_bytes = new_bytes.size();
+  delta.old_page_size = static_cast<uint32_t>(ParseSqliteHeader(old_bytes).page_size);
+  delta.new_page_size = static_cast<uint32_t>(ParseSqliteHeader(new_bytes).page_size);
+  CAIRN_ASSIGN_OR_RETURN(delta.payload, Compress(UnlinkPages(old_bytes, delta.old_page_size),
+                                                 UnlinkPages(new_bytes, delta.new_page_size), new_path));
+  if (key) {
+    CAIRN_ASSIGN_OR_RETURN(delta.public_key, PublicKeyOf(*key));
+    CAIRN_ASSIGN_OR_RETURN(delta.signature, SignBytes(SignedHead(delta), *key));
+  }
+  return delta;
+}
+
+std::string EncodeMapDelta(const MapDelta& delta) {
+  BlobWriter writer;
+  writer.Bytes(SignedHead(delta));
+  writer.Bytes(delta.signature.data(), delta.signature.size());
+  writer.UInt32(static_cast<uint32_t>(delta.map_name.size()));
+  writer.Bytes(delta.map_name);
+  writer.Bytes(delta.payload);
+  return writer.Take();
+}
+
+Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  if (bytes.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: is empty, expected a delta", path);
+  const std::string_view magic = std::string_view(bytes).substr(0, kMagic.size());
+  if (magic != kMagic.substr(0, magic.size())) {
+    if (magic.substr(0, kMagic.size() - 1) == kMagic.substr(0, kMagic.size() - 1)) {
+      return MakeError(ErrorCode::kUnsupported, "{}: a delta of a later format than this program reads",
+                       path);
+    }
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: is no delta of maps; `cairn delta OLD NEW -o D` makes them", path);
+  }
+  BlobReader reader(bytes);
+  MapDelta delta;
+  const auto read = [&](auto* field) {
+    const std::string_view found = reader.Bytes(field->size());
+    if (found.size() == field->size()) std::memcpy(field->data(), found.data(), found.size());
+  };
+  reader.Bytes(kMagic.size());
+  read(&delta.old_hash);
+  read(&delta.new_hash);
+  delta.old_num_bytes = reader.UInt64();
+  delta.new_num_bytes = reader.UInt64();
+  delta.old_page_size = reader.UInt32();
+  delta.new_page_size = reader.UInt32();
+  Hash payload_hash;
+  read(&payload_hash);
+  read(&delta.public_key);
+  read(&delta.signature);
+  const uint32_t name_size = reader.UInt32();
+  delta.map_name = reader.Bytes(name_size);
+  if (!reader.ok()) {
+    return MakeError(ErrorCode::kTruncated, "{}: {} bytes, its head alone has more; copy it again", path,
+                     bytes.size());
+  }
+  delta.payload = reader.Bytes(reader.num_left());
+  if (HashOf(delta.map_name + '\0' + delta.payload) != payload_hash) {
+    return MakeError(ErrorCode::kCorrupt,
+                     "{}: its payload has not the hash that its head states: it was cut off, damaged or "
+                     "changed; copy it again",
+                     path);
+  }
+  CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(delta), delta.public_key, delta.signature, path, required,
+                                         "make it with `cairn delta --key`"));
+  for (const auto& [num_bytes, page_size] : {std::pair(delta.old_num_bytes, delta.old_page_size),
+                                             std::pair(delta.new_num_bytes, delta.new_page_size)}) {
+    if (!IsPageSize(page_size) || num_bytes % page_size != 0 || num_bytes == 0 ||
+        num_bytes > static_cast<uint64_t>(MapDelta::kMaxMapBytes)) {
+      return MakeError(ErrorCode::kCorrupt, "{}: states a map of {} bytes in pages of {}", path, num_bytes,
+                       page_size);
+    }
+  }
+  return delta;
+}
+
+Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_bytes,
+                                  const std::string& old_path, const std::string& delta_path) {
+  const Hash found = HashOf(old_bytes);
+  if (found != delta.old_hash || old_bytes.size() != delta.old_num_bytes) {
+    const Result<MapFile> map = MapFile::Open(old_path, {});
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: {} of {} bytes with the hash {}..., but {} leads from one of {} bytes with {}... "
+                     "to map '{}'; ask "
+                     "for a delta from this map, or for the new map as a whole",
+                     old_path, map.ok() ? fmt::format("map '{}'", map->head().name) : "a file",
+                     old_bytes.size(), ShortHex(found), delta_path, delta.old_num_bytes,
+                     ShortHex(delta.old_hash), delta.map_name);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::string unlinked,
+                         Decompress(UnlinkPages(old_bytes, delta.old_page_size), delta.payload,
+                                    delta.new_num_bytes, delta_path));
+  std::string new_bytes = LinkPages(unlinked, delta.new_page_size);
+  if (HashOf(new_bytes) != delta.new_hash) {
+    return MakeError(ErrorCode::kCorrupt, "{}: leads to other bytes than it states; ask for it again",
+                     delta_path);
+  }
+  return new_bytes;
+}
+
+}  // namespace cairn

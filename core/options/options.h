@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace cairn {
+
+// That an option has one of these values, as OptionValueText has them; "not X": any but X.
+struct OptionCondition {
+  std::string option;
+  std::vector<std::string> values;
+};
+
+// One field of a stage's options struct, described once: --help, the recipe's table, its reference page and
+// the range check are all made from this.
+struct Option {
+  std::string name;  // the field's name, snake_case, unit as suffix
+  std::variant<bool*, int*, double*, std::string*, std::vector<double>*> value;
+  std::string help;  // one sentence, with the unit and the source's value
+  double min = -std::numeric_limits<double>::infinity();  // numbers: inclusive range
+  double max = std::numeric_limits<double>::infinity();
+  std::vector<std::string> choices;  // strings: the allowed values; empty = any
+  // Where others of the table have other values, nothing reads this one: then it is refused on the command
+  // line, and warned of in a recipe.
+  std::vector<OptionCondition> only_where = {};
+};
+using OptionTable = std::vector<Option>;
+
+// Sets an option from its text ("16", "true", "frustum", "0,0,1").
+// Errors: InvalidArgument, naming the option, what was found, and the range or choices.
+Status SetOption(const Option& option, const std::string& text);
+// Value as text, in the form that SetOption reads.
+std::string OptionValueText(const Option& option);
+// Errors: InvalidArgument for the first value outside of its range or choices.
+Status CheckOptions(const OptionTable& table);
+
+std::vector<std::string> NamesOf(const OptionTable& table);
+// Adds a condition to options of the table.  REQUIRES: all are in it
+void AddCondition(const OptionCondition& condition, const std::vector<std::string>& names,
+                  OptionTable* table);
+// Whether something reads this option of the table, by its conditions.
+// Errors: InvalidArgument, naming the condition that does not hold.
+Status CheckIsRead(const Option& option, const OptionTable& table);
+
+// Sets options from the keys of a TOML file (a stage's options file: one table, no headers).
+// Errors: NotFound, Corrupt (not TOML; line), InvalidArgument (unknown key, with the nearest valid one; wrong
+// type).
+Status ReadOptionsFile(const std::string& path, const OptionTable& table);
+// The table as a TOML document, every key with its value in the table's order: canonical, equal options give
+// equal bytes.
+std::string OptionsToml(const OptionTable& table);
+
+// Of `candidates`, the one with the least edit distance to `word`; empty when none is near.
+std::string NearestWord(const std::string& word, const std::vector<std::string>& candidates);
+
+}  // namespace cairn

@@ -1,0 +1,34 @@
+#include "core/plan/floor_plan.h"
+
+#include <cstdlib>
+
+namespace cairn {
+
+Status CheckFloorPlan(const FloorPlan& plan, const std::string& what) {
+  if (!(plan.grid_m > 0) || !plan.origin.allFinite()) return Corrupt(what, "the plan's grid is not a grid");
+  const auto on_grid = [](const GridPoint& point) {
+    return std::abs(point.x) <= kMaxGridCoordinate && std::abs(point.y) <= kMaxGridCoordinate;
+  };
+  for (const GridPoint& vertex : plan.vertices) {
+    if (!on_grid(vertex)) return Corrupt(what, "vertex ({}, {}) is off the grid", vertex.x, vertex.y);
+  }
+  const auto num_vertices = static_cast<int32_t>(plan.vertices.size());
+  int32_t last_wall = 0;
+  for (const PlanPiece& piece : plan.pieces) {
+    if (piece.wall < last_wall) return Corrupt(what, "pieces of walls are out of order");
+    last_wall = piece.wall;
+    if (piece.start < 0 || piece.end < 0 || piece.start >= num_vertices || piece.end >= num_vertices ||
+        piece.start == piece.end || piece.wall < 0 || piece.wall >= plan.num_walls()) {
+      return Corrupt(what, "a piece of wall {} joins vertices {} and {} of {}", piece.wall, piece.start,
+                     piece.end, num_vertices);
+    }
+  }
+  for (const PlanWall& wall : plan.walls) {
+    if (!wall.start.allFinite() || !wall.end.allFinite() || wall.Length() <= 0) {
+      return Corrupt(what, "a wall has no length");
+    }
+  }
+  return Ok();
+}
+
+}  // namespace cairn

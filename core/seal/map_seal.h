@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/base/error.h"
+#include "core/blocks/map_blocks.h"
+#include "core/seal/signing_key.h"
+
+namespace cairn {
+
+// What makes a map one that nobody changed since: 176 bytes at a fixed place in the file, its page 2.
+//
+//   0            16         48         80            112          176
+//   | magic      | root     | file     | public key  | signature  |
+//
+// root: BLAKE2b over the tables that a robot reads when it opens the map, and over the directory with the
+// hash of every block: whoever has checked root and signature can check a block when it is loaded.  file:
+// BLAKE2b over all bytes of the file, those of `file` to `signature` taken as zero.  signature: Ed25519 over
+// magic, root and file; key and signature are zero in a map that nobody has signed.
+struct Seal {
+  static constexpr size_t kNumBytes = 176;
+  Hash root = {};
+  Hash file = {};
+  PublicKey public_key = {};
+  Signature signature = {};
+
+  bool is_signed() const { return public_key != PublicKey() || signature != Signature(); }
+};
+
+// BLAKE2b-256 of parts one after the other.
+class Hasher {
+ public:
+  Hasher();
+  void Add(std::string_view bytes);
+  void Add(uint64_t number);  // 8 bytes, little-endian
+  Hash Finish();
+
+ private:
+  alignas(64) std::array<uint8_t, 384> state_;  // crypto_generichash_state
+};
+Hash HashOf(std::string_view bytes);
+
+std::string EncodeSeal(const Seal& seal);
+// Errors: Corrupt when it does not have the magic and the length.
+Result<Seal> DecodeSeal(std::string_view bytes);
+
+// Writes root and file hash into a map file whose seal has the magic only.  Errors: Io, Corrupt (no place for
+// a seal in page 2).
+Status SealFile(const std::string& path, const Hash& root);
+// The same with a signature.  Errors: also those of SignBytes.
+Status SignFile(const std::string& path, const Hash& root, const SecretKey& key);
+// The seal of a map file.  Errors: NotFound, Corrupt.
+Result<Seal> ReadSeal(const std::string& path);
+// Errors: Corrupt when the bytes of the file do not have the hash that its seal states.
+Status CheckFileHash(const std::string& path);
+// Whether the signature is that of `required`, or, without it, of the key that the seal has.
+// Errors: NotSigned (required only), WrongKey.
+Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required);
+
+// Writes a signed copy of a map, of this epoch; the old file stays.  Without an epoch: of the map's own, or 1
+// where it was never counted.  Returns the epoch.  What is put in place was opened with the key before; same
+// map, epoch and key, same bytes.  Errors: as MapFile::Open; InvalidArgument (epoch 0); Corrupt (the map's
+// own hash is wrong: what nobody has checked is not signed; or the key: PublicKeyOf); as Replacement::Finish.
+Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path,
+                         std::optional<uint64_t> epoch = std::nullopt);
+
+}  // namespace cairn

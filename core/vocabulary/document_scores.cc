@@ -1,0 +1,90 @@
+#include "core/vocabulary/document_scores.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace cairn {
+
+BagOfWords CountWords(const std::vector<WordIdx>& words) {
+  BagOfWords bag;
+  for (const WordIdx word : words) {
+    if (bag.empty() || bag.back().word != word) bag.push_back({word, 0});
+    ++bag.back().count;
+  }
+  return bag;
+}
+
+BagOfWords CountWords(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors) {
+  if (vocabulary.nodes.empty()) return {};
+  return CountWords(QuantizeDescriptors(vocabulary, descriptors));
+}
+
+std::vector<BagOfWords> DocumentWords(const Vocabulary& vocabulary) {
+  std::vector<BagOfWords> bags(vocabulary.document_ids.size());
+  for (WordIdx word = 0; word < vocabulary.num_words(); ++word) {
+    for (const Posting& posting : vocabulary.inverted_files[word]) {
+      bags[posting.document].push_back({word, posting.count});
+    }
+  }
+  return bags;
+}
+
+std::vector<double> ScoreDocuments(const Vocabulary& vocabulary, const BagOfWords& bag) {
+  std::vector<double> scores(vocabulary.document_ids.size(), 0.0);
+  double squared_norm = 0;
+  for (const WordCount& entry : bag) {
+    const double idf = vocabulary.idf[entry.word];
+    const double weight = entry.count * idf;
+    squared_norm += weight * weight;
+    for (const Posting& posting : vocabulary.inverted_files[entry.word]) {
+      scores[posting.document] += weight * idf * posting.count;
+    }
+  }
+  const double norm = std::sqrt(squared_norm);
+  for (size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i] > 0) scores[i] = std::min(1.0, scores[i] / (norm * vocabulary.document_norms[i]));
+  }
+  return scores;
+}
+
+std::vector<int32_t> BestFirst(const std::vector<double>& scores) {
+  std::vector<int32_t> order(scores.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return scores[a] > scores[b]; });
+  return order;
+}
+
+std::vector<double> ProbabilitiesOfScores(const std::vector<double>& scores, double exponent) {
+  const double best = scores.empty() ? 0 : *std::max_element(scores.begin(), scores.end());
+  std::vector<double> probabilities(scores.size(), 1.0 / static_cast<double>(scores.size()));
+  if (best <= 0) return probabilities;
+  double sum = 0;
+  for (size_t i = 0; i < scores.size(); ++i) {
+    probabilities[i] = std::pow(scores[i] / best, exponent);  // at least one is 1: no overflow, no zero sum
+    sum += probabilities[i];
+  }
+  for (double& p : probabilities) p /= sum;
+  return probabilities;
+}
+
+double Entropy(const std::vector<double>& probabilities) {
+  double entropy = 0;
+  for (const double p : probabilities) {
+    if (p > 0) entropy -= p * std::log(p);
+  }
+  return std::max(0.0, entropy);
+}
+
+double JeffreyDivergence(const std::vector<double>& p, const std::vector<double>& q, double uniform_ratio) {
+  const double floor = uniform_ratio / static_cast<double>(p.size());
+  double divergence = 0;
+  for (size_t i = 0; i < p.size(); ++i) {
+    if (p[i] == q[i]) continue;
+    const double a = (1 - uniform_ratio) * p[i] + floor, b = (1 - uniform_ratio) * q[i] + floor;
+    divergence += (a - b) * std::log(a / b);
+  }
+  return divergence;
+}
+
+}  // namespace cairn

@@ -1,0 +1,198 @@
+#include "core/world/feature_class.h"
+
+#include <array>
+#include <set>
+
+#include "core/files/database.h"
+#include "core/world/dropped_items.h"
+#include "schemas/classes_sql.h"
+
+namespace cairn {
+namespace {
+
+using PoseArray = std::array<double, 7>;
+
+PoseArray ArrayFromPose(const Pose& pose) {
+  return {pose.rotation.w(),    pose.rotation.x(),    pose.rotation.y(),   pose.rotation.z(),
+          pose.translation.x(), pose.translation.y(), pose.translation.z()};
+}
+
+Pose PoseFromArray(const PoseArray& a) {
+  return {Eigen::Quaterniond(a[0], a[1], a[2], a[3]), Eigen::Vector3d(a[4], a[5], a[6])};
+}
+
+// What an observation looks like in its blob: the struct itself has no padding.
+static_assert(sizeof(Observation) == 24 && std::is_trivially_copyable_v<Observation>);
+
+template <size_t N>
+void BindArray(SQLite::Statement& statement, int index, const std::array<double, N>& values) {
+  statement.bind(index, values.data(), static_cast<int>(sizeof(double) * N));
+}
+
+template <size_t N>
+Result<std::array<double, N>> ArrayFromColumn(const SQLite::Column& column, const std::string& what) {
+  std::array<double, N> values;
+  if (column.getBytes() != static_cast<int>(sizeof(values))) {
+    return MakeError(ErrorCode::kCorrupt, "{}: blob of {} bytes, expected {}", what, column.getBytes(),
+                     sizeof(values));
+  }
+  std::memcpy(values.data(), column.getBlob(), sizeof(values));
+  return values;
+}
+
+Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& path,
+                                  const std::set<ImageId>& image_ids) {
+  FeatureClass feature_class;
+  feature_class.class_id = row.getColumn(0).getUInt();
+  const std::string what = fmt::format("{}: class {}", path, feature_class.class_id);
+  CAIRN_ASSIGN_OR_RETURN(const auto position, ArrayFromColumn<3>(row.getColumn(1), what));
+  CAIRN_ASSIGN_OR_RETURN(const auto c, ArrayFromColumn<6>(row.getColumn(2), what));
+  feature_class.position = Eigen::Vector3d(position[0], position[1], position[2]);
+  feature_class.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  feature_class.reprojection_error_px = row.getColumn(3).getDouble();
+  const SQLite::Column descriptor = row.getColumn(4);
+  if (descriptor.getBytes() != kDescriptorDim) {
+    return MakeError(ErrorCode::kCorrupt, "{}: descriptor of {} bytes, expected {}", what,
+                     descriptor.getBytes(), kDescriptorDim);
+  }
+  std::memcpy(feature_class.descriptor.data(), descriptor.getBlob(), kDescriptorDim);
+  CAIRN_ASSIGN_OR_RETURN(feature_class.observations, BlobToVector<Observation>(row.getColumn(5), what));
+  for (const Observation& observation : feature_class.observations) {
+    if (image_ids.count(observation.image_id) == 0) {
+      return MakeError(ErrorCode::kCorrupt, "{}: observed in image {}, which the file does not list", what,
+                       observation.image_id);
+    }
+  }
+  return feature_class;
+}
+
+}  // namespace
+
+Status WriteClasses(const Classes& classes, const std::string& path,
+                    const std::vector<DroppedItem>& dropped_items) {
+  return WriteDatabase(path, kClassesSql, [&](SQLite::Database& database) -> Status {
+    SQLite::Statement camera_row(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, ?)");
+    for (const Camera& camera : classes.cameras) {
+      camera_row.bind(1, camera.camera_id);
+      camera_row.bind(2, static_cast<int>(camera.model));
+      camera_row.bind(3, camera.width);
+      camera_row.bind(4, camera.height);
+      camera_row.bind(5, camera.params.data(), static_cast<int>(camera.params.size() * sizeof(double)));
+      camera_row.bind(6, camera.has_focal_prior ? 1 : 0);
+      camera_row.exec();
+      camera_row.reset();
+    }
+    SQLite::Statement image_row(database, "INSERT INTO images VALUES (?, ?, ?, ?, ?)");
+    for (const SurveyImage& image : classes.images) {
+      image_row.bind(1, image.image_id);
+      image_row.bind(2, image.name);
+      image_row.bind(3, image.camera_id);
+      BindArray(image_row, 4, ArrayFromPose(image.cam_from_world));
+      BindArray(image_row, 5, ArrayFromPose(image.given_cam_from_world));
+      image_row.exec();
+      image_row.reset();
+    }
+    SQLite::Statement class_row(database, "INSERT INTO classes VALUES (?, ?, ?, ?, ?, ?)");
+    for (const FeatureClass& feature_class : classes.classes) {
+      const Eigen::Vector3d& p = feature_class.position;
+      const Eigen::Matrix3d& c = feature_class.covariance;
+      class_row.bind(1, feature_class.class_id);
+      BindArray(class_row, 2, std::array<double, 3>{p.x(), p.y(), p.z()});
+      BindArray(class_row, 3, std::array<double, 6>{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
+      class_row.bind(4, feature_class.reprojection_error_px);
+      class_row.bind(5, feature_class.descriptor.data(), kDescriptorDim);
+      class_row.bind(6, feature_class.observations.data(),
+                     static_cast<int>(feature_class.observations.size() * sizeof(Observation)));
+      class_row.exec();
+      class_row.reset();
+    }
+    SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?)");
+    BindArray(alignment_row, 1, ArrayFromPose(classes.camera_from_given));
+    alignment_row.bind(2, classes.stated_pose_sigma_m);
+    alignment_row.bind(3, classes.stated_pose_sigma_deg);
+    alignment_row.exec();
+    SQLite::Statement dropped_row(database, "INSERT INTO dropped VALUES (?, ?)");
+    for (const auto& [reason, num_classes] : classes.dropped) {
+      dropped_row.bind(1, reason);
+      dropped_row.bind(2, num_classes);
+      dropped_row.exec();
+      dropped_row.reset();
+    }
+    WriteDroppedItems(database, kDroppedItemsTable, dropped_items);
+    return Ok();
+  });
+}
+
+Status WriteClasses(const Classes& classes, const std::string& path) {
+  return WriteClasses(classes, path, {});
+}
+
+Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum) {
+  const double norm = sum.norm();
+  if (norm > 0) sum *= 512.0 / norm;
+  return sum.array().round().cwiseMin(255.0).cast<uint8_t>();
+}
+
+Result<Classes> ReadClasses(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
+  return WithDatabaseErrors(path, [&]() -> Result<Classes> {
+    if (!HasTable(database, "classes")) {
+      return MakeError(ErrorCode::kUnsupported,
+                       "{}: has no table 'classes'; expected the output of group-classes", path);
+    }
+    Classes classes;
+    SQLite::Statement camera_row(
+        database, "SELECT camera_id, model, width, height, params, has_focal_prior FROM cameras ORDER BY 1");
+    while (camera_row.executeStep()) {
+      Camera camera;
+      camera.camera_id = camera_row.getColumn(0).getUInt();
+      CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromId(camera_row.getColumn(1).getInt()));
+      camera.width = camera_row.getColumn(2).getInt();
+      camera.height = camera_row.getColumn(3).getInt();
+      CAIRN_ASSIGN_OR_RETURN(camera.params,
+                             BlobToVector<double>(camera_row.getColumn(4), path + ": cameras"));
+      camera.has_focal_prior = camera_row.getColumn(5).getInt() != 0;
+      CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+      classes.cameras.push_back(camera);
+    }
+    std::set<ImageId> image_ids;
+    SQLite::Statement image_row(database,
+                                "SELECT image_id, name, camera_id, refined, given FROM images ORDER BY 1");
+    while (image_row.executeStep()) {
+      SurveyImage image;
+      image.image_id = image_row.getColumn(0).getUInt();
+      image.name = image_row.getColumn(1).getString();
+      image.camera_id = image_row.getColumn(2).getUInt();
+      CAIRN_ASSIGN_OR_RETURN(const PoseArray refined,
+                             ArrayFromColumn<7>(image_row.getColumn(3), path + ": " + image.name));
+      CAIRN_ASSIGN_OR_RETURN(const PoseArray given,
+                             ArrayFromColumn<7>(image_row.getColumn(4), path + ": " + image.name));
+      image.cam_from_world = PoseFromArray(refined);
+      image.given_cam_from_world = PoseFromArray(given);
+      image_ids.insert(image.image_id);
+      classes.images.push_back(image);
+    }
+    SQLite::Statement class_row(database,
+                                "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
+                                "observations FROM classes ORDER BY 1");
+    while (class_row.executeStep()) {
+      CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class, ClassFromRow(class_row, path, image_ids));
+      classes.classes.push_back(std::move(feature_class));
+    }
+    SQLite::Statement alignment_row(
+        database, "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg FROM alignment");
+    if (alignment_row.executeStep()) {
+      CAIRN_ASSIGN_OR_RETURN(const PoseArray pose,
+                             ArrayFromColumn<7>(alignment_row.getColumn(0), path + ": alignment"));
+      classes.camera_from_given = PoseFromArray(pose);
+      classes.stated_pose_sigma_m = alignment_row.getColumn(1).getDouble();
+      classes.stated_pose_sigma_deg = alignment_row.getColumn(2).getDouble();
+    }
+    SQLite::Statement dropped_row(database, "SELECT reason, num_classes FROM dropped ORDER BY 1");
+    while (dropped_row.executeStep())
+      classes.dropped[dropped_row.getColumn(0).getString()] = dropped_row.getColumn(1).getInt64();
+    return classes;
+  });
+}
+
+}  // namespace cairn

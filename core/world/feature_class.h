@@ -1,0 +1,70 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/camera/camera.h"
+#include "core/features/features.h"
+#include "core/geometry/pose.h"
+
+namespace cairn {
+
+// One keypoint of a feature class.
+struct Observation {
+  ImageId image_id = 0;
+  KeypointIdx keypoint_idx = 0;
+  Keypoint keypoint;
+};
+
+// Equivalence class of keypoints = one scene feature [Sala06 §VI-B], triangulated.
+struct FeatureClass {
+  ClassId class_id = 0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
+  double reprojection_error_px = 0;                      // root mean square over the observations
+  Eigen::Matrix<uint8_t, 1, kDescriptorDim> descriptor = Eigen::Matrix<uint8_t, 1, kDescriptorDim>::Zero();
+  std::vector<Observation> observations;  // ascending image_id, one per image
+};
+
+struct SurveyImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+  Pose cam_from_world;        // refined; in the capture's world frame
+  Pose given_cam_from_world;  // as the capture states it
+};
+
+// The mean of RootSIFT descriptors with this sum, renormalised to norm 512 and rounded.
+using DescriptorSum = Eigen::Matrix<double, 1, kDescriptorDim>;
+Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum);
+
+// How many of something were dropped, and why ("ambiguous", "few_observations", ...).
+using DropCounts = std::map<std::string, int64_t>;
+
+// What group_classes knows of a capture: images in their refined poses, cameras, and the feature classes.
+struct Classes {
+  std::vector<Camera> cameras;  // ascending camera_id; intrinsics as refined
+  std::vector<SurveyImage>
+      images;  // ascending image_id; all posed images of the capture, with classes or without
+  std::vector<FeatureClass> classes;  // ascending class_id
+  // Constant offset between the pose that the capture states and its camera, if refined, else identity:
+  // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
+  Pose camera_from_given;
+  // Where poses were refined: how far they moved from the stated ones, root mean square per axis of the
+  // camera's place and rotation.  An error that the survey's poses share with whoever is localized against
+  // them.
+  double stated_pose_sigma_m = 0;
+  double stated_pose_sigma_deg = 0;
+  DropCounts dropped;  // classes, by reason
+};
+
+// classes.db (schemas/classes.sql).
+Result<Classes> ReadClasses(const std::string& path);
+Status WriteClasses(const Classes& classes, const std::string& path);
+
+}  // namespace cairn

@@ -1,0 +1,220 @@
+#include "pipeline/build/build_folder.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "core/files/file.h"
+#include "pipeline/build/make_words.h"
+
+namespace cairn::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kConfigHead =
+    "# Written by cairn from the recipe whose path is in the file `recipe` beside this one; edit that "
+    "instead.\n";
+
+Status CreateFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!error) return Ok();
+  return MakeError(ErrorCode::kIo, "{}: the folder cannot be made: {}", path, error.message());
+}
+
+std::string Absolute(const std::string& path) {
+  std::string text = fs::absolute(path).lexically_normal().string();
+  while (text.size() > 1 && text.back() == '/') text.pop_back();
+  return text;
+}
+
+// Several captures are joined into one, in the build folder.
+bool IsJoined(const Recipe& recipe) { return recipe.captures.size() > 1; }
+
+// Tells programs apart without reading them, as map.mk does: bytes and seconds since 1970.
+std::string SizeAndDate(const std::string& path) {
+  struct stat status = {};
+  if (stat(path.c_str(), &status) != 0) return "";
+  return fmt::format("{}-{}", status.st_size, status.st_mtim.tv_sec);
+}
+
+// The value of an option of a stage.
+std::string OptionText(const Recipe& recipe, const std::string& stage_name, const std::string& name) {
+  for (const StageOptions& stage : recipe.stages) {
+    if (stage.stage != stage_name) continue;
+    for (const Option& option : stage.table) {
+      if (option.name == name) return OptionValueText(option);
+    }
+  }
+  return "";
+}
+
+// Files that tell where images stand, beside the capture's own.
+Result<std::vector<std::string>> KnownPlaces(const Recipe& recipe, const std::string& capture) {
+  std::vector<std::string> files;
+  for (const char* name : {"control_points", "distances"}) {
+    const std::string file = OptionText(recipe, "reconstruct", name);
+    if (file.empty()) continue;
+    if (IsJoined(recipe)) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "[reconstruct] {} = \"{}\" names images of one capture, and the recipe has {}: put the images of "
+          "each session into a folder of one capture, and the folders' names into its sessions.txt",
+          name, file, recipe.captures.size());
+    }
+    const std::string path = (fs::path(capture) / file).lexically_normal().string();
+    if (!fs::exists(path)) {
+      return MakeError(ErrorCode::kNotFound,
+                       "[reconstruct] {} = \"{}\": there is no {} (paths are relative to the capture)", name,
+                       file, path);
+    }
+    files.push_back(path);
+  }
+  return files;
+}
+
+// The file whose words [build_vocabulary] takes over; empty: none.
+Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
+  const std::string file = OptionText(recipe, "build_vocabulary", "tree_from");
+  if (file.empty()) return file;
+  const std::string path = (fs::path(paths.recipe).parent_path() / file).lexically_normal().string();
+  if (!fs::exists(path)) {
+    return MakeError(
+        ErrorCode::kNotFound,
+        "[build_vocabulary] tree_from = \"{}\": there is no {} (paths are relative to the recipe)", file,
+        path);
+  }
+  return path;
+}
+
+// The folder that the stages read.
+std::string CaptureFolder(const Recipe& recipe, const std::string& build_dir) {
+  if (recipe.simulated || IsJoined(recipe)) return build_dir + "/capture";
+  return Absolute(recipe.captures.front().path);
+}
+
+// What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
+struct SessionWords {
+  std::vector<std::pair<std::string, std::string>> folders, queries;
+};
+
+SessionWords JoinedSessions(const Recipe& recipe) {
+  SessionWords words;
+  if (!IsJoined(recipe)) return words;
+  for (const RecipeCapture& capture : recipe.captures) {
+    words.folders.emplace_back(capture.name, Absolute(capture.path));
+    if (!capture.queries_path.empty())
+      words.queries.emplace_back(capture.name, Absolute(capture.queries_path));
+  }
+  return words;
+}
+
+std::string PairsLine(const std::vector<std::pair<std::string, std::string>>& pairs) {
+  std::string line;
+  for (const auto& [first, second] : pairs)
+    line += fmt::format("{}{}={}", line.empty() ? "" : " ", first, second);
+  return line + "\n";
+}
+
+// The held-out images that check_map localizes; empty = the map is sealed without a self-test.
+std::string QueriesPath(const Recipe& recipe, const std::string& capture, const std::string& build_dir) {
+  const auto has_queries = [](const RecipeCapture& c) {
+    return !c.queries_path.empty() || fs::exists(c.path + "/queries.txt");
+  };
+  if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
+    return Absolute(recipe.captures.front().queries_path);
+  if (IsReconstructed(recipe))
+    return OptionText(recipe, "reconstruct", "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
+  const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
+  return recipe.simulated || is_any ? capture + "/queries.txt" : "";
+}
+
+// Of the place; empty = none.
+std::string FloorPlanPath(const Recipe& recipe, const std::string& capture) {
+  if (!recipe.simulated_floor_plan.empty()) return capture + "/" + recipe.simulated_floor_plan;
+  for (const RecipeCapture& given : recipe.captures) {
+    if (!given.floor_plan_path.empty()) return Absolute(given.floor_plan_path);
+  }
+  return "";
+}
+
+}  // namespace
+
+bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empty(); }
+
+bool IsReconstructed(const Recipe& recipe) {
+  return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
+}
+
+Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
+  const std::string capture = CaptureFolder(recipe, paths.build_dir);
+  const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
+  const std::string floor_plan = FloorPlanPath(recipe, capture);
+  const SessionWords sessions = JoinedSessions(recipe);
+  const std::string seed = std::to_string(recipe.seed);
+  std::vector<std::string> known_places;
+  if (IsReconstructed(recipe)) {
+    CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
+  // Before anything is written: what make would not take for a name is refused.
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
+  MakeVariables config;
+  CAIRN_RETURN_IF_ERROR(config.Set("MAP", "the map", {paths.map}));
+  CAIRN_RETURN_IF_ERROR(config.Set("CAPTURE", "the capture", {capture}));
+  CAIRN_RETURN_IF_ERROR(config.Set("SIMULATED", "", {recipe.simulated ? "yes" : "no"}));
+  CAIRN_RETURN_IF_ERROR(config.Set("RECONSTRUCTED", "", {IsReconstructed(recipe) ? "yes" : "no"}));
+  CAIRN_RETURN_IF_ERROR(
+      config.Set("KNOWN_PLACES", "[reconstruct] control_points or distances", known_places));
+  CAIRN_RETURN_IF_ERROR(config.Set("QUERIES", "the list of queries", {queries}));
+  CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));
+  CAIRN_RETURN_IF_ERROR(config.Set("SEED", "the seed", {seed}));
+  CAIRN_RETURN_IF_ERROR(config.Set("PROGRAM", "the program", {SizeAndDate(paths.program)}));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSIONS", "the capture", sessions.folders));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
+  CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
+  CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
+  if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
+                     "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
+                     recipe.captures.front().queries_path, recipe.captures.front().path);
+  }
+
+  const std::string options = paths.build_dir + "/options";
+  CAIRN_RETURN_IF_ERROR(CreateFolder(options));
+  for (const StageOptions& stage : recipe.stages) {
+    CAIRN_RETURN_IF_ERROR(
+        WriteFileAtomically(options + "/" + stage.stage + ".toml", OptionsToml(stage.table)));
+  }
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/seed", seed + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+      options + "/capture",
+      IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) : capture + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
+  CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(paths.build_dir + "/recipe", paths.recipe + "\n"));
+  return WriteFileAtomically(paths.build_dir + "/config.mk", kConfigHead + config.MakefileText());
+}
+
+std::string ConfiguredMap(const std::string& build_dir) {
+  static constexpr std::string_view kBefore = "\nMAP := ";
+  const auto config = ReadFile(build_dir + "/config.mk");
+  const size_t found = config.ok() ? config->find(kBefore) : std::string::npos;
+  if (found == std::string::npos) return "";
+  const size_t begin = found + kBefore.size();
+  return config->substr(begin, config->find('\n', begin) - begin);
+}
+
+std::string ConfiguredRecipe(const std::string& build_dir) {
+  const auto recipe = ReadFile(build_dir + "/recipe");
+  return recipe.ok() && recipe->ends_with('\n') ? recipe->substr(0, recipe->size() - 1) : "";
+}
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+#include "pipeline/build/recipe.h"
+
+namespace cairn::pipeline {
+
+// Where a recipe is compiled to and by what; all paths absolute.
+struct BuildPaths {
+  std::string build_dir;  // the build folder: options, stage files, stamps
+  std::string map;        // NAME.cairn
+  std::string program;    // cairn
+  std::string recipe;     // as an absolute path
+};
+
+// Whether the captures have no poses of their own: then `reconstruct` finds them.
+bool IsReconstructed(const Recipe& recipe);
+// Whether the recipe names a floor plan: then `decompose_views` divides it.
+bool HasFloorPlan(const Recipe& recipe);
+
+// Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
+//   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
+//   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
+//   options/program       hash of the program: another one redoes every stage, whatever its date
+//   config.mk             MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
+//                         QUERIES, NAME, SEED, PROGRAM and VOCABULARY_TREE for map.mk
+//   recipe                path of the recipe, for people and for `cairn clean`: no part of a Makefile
+// Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names beside several captures), NotFound
+// (a file that [reconstruct] names), Io.
+Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
+
+// The map and the recipe that a folder was last configured for; empty where it is no build folder.
+std::string ConfiguredMap(const std::string& build_dir);
+std::string ConfiguredRecipe(const std::string& build_dir);
+
+}  // namespace cairn::pipeline

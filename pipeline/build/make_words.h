@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace cairn::pipeline {
+
+// What is written into a Makefile or handed to make is read again, by make and by the shell that it starts.
+// Nothing gets there but words that both take for what they are: by way of CheckMakePath and MakeVariables.
+
+// Errors: InvalidArgument when a path has characters that Make or a shell would not take for a name's: white
+// space, control characters and $#%:;&|<>()[]{}*?'"`\=!
+Status CheckMakePath(const std::string& what, const std::string& path);
+
+// Variables for make, in the order in which they were set.  `what` names a value in messages.
+// Errors of all three: InvalidArgument.
+class MakeVariables {
+ public:
+  // Paths, numbers or names, each as CheckMakePath demands.
+  Status Set(const std::string& variable, const std::string& what, const std::vector<std::string>& words);
+  // The same for FIRST=SECOND words.
+  Status SetPairs(const std::string& variable, const std::string& what,
+                  const std::vector<std::pair<std::string, std::string>>& words);
+  // Words with which a command begins, separated by blanks.  No quotes, no variables: nothing but words.
+  Status SetLauncher(const std::string& variable, const std::string& what, const std::string& words);
+
+  std::string MakefileText() const;               // "VARIABLE := WORDS", a line each
+  std::vector<std::string> CommandWords() const;  // "VARIABLE=WORDS"
+
+ private:
+  std::vector<std::pair<std::string, std::string>> values_;
+};
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,123 @@
+#include "pipeline/build/recipe_source.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/capture/image_file.h"
+#include "core/files/database.h"
+#include "core/files/file.h"
+#include "core/map/map_head.h"
+#include "pipeline/build/make_words.h"
+#include "pipeline/build/recipe.h"
+
+namespace cairn::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kWhatIsCompiled = "compile takes a recipe (docs/recipe.md) or the folder of a capture";
+
+bool HoldsImages(const std::string& folder) {
+  std::error_code error;
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+  for (; !error && it != end; it.increment(error)) {
+    std::error_code type_error;
+    if (it->is_regular_file(type_error) && HasImageSuffix(it->path().string())) return true;
+  }
+  return false;
+}
+
+Status CheckIsCapture(const std::string& folder) {
+  std::error_code error;
+  if (fs::exists(folder + "/config.mk", error) && fs::is_directory(folder + "/options", error)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the build folder of a map, no capture; {}", folder,
+                     kWhatIsCompiled);
+  }
+  if (HoldsImages(folder)) return Ok();
+  std::string hint = "does it lie elsewhere?";
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".toml")
+      hint = fmt::format("is {} the recipe that is meant?", entry.path().string());
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{}: a folder without an image; {}; {}", folder,
+                   kWhatIsCompiled, hint);
+}
+
+// A file that is plainly something else than a text is named as what it is.
+Status CheckIsText(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    return MakeError(ErrorCode::kNotFound, "{}: no such file or folder; {}", path, kWhatIsCompiled);
+  }
+  if (!fs::is_regular_file(path, error)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: neither a file nor a folder; {}", path,
+                     kWhatIsCompiled);
+  }
+  if (IsSqliteFile(path)) {
+    const bool is_map = WithDatabaseErrors(path, [&]() -> Status {
+                          SQLite::Database database = OpenImmutable(path);
+                          const Status status = CheckMapVersion(database, path, kMapVersionMajor);
+                          const bool is_foreign =
+                              !status.ok() && status.error().code == ErrorCode::kForeignFile;
+                          return is_foreign ? status : Ok();
+                        }).ok();
+    if (is_map) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: a compiled map; `cairn inspect` shows it, and {}",
+                       path, kWhatIsCompiled);
+    }
+    return MakeError(ErrorCode::kInvalidArgument, "{}: a database, of COLMAP or of a stage, no recipe; {}",
+                     path, kWhatIsCompiled);
+  }
+  if (HasImageSuffix(path)) {
+    const std::string folder = fs::absolute(path).lexically_normal().parent_path().string();
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: an image, no recipe; to compile its folder: cairn compile {}", path, folder);
+  }
+  return Ok();
+}
+
+// The recipe that compiles a folder with defaults.  The path has no character that TOML would want escaped.
+std::string DefaultRecipe(const std::string& name, const std::string& folder) {
+  return fmt::format(
+      "# Every key that is not here has its default; docs/recipe.md lists them.\n"
+      "name = \"{}\"\n\n[[capture]]\npath = \"{}\"\n",
+      name, folder);
+}
+
+}  // namespace
+
+Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map) {
+  std::error_code error;
+  if (!fs::is_directory(given, error)) {
+    CAIRN_RETURN_IF_ERROR(CheckIsText(given));
+    return RecipeSource{.recipe = given, .map = map};
+  }
+  fs::path folder = fs::absolute(given).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();  // a trailing '/'
+  CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
+  const std::string name = NameOfFolder(folder.string());
+  RecipeSource source{.map = map.empty() ? name + ".cairn" : map};
+  if (fs::path(source.map).extension() != ".cairn")
+    return MakeError(ErrorCode::kInvalidArgument, "-o {}: a map's name ends in .cairn", source.map);
+  const fs::path recipe = fs::path(source.map).replace_extension(".toml");
+  source.recipe = recipe.string();
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", folder.string()));
+  CAIRN_RETURN_IF_ERROR(CheckMakePath("the map", source.map));
+  // Where the two are moved together they still fit.
+  const fs::path beside = fs::absolute(recipe).lexically_normal().parent_path();
+  const std::string text = DefaultRecipe(name, folder.lexically_relative(beside).string());
+  if (!fs::exists(fs::symlink_status(recipe, error))) {
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(source.recipe, text));
+    source.was_written = true;
+    return source;
+  }
+  const auto there = ReadFile(source.recipe);
+  if (there.ok() && *there == text) return source;
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{}: is there and is not the recipe that compiles {} with defaults; compile it (cairn compile {} "
+      "-o {}), or give another -o",
+      source.recipe, given, source.recipe, source.map);
+}
+
+}  // namespace cairn::pipeline

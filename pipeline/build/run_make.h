@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/line/command.h"
+#include "pipeline/build/make_words.h"
+
+namespace cairn::pipeline {
+
+// This program's own file, for rules that run it.  Errors: Failed.
+Result<std::string> ProgramPath();
+
+// map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
+// Errors: NotFound.
+Result<std::string> RulesPath(const std::string& program);
+
+// A command line of make that makes `goal` by these rules in this build folder; `progress_style`: of the
+// stages; `variables`: more of map.mk's.  Errors: InvalidArgument (a path with characters that Make cannot
+// carry).
+Result<std::vector<std::string>> MakeWords(const std::string& rules, const std::string& build_dir,
+                                           const std::string& program, const std::string& goal,
+                                           const CommandEnvironment& environment,
+                                           const std::string& progress_style, MakeVariables variables = {});
+
+// Runs a program with this one's terminal and, of its environment, what programs get that cairn starts
+// (core/line/child_environment.h) and `variable`; returns its wait status.
+// Asked to stop, it asks the program to stop and waits for it.  Errors: NotFound, Failed.
+Result<int> RunProgramAndWait(const std::vector<std::string>& words, const std::string& variable,
+                              const Progress& progress);
+
+}  // namespace cairn::pipeline

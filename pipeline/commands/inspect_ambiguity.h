@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/blocks/map_rows.h"
+
+namespace cairn::pipeline {
+
+// The places of a map that are hardest to tell from others, for people: at most `max_num_places`, most
+// ambiguous first, each with the look-alike that scores most; and as many regions, by the mean of their
+// images.  Empty for a map that does not know.
+std::string AmbiguityText(const MapRows& rows, int max_num_places);
+
+// For programs: all nodes, in the map's order, and all regions; nothing for a map that does not know.
+nlohmann::ordered_json AmbiguityJson(const MapRows& rows);
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,79 @@
+#include "pipeline/commands/commands.h"
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+
+#include "core/capture/join_captures.h"
+
+namespace cairn::pipeline {
+namespace {
+
+struct Arguments {
+  std::vector<std::string> captures;  // "NAME=FOLDER"
+  std::vector<std::string> queries;   // "NAME=FILE"
+  std::string output;
+};
+
+Result<std::pair<std::string, std::string>> SplitAtEquals(const std::string& text, const char* form) {
+  const size_t equals = text.find('=');
+  if (equals == 0 || equals == std::string::npos || equals + 1 == text.size())
+    return MakeError(ErrorCode::kInvalidArgument, "'{}': expected {}", text, form);
+  return std::pair(text.substr(0, equals), text.substr(equals + 1));
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  std::vector<CaptureSession> sessions;
+  for (const std::string& text : arguments.captures) {
+    CAIRN_ASSIGN_OR_RETURN(const auto session, SplitAtEquals(text, "NAME=FOLDER"));
+    sessions.push_back({.name = session.first, .root = session.second});
+  }
+  for (const std::string& text : arguments.queries) {
+    CAIRN_ASSIGN_OR_RETURN(const auto queries, SplitAtEquals(text, "NAME=FILE"));
+    const auto session = std::find_if(sessions.begin(), sessions.end(),
+                                      [&](const CaptureSession& s) { return s.name == queries.first; });
+    if (session == sessions.end())
+      return MakeError(ErrorCode::kInvalidArgument, "--queries {}: no capture is named '{}'", text,
+                       queries.first);
+    session->queries_path = queries.second;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const JoinedCapture joined, JoinCaptures(sessions, arguments.output));
+  for (const std::string& warning : joined.warnings) spdlog::warn("{}", warning);
+  environment.report->in = {{"sessions", static_cast<int64_t>(sessions.size())}};
+  environment.report->out = {{"images", joined.num_images}, {"queries", joined.num_queries}};
+  std::string counts = "without poses";
+  if (joined.num_images > 0) {
+    counts = fmt::format("{} images, {} queries, {} cameras", joined.num_images, joined.num_queries,
+                         joined.num_cameras);
+  }
+  *environment.out << fmt::format("join_captures: {} sessions, {}\n", sessions.size(), counts);
+  return Ok();
+}
+
+}  // namespace
+
+Command JoinCapturesCommand() {
+  const auto arguments = std::make_shared<Arguments>();
+  return {.name = "join-captures",
+          .summary = "Join several surveys in one frame into one capture, without copying images",
+          .add_arguments =
+              [arguments](CLI::App& app) {
+                app.add_option("captures", arguments->captures,
+                               "Session's name and capture folder, once per session")
+                    ->required()
+                    ->type_name("NAME=FOLDER");
+                app.add_option("--queries", arguments->queries,
+                               "Held-out images of a session [its capture's queries.txt]")
+                    ->type_name("NAME=FILE");
+                app.add_option("-o,--output", arguments->output, "Capture folder to write")
+                    ->required()
+                    ->type_name("FOLDER");
+              },
+          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+}
+
+}  // namespace cairn::pipeline

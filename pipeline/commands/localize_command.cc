@@ -1,0 +1,366 @@
+#include "pipeline/commands/commands.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "core/base/parallel.h"
+#include "core/base/text.h"
+#include "core/capture/capture.h"
+#include "core/capture/image_file.h"
+#include "core/colmap/cameras_text.h"
+#include "core/colmap/image_list.h"
+#include "core/files/file.h"
+#include "pipeline/commands/visual_answer.h"
+#include "pipeline/program/json_text.h"
+#include "runtime/localize/region_tracker.h"
+
+namespace cairn::pipeline {
+namespace {
+
+struct Arguments {
+  std::string map_path;
+  std::vector<std::string> images;
+  std::string list_path;
+  std::string output_path;
+  std::string camera;
+  std::string cameras_path;
+  bool is_sequence = false;
+  std::string estimator = "pnp";
+  LocalizerOptions options;
+  VisualMapOptions visual_options;
+  VisualEstimateOptions estimate_options;
+  RegionTrackerOptions tracker_options;
+  OptionArguments option_arguments;
+};
+
+// An image's answer.
+struct Answer {
+  std::string image;
+  CameraId camera_id = 0;
+  Result<Localization> localization = Error{};
+  std::optional<Result<VisualPose>> visual;
+  std::optional<Disagreement> disagreement;  // where both have a fix
+};
+
+// The camera to use for an image size: given on the command line, else the map's.
+class CameraChoice {
+ public:
+  static Result<CameraChoice> Make(const Arguments& arguments, std::shared_ptr<const Map> map) {
+    CameraChoice choice;
+    choice.map_ = std::move(map);
+    if (!arguments.camera.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(choice.camera_, ParseCamera(arguments.camera));
+    }
+    if (!arguments.cameras_path.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(choice.cameras_, ReadCamerasText(arguments.cameras_path));
+    }
+    return choice;
+  }
+
+  Result<Camera> ForImage(int width, int height) const {
+    if (camera_) return *camera_;
+    if (cameras_.empty()) return map_->CameraForSize(width, height);
+    const Camera* found = nullptr;
+    for (const auto& [camera_id, camera] : cameras_) {
+      if (camera.width != width || camera.height != height) continue;
+      if (found != nullptr) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "cameras {} and {} of --cameras both take {} x {} px; use --camera",
+                         found->camera_id, camera_id, width, height);
+      }
+      found = &camera;
+    }
+    if (found != nullptr) return *found;
+    return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
+  }
+
+ private:
+  std::shared_ptr<const Map> map_;
+  std::optional<Camera> camera_;
+  std::map<CameraId, Camera> cameras_;
+};
+
+// What only another estimator or a sequence reads is refused.
+Status CheckWhatIsRead(const Arguments& arguments) {
+  if (!arguments.camera.empty() && !arguments.cameras_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--camera is the camera of all images, --cameras has one for each size; leave one out");
+  }
+  if (!arguments.is_sequence) {
+    RegionTrackerOptions of_tracker;
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        NamesOf(DescribeOptions(&of_tracker)), "is for frames in order; give --sequence, or leave it out"));
+  }
+  if (arguments.estimator == "pnp") {
+    VisualMapOptions of_map;
+    VisualEstimateOptions of_estimate;
+    for (const OptionTable& table : {DescribeOptions(&of_map), DescribeOptions(&of_estimate)}) {
+      CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+          NamesOf(table), "is for --estimator visual-map or both; give one of them, or leave it out"));
+    }
+  }
+  return Ok();
+}
+
+Status CheckEstimator(const Arguments& arguments) {
+  if (arguments.estimator != "pnp" && arguments.is_sequence) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--sequence follows a camera by --estimator pnp; leave one of them out");
+  }
+  if (arguments.estimator == "visual-map" && !arguments.output_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
+                     "--estimator both");
+  }
+  return Ok();
+}
+
+// By the visual map, and where asked for by PnP too.
+Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>& map, const VisualMap& visual,
+                     const CameraChoice& cameras, const Arguments& arguments) {
+  Answer answer{.image = image};
+  const auto locate = [&]() -> Result<VisualPose> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    const Localizer localizer(map, arguments.options);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
+    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(query));
+    if (arguments.estimator == "both") {
+      CAIRN_ASSIGN_OR_RETURN(answer.localization, localizer.LocalizeQuery(query, std::nullopt));
+    }
+    return EstimateVisualPose(visual, seen, arguments.estimate_options);
+  };
+  answer.visual = locate();
+  if (!answer.visual->ok()) {
+    answer.localization = answer.visual->error();
+  } else if (arguments.estimator == "visual-map") {
+    answer.localization = Localization();  // none in space
+  } else if (answer.localization->has_fix() && (*answer.visual)->flag == VisualFlag::kNone) {
+    answer.disagreement =
+        Compare(FloorFixOf(*answer.localization, map->head().floor_from_world), **answer.visual);
+  }
+  return answer;
+}
+
+Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>& map,
+                     const CameraChoice& cameras, const LocalizerOptions& options) {
+  Answer answer{.image = image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    return Localizer(map, options).Localize(grey, camera);
+  }();
+  return answer;
+}
+
+// The same for the next frame of a sequence.
+Answer TrackImage(const std::string& image, const CameraChoice& cameras, RegionTracker* tracker) {
+  Answer answer{.image = image};
+  answer.localization = [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
+    CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
+    answer.camera_id = camera.camera_id;
+    return tracker->Track(grey, camera);
+  }();
+  return answer;
+}
+
+// That an image could not be tried.
+nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
+  return {
+      {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
+}
+
+nlohmann::ordered_json PnpJson(const Answer& answer) {
+  nlohmann::ordered_json json = {{"image", answer.image}};
+  if (!answer.localization.ok()) return ErrorJson(answer.image, answer.localization.error());
+  const Localization& found = *answer.localization;
+  json["fix"] = found.has_fix();
+  if (found.has_fix()) {
+    const Eigen::Quaterniond& q = found.cam_from_world.rotation;
+    const Eigen::Vector3d& t = found.cam_from_world.translation;
+    const Eigen::Vector3d center = found.cam_from_world.Center();
+    json["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+    json["translation_m"] = {t.x(), t.y(), t.z()};
+    json["center_m"] = {center.x(), center.y(), center.z()};
+    json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
+    json["region"] = found.region;
+  } else {
+    json["reason"] = NoFixName(found.reason);
+    json["message"] = found.message;
+  }
+  json["scope"] = ScopeName(found.scope);
+  json["num_features"] = found.num_features;
+  json["num_matches"] = found.num_matches;
+  json["num_inliers"] = found.num_inliers;
+  json["candidates"] = found.candidates;
+  return json;
+}
+
+nlohmann::ordered_json AnswerJson(const Answer& answer, const std::string& estimator) {
+  if (!answer.visual) return PnpJson(answer);
+  if (!answer.visual->ok()) return ErrorJson(answer.image, answer.visual->error());
+  if (estimator == "visual-map") {
+    nlohmann::ordered_json json = {{"image", answer.image}};
+    json.update(VisualJson(**answer.visual));
+    return json;
+  }
+  nlohmann::ordered_json json = PnpJson(answer);
+  json["visual_map"] = VisualJson(**answer.visual);
+  if (answer.disagreement) json["disagreement"] = DisagreementJson(*answer.disagreement);
+  return json;
+}
+
+// Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
+class ImageNames {
+ public:
+  static Result<ImageNames> Make(const Arguments& arguments) {
+    ImageNames names;
+    names.names_ = arguments.images;
+    if (!arguments.list_path.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(const std::string list, ReadFile(arguments.list_path));
+      for (const std::string_view line : SplitLines(list)) {
+        if (!line.empty()) names.names_.emplace_back(line);
+      }
+    }
+    if (names.names_.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "no image: name images, use --list FILE, or '-' for stdin");
+    }
+    return names;
+  }
+
+  // Up to `count` names; only one at a time from stdin, so that it is answered before the next is read.
+  std::vector<std::string> Next(size_t count) {
+    std::vector<std::string> batch;
+    while (batch.size() < count && position_ < names_.size()) {
+      if (names_[position_] == "-") {
+        if (!batch.empty()) return batch;
+        std::string line;
+        while (std::getline(std::cin, line) && line.empty()) {
+        }
+        if (!line.empty()) return {line};
+        ++position_;
+      } else {
+        batch.push_back(names_[position_++]);
+      }
+    }
+    return batch;
+  }
+
+ private:
+  std::vector<std::string> names_;
+  size_t position_ = 0;
+};
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
+  CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
+  cv::setNumThreads(1);  // images in parallel, each on one thread
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  std::shared_ptr<const VisualMap> visual;
+  if (arguments.estimator != "pnp") {
+    CAIRN_ASSIGN_OR_RETURN(visual, VisualMap::Load(*map, arguments.visual_options));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras, CameraChoice::Make(arguments, map));
+  CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments));
+
+  std::vector<CaptureImage> poses;
+  std::optional<Error> first_error;
+  int num_images = 0, num_failed = 0, num_places = 0;
+  RegionTracker tracker(map, arguments.options, arguments.tracker_options);
+  const size_t batch_size =
+      arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
+  for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
+    std::vector<Answer> answers(batch.size());
+    ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
+      answers[i] = visual                  ? LocateByViews(batch[i], map, *visual, cameras, arguments)
+                   : arguments.is_sequence ? TrackImage(batch[i], cameras, &tracker)
+                                           : LocalizeImage(batch[i], map, cameras, arguments.options);
+    });
+    for (const Answer& answer : answers) {
+      *environment.out << JsonText(AnswerJson(answer, arguments.estimator)) << "\n" << std::flush;
+      ++num_images;
+      if (answer.visual && answer.visual->ok() && (*answer.visual)->flag == VisualFlag::kNone) ++num_places;
+      if (!answer.localization.ok()) {
+        ++num_failed;
+        if (!first_error) first_error = answer.localization.error();
+      } else if (answer.localization->has_fix()) {
+        const std::string name = std::filesystem::path(answer.image).filename().string();
+        if (const Status status = CheckListedName(arguments.output_path, name);
+            !arguments.output_path.empty() && !status.ok()) {
+          spdlog::warn("{}", status.error().message);
+          continue;
+        }
+        poses.push_back({.name = name,
+                         .camera_id = answer.camera_id,
+                         .cam_from_world = answer.localization->cam_from_world});
+      }
+    }
+    if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "localizing was stopped");
+  }
+  if (!arguments.output_path.empty()) CAIRN_RETURN_IF_ERROR(WriteImagesText(arguments.output_path, poses));
+  if (arguments.estimator != "visual-map")
+    spdlog::info("{} of {} images localized", poses.size(), num_images);
+  if (visual) spdlog::info("{} of {} images localized by the visual map", num_places, num_images);
+  if (!first_error) return Ok();
+  return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
+                   num_images, first_error->message);
+}
+
+}  // namespace
+
+Command LocalizeCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "localize",
+      .summary = "Says where images were taken, as JSON lines",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_option("images", arguments->images, "Image files; '-' reads names from stdin")
+                ->type_name("IMAGE");
+            app.add_option("--list", arguments->list_path, "File with an image's name per line")
+                ->type_name("FILE");
+            app.add_option("-o,--output", arguments->output_path,
+                           "Write the poses found in COLMAP's images.txt form too")
+                ->type_name("poses.txt");
+            app.add_option("--camera", arguments->camera, "Camera of the images [the map's one of that size]")
+                ->type_name("MODEL,W,H,P...");
+            app.add_option("--cameras", arguments->cameras_path, "cameras.txt; chosen by image size")
+                ->type_name("FILE");
+            app.add_flag("--sequence", arguments->is_sequence,
+                         "The images are frames in order: follow the camera from one to the next");
+            app.add_option(
+                   "--estimator", arguments->estimator,
+                   "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
+                   "how landmarks look from where (the map needs a visual map); both: and how far "
+                   "they disagree [pnp]")
+                ->check(CLI::IsMember({"pnp", "visual-map", "both"}));
+            OptionTable options = DescribeOptions(&arguments->options);
+            const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
+            options.insert(options.end(), of_tracker.begin(), of_tracker.end());
+            for (const OptionTable& of_visual : {DescribeOptions(&arguments->visual_options),
+                                                 DescribeOptions(&arguments->estimate_options)}) {
+              options.insert(options.end(), of_visual.begin(), of_visual.end());
+            }
+            arguments->option_arguments.Add(app, options);
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn::pipeline

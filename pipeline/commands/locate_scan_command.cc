@@ -1,0 +1,163 @@
+#include "pipeline/commands/commands.h"
+
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/parallel.h"
+#include "core/base/text.h"
+#include "core/files/file.h"
+#include "core/plan/views.h"
+#include "pipeline/program/json_text.h"
+#include "runtime/laser/interpretation_tree.h"
+#include "runtime/map/open_views.h"
+#include "runtime/scans/read_scans.h"
+#include "stages/decompose_views/picture.h"
+
+namespace cairn::pipeline {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr int kMaxDrawnSolutions = 6;
+
+struct Arguments {
+  std::string views;
+  std::string scans;
+  bool has_scan = false;  // otherwise all
+  std::string scan;
+  std::string svg;
+  ScanSegmentsOptions segment_options;
+  InterpretationTreeOptions search_options{.max_null_ratio = 0.25, .one_segment_per_wall = false};
+  OptionArguments option_arguments;
+};
+
+ordered_json Json(const Interpretation& found, FaceIdx region) {
+  ordered_json covariance = ordered_json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) covariance.push_back(found.covariance(row, column));
+  }
+  return {{"x", found.pose.position.x()},
+          {"y", found.pose.position.y()},
+          {"heading_deg", found.pose.heading_rad / kDegree},
+          {"determined", found.determined},
+          {"matched", found.num_matched},
+          {"matched_length_m", found.matched_length_m},
+          {"hidden_length_m", found.hidden_length_m},
+          {"rms_m", found.rms_m},
+          {"region", region},
+          {"labels", found.labels},
+          {"covariance", covariance}};
+}
+
+decompose_views::ViewsOverlay Overlay(const ScanView& scan, const InterpretationTreeResult& result) {
+  decompose_views::ViewsOverlay overlay;
+  for (size_t i = 0; i < result.solutions.size() && i < kMaxDrawnSolutions; ++i) {
+    const PlanarPose& pose = result.solutions[i].pose;
+    overlay.robots.push_back(
+        {pose.position, pose.heading_rad, result.solutions.size() > 1 ? std::to_string(i + 1) : ""});
+  }
+  if (result.solutions.empty()) return overlay;
+  const Interpretation& best = result.solutions[0];
+  for (size_t i = 0; i < scan.segments.size(); ++i) {
+    overlay.segments.push_back({best.pose.FloorFromRobot(scan.segments[i].start),
+                                best.pose.FloorFromRobot(scan.segments[i].end), best.labels[i] >= 0});
+  }
+  overlay.captions = {
+      fmt::format("{} of {} segments on walls", best.num_matched, scan.segments.size()),
+      fmt::format("{} {}", result.solutions.size(), result.solutions.size() == 1 ? "solution" : "solutions"),
+      fmt::format("pairings tried: {}", result.num_nodes)};
+  return overlay;
+}
+
+// The first of the scans to locate, and the one after the last.
+// Errors: InvalidArgument for a --scan that is not the number of one.
+Result<std::pair<int, int>> ChosenScans(const Arguments& arguments, int num_scans) {
+  if (!arguments.has_scan) return std::pair(0, num_scans);
+  int scan = 0;
+  if (ParseNumber(arguments.scan, &scan) && scan >= 0 && scan < num_scans) return std::pair(scan, scan + 1);
+  return MakeError(ErrorCode::kInvalidArgument, "{}: --scan '{}': it has {} scan(s), numbered 0 to {}",
+                   arguments.scans, arguments.scan, num_scans, num_scans - 1);
+}
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<ScanView> scans,
+                         ReadScans(arguments.scans, arguments.segment_options));
+  CAIRN_ASSIGN_OR_RETURN(const auto chosen, ChosenScans(arguments, static_cast<int>(scans.size())));
+  const auto [first, end] = chosen;
+  const ViewSearchIndex index(views);
+  const FaceLocator locator(views);
+  int64_t num_located = 0;
+  environment.progress->Begin("locate-scan", end - first, "scans");
+  for (int i = first; i < end; ++i) {
+    if (environment.progress->Cancelled()) return MakeError(ErrorCode::kCancelled, "cancelled");
+    ordered_json line = {{"scan", i}, {"segments", scans[i].segments.size()}};
+    const auto result = SearchInterpretations(index, scans[i].segments, arguments.search_options);
+    if (!result.ok()) {
+      if (result.error().code != ErrorCode::kNoData || end - first == 1) {
+        return MakeError(result.error().code, "{}: scan {}: {}", arguments.scans, i, result.error().message);
+      }
+      line["reason"] = result.error().message;
+      line["solutions"] = ordered_json::array();
+    } else {
+      ordered_json solutions = ordered_json::array();
+      for (const Interpretation& found : result->solutions)
+        solutions.push_back(Json(found, locator.Find(found.pose.position)));
+      num_located += !result->solutions.empty();
+      line["nodes"] = result->num_nodes;
+      line["expanded"] = result->num_expanded;
+      line["candidates"] = result->num_candidates;
+      line["complete"] = result->complete;
+      line["solutions"] = std::move(solutions);
+      if (!arguments.svg.empty() && i == first) {
+        CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+            arguments.svg, decompose_views::DrawViews(views, Overlay(scans[i], *result), /*regions=*/false)));
+      }
+    }
+    *environment.out << JsonText(line) << "\n";
+    environment.progress->Advance();
+  }
+  environment.progress->End();
+  environment.report->in = {{"scans", end - first}};
+  environment.report->out = {{"scans located", num_located}};
+  return Ok();
+}
+
+}  // namespace
+
+Command LocateScanCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  Command command;
+  command.name = "locate-scan";
+  command.summary = "Find where a laser scan was taken in a floor plan";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("scans", arguments->scans,
+                   "Carmen log, or lines x0,y0,x1,y1 of the walls seen (robot frame, metres)")
+        ->required()
+        ->type_name("FILE");
+    // As text, for one error that says how many scans there are.
+    app.add_option_function<std::string>(
+           "--scan",
+           [arguments](const std::string& scan) {
+             arguments->has_scan = true;
+             arguments->scan = scan;
+           },
+           "number of the only scan to locate, from 0")
+        ->type_name("INT");
+    app.add_option("--svg", arguments->svg, "also draw the first scan over the plan")->type_name("FILE.svg");
+    OptionTable table = DescribeOptions(&arguments->segment_options);
+    for (Option& option : DescribeOptions(&arguments->search_options)) table.push_back(std::move(option));
+    arguments->option_arguments.Add(app, std::move(table));
+  };
+  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
+  return command;
+}
+
+}  // namespace cairn::pipeline

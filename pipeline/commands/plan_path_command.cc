@@ -1,0 +1,231 @@
+#include "pipeline/commands/commands.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "core/files/file.h"
+#include "core/plan/views.h"
+#include "pipeline/program/json_text.h"
+#include "runtime/map/open_views.h"
+#include "runtime/paths/disambiguate.h"
+#include "runtime/paths/plan_path.h"
+#include "stages/decompose_views/picture.h"
+
+namespace cairn::pipeline {
+namespace {
+
+using nlohmann::ordered_json;
+using Vec2 = Eigen::Vector2d;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+ordered_json Json(const std::vector<Vec2>& points) {
+  ordered_json list = ordered_json::array();
+  for (const Vec2& point : points) list.push_back({point.x(), point.y()});
+  return list;
+}
+
+struct PathArguments {
+  std::string views;
+  std::vector<double> from, to;
+  std::string kind = "short";
+  std::string svg;
+  PlanPathOptions options;
+  OptionArguments option_arguments;
+};
+
+Status RunPath(const PathArguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  if (arguments.kind != "search" && arguments.to.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "--kind {} needs --to X,Y", arguments.kind);
+  }
+  if (arguments.kind == "search" && !arguments.to.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--kind search ends where the last of the plan is seen; leave --to out");
+  }
+  if (arguments.kind != "search") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"seen_ratio"}, "is for --kind search; leave it out, or change the kind"));
+  }
+  if (arguments.kind == "short") {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"max_num_places"}, "is for --kind min-link and search; leave it out, or change the kind"));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
+  const PlanSpace space(views);
+  const Vec2 from(arguments.from[0], arguments.from[1]);
+  PlanPath path;
+  ordered_json line = {{"kind", arguments.kind}};
+  decompose_views::ViewsOverlay overlay;
+  if (arguments.kind == "search") {
+    CAIRN_ASSIGN_OR_RETURN(SearchPath search, FindSearchPath(space, from, arguments.options));
+    line["places"] = Json(search.places);
+    line["seen_area_m2"] = search.seen_area_m2;
+    line["reachable_area_m2"] = search.reachable_area_m2;
+    overlay.captions = {fmt::format("{} places to look around from", search.places.size())};
+    path = std::move(search.path);
+  } else {
+    const Vec2 to(arguments.to[0], arguments.to[1]);
+    CAIRN_ASSIGN_OR_RETURN(path, arguments.kind == "short"
+                                     ? FindPath(space, from, to, arguments.options)
+                                     : FindMinimumLinkPath(space, from, to, arguments.options));
+  }
+  line["length_m"] = path.length_m;
+  line["links"] = path.num_links();
+  line["points"] = Json(path.points);
+  *environment.out << JsonText(line) << "\n";
+  environment.report->out = {{"links", path.num_links()}};
+  if (arguments.svg.empty()) return Ok();
+  overlay.captions.push_back(fmt::format("{:.1f} m, {} links", path.length_m, path.num_links()));
+  overlay.paths = {path.points};
+  return WriteFileAtomically(arguments.svg, decompose_views::DrawViews(views, overlay, /*regions=*/false));
+}
+
+struct ApartArguments {
+  std::string views;
+  std::vector<double> a, b;
+  std::string svg;
+  DisambiguateOptions options;
+  OptionArguments option_arguments;
+};
+
+// Errors: InvalidArgument for a heading that is no angle; places are checked with the plan.
+Result<PlanarPose> ParsePose(const std::string& option, const std::vector<double>& values) {
+  if (!(std::abs(values[2]) <= 360)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} {:g},{:g},{:g}: the heading must be in [-360, 360] degrees", option, values[0],
+                     values[1], values[2]);
+  }
+  return PlanarPose{{values[0], values[1]}, values[2] * kDegree};
+}
+
+const char* OutcomeName(DisambiguationOutcome outcome) {
+  switch (outcome) {
+    case DisambiguationOutcome::kFound:
+      return "found";
+    case DisambiguationOutcome::kAlike:
+      return "alike";
+    case DisambiguationOutcome::kGaveUp:
+      return "gave_up";
+  }
+  return "";
+}
+
+std::string Caption(const DisambiguationPlan& plan) {
+  switch (plan.outcome) {
+    case DisambiguationOutcome::kFound:
+      return fmt::format("case {}: {:.1f} m to go", plan.kind, plan.path_length_m);
+    case DisambiguationOutcome::kAlike:
+      return "nothing tells a from b";
+    case DisambiguationOutcome::kGaveUp:
+      return fmt::format("gave up after {} regions", plan.num_regions);
+  }
+  return "";
+}
+
+std::string Drawn(const Views& views, const PlanarPose& a, const PlanarPose& b,
+                  const DisambiguationPlan& plan) {
+  decompose_views::ViewsOverlay overlay;
+  overlay.robots = {{a.position, a.heading_rad, "a"}, {b.position, b.heading_rad, "b"}};
+  overlay.captions = {Caption(plan)};
+  if (plan.kind > 0) {
+    overlay.paths = {plan.path_a, plan.path_b};
+    overlay.segments = {{plan.feature_start_a, plan.feature_end_a, plan.feature_is_at_a},
+                        {plan.feature_start_b, plan.feature_end_b, !plan.feature_is_at_a}};
+    overlay.captions.push_back(plan.feature_is_at_a ? "a wall seen from a only" : "a wall seen from b only");
+  }
+  return decompose_views::DrawViews(views, overlay, /*regions=*/false);
+}
+
+Status RunApart(const ApartArguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
+  const Views& views = *opened;
+  const PlanSpace space(views);
+  CAIRN_ASSIGN_OR_RETURN(const PlanarPose a, ParsePose("--a", arguments.a));
+  CAIRN_ASSIGN_OR_RETURN(const PlanarPose b, ParsePose("--b", arguments.b));
+  CAIRN_ASSIGN_OR_RETURN(const DisambiguationPlan plan, PlanDisambiguation(space, a, b, arguments.options));
+  ordered_json line = {
+      {"outcome", OutcomeName(plan.outcome)}, {"case", plan.kind}, {"regions", plan.num_regions}};
+  if (plan.kind > 0) {
+    line["is_best"] = plan.is_best;
+    line["length_m"] = plan.path_length_m;
+    line["path_a"] = Json(plan.path_a);
+    line["path_b"] = Json(plan.path_b);
+    line["feature_at"] = plan.feature_is_at_a ? "a" : "b";
+    line["feature_a"] = Json({plan.feature_start_a, plan.feature_end_a});
+    line["feature_b"] = Json({plan.feature_start_b, plan.feature_end_b});
+    line["distance_m"] = plan.distance_m;
+  }
+  *environment.out << JsonText(line) << "\n";
+  if (!arguments.svg.empty())
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, Drawn(views, a, b, plan)));
+  if (plan.outcome != DisambiguationOutcome::kGaveUp) return Ok();
+  return MakeError(ErrorCode::kFailed,
+                   "gave up: nothing that tells a from b is seen from the {} regions nearest to them, and "
+                   "there are more; allow more with --max-num-regions",
+                   plan.num_regions);
+}
+
+}  // namespace
+
+Command PlanPathCommand() {
+  auto arguments = std::make_shared<PathArguments>();
+  Command command;
+  command.name = "plan-path";
+  command.summary =
+      "Plan a path in a floor plan: a short one, one with few turns, or one that sees everything";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("--from", arguments->from, "start, metres")
+        ->required()
+        ->expected(2)
+        ->delimiter(',')
+        ->type_name("X,Y");
+    app.add_option("--to", arguments->to, "goal, metres")->expected(2)->delimiter(',')->type_name("X,Y");
+    app.add_option("--kind", arguments->kind, "short, min-link (few turns) or search (sees every point)")
+        ->check(CLI::IsMember({"short", "min-link", "search"}))
+        ->capture_default_str();
+    app.add_option("--svg", arguments->svg, "also draw it")->type_name("FILE.svg");
+    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  };
+  command.run = [arguments](const CommandEnvironment& environment) {
+    return RunPath(*arguments, environment);
+  };
+  return command;
+}
+
+Command TellApartCommand() {
+  auto arguments = std::make_shared<ApartArguments>();
+  Command command;
+  command.name = "tell-apart";
+  command.summary = "Plan where to go to tell which of two poses in a floor plan is the right one";
+  command.add_arguments = [arguments](CLI::App& app) {
+    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("--a", arguments->a, "a pose, metres and degrees")
+        ->required()
+        ->expected(3)
+        ->delimiter(',')
+        ->type_name("X,Y,DEG");
+    app.add_option("--b", arguments->b, "another")
+        ->required()
+        ->expected(3)
+        ->delimiter(',')
+        ->type_name("X,Y,DEG");
+    app.add_option("--svg", arguments->svg, "also draw it")->type_name("FILE.svg");
+    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  };
+  command.run = [arguments](const CommandEnvironment& environment) {
+    return RunApart(*arguments, environment);
+  };
+  return command;
+}
+
+}  // namespace cairn::pipeline

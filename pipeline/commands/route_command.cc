@@ -1,0 +1,70 @@
+#include "pipeline/commands/commands.h"
+
+#include <memory>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "core/geometry/floor_pose.h"
+#include "pipeline/program/json_text.h"
+#include "runtime/drive/route.h"
+#include "runtime/map/map.h"
+
+namespace cairn::pipeline {
+namespace {
+
+struct Arguments {
+  std::string map_path;
+  std::string from;
+  std::string to;
+  bool json = false;
+  RouteOptions options;
+  OptionArguments option_arguments;
+};
+
+Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.from));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.to));
+  CAIRN_ASSIGN_OR_RETURN(const Route route, PlanRoute(*map, from, to, arguments.options));
+  auto json = nlohmann::ordered_json{
+      {"num_links", route.num_links}, {"cost", route.cost}, {"images", nlohmann::ordered_json::array()}};
+  std::string text = fmt::format("{:>4}  {:>9} {:>9} {:>8}  {}\n", "", "x, m", "y, m", "heading", "image");
+  for (const int32_t index : route.images) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map->Image(index));
+    const FloorPose place = FloorPoseOf(image->cam_from_world, map->head().floor_from_world);
+    text += fmt::format("{:>4}  {:>9.2f} {:>9.2f} {:>8.1f}  {}\n", json["images"].size(), place.position.x(),
+                        place.position.y(), place.heading_deg, image->name);
+    json["images"].push_back({{"name", image->name},
+                              {"x_m", place.position.x()},
+                              {"y_m", place.position.y()},
+                              {"heading_deg", place.heading_deg}});
+  }
+  *environment.out << (arguments.json ? JsonText(json, 2) + "\n" : text);
+  return Ok();
+}
+
+}  // namespace
+
+Command RouteCommand() {
+  auto arguments = std::make_shared<Arguments>();
+  return {
+      .name = "route",
+      .summary =
+          "Lists the images on the way from one survey image to another, over those that the map keeps",
+      .add_arguments =
+          [arguments](CLI::App& app) {
+            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
+            app.add_option("from", arguments->from, "Survey image to start at")
+                ->required()
+                ->type_name("IMAGE");
+            app.add_option("to", arguments->to, "Survey image to go to")->required()->type_name("IMAGE");
+            app.add_flag("--json", arguments->json, "Print JSON");
+            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+  };
+}
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,108 @@
+#include "pipeline/exchange/import/parts.h"
+
+#include <algorithm>
+#include <array>
+
+#include <Eigen/SVD>
+
+#include "core/base/text.h"
+#include "core/capture/image_file.h"
+#include "core/colmap/colmap_model.h"
+
+namespace cairn::pipeline {
+
+std::vector<ListLine> ListLines(std::string_view contents, const std::string& path) {
+  std::vector<ListLine> lines;
+  int line_number = 0;
+  for (const std::string_view line : SplitLines(contents)) {
+    ++line_number;
+    const std::string_view text = Trim(line);
+    if (!text.empty() && !text.starts_with('#'))
+      lines.push_back({text, fmt::format("{}:{}", path, line_number)});
+  }
+  return lines;
+}
+
+Result<std::vector<double>> ParseNumbers(std::span<const std::string> words) {
+  std::vector<double> numbers;
+  for (const std::string& word : words) {
+    double number = 0;
+    // A leading '+' is read by everybody but from_chars.
+    if (!ParseNumber(std::string_view(word).substr(word.starts_with('+') ? 1 : 0), &number))
+      return MakeError(ErrorCode::kCorrupt, "'{}' is not a number", word);
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+Result<Pose> PoseFromMatrix(std::span<const double> rows) {
+  constexpr double kMaxRotationError = 0.02;
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(rows.data());
+  if (!matrix.allFinite()) return MakeError(ErrorCode::kCorrupt, "pose is not finite");
+  const Eigen::Matrix3d R = matrix.leftCols<3>();
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error > kMaxRotationError || R.determinant() < 0) {
+    return MakeError(ErrorCode::kCorrupt,
+                     "the pose's rotation is none: R R^T is off by {:g}, its determinant is {:g}", error,
+                     R.determinant());
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
+  return Pose{Eigen::Quaterniond(nearest).normalized(), matrix.col(3)};
+}
+
+Result<Pose> PoseFromNumbers(std::span<const double> numbers) {
+  Pose pose{Eigen::Quaterniond(numbers[0], numbers[1], numbers[2], numbers[3]),
+            Eigen::Vector3d(numbers[4], numbers[5], numbers[6])};
+  CAIRN_RETURN_IF_ERROR(NormalizePose(&pose));
+  return pose;
+}
+
+Camera CameraFromOpenCv(CameraId camera_id, CameraModel model, int width, int height,
+                        std::vector<double> params) {
+  Camera camera;
+  camera.camera_id = camera_id;
+  camera.model = model;
+  camera.width = width;
+  camera.height = height;
+  camera.params = std::move(params);
+  const bool has_one_focal = model == CameraModel::kSimplePinhole || model == CameraModel::kSimpleRadial ||
+                             model == CameraModel::kRadial;
+  const size_t first = has_one_focal ? 1 : 2;
+  camera.params[first] += 0.5;
+  camera.params[first + 1] += 0.5;
+  return camera;
+}
+
+Result<ImageSize> ReadImageSize(const std::string& path) {
+  CAIRN_ASSIGN_OR_RETURN(const cv::Mat image, ReadGreyImage(path));
+  return ImageSize{image.cols, image.rows};
+}
+
+void Trajectory::Sort() {
+  std::stable_sort(poses_.begin(), poses_.end(),
+                   [](const TimedPose& a, const TimedPose& b) { return a.time_ns < b.time_ns; });
+}
+
+Result<Pose> Trajectory::At(int64_t time_ns, double max_gap_s) const {
+  const auto next = std::lower_bound(poses_.begin(), poses_.end(), time_ns,
+                                     [](const TimedPose& pose, int64_t time) { return pose.time_ns < time; });
+  if (next != poses_.end() && next->time_ns == time_ns) return next->pose;
+  if (next == poses_.begin() || next == poses_.end()) {
+    return MakeError(ErrorCode::kNoData, "no stated pose {} it", next == poses_.begin() ? "before" : "after");
+  }
+  const TimedPose& before = *std::prev(next);
+  const double since_s = 1e-9 * static_cast<double>(time_ns - before.time_ns);
+  const double until_s = 1e-9 * static_cast<double>(next->time_ns - time_ns);
+  if (std::max(since_s, until_s) > max_gap_s) {
+    return MakeError(ErrorCode::kNoData,
+                     "the stated poses around it are {:.3f} s before and {:.3f} s after, farther than {:g} s "
+                     "(--max-time-gap-s)",
+                     since_s, until_s, max_gap_s);
+  }
+  const double ratio = since_s / (since_s + until_s);
+  return Pose{before.pose.rotation.slerp(ratio, next->pose.rotation).normalized(),
+              (1 - ratio) * before.pose.translation + ratio * next->pose.translation};
+}
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <ostream>
+#include <streambuf>
+#include <string>
+
+namespace cairn::pipeline {
+
+// Writes to `target` what it is given as Printable shows it (core/base/printable.h): the one way of results
+// and messages to a terminal, so that no name in a map, a capture or a recipe can command it.  What commands
+// the terminal on purpose, the progress bar and colours, goes past it.  A character may come in parts;
+// flushing ends it.
+class PrintableStream : public std::ostream {
+ public:
+  explicit PrintableStream(std::ostream& target) : std::ostream(nullptr), buffer_(target.rdbuf()) {
+    rdbuf(&buffer_);
+  }
+
+ private:
+  class Buffer : public std::streambuf {
+   public:
+    explicit Buffer(std::streambuf* target) : target_(target) {}
+    ~Buffer() override;
+    Buffer(const Buffer&) = delete;
+    Buffer& operator=(const Buffer&) = delete;
+
+   protected:
+    int_type overflow(int_type c) override;
+    std::streamsize xsputn(const char* text, std::streamsize size) override;
+    int sync() override;
+
+   private:
+    bool Write(std::string_view text);
+
+    std::streambuf* target_;
+    std::string begun_;  // a character whose last bytes are still to come
+  };
+
+  Buffer buffer_;
+};
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,235 @@
+/* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, hand it grey pixels.
+ *
+ * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
+ * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
+ * crashes it: null pointers, handles that were closed or never opened, sizes that do not fit, a localizer
+ * used by two threads at once.
+ *
+ * ABI: a program built with this header runs with every later libcairn-runtime.so.0.  Functions are only
+ * added.  Structs begin with their size and only grow at their end: set `size` to sizeof the struct before
+ * every call (CAIRN_FIX_INIT and the like do), and the library touches no more than that.
+ *
+ * Threads: a map is shared by all, a localizer is for one thread at a time.
+ * Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x right, y down;
+ * poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the frame of the
+ * surveyed capture.
+ */
+#ifndef CAIRN_RUNTIME_CAIRN_H_
+#define CAIRN_RUNTIME_CAIRN_H_
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(__GNUC__)
+#define CAIRN_API __attribute__((visibility("default")))
+#else
+#define CAIRN_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Error codes: the program's exit codes (core/base/error.h).  Append-only. */
+enum {
+  CAIRN_OK = 0,
+  CAIRN_FAILED = 1,           /* anything that has no code of its own */
+  CAIRN_INVALID_ARGUMENT = 2, /* a call that cannot be meant: null, a closed handle, a wrong size */
+  CAIRN_NOT_FOUND = 3,        /* a file, a camera or a part of a map that does not exist */
+  CAIRN_CORRUPT = 4,          /* a map that is damaged */
+  CAIRN_UNSUPPORTED = 5,      /* a camera model or a version that this library does not know */
+  CAIRN_NO_DATA = 6,
+  CAIRN_IO = 7,
+  CAIRN_GATE = 8,
+  CAIRN_BUSY = 9, /* another thread is using this localizer */
+  CAIRN_CANCELLED = 10,
+  CAIRN_EMPTY_FILE = 11,
+  CAIRN_TRUNCATED = 12,
+  CAIRN_NOT_SQLITE = 13,
+  CAIRN_FOREIGN_FILE = 14,
+  CAIRN_TOO_NEW = 15,
+  CAIRN_TOO_OLD = 16,
+  CAIRN_NOT_SIGNED = 17,
+  CAIRN_WRONG_KEY = 18,
+  CAIRN_READ_ONLY = 19,
+  CAIRN_DISK_FULL = 20,
+  CAIRN_LOST = 21,
+  CAIRN_NOT_NEWER = 22, /* a signed map of an epoch that is not after what this robot has or asks for */
+  CAIRN_OTHER_MAP = 23  /* a signed map of another name: another site's */
+};
+
+/* Why an image has no fix: a result, not an error.  Append-only. */
+enum {
+  CAIRN_FIX = 0,              /* there is one */
+  CAIRN_TOO_FEW_FEATURES = 1, /* blank, dark or blurred */
+  CAIRN_NO_CANDIDATES = 2,    /* nothing in the map looks like it */
+  CAIRN_TOO_FEW_MATCHES = 3,
+  CAIRN_NO_POSE = 4,
+  CAIRN_TOO_FEW_INLIERS = 5,
+  CAIRN_POOR_SPREAD = 6,
+  CAIRN_UNCERTAIN = 7,
+  CAIRN_FAR_FROM_SURVEY = 8,
+  CAIRN_AMBIGUOUS = 9 /* another place explains the image nearly as well */
+};
+
+/* Handles.  They are numbers in disguise, not addresses: one that was closed is never taken for another. */
+typedef struct cairn_map cairn_map;
+typedef struct cairn_localizer cairn_localizer;
+
+#define CAIRN_MESSAGE_BYTES 256
+#define CAIRN_MAX_CAMERA_PARAMS 12
+
+typedef struct cairn_map_options {
+  size_t size;
+  int64_t memory_budget_bytes; /* what is loaded of the map and kept, at most; 0: the default, 256 MiB */
+  const uint8_t* public_key;   /* 32 bytes: maps that this key has not signed are refused; NULL: any map */
+  /* To be trusted only with a key: without one, anybody can write a map that says so. */
+  const char* name;    /* maps of another name are refused (CAIRN_OTHER_MAP); NULL or "": any name */
+  uint64_t min_epoch;  /* maps of an earlier epoch are refused (CAIRN_NOT_NEWER); 0: any */
+  int32_t allow_older; /* 1: cairn_map_update takes an earlier or the same epoch, too; never another map */
+  int32_t reserved;    /* 0 */
+} cairn_map_options;
+#define CAIRN_MAP_OPTIONS_INIT \
+  { sizeof(cairn_map_options), 0, NULL, NULL, 0, 0, 0 }
+
+/* What a map says of itself. */
+typedef struct cairn_map_description {
+  size_t size;
+  int64_t num_landmarks;
+  int64_t num_images; /* of the survey */
+  int64_t num_regions;
+  int32_t has_visual_map; /* 1: cairn_localize_on_floor works */
+  int32_t is_metric;      /* 0: nothing gave the survey its scale, "metres" are of arbitrary length */
+  char name[128];         /* as the recipe calls it, cut to fit, always with a NUL */
+  uint64_t epoch;         /* counts the signed releases of a map of this name; 0: never counted */
+} cairn_map_description;
+#define CAIRN_MAP_DESCRIPTION_INIT \
+  { sizeof(cairn_map_description), 0, 0, 0, 0, 0, {0}, 0 }
+
+/* Intrinsics: COLMAP's models by their numbers, with its parameters in its order (0 SIMPLE_PINHOLE: f, cx,
+ * cy; 1 PINHOLE: fx, fy, cx, cy; 2 SIMPLE_RADIAL: f, cx, cy, k; 4 OPENCV: fx, fy, cx, cy, k1, k2, p1, p2;
+ * ...), px.  The centre of the first pixel is at (0.5, 0.5). */
+typedef struct cairn_camera {
+  size_t size;
+  int32_t model;
+  int32_t width, height; /* px */
+  int32_t num_params;
+  double params[CAIRN_MAX_CAMERA_PARAMS];
+} cairn_camera;
+#define CAIRN_CAMERA_INIT                   \
+  {                                         \
+    sizeof(cairn_camera), 0, 0, 0, 0, { 0 } \
+  }
+
+/* 8-bit grey pixels: `height` rows of `width` bytes, `stride` bytes from one row's begin to the next.  Only
+ * read, and only during the call. */
+typedef struct cairn_image {
+  size_t size;
+  const uint8_t* pixels;
+  int32_t width, height; /* px */
+  size_t stride;         /* bytes, >= width; 0: rows without gaps */
+} cairn_image;
+#define CAIRN_IMAGE_INIT \
+  { sizeof(cairn_image), NULL, 0, 0, 0 }
+
+/* Where the camera is believed to be. */
+typedef struct cairn_prior {
+  size_t size;
+  double rotation_wxyz[4]; /* cam_from_world, a unit quaternion */
+  double translation_m[3];
+  double sigma_m;   /* of the camera's place, per axis, > 0 */
+  double sigma_deg; /* of its rotation, > 0 */
+} cairn_prior;
+#define CAIRN_PRIOR_INIT \
+  { sizeof(cairn_prior), {1, 0, 0, 0}, {0, 0, 0}, 1, 10 }
+
+/* A fix, or the reason for none. */
+typedef struct cairn_fix {
+  size_t size;
+  int32_t has_fix; /* 1 or 0 */
+  int32_t reason;  /* CAIRN_FIX, or why there is none */
+  /* With a fix, else zero. */
+  double rotation_wxyz[4]; /* cam_from_world */
+  double translation_m[3];
+  double center_m[3]; /* where the camera stands, world frame */
+  /* 6 x 6: rotation (rad), translation (m), of the left perturbation of cam_from_world. */
+  double covariance[36];
+  int32_t region; /* with most inliers; -1: of none */
+  int32_t num_features, num_matches, num_inliers;
+  char
+      message[CAIRN_MESSAGE_BYTES]; /* why there is no fix: found and needed; cut to fit, always with a NUL */
+} cairn_fix;
+#define CAIRN_FIX_INIT                                             \
+  {                                                                \
+    sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, { 0 } \
+  }
+
+/* A place on the floor, by how landmarks look from where (maps with a visual map). */
+typedef struct cairn_floor_fix {
+  size_t size;
+  int32_t has_fix;
+  int32_t num_matches, num_agreeing;
+  int32_t reserved;
+  double position_m[2]; /* floor frame */
+  double heading_deg;   /* counter-clockwise from +x, [0, 360) */
+  double covariance[9]; /* 3 x 3: x m, y m, heading rad; without a fix that of the whole survey */
+  char message[CAIRN_MESSAGE_BYTES];
+} cairn_floor_fix;
+#define CAIRN_FLOOR_FIX_INIT                                \
+  {                                                         \
+    sizeof(cairn_floor_fix), 0, 0, 0, 0, {0}, 0, {0}, { 0 } \
+  }
+
+/* "0.1.0". */
+CAIRN_API const char* cairn_version(void);
+/* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES; "unknown" for a number that is
+ * none. */
+CAIRN_API const char* cairn_error_name(int32_t code);
+CAIRN_API const char* cairn_reason_name(int32_t reason);
+/* Of the last call of this thread that failed: names what was found and what to do.  Never NULL; valid until
+ * this thread's next call of the library. */
+CAIRN_API const char* cairn_last_error(void);
+
+/* Opens a map file, which must not change while it is open.  `options` may be NULL.  On an error *map is
+ * NULL. */
+CAIRN_API int32_t cairn_map_open(const char* path, const cairn_map_options* options, cairn_map** map);
+CAIRN_API int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* description);
+/* The survey's camera of this image size.  CAIRN_NOT_FOUND when none or more than one has it. */
+CAIRN_API int32_t cairn_map_camera_for_size(const cairn_map* map, int32_t width, int32_t height,
+                                            cairn_camera* camera);
+/* Localizers of the map stay usable.  NULL is fine; a handle that is closed already is
+ * CAIRN_INVALID_ARGUMENT. */
+CAIRN_API int32_t cairn_map_close(cairn_map* map);
+
+CAIRN_API int32_t cairn_localizer_create(const cairn_map* map, cairn_localizer** localizer);
+/* Any option that `cairn localize --help` lists under "Stage options", as text: ("min_num_inliers", "9"). */
+CAIRN_API int32_t cairn_localizer_set_option(cairn_localizer* localizer, const char* name, const char* value);
+CAIRN_API int32_t cairn_localizer_destroy(cairn_localizer* localizer);
+
+/* `camera` NULL: the survey's of the image's size; `prior` may be NULL.  An image without a fix is no error:
+ * see fix->has_fix.  After an error *fix says that there is none. */
+CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image,
+                                 const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix);
+/* The same by the visual map, on the floor.  CAIRN_NOT_FOUND where the map has none; the first call loads it.
+ */
+CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
+                                          const cairn_camera* camera, cairn_floor_fix* fix);
+
+/* Maps sent as what changed (`cairn delta`).  Brings the file at `map_path` to the map that the delta leads
+ * to: at any instant it is the whole old or the whole new one, and the old one stays beside it, for
+ * cairn_map_roll_back.  Who has the map open keeps the old one; open it again.  `options`, which may be NULL:
+ * delta and new map must be signed with the public key; name, min_epoch, allow_older.  *was_updated (may be
+ * NULL): 0 where the map is the new one already.  CAIRN_INVALID_ARGUMENT: the delta leads from another map;
+ * CAIRN_NOT_NEWER, CAIRN_OTHER_MAP: a key is required, or the map in place is signed, and the new map does
+ * not follow it; CAIRN_BUSY: another update is at work in the folder. */
+CAIRN_API int32_t cairn_map_update(const char* map_path, const char* delta_path,
+                                   const cairn_map_options* options, int32_t* was_updated);
+/* Exchanges the map and the one before the last update; a second time exchanges them back.  min_epoch holds
+ * here too; allow_older does not matter. */
+CAIRN_API int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options);
+
+#ifdef __cplusplus
+} /* extern "C" */
+#endif
+
+#endif /* CAIRN_RUNTIME_CAIRN_H_ */

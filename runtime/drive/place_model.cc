@@ -1,0 +1,116 @@
+#include "runtime/drive/place_model.h"
+
+#include <algorithm>
+
+#include "core/base/no_throw.h"
+
+namespace cairn {
+
+OptionTable DescribeOptions(PlaceModelOptions* options) {
+  return {{.name = "score_exponent",
+           .value = &options->score_exponent,
+           .help = "probabilities go with scores to this power; more: the best-looking place counts for more",
+           .min = 1e-3,
+           .max = 100}};
+}
+
+Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& options) {
+  return WithoutExceptions("place model", [&]() -> Result<PlaceModel> {
+    PlaceModelOptions checked = options;
+    CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+    PlaceModel model;
+    model.options_ = options;
+    CAIRN_ASSIGN_OR_RETURN(model.appearance_, map.Appearance());
+    if (model.appearance_->is_kept.empty() || !map.has_words()) {
+      return MakeError(
+          ErrorCode::kNotFound,
+          "map '{}' has {}: places cannot be told apart by looking; compile it with [emit_map] words = "
+          "\"survey\"",
+          map.head().name, map.has_words() ? "no appearance graph" : "no visual words");
+    }
+    CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
+    model.vocabulary_ = *tree;
+    for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kWords); ++ordinal) {
+      CAIRN_ASSIGN_OR_RETURN(const auto words, map.Words(ordinal));
+      std::copy(words->postings.begin(), words->postings.end(),
+                model.vocabulary_.inverted_files.begin() + words->first);
+    }
+    model.vocabulary_.document_ids.resize(map.num_images());
+    for (size_t i = 0; i < model.vocabulary_.document_ids.size(); ++i)
+      model.vocabulary_.document_ids[i] = static_cast<ImageId>(i);
+    WeightVocabulary(&model.vocabulary_);
+    model.bags_ = DocumentWords(model.vocabulary_);
+    return model;
+  });
+}
+
+Result<PlaceView> ViewOfImage(const Map& map, int32_t image) {
+  CAIRN_ASSIGN_OR_RETURN(const auto of_map, map.Image(image));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(of_map->landmarks, true));
+  PlaceView view;
+  for (const MapLandmark& landmark : landmarks->landmarks)
+    view.bearings.push_back((of_map->cam_from_world * landmark.position).normalized());
+  view.packed = landmarks->packed;
+  return view;
+}
+
+std::vector<double> PlaceModel::ImageScores(const BagOfWords& bag) const {
+  std::vector<double> scores = ScoreDocuments(vocabulary_, bag);
+  for (size_t image = 0; image < scores.size(); ++image) {
+    if (appearance_->node_of_image[image] < 0) scores[image] = 0;
+  }
+  return scores;
+}
+
+PlaceScores PlaceModel::OfNodes(const std::vector<double>& scores) const {
+  const std::vector<double> probabilities = ProbabilitiesOfScores(scores, options_.score_exponent);
+  PlaceScores places{std::vector<double>(num_nodes(), 0.0), std::vector<double>(num_nodes(), 0.0)};
+  double sum = 0;
+  for (size_t image = 0; image < scores.size(); ++image) {
+    const NodeIdx node = appearance_->node_of_image[image];
+    if (node < 0) continue;
+    places.scores[node] = std::max(places.scores[node], scores[image]);
+    places.probabilities[node] += probabilities[image];
+    sum += probabilities[image];
+  }
+  for (double& p : places.probabilities) p /= sum;
+  return places;
+}
+
+PlaceScores PlaceModel::Look(const DescriptorMatrix& descriptors) const {
+  return OfNodes(ImageScores(CountWords(vocabulary_, descriptors)));
+}
+
+Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
+                                           const RerankOptions& options) const {
+  return WithoutExceptions("place model", [&]() -> Result<PlaceScores> {
+    const std::vector<double> by_words = ImageScores(CountWords(vocabulary_, query.features.descriptors));
+    const std::vector<int32_t> order = BestFirst(by_words);
+    std::vector<PlaceView> views;
+    for (const int32_t image : order) {
+      if (by_words[image] <= 0 || static_cast<int>(views.size()) >= options.num_candidates) break;
+      CAIRN_ASSIGN_OR_RETURN(PlaceView view, ViewOfImage(map, image));
+      views.push_back(std::move(view));
+    }
+    std::vector<const PlaceView*> candidates;
+    for (const PlaceView& view : views) candidates.push_back(&view);
+    CAIRN_ASSIGN_OR_RETURN(const auto places,
+                           RerankPlaces(MakePlaceView(query.features, query.camera), candidates, options, 1));
+    if (places.empty() || !places.front().is_verified()) return OfNodes(by_words);
+    std::vector<double> verified(by_words.size(), 0.0);
+    for (const RerankedPlace& place : places) verified[order[place.candidate]] = place.score;
+    return OfNodes(verified);
+  });
+}
+
+std::vector<double> PlaceModel::Expected(NodeIdx node) const {
+  const std::vector<int32_t>& images = appearance_->node_images[node];
+  std::vector<double> mean(num_nodes(), 0.0);
+  for (const int32_t image : images) {
+    const std::vector<double> probabilities = OfNodes(ImageScores(bags_[image])).probabilities;
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] += probabilities[i] / static_cast<double>(images.size());
+  }
+  return mean;
+}
+
+}  // namespace cairn

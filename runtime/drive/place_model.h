@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "core/vocabulary/document_scores.h"
+#include "core/vocabulary/rerank_places.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
+
+namespace cairn {
+
+struct PlaceModelOptions {
+  // Of ProbabilitiesOfScores.  REQUIRES: > 0
+  double score_exponent = kScoreExponent;
+};
+OptionTable DescribeOptions(PlaceModelOptions* options);
+
+// What an image says about where it was taken, before anything is matched: of the nodes of the appearance
+// graph.
+struct PlaceScores {
+  std::vector<double> scores;  // per node: the best of its images', in [0, 1]; zeros: nothing is shared
+  std::vector<double>
+      probabilities;  // p(X = node | image) [Mariottini11 §IV]: sums to 1, all alike for zeros
+};
+
+// A survey image of a map as geometry sees it: the landmarks that it shows, where they are and as they look.
+// Errors: as Map::Landmarks.
+Result<PlaceView> ViewOfImage(const Map& map, int32_t image);
+
+// Scores images against the places of a map by its visual words [Mariottini11 §IV].  Holds the whole
+// vocabulary and its inverted files: unlike a Localizer it looks at all of the map for every image.
+// Immutable, shareable between threads.
+class PlaceModel {
+ public:
+  // Errors: NotFound (a map without appearance graph or without words: says how to get one), InvalidArgument
+  // (an option), Corrupt.
+  static Result<PlaceModel> Make(const Map& map, const PlaceModelOptions& options = {});
+
+  int num_nodes() const { return static_cast<int>(appearance_->is_kept.size()); }
+  const AppearanceMap& appearance() const { return *appearance_; }
+
+  // Of an image's descriptors (n x 128); none: nothing is known.  Touches shared words only.
+  PlaceScores Look(const DescriptorMatrix& descriptors) const;
+  // A closer look, for a robot that stands still because it is lost: the images that score best by their
+  // words are verified (core/vocabulary/rerank_places.h), and those that are get the score of that instead,
+  // the others none.  Where none is, the same as Look.  Costs one matching of descriptors for each of them.
+  // `map`: the one that the model is of, best with all landmarks. Errors: InvalidArgument (an option), and as
+  // Map::Landmarks.  No exception leaves it.
+  Result<PlaceScores> LookCloser(const Map& map, const Query& query, const RerankOptions& options = {}) const;
+  // h' = p(X | Z of a node) [Mariottini11 eq. 7]: what a robot at the node expects to get, the mean over its
+  // images.
+  std::vector<double> Expected(NodeIdx node) const;
+
+ private:
+  PlaceModel() = default;
+  std::vector<double> ImageScores(const BagOfWords& bag) const;  // images of no node: 0
+  PlaceScores OfNodes(const std::vector<double>& image_scores) const;
+
+  std::shared_ptr<const AppearanceMap> appearance_;
+  Vocabulary vocabulary_;  // documents: the map's images, by index
+  std::vector<BagOfWords> bags_;
+  PlaceModelOptions options_;
+};
+
+}  // namespace cairn

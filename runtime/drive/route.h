@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "runtime/map/map.h"
+
+namespace cairn {
+
+struct RouteOptions {
+  // What the links of a way add up: "links": 1 each; "matches": 1 / verified inliers, over which the planner
+  // that [Mariottini11 §V] compares with runs; "entropy": the mean of the entropies at both ends (eq. 2), so
+  // that the way leads where the robot can tell where it is.
+  std::string weight = "links";
+};
+OptionTable DescribeOptions(RouteOptions* options);
+
+// A way over nodes of the appearance graph.
+struct NodePath {
+  std::vector<NodeIdx> nodes;  // the start, ..., the goal; one where they are the same
+  double cost = 0;             // sum of the links' weights
+  double MeanCost() const { return nodes.size() < 2 ? 0 : cost / static_cast<double>(nodes.size() - 1); }
+};
+
+// From each start the way of least cost to the goal over kept nodes (its ends may be others) [Booij06 §IV:
+// paths over the connected dominating set; Mariottini11 §V: Dijkstra], of equal ones the one of fewest links,
+// of these the one through the smallest nodes; nothing where there is none.  O(links log links).  REQUIRES:
+// nodes of the graph.  Errors: InvalidArgument (no such weight), NotFound (weight "entropy" in a map without
+// entropies).
+Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
+                                                       const std::vector<NodeIdx>& starts, NodeIdx goal,
+                                                       const RouteOptions& options);
+
+// A way from image to image along which each shows what the next one shows: a robot that can steer by its
+// camera follows it without a metric map [Booij06 §I].
+struct Route {
+  std::vector<int32_t> images;  // indices: the start, then one per place on the way, then the goal
+  int num_links = 0;            // between places; 0: start and goal were taken at one place
+  double cost = 0;              // sum of the links' weights
+};
+
+// FindPaths for two images.  Errors: the same; InvalidArgument (no such image), NotFound (the map has no
+// appearance graph; one of the images is not in it; no path leads from one to the other), Corrupt (a damaged
+// block).
+Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOptions& options = {});
+
+// The index of a survey image by its name.  O(images).  Errors: NotFound (no such image), Corrupt.
+Result<int32_t> FindImage(const Map& map, const std::string& name);
+
+}  // namespace cairn

@@ -1,0 +1,184 @@
+#include "runtime/localize/accept.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+namespace cairn {
+namespace {
+
+int NumCells(const Query& query, const std::vector<Correspondence>& inliers, int grid) {
+  std::set<std::pair<int, int>> cells;
+  for (const Correspondence& inlier : inliers) {
+    const Keypoint& keypoint = query.features.keypoints[inlier.keypoint];
+    cells.emplace(static_cast<int>(keypoint.x * grid / query.camera.width),
+                  static_cast<int>(keypoint.y * grid / query.camera.height));
+  }
+  return static_cast<int>(cells.size());
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(
+      std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
+}
+
+double Log10Choose(int n, int k) {
+  return (std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0)) / std::numbers::ln10;
+}
+
+}  // namespace
+
+double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
+                      double max_error_px, const Camera& camera) {
+  constexpr size_t kMaxSamples = 400;  // matches looked at; pairs grow with their square
+  const size_t stride = measurements.size() / kMaxSamples + 1;
+  std::vector<std::pair<const QueryRay*, Eigen::Vector2d>> samples;  // keypoint, its landmark's ray
+  for (size_t i = 0; i < measurements.size(); i += stride) {
+    const Eigen::Vector3d point = cam_from_world * measurements[i].point;
+    if (point.z() > 0) samples.emplace_back(&measurements[i].ray, point.hnormalized());
+  }
+  int64_t num_close = 0;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    for (size_t j = 0; j < samples.size(); ++j) {
+      const Eigen::Vector2d offset =
+          samples[i].first->pixel_from_ray * (samples[j].second - samples[i].first->ray);
+      num_close += i != j && offset.squaredNorm() <= max_error_px * max_error_px ? 1 : 0;
+    }
+  }
+  const double num_pairs =
+      std::max(1.0, static_cast<double>(samples.size()) * (static_cast<double>(samples.size()) - 1));
+  const double disc =
+      std::numbers::pi * max_error_px * max_error_px / (static_cast<double>(camera.width) * camera.height);
+  return std::min(1.0, std::max(disc, static_cast<double>(num_close) / num_pairs));
+}
+
+double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier) {
+  constexpr int kSampleSize = 3;
+  if (num_inliers <= kSampleSize) return std::numeric_limits<double>::infinity();
+  return Log10Choose(num_matches, kSampleSize) +
+         Log10Choose(num_matches - kSampleSize, num_inliers - kSampleSize) +
+         (num_inliers - kSampleSize) * std::log10(chance_of_inlier);
+}
+
+const char* NoFixName(NoFix reason) {
+  switch (reason) {
+    case NoFix::kNone:
+      return "none";
+    case NoFix::kTooFewFeatures:
+      return "too_few_features";
+    case NoFix::kNoCandidates:
+      return "no_candidates";
+    case NoFix::kTooFewMatches:
+      return "too_few_matches";
+    case NoFix::kNoPose:
+      return "no_pose";
+    case NoFix::kTooFewInliers:
+      return "too_few_inliers";
+    case NoFix::kPoorSpread:
+      return "poor_spread";
+    case NoFix::kUncertain:
+      return "uncertain";
+    case NoFix::kFarFromSurvey:
+      return "far_from_survey";
+    case NoFix::kAmbiguous:
+      return "ambiguous";
+  }
+  return "none";
+}
+
+OptionTable DescribeOptions(AcceptOptions* o) {
+  OptionTable table = {
+      {.name = "min_num_features",
+       .value = &o->min_num_features,
+       .help = "least features of the image",
+       .min = 4},
+      {.name = "min_num_matches",
+       .value = &o->min_num_matches,
+       .help = "least matches to try for a pose",
+       .min = 4},
+      {.name = "min_num_unguided_inliers",
+       .value = &o->min_num_unguided_inliers,
+       .help = "least matches found without the pose that agree with it",
+       .min = 4},
+      {.name = "max_log10_chance",
+       .value = &o->max_log10_chance,
+       .help = "log10 of the number of poses that random matches would agree on as well, at most"},
+      {.name = "min_num_inliers", .value = &o->min_num_inliers, .help = "least inliers in all", .min = 5},
+      {.name = "min_kept_ratio",
+       .value = &o->min_kept_ratio,
+       .help = "least inliers after refinement, as part of those before",
+       .min = 0,
+       .max = 1},
+      {.name = "spread_grid",
+       .value = &o->spread_grid,
+       .help = "cells per side of the image for the spread",
+       .min = 1},
+      {.name = "min_num_cells", .value = &o->min_num_cells, .help = "least cells with inliers", .min = 1},
+      {.name = "max_sigma_m",
+       .value = &o->max_sigma_m,
+       .help = "largest standard deviation of the place in the worst direction, m",
+       .min = 1e-6},
+      {.name = "max_sigma_deg",
+       .value = &o->max_sigma_deg,
+       .help = "largest standard deviation of the rotation about the worst axis, degrees",
+       .min = 1e-6},
+      {.name = "max_distance_from_survey_m",
+       .value = &o->max_distance_from_survey_m,
+       .help = "largest distance from the nearest survey image, m; 0: any",
+       .min = 0},
+      {.name = "max_second_pose_ratio",
+       .value = &o->max_second_pose_ratio,
+       .help =
+           "a second pose with this part of the first one's inliers makes it ambiguous; 0: not looked for",
+       .min = 0,
+       .max = 1},
+      {.name = "num_second_pose_iterations",
+       .value = &o->num_second_pose_iterations,
+       .help = "samples that look for the second pose",
+       .min = 1},
+      {.name = "second_pose_distance_m",
+       .value = &o->second_pose_distance_m,
+       .help = "poses this far apart are different, m",
+       .min = 1e-6},
+      {.name = "second_pose_angle_deg",
+       .value = &o->second_pose_angle_deg,
+       .help = "poses this far apart are different, degrees",
+       .min = 1e-6},
+  };
+  AddCondition({"max_second_pose_ratio", {"not 0"}},
+               {"num_second_pose_iterations", "second_pose_distance_m", "second_pose_angle_deg"}, &table);
+  return table;
+}
+
+Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
+                  double distance_from_survey_m, const AcceptOptions& options) {
+  if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
+    return {NoFix::kTooFewInliers,
+            fmt::format("{} inliers, at least {} are needed", inliers.size(), options.min_num_inliers)};
+  }
+  const int num_cells = NumCells(query, inliers, options.spread_grid);
+  if (num_cells < options.min_num_cells) {
+    return {NoFix::kPoorSpread, fmt::format("inliers in {} cells of the image, at least {} are needed",
+                                            num_cells, options.min_num_cells)};
+  }
+  const double sigma_deg = DegFromRad(LargestSigma(pose.covariance.topLeftCorner<3, 3>()));
+  const double sigma_m = LargestSigma(pose.covariance.bottomRightCorner<3, 3>());
+  if (!(sigma_m <= options.max_sigma_m) || !(sigma_deg <= options.max_sigma_deg)) {
+    return {NoFix::kUncertain,
+            fmt::format("standard deviation {:.3f} m and {:.2f} degrees, at most {} and {} are allowed",
+                        sigma_m, sigma_deg, options.max_sigma_m, options.max_sigma_deg)};
+  }
+  if (options.max_distance_from_survey_m > 0 && distance_from_survey_m > options.max_distance_from_survey_m) {
+    return {NoFix::kFarFromSurvey,
+            fmt::format("{:.1f} m from the nearest survey image, at most {} m are allowed",
+                        distance_from_survey_m, options.max_distance_from_survey_m)};
+  }
+  return {};
+}
+
+}  // namespace cairn

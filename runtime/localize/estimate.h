@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/geometry/pose.h"
+#include "core/options/options.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
+
+namespace cairn {
+
+struct EstimateOptions {
+  // Largest reprojection error of an inlier, px.  REQUIRES: > 0
+  double max_error_px = 6;
+  // Probability of drawing one sample of inliers only, at the inlier ratio found so far.  REQUIRES: in (0, 1)
+  double confidence = 0.9999;
+  // REQUIRES: >= 1
+  int min_num_ransac_iterations = 64;
+  int max_num_ransac_iterations = 3000;
+};
+OptionTable DescribeOptions(EstimateOptions* options);
+
+struct PoseEstimate {
+  Pose cam_from_world;
+  std::vector<int> inliers;  // indices of measurements, ascending
+  int num_iterations = 0;
+};
+
+// Pose from correspondences of which many are wrong: RANSAC over three points (P3P, OpenCV), truncated
+// squared errors as score, each best pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler,
+// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result. Nothing when no pose has at
+// least 4 inliers.
+std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
+                                         const EstimateOptions& options, const RefineOptions& refine_options,
+                                         uint64_t seed);
+
+}  // namespace cairn

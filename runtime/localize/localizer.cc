@@ -1,0 +1,411 @@
+#include "runtime/localize/localizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "core/base/no_throw.h"
+
+namespace cairn {
+namespace {
+
+// Seed of RANSAC: fixed, so that an image always gives the same answer.
+constexpr uint64_t kRansacSeed = 0;
+
+std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
+  std::vector<int32_t> images;
+  for (const Candidate& candidate : candidates) images.push_back(candidate.image);
+  return images;
+}
+
+std::vector<Correspondence> Select(const std::vector<Correspondence>& correspondences,
+                                   const std::vector<int>& indices) {
+  std::vector<Correspondence> selected;
+  for (const int i : indices) selected.push_back(correspondences[i]);
+  return selected;
+}
+
+// Ascending, each once.
+std::vector<LandmarkIdx> LandmarksOf(const std::vector<Correspondence>& correspondences) {
+  std::vector<LandmarkIdx> landmarks;
+  for (const Correspondence& correspondence : correspondences) landmarks.push_back(correspondence.landmark);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+Localization Failure(NoFix reason, std::string message) {
+  Localization localization;
+  localization.reason = reason;
+  localization.message = std::move(message);
+  return localization;
+}
+
+// The one of two answers to believe.  Of two fixes the one with more inliers, unless they are at different
+// places and nearly as good; of two failures the one that came farther is the more telling.
+Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
+  if (!first.has_fix() && !second.has_fix()) {
+    const bool is_better =
+        std::pair(second.num_inliers, second.num_matches) >= std::pair(first.num_inliers, first.num_matches);
+    return is_better ? second : first;
+  }
+  if (!first.has_fix()) return second;
+  if (!second.has_fix()) return first;
+  if (second.num_unguided_inliers > first.num_unguided_inliers) std::swap(first, second);
+  const bool differ =
+      CenterErrorM(first.cam_from_world, second.cam_from_world) > accept.second_pose_distance_m ||
+      RotationErrorDeg(first.cam_from_world, second.cam_from_world) > accept.second_pose_angle_deg;
+  const double needed = accept.max_second_pose_ratio * first.num_unguided_inliers;
+  if (accept.max_second_pose_ratio <= 0 || !differ || second.num_unguided_inliers < needed) return first;
+  first.reason = NoFix::kAmbiguous;
+  first.message = fmt::format("{} and {} matches agree on poses at different places",
+                              first.num_unguided_inliers, second.num_unguided_inliers);
+  return first;
+}
+
+Status CheckQueryCamera(const Camera& camera) {
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  if (camera.model != CameraModel::kEquirectangular) return Ok();
+  return MakeError(ErrorCode::kUnsupported,
+                   "localize: a panorama is not localized as a whole; cut it into pinhole views first");
+}
+
+}  // namespace
+
+// A set of landmarks to match.
+struct Localizer::Attempt {
+  Scope scope = Scope::kAll;
+  std::vector<LandmarkIdx> landmarks;  // ascending
+};
+
+const char* ScopeName(Scope scope) {
+  switch (scope) {
+    case Scope::kPrior:
+      return "prior";
+    case Scope::kRegions:
+      return "regions";
+    case Scope::kImages:
+      return "images";
+    case Scope::kAll:
+      return "all";
+    case Scope::kTrack:
+      return "track";
+  }
+  return "all";
+}
+
+OptionTable DescribeOptions(LocalizerOptions* options) {
+  OptionTable table;
+  for (const OptionTable& part : {DescribeOptions(&options->sift), DescribeOptions(&options->measurement),
+                                  DescribeOptions(&options->retrieve), DescribeOptions(&options->match),
+                                  DescribeOptions(&options->estimate), DescribeOptions(&options->refine),
+                                  DescribeOptions(&options->accept)}) {
+    table.insert(table.end(), part.begin(), part.end());
+  }
+  table.push_back(
+      {.name = "first_landmarks",
+       .value = &options->first_landmarks,
+       .help = "landmarks to match first: of the candidates' regions or of the candidate images; auto: "
+               "regions, unless the map keeps landmarks that no region has",
+       .choices = {"auto", "regions", "images"}});
+  table.push_back(
+      {.name = "exclude_look_alikes",
+       .value = &options->exclude_look_alikes,
+       .help = "withhold a fix as long as a place that looks alike explains the image nearly as well"});
+  table.push_back({.name = "fall_back_to_all",
+                   .value = &options->fall_back_to_all,
+                   .help = "try all landmarks of the map when those fail"});
+  table.push_back(
+      {.name = "sure_num_unguided_inliers",
+       .value = &options->sure_num_unguided_inliers,
+       .help = "a fix with at least so many unguided inliers is taken without trying more landmarks",
+       .min = 0});
+  table.push_back({.name = "fall_back_max_num_landmarks",
+                   .value = &options->fall_back_max_num_landmarks,
+                   .help = "but not in maps of more landmarks than this",
+                   .min = 0});
+  AddCondition({"fall_back_to_all", {"true"}}, {"fall_back_max_num_landmarks"}, &table);
+  return table;
+}
+
+Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
+    : map_(std::move(map)), options_(options) {
+  // What the survey's poses were off by does not average out over landmarks.
+  options_.refine.systematic_sigma_m =
+      std::hypot(options.refine.systematic_sigma_m, map_->head().stated_pose_sigma_m);
+  options_.refine.systematic_sigma_deg =
+      std::hypot(options.refine.systematic_sigma_deg, map_->head().stated_pose_sigma_deg);
+}
+
+Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,
+                                         const std::optional<PosePrior>& prior) {
+  return WithoutExceptions("localize", [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromImage(grey, camera));
+    return LocalizeQuery(query, prior);
+  });
+}
+
+Result<Localization> Localizer::LocalizeFeatures(Features features, const Camera& camera,
+                                                 const std::optional<PosePrior>& prior) {
+  return WithoutExceptions("localize", [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const Query query, QueryFromFeatures(std::move(features), camera));
+    return LocalizeQuery(query, prior);
+  });
+}
+
+Result<Query> Localizer::QueryFromImage(const cv::Mat& grey, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+  if (grey.cols != camera.width || grey.rows != camera.height) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "localize: an image of {} x {} px with a camera of {} x {} px", grey.cols, grey.rows,
+                     camera.width, camera.height);
+  }
+  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options_.sift));
+  return QueryFromFeatures(std::move(features), camera);
+}
+
+Result<Query> Localizer::QueryFromFeatures(Features features, const Camera& camera) const {
+  CAIRN_RETURN_IF_ERROR(CheckQueryCamera(camera));
+  if (features.descriptors.rows() != static_cast<Eigen::Index>(features.keypoints.size())) {
+    return MakeError(ErrorCode::kInvalidArgument, "localize: {} keypoints with {} descriptors",
+                     features.keypoints.size(), features.descriptors.rows());
+  }
+  return MakeQuery(std::move(features), camera, options_.measurement);
+}
+
+Result<Localization> Localizer::LocalizeQuery(const Query& query,
+                                              const std::optional<PosePrior>& prior) const {
+  const int num_features = static_cast<int>(query.features.keypoints.size());
+  if (num_features < options_.accept.min_num_features) {
+    Localization none = Failure(
+        NoFix::kTooFewFeatures,
+        fmt::format("{} features, at least {} are needed", num_features, options_.accept.min_num_features));
+    none.num_features = num_features;
+    return none;
+  }
+  std::vector<ImageId> candidate_ids;
+  Localization best = Failure(NoFix::kNoCandidates, "no survey image looks like it");
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
+  for (const Attempt& attempt : attempts) {
+    CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, attempt));
+    best = Better(std::move(best), std::move(localization), options_.accept);
+    if (best.has_fix() && best.num_unguided_inliers >= options_.sure_num_unguided_inliers) break;
+  }
+  CAIRN_ASSIGN_OR_RETURN(best, Answer(query, prior, std::move(best)));
+  best.candidates = std::move(candidate_ids);
+  return best;
+}
+
+Result<Localization> Localizer::LocalizeAmong(const Query& query, Scope scope,
+                                              std::vector<LandmarkIdx> landmarks,
+                                              const std::optional<PosePrior>& prior) const {
+  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {scope, std::move(landmarks)}));
+  return Answer(query, prior, std::move(localization));
+}
+
+Result<Localization> Localizer::Answer(const Query& query, const std::optional<PosePrior>& prior,
+                                       Localization localization) const {
+  if (options_.exclude_look_alikes && localization.has_fix()) {
+    CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(query, prior, std::move(localization)));
+  }
+  localization.num_features = static_cast<int>(query.features.keypoints.size());
+  if (localization.has_fix()) {
+    const Pose given_from_camera = map_->head().camera_from_given.Inverse();
+    localization.cam_from_world = given_from_camera * localization.cam_from_world;
+    localization.covariance = TransformCovariance(given_from_camera, localization.covariance);
+  }
+  return localization;
+}
+
+Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
+                                                  Localization best) const {
+  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return best;
+  const Pose given_from_camera = map_->head().camera_from_given.Inverse();
+  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
+  CAIRN_ASSIGN_OR_RETURN(
+      const auto near,
+      RetrieveByPrior(*map_, {given_from_camera * best.cam_from_world, 0, 0}, options_.retrieve));
+  const NodeIdx node = near.empty() ? -1 : appearance->node_of_image[near[0].image];
+  if (node < 0) return best;
+  std::vector<int32_t> possible;  // by the prior
+  if (prior) {
+    RetrieveOptions retrieve = options_.retrieve;
+    retrieve.max_num_candidates = std::numeric_limits<int>::max();
+    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, *prior, retrieve));
+    possible = ImagesOf(candidates);
+    std::sort(possible.begin(), possible.end());
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(near[0].image));
+  const Pose cam_from_nearest = best.cam_from_world * nearest->cam_from_world.Inverse();
+  for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
+    const int32_t image = appearance->node_images[look_alike.node].front();
+    if (prior && !std::binary_search(possible.begin(), possible.end(), image)) continue;
+    // Where the camera would be there.
+    CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(image));
+    const PosePrior there{given_from_camera * (cam_from_nearest * other_image->cam_from_world), 0, 0};
+    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, there, options_.retrieve));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(candidates)));
+    if (landmarks.empty()) continue;
+    CAIRN_ASSIGN_OR_RETURN(Localization other, Try(query, {Scope::kImages, std::move(landmarks)}));
+    if (other.has_fix()) best = Better(std::move(best), std::move(other), options_.accept);
+    if (!best.has_fix()) break;
+  }
+  return best;
+}
+
+Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Query& query,
+                                                                const std::optional<PosePrior>& prior,
+                                                                std::vector<ImageId>* candidate_ids) const {
+  std::vector<Attempt> attempts;
+  const auto add = [&](Scope scope, std::vector<LandmarkIdx> landmarks) {
+    if (landmarks.empty()) return;
+    for (const Attempt& attempt : attempts) {
+      if (attempt.landmarks == landmarks) return;
+    }
+    attempts.push_back({scope, std::move(landmarks)});
+  };
+  if (prior) {
+    CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, *prior, options_.retrieve));
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(near)));
+    add(Scope::kPrior, std::move(landmarks));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, options_.retrieve));
+  for (const Candidate& candidate : candidates) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map_->Image(candidate.image));
+    candidate_ids->push_back(image->image_id);
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto regions, RegionsOfCandidates(*map_, candidates, options_.retrieve));
+  CAIRN_ASSIGN_OR_RETURN(auto of_regions, LandmarksOfRegions(*map_, regions));
+  CAIRN_ASSIGN_OR_RETURN(auto of_images, LandmarksOfImages(*map_, ImagesOf(candidates)));
+  const bool images_first = options_.first_landmarks == "images" ||
+                            (options_.first_landmarks == "auto" && map_->head().landmark_choice == "all");
+  if (images_first) add(Scope::kImages, of_images);
+  add(Scope::kRegions, std::move(of_regions));
+  add(Scope::kImages, std::move(of_images));
+  if (options_.fall_back_to_all && map_->num_landmarks() <= options_.fall_back_max_num_landmarks) {
+    std::vector<LandmarkIdx> all(map_->num_landmarks());
+    std::iota(all.begin(), all.end(), 0);
+    add(Scope::kAll, std::move(all));
+  }
+  return attempts;
+}
+
+Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) const {
+  const AcceptOptions& accept = options_.accept;
+  Localization localization;
+  localization.scope = attempt.scope;
+  const auto fail = [&](NoFix reason, std::string message) {
+    localization.reason = reason;
+    localization.message = std::move(message);
+    return localization;
+  };
+
+  const bool all = static_cast<int64_t>(attempt.landmarks.size()) == map_->num_landmarks();
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks,
+                         all ? map_->AllLandmarks() : map_->Gather(attempt.landmarks, true));
+  const std::vector<Correspondence> matches = MatchLandmarks(query, *landmarks, options_.match);
+  localization.num_matches = static_cast<int>(matches.size());
+  if (localization.num_matches < accept.min_num_matches) {
+    return fail(NoFix::kTooFewMatches,
+                fmt::format("{} matches with {} landmarks, at least {} are needed", matches.size(),
+                            attempt.landmarks.size(), accept.min_num_matches));
+  }
+  const std::vector<PoseMeasurement> measurements = MakeMeasurements(query, *landmarks, matches);
+  const auto estimate = EstimatePose(measurements, options_.estimate, options_.refine, kRansacSeed);
+  if (!estimate) return fail(NoFix::kNoPose, fmt::format("{} matches agree on no pose", matches.size()));
+  localization.num_inliers = localization.num_unguided_inliers = static_cast<int>(estimate->inliers.size());
+  const double chance_of_inlier =
+      ChanceOfInlier(measurements, estimate->cam_from_world, options_.estimate.max_error_px, query.camera);
+  const double log10_chance =
+      Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier);
+  if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
+      log10_chance > accept.max_log10_chance) {
+    return fail(
+        NoFix::kTooFewInliers,
+        fmt::format(
+            "{} of {} matches agree on a pose, as 10^{:.1f} poses would by chance; at least {} and at "
+            "most 10^{:g} are needed",
+            estimate->inliers.size(), matches.size(), log10_chance, accept.min_num_unguided_inliers,
+            accept.max_log10_chance));
+  }
+  if (accept.max_second_pose_ratio > 0 && IsAmbiguous(measurements, *estimate)) {
+    return fail(NoFix::kAmbiguous, fmt::format("another pose has at least {:.0f} % as many inliers",
+                                               100 * accept.max_second_pose_ratio));
+  }
+
+  return Refine(query, *landmarks, Select(matches, estimate->inliers), estimate->cam_from_world,
+                std::move(localization));
+}
+
+Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& matched,
+                                       std::vector<Correspondence> matches, const Pose& cam_from_world,
+                                       Localization localization) const {
+  const auto fail = [&](NoFix reason, std::string message) {
+    localization.reason = reason;
+    localization.message = std::move(message);
+    return localization;
+  };
+  const LandmarkSet* landmarks = &matched;
+  std::shared_ptr<const LandmarkSet> covisible;
+  if (options_.match.guided_num_images > 0) {
+    CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
+                           CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match));
+    CAIRN_ASSIGN_OR_RETURN(covisible, map_->Gather(std::move(seen), false));
+    std::vector<Correspondence> guided = MatchGuided(query, *covisible, cam_from_world, options_.match);
+    if (guided.size() >= matches.size()) {
+      matches = std::move(guided);
+      landmarks = covisible.get();
+    }
+  }
+  const auto refined =
+      RefinePoseWithCovariance(MakeMeasurements(query, *landmarks, matches), cam_from_world, options_.refine);
+  if (!refined)
+    return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
+  const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
+  localization.num_inliers = static_cast<int>(inliers.size());
+  const double min_kept_ratio = options_.accept.min_kept_ratio;
+  if (localization.num_inliers < min_kept_ratio * localization.num_unguided_inliers) {
+    return fail(
+        NoFix::kTooFewInliers,
+        fmt::format(
+            "of {} matches that agree on a pose {} are left after refinement, at least {:.0f} % are needed",
+            localization.num_unguided_inliers, localization.num_inliers, 100 * min_kept_ratio));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
+  Verdict verdict = JudgePose(*refined, inliers, query, distance, options_.accept);
+  if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
+  localization.reason = NoFix::kNone;
+  localization.cam_from_world = refined->cam_from_world;
+  localization.covariance = refined->covariance;
+  CAIRN_ASSIGN_OR_RETURN(localization.region, RegionWithMost(*map_, LandmarksOf(inliers)));
+  return localization;
+}
+
+bool Localizer::IsAmbiguous(const std::vector<PoseMeasurement>& measurements,
+                            const PoseEstimate& first) const {
+  const AcceptOptions& accept = options_.accept;
+  const double needed = accept.max_second_pose_ratio * static_cast<double>(first.inliers.size());
+  std::vector<PoseMeasurement> others;
+  size_t next = 0;
+  for (size_t i = 0; i < measurements.size(); ++i) {
+    if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
+      ++next;
+    } else {
+      others.push_back(measurements[i]);
+    }
+  }
+  if (static_cast<double>(others.size()) < needed) return false;
+  EstimateOptions estimate_options = options_.estimate;
+  estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
+  estimate_options.min_num_ransac_iterations =
+      std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
+  const auto second = EstimatePose(others, estimate_options, options_.refine, kRansacSeed);
+  return second && static_cast<double>(second->inliers.size()) >= needed &&
+         (CenterErrorM(first.cam_from_world, second->cam_from_world) > accept.second_pose_distance_m ||
+          RotationErrorDeg(first.cam_from_world, second->cam_from_world) > accept.second_pose_angle_deg);
+}
+
+}  // namespace cairn

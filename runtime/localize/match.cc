@@ -1,0 +1,196 @@
+#include "runtime/localize/match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/camera/pixel_ray.h"
+#include "core/features/descriptor_distance.h"
+#include "core/features/descriptor_matcher.h"
+
+namespace cairn {
+namespace {
+
+// Keypoints of the query in square cells, for those near a pixel.
+class KeypointGrid {
+ public:
+  KeypointGrid(const Query& query, double cell_px) : query_(query), cell_px_(cell_px) {
+    num_columns_ = static_cast<int>(query.camera.width / cell_px) + 1;
+    num_rows_ = static_cast<int>(query.camera.height / cell_px) + 1;
+    cells_.resize(static_cast<size_t>(num_columns_) * num_rows_);
+    for (KeypointIdx i = 0; i < query.features.keypoints.size(); ++i) {
+      if (!query.rays[i]) continue;
+      const Keypoint& keypoint = query.features.keypoints[i];
+      cells_[static_cast<size_t>(Clamp(keypoint.y, num_rows_)) * num_columns_ +
+             Clamp(keypoint.x, num_columns_)]
+          .push_back(i);
+    }
+  }
+
+  template <typename Visit>
+  void VisitNear(const Eigen::Vector2d& pixel, double radius_px, const Visit& visit) const {
+    for (int row = Clamp(pixel.y() - radius_px, num_rows_); row <= Clamp(pixel.y() + radius_px, num_rows_);
+         ++row) {
+      for (int col = Clamp(pixel.x() - radius_px, num_columns_);
+           col <= Clamp(pixel.x() + radius_px, num_columns_); ++col) {
+        for (const KeypointIdx i : cells_[static_cast<size_t>(row) * num_columns_ + col]) {
+          const Keypoint& keypoint = query_.features.keypoints[i];
+          if (std::hypot(keypoint.x - pixel.x(), keypoint.y - pixel.y()) <= radius_px) visit(i);
+        }
+      }
+    }
+  }
+
+ private:
+  int Clamp(double coordinate, int count) const {
+    return static_cast<int>(std::clamp(coordinate / cell_px_, 0.0, static_cast<double>(count - 1)));
+  }
+
+  const Query& query_;
+  double cell_px_;
+  int num_columns_ = 0;
+  int num_rows_ = 0;
+  std::vector<std::vector<KeypointIdx>> cells_;
+};
+
+bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
+               double max_ratio) {
+  if (landmark.scale_m <= 0) return true;  // not known
+  const double ratio = keypoint.scale * depth_m / (landmark.scale_m * focal_px);
+  return ratio <= max_ratio && ratio * max_ratio >= 1;
+}
+
+// How far from its projection a landmark, at `point` in the camera's frame, may show, px.
+double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, const Pose& cam_from_world,
+                    double focal_px, const MatchOptions& options) {
+  if (point.z() <= 0) return options.guided_radius_px;  // beyond 90 degrees no keypoint has a ray
+  Eigen::Matrix<double, 2, 3> ray_from_point;
+  ray_from_point << 1, 0, -point.x() / point.z(), 0, 1, -point.y() / point.z();
+  const Eigen::Matrix<double, 2, 3> pixel_from_world =
+      focal_px / point.z() * ray_from_point * cam_from_world.rotation.toRotationMatrix();
+  const Eigen::Matrix2d covariance = pixel_from_world * landmark.covariance * pixel_from_world.transpose();
+  const double half_trace = 0.5 * covariance.trace();
+  const double largest =
+      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - covariance.determinant()));
+  return std::sqrt(options.guided_radius_px * options.guided_radius_px +
+                   options.guided_radius_sigmas * options.guided_radius_sigmas * largest);
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(MatchOptions* o) {
+  return {
+      {.name = "max_ratio",
+       .value = &o->max_ratio,
+       .help = "largest ratio of best to second-best descriptor angle, both ways",
+       .min = 1e-3,
+       .max = 1},
+      {.name = "max_angle_rad",
+       .value = &o->max_angle_rad,
+       .help = "largest descriptor angle of a match, radians",
+       .min = 1e-3},
+      {.name = "guided_radius_px",
+       .value = &o->guided_radius_px,
+       .help = "a landmark is looked for this near to its projection, px",
+       .min = 0.1},
+      {.name = "guided_radius_sigmas",
+       .value = &o->guided_radius_sigmas,
+       .help = "and this many standard deviations of its own position, projected",
+       .min = 0},
+      {.name = "guided_max_angle_rad",
+       .value = &o->guided_max_angle_rad,
+       .help = "largest descriptor angle there, radians",
+       .min = 1e-3},
+      {.name = "guided_max_scale_ratio",
+       .value = &o->guided_max_scale_ratio,
+       .help = "largest ratio of a keypoint's scale to the predicted one, either way",
+       .min = 1},
+      {.name = "guided_num_images",
+       .value = &o->guided_num_images,
+       .help = "survey images whose landmarks are looked for; 0: no guided matching",
+       .min = 0},
+  };
+}
+
+std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet& landmarks,
+                                           const MatchOptions& options) {
+  const DescriptorMatcherOptions matcher_options{
+      .max_ratio = options.max_ratio, .max_angle_rad = options.max_angle_rad, .mutual = true};
+  std::vector<Correspondence> correspondences;
+  for (const Match& match : MatchDescriptors(query.packed, landmarks.packed, matcher_options)) {
+    if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks.idx[match.idx2]});
+  }
+  return correspondences;
+}
+
+Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                                    const MatchOptions& options) {
+  std::set<int32_t> image_blocks;  // those that a landmark's block names
+  int64_t ordinal = -1;
+  for (const LandmarkIdx landmark : seen) {
+    const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
+    if (next == ordinal) continue;
+    ordinal = next;
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+    image_blocks.insert(block->image_blocks.begin(), block->image_blocks.end());
+  }
+  std::vector<std::pair<int, int32_t>> order;
+  for (const int32_t image_block : image_blocks) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));
+    for (size_t i = 0; i < block->images.size(); ++i) {
+      const int num_shared = NumShared(block->images[i].landmarks, seen);
+      if (num_shared > 0) order.emplace_back(-num_shared, block->first + static_cast<int32_t>(i));
+    }
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<LandmarkIdx> landmarks = seen;
+  for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
+    landmarks.insert(landmarks.end(), image->landmarks.begin(), image->landmarks.end());
+  }
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
+                                        const Pose& cam_from_world, const MatchOptions& options) {
+  const KeypointGrid grid(query, std::max(8.0, options.guided_radius_px));
+  const double focal_px = query.camera.MeanFocal();
+  const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
+  // An angle between RootSIFT vectors of norm 512 as a dot product.
+  const double min_dot = kSquaredDescriptorNorm * std::cos(options.guided_max_angle_rad);
+  std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
+  for (size_t k = 0; k < landmarks.idx.size(); ++k) {
+    const LandmarkIdx landmark_idx = landmarks.idx[k];
+    const MapLandmark& landmark = landmarks.landmarks[k];
+    const Eigen::Vector3d point = cam_from_world * landmark.position;
+    const auto pixel = ImageFromCamera(query.camera, point);
+    if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > query.camera.width ||
+        pixel->y() > query.camera.height) {
+      continue;
+    }
+    const uint8_t* descriptor = landmarks.descriptors.row(static_cast<Eigen::Index>(k)).data();
+    std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
+    const double radius_px =
+        std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px);
+    grid.VisitNear(*pixel, radius_px, [&](KeypointIdx i) {
+      if (!ScaleFits(query.features.keypoints[i], landmark, DepthOfScale(query.camera, point), focal_px,
+                     options.guided_max_scale_ratio))
+        return;
+      const int32_t dot = DescriptorDot(query.features.descriptors.row(i).data(), descriptor);
+      if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
+    });
+    if (best.second < 0 || best.first < min_dot) continue;
+    const auto [entry, inserted] =
+        best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
+    if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+  }
+  std::vector<Correspondence> correspondences;
+  for (const auto& [keypoint, match] : best_of_keypoint) correspondences.push_back({keypoint, match.second});
+  return correspondences;
+}
+
+}  // namespace cairn

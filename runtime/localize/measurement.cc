@@ -1,0 +1,65 @@
+#include "runtime/localize/measurement.h"
+
+#include <cmath>
+#include <utility>
+
+namespace cairn {
+namespace {
+
+// d pixel / d ray by central differences; nothing where the ray's neighbours are not seen.
+std::optional<Eigen::Matrix2d> PixelFromRay(const Camera& camera, const Eigen::Vector2d& ray) {
+  constexpr double kStep = 1e-5;
+  Eigen::Matrix2d jacobian;
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::Vector2d step = Eigen::Vector2d::Zero();
+    step[axis] = kStep;
+    const auto ahead = ImageFromCamera(camera, (ray + step).homogeneous());
+    const auto behind = ImageFromCamera(camera, (ray - step).homogeneous());
+    if (!ahead || !behind) return std::nullopt;
+    jacobian.col(axis) = (*ahead - *behind) / (2 * kStep);
+  }
+  return jacobian;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(MeasurementOptions* o) {
+  return {{.name = "keypoint_sigma_px",
+           .value = &o->keypoint_sigma_px,
+           .help = "standard deviation of a small keypoint's position, px",
+           .min = 1e-3},
+          {.name = "keypoint_sigma_per_scale",
+           .value = &o->keypoint_sigma_per_scale,
+           .help = "its growth with the keypoint's scale",
+           .min = 0}};
+}
+
+Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options) {
+  Query query;
+  query.camera = camera;
+  for (const Keypoint& keypoint : features.keypoints) {
+    std::optional<QueryRay>& ray = query.rays.emplace_back();
+    const auto direction = CameraFromImage(camera, {keypoint.x, keypoint.y});
+    if (!direction) continue;
+    const auto pixel_from_ray = PixelFromRay(camera, *direction);
+    if (!pixel_from_ray) continue;
+    ray = QueryRay{*direction, *pixel_from_ray,
+                   std::hypot(options.keypoint_sigma_px, options.keypoint_sigma_per_scale * keypoint.scale)};
+  }
+  query.packed = PackedDescriptors(features.descriptors);
+  query.features = std::move(features);
+  return query;
+}
+
+std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
+                                              const std::vector<Correspondence>& correspondences) {
+  std::vector<PoseMeasurement> measurements;
+  measurements.reserve(correspondences.size());
+  for (const Correspondence& correspondence : correspondences) {
+    const MapLandmark& landmark = landmarks.Find(correspondence.landmark);
+    measurements.push_back({landmark.position, landmark.covariance, *query.rays[correspondence.keypoint]});
+  }
+  return measurements;
+}
+
+}  // namespace cairn

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/blocks/map_rows.h"
+#include "core/camera/camera.h"
+#include "core/features/features.h"
+#include "core/features/packed_descriptors.h"
+#include "core/options/options.h"
+#include "runtime/map/landmark_set.h"
+
+namespace cairn {
+
+struct MeasurementOptions {
+  // Standard deviation of a small keypoint's position, px.  REQUIRES: > 0
+  double keypoint_sigma_px = 0.5;
+  // Growth of that standard deviation with the keypoint's scale (sigma, px): they add as squares.  REQUIRES:
+  // >= 0
+  double keypoint_sigma_per_scale = 0.2;
+};
+OptionTable DescribeOptions(MeasurementOptions* options);
+
+// A keypoint of the query as a ray: any camera model is gone from here on, up to first order.
+struct QueryRay {
+  Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // x/z, y/z
+  Eigen::Matrix2d pixel_from_ray =
+      Eigen::Matrix2d::Identity();  // d pixel / d ray: turns ray differences into px
+  double sigma_px = 1;
+};
+
+// What localization needs of a query image.
+struct Query {
+  Features features;
+  Camera camera;
+  std::vector<std::optional<QueryRay>> rays;  // per keypoint; none where the camera model has no forward ray
+  PackedDescriptors packed;                   // the features' descriptors
+};
+Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options);
+
+// A keypoint that shows a landmark.
+struct Correspondence {
+  KeypointIdx keypoint = 0;
+  LandmarkIdx landmark = 0;
+};
+
+// A correspondence with everything that pose estimation needs.
+struct PoseMeasurement {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();             // landmark, world frame, metres
+  Eigen::Matrix3d point_covariance = Eigen::Matrix3d::Zero();  // m^2
+  QueryRay ray;
+};
+// REQUIRES: the keypoints have rays, the landmarks are in the set
+std::vector<PoseMeasurement> MakeMeasurements(const Query& query, const LandmarkSet& landmarks,
+                                              const std::vector<Correspondence>& correspondences);
+
+}  // namespace cairn

@@ -1,0 +1,293 @@
+#include "runtime/localize/refine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "core/base/deciles.h"
+#include "core/geometry/vector_geometry.h"
+
+namespace cairn {
+namespace {
+
+// Least depth of a point in front of the camera, metres.
+constexpr double kMinDepthM = 1e-3;
+
+Eigen::Quaterniond Exp(const Eigen::Vector3d& rotation) {
+  const double angle = rotation.norm();
+  if (angle < 1e-12)
+    return Eigen::Quaterniond(1, 0.5 * rotation.x(), 0.5 * rotation.y(), 0.5 * rotation.z()).normalized();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
+}
+
+// One measurement linearised at a pose: residual in px, its Jacobian over the perturbation, its covariance.
+struct Linearised {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6> jacobian;
+  Eigen::Matrix2d covariance;
+};
+
+std::optional<Eigen::Vector2d> Residual(const PoseMeasurement& measurement, const Pose& pose) {
+  const Eigen::Vector3d x = pose * measurement.point;
+  if (!(x.z() > kMinDepthM)) return std::nullopt;
+  return measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray);
+}
+
+std::optional<Linearised> Linearise(const PoseMeasurement& measurement, const Pose& pose) {
+  const Eigen::Vector3d x = pose * measurement.point;
+  if (!(x.z() > kMinDepthM)) return std::nullopt;
+  Eigen::Matrix<double, 2, 3> pixel_from_point;  // d residual / d point in the camera frame
+  const double inverse_z = 1 / x.z();
+  pixel_from_point << inverse_z, 0, -x.x() * inverse_z * inverse_z, 0, inverse_z,
+      -x.y() * inverse_z * inverse_z;
+  pixel_from_point = measurement.ray.pixel_from_ray * pixel_from_point;
+  Linearised linearised;
+  linearised.residual = measurement.ray.pixel_from_ray * (x.hnormalized() - measurement.ray.ray);
+  linearised.jacobian.leftCols<3>() = -pixel_from_point * CrossMatrix(x);
+  linearised.jacobian.rightCols<3>() = pixel_from_point;
+  const Eigen::Matrix<double, 2, 3> pixel_from_landmark = pixel_from_point * pose.rotation.toRotationMatrix();
+  linearised.covariance =
+      measurement.ray.sigma_px * measurement.ray.sigma_px * Eigen::Matrix2d::Identity() +
+      pixel_from_landmark * measurement.point_covariance * pixel_from_landmark.transpose();
+  return linearised;
+}
+
+struct NormalEquations {
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0;
+  int num_points = 0;
+  std::vector<Eigen::Matrix2d> informations;  // per measurement; zero behind the camera
+};
+
+double Cauchy(double squared, double scale) {
+  return std::isinf(scale) ? squared : scale * scale * std::log1p(squared / (scale * scale));
+}
+
+// `scale`: of the robust loss; infinity for plain least squares.
+NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measurements, const Pose& pose,
+                                     double scale) {
+  NormalEquations equations;
+  equations.informations.assign(measurements.size(), Eigen::Matrix2d::Zero());
+  for (size_t i = 0; i < measurements.size(); ++i) {
+    const auto linearised = Linearise(measurements[i], pose);
+    if (!linearised) continue;
+    const Eigen::Matrix2d information = linearised->covariance.inverse();
+    const double squared = linearised->residual.dot(information * linearised->residual);
+    const double weight = std::isinf(scale) ? 1 : 1 / (1 + squared / (scale * scale));
+    const Eigen::Matrix<double, 6, 2> weighted = weight * linearised->jacobian.transpose() * information;
+    equations.matrix += weighted * linearised->jacobian;
+    equations.gradient += weighted * linearised->residual;
+    equations.cost += Cauchy(squared, scale);
+    equations.informations[i] = information;
+    ++equations.num_points;
+  }
+  return equations;
+}
+
+// The cost at another pose with the same weights of the measurements; infinite when a point went behind the
+// camera.
+double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEquations& equations,
+              const Pose& pose, double scale) {
+  double cost = 0;
+  for (size_t i = 0; i < measurements.size(); ++i) {
+    if (equations.informations[i].isZero(0)) continue;
+    const auto residual = Residual(measurements[i], pose);
+    if (!residual) return std::numeric_limits<double>::infinity();
+    cost += Cauchy(residual->dot(equations.informations[i] * *residual), scale);
+  }
+  return cost;
+}
+
+std::optional<Pose> LevenbergMarquardt(const std::vector<PoseMeasurement>& measurements, Pose pose,
+                                       double scale, int max_num_iterations) {
+  double damping = 1e-6;
+  for (int iteration = 0; iteration < max_num_iterations; ++iteration) {
+    const NormalEquations equations = BuildNormalEquations(measurements, pose, scale);
+    if (equations.num_points < 3) return std::nullopt;
+    bool improved = false;
+    double step_norm = 0;
+    for (int attempt = 0; attempt < 8 && !improved; ++attempt) {
+      Matrix6d damped = equations.matrix;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::LDLT<Matrix6d> factors(damped);
+      const Vector6d step = -factors.solve(equations.gradient);
+      if (factors.info() != Eigen::Success || !factors.isPositive() || !step.allFinite()) return std::nullopt;
+      const Pose candidate = Perturb(pose, step);
+      if (CostAt(measurements, equations, candidate, scale) <= equations.cost) {
+        pose = candidate;
+        step_norm = step.norm();
+        damping = std::max(1e-9, damping * 0.1);
+        improved = true;
+      } else {
+        damping = std::max(1e-4, damping) * 10;
+      }
+    }
+    if (!improved || step_norm < 1e-9) break;
+  }
+  return pose;
+}
+
+std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurements,
+                                    const std::vector<int>& indices) {
+  std::vector<PoseMeasurement> selected;
+  for (const int i : indices) selected.push_back(measurements[i]);
+  return selected;
+}
+
+// Squared whitened residuals; infinite behind the camera.
+std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurements, const Pose& pose) {
+  std::vector<double> squares;
+  for (const PoseMeasurement& measurement : measurements) {
+    const auto linearised = Linearise(measurement, pose);
+    squares.push_back(linearised
+                          ? linearised->residual.dot(linearised->covariance.inverse() * linearised->residual)
+                          : std::numeric_limits<double>::infinity());
+  }
+  return squares;
+}
+
+// Noise variance from the median of squared residuals, most of which belong to inliers; the 6 parameters took
+// their part.
+double VarianceFromMedian(const std::vector<double>& squares) {
+  constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
+  const double num_residuals = 2.0 * static_cast<double>(squares.size());
+  return std::max(1e-6,
+                  Median(squares) / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
+}
+
+// Sum of squared residuals of n two-dimensional inliers, as a variance whose inverse has the right mean for
+// the normalised error squared: E[F(6, d)] = d / (d - 2).
+double VarianceFromSum(double sum, int num_inliers) { return sum / std::max(1, 2 * num_inliers - 6 - 2); }
+
+// 2 / E[r^2 | r^2 < limit] for a chi-square of 2 degrees of freedom: what cutting the tail hides of the
+// variance.  By Stein's identity the estimate from the inliers alone is worse by the same factor.
+double TruncationFactor(double limit) {
+  const double tail = std::exp(-0.5 * limit);
+  return (1 - tail) / (1 - (1 + 0.5 * limit) * tail);
+}
+
+Matrix6d Adjoint(const Pose& b_from_a) {
+  const Eigen::Matrix3d rotation = b_from_a.rotation.toRotationMatrix();
+  Matrix6d adjoint = Matrix6d::Zero();
+  adjoint.topLeftCorner<3, 3>() = rotation;
+  adjoint.bottomLeftCorner<3, 3>() = CrossMatrix(b_from_a.translation) * rotation;
+  adjoint.bottomRightCorner<3, 3>() = rotation;
+  return adjoint;
+}
+
+// Adds independent errors of the camera's rotation and place.  The place moves by R' v for a translation v of
+// the perturbation, and a rotation about the camera's own centre is the perturbation (w, 0).
+void AddSystematic(const RefineOptions& options, Matrix6d* covariance) {
+  const double rotation = RadFromDeg(options.systematic_sigma_deg);
+  covariance->diagonal().head<3>().array() += rotation * rotation;
+  covariance->diagonal().tail<3>().array() += options.systematic_sigma_m * options.systematic_sigma_m;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(RefineOptions* o) {
+  return {
+      {.name = "robust_scale",
+       .value = &o->robust_scale,
+       .help = "whitened residual from which a measurement loses weight",
+       .min = 1e-3},
+      {.name = "max_num_refine_iterations",
+       .value = &o->max_num_refine_iterations,
+       .help = "most Levenberg-Marquardt steps",
+       .min = 1},
+      {.name = "inlier_chi_square",
+       .value = &o->inlier_chi_square,
+       .help = "squared whitened residual up to which a measurement is an inlier",
+       .min = 1e-3},
+      {.name = "covariance_scale",
+       .value = &o->covariance_scale,
+       .help = "factor on the reported covariance",
+       .min = 1e-9},
+      {.name = "systematic_sigma_m",
+       .value = &o->systematic_sigma_m,
+       .help = "error of the camera's place that landmarks do not average out, m per axis",
+       .min = 0},
+      {.name = "systematic_sigma_deg",
+       .value = &o->systematic_sigma_deg,
+       .help = "error of the camera's rotation that landmarks do not average out, degrees per axis",
+       .min = 0},
+  };
+}
+
+Pose Perturb(const Pose& cam_from_world, const Vector6d& xi) {
+  return Pose{Exp(xi.head<3>()), xi.tail<3>()} * cam_from_world;
+}
+
+Vector6d PerturbationBetween(const Pose& from, const Pose& to) {
+  const Pose difference = to * from.Inverse();
+  const Eigen::AngleAxisd rotation(difference.rotation);
+  Vector6d xi;
+  xi << rotation.angle() * rotation.axis(), difference.translation;
+  return xi;
+}
+
+std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
+                               const RefineOptions& options) {
+  return LevenbergMarquardt(measurements, initial, options.robust_scale, options.max_num_refine_iterations);
+}
+
+std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
+                                                    const Pose& initial, const RefineOptions& options) {
+  constexpr int kMinNumInliers = 5;  // 10 residuals for 6 parameters
+  if (static_cast<int>(measurements.size()) < kMinNumInliers) return std::nullopt;
+  std::optional<Pose> pose = RefinePose(measurements, initial, options);
+  if (!pose) return std::nullopt;
+  RefinedPose refined;
+  std::vector<double> squares = WhitenedSquares(measurements, *pose);
+  // The loss's scale is in units of the noise, which shows only now.
+  refined.noise_variance = VarianceFromMedian(squares);
+  pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
+                            options.max_num_refine_iterations);
+  if (!pose) return std::nullopt;
+  squares = WhitenedSquares(measurements, *pose);
+  refined.noise_variance = VarianceFromMedian(squares);
+  const double truncation = TruncationFactor(options.inlier_chi_square);
+  for (int round = 0; round < 4; ++round) {
+    std::vector<int> inliers;
+    for (size_t i = 0; i < squares.size(); ++i) {
+      if (squares[i] <= options.inlier_chi_square * refined.noise_variance)
+        inliers.push_back(static_cast<int>(i));
+    }
+    if (inliers.size() < kMinNumInliers) return std::nullopt;
+    if (round > 0 && inliers == refined.inliers) break;
+    refined.inliers = std::move(inliers);
+    pose = LevenbergMarquardt(Select(measurements, refined.inliers), *pose,
+                              std::numeric_limits<double>::infinity(), options.max_num_refine_iterations);
+    if (!pose) return std::nullopt;
+    squares = WhitenedSquares(measurements, *pose);
+    double sum = 0;
+    for (const int i : refined.inliers) sum += squares[i];
+    refined.noise_variance =
+        std::max(1e-6, truncation * VarianceFromSum(sum, static_cast<int>(refined.inliers.size())));
+    if (!std::isfinite(refined.noise_variance)) return std::nullopt;
+  }
+  const NormalEquations equations = BuildNormalEquations(Select(measurements, refined.inliers), *pose,
+                                                         std::numeric_limits<double>::infinity());
+  const Eigen::LDLT<Matrix6d> factors(equations.matrix);
+  if (factors.info() != Eigen::Success || !factors.isPositive() || factors.vectorD().minCoeff() <= 0)
+    return std::nullopt;
+  refined.cam_from_world = *pose;
+  refined.covariance = factors.solve(Matrix6d::Identity());
+  refined.covariance *= options.covariance_scale * truncation * refined.noise_variance;
+  refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
+  AddSystematic(options, &refined.covariance);
+  if (!refined.covariance.allFinite()) return std::nullopt;
+  return refined;
+}
+
+Matrix6d TransformCovariance(const Pose& b_from_cam, const Matrix6d& covariance) {
+  const Matrix6d adjoint = Adjoint(b_from_cam);
+  return adjoint * covariance * adjoint.transpose();
+}
+
+}  // namespace cairn

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/geometry/pose.h"
+#include "core/options/options.h"
+#include "runtime/localize/measurement.h"
+
+namespace cairn {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+struct RefineOptions {
+  // Whitened residual (standard deviations) from which a measurement loses weight (Cauchy's loss).  REQUIRES:
+  // > 0
+  double robust_scale = 2.5;
+  // Most Levenberg-Marquardt steps.  REQUIRES: >= 1
+  int max_num_refine_iterations = 20;
+  // Squared whitened residual, over the estimated noise, up to which a measurement is an inlier: chi-square
+  // of 2 degrees of freedom at 99 %.  REQUIRES: > 0
+  double inlier_chi_square = 9.21;
+  // Factor on the reported covariance: neighbouring keypoints and landmarks err together, which the normal
+  // matrix does not know.  Measured on the demo, where it brings the normalised error squared from 10.7 to
+  // its 6 degrees of freedom.  REQUIRES: > 0
+  double covariance_scale = 1.8;
+  // Errors that more landmarks do not average out (survey poses, intrinsics): added to the covariance of the
+  // camera's place, m, and of its rotation, degrees, as standard deviations per axis.  REQUIRES: >= 0
+  double systematic_sigma_m = 0;
+  double systematic_sigma_deg = 0;
+};
+OptionTable DescribeOptions(RefineOptions* options);
+
+// exp of a perturbation xi = (rotation in rad, translation in m), applied from the left:
+// cam_from_world' = (Exp(rotation), translation) * cam_from_world.
+Pose Perturb(const Pose& cam_from_world, const Vector6d& xi);
+// The xi with Perturb(from, xi) = to.
+Vector6d PerturbationBetween(const Pose& from, const Pose& to);
+
+// Minimises the robust sum over measurements of rho(r' S^-1 r): r = reprojection error in px, S = keypoint's
+// variance + landmark's covariance projected into the image, rho = Cauchy's loss.  Levenberg-Marquardt on 6
+// parameters. Nothing when fewer than 3 points lie in front of the camera or the normal equations are
+// singular.
+std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
+                               const RefineOptions& options);
+
+// A pose with its uncertainty.
+struct RefinedPose {
+  Pose cam_from_world;
+  // Order: rotation (rad), translation (m); of the left perturbation.  Inverse of the normal matrix, scaled
+  // by the noise that the inliers show (unbiased for the normalised error squared: the residuals' sum is
+  // divided by their degrees of freedom minus 2, as the mean of an F distribution asks), and by what leaving
+  // out outliers costs and hides.
+  Matrix6d covariance = Matrix6d::Identity();
+  double noise_variance = 1;  // of whitened residuals; 1: keypoints and landmarks are as good as they claim
+  std::vector<int> inliers;   // indices of measurements, ascending
+};
+
+// Refines robustly, then by least squares over the inliers, whose limit follows the noise found.
+// Nothing when fewer than 5 inliers are left or the geometry is degenerate.
+std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasurement>& measurements,
+                                                    const Pose& initial, const RefineOptions& options);
+
+// Covariance of b_from_world for b_from_cam * cam_from_world: Ad C Ad'.
+Matrix6d TransformCovariance(const Pose& b_from_cam, const Matrix6d& covariance);
+
+}  // namespace cairn

@@ -1,0 +1,179 @@
+#include "runtime/localize/region_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/base/no_throw.h"
+
+namespace cairn {
+
+OptionTable DescribeOptions(RegionTrackerOptions* o) {
+  return {
+      {.name = "step_sigma_m",
+       .value = &o->step_sigma_m,
+       .help = "standard deviation of the change of motion from frame to frame, m",
+       .min = 1e-6},
+      {.name = "step_sigma_deg",
+       .value = &o->step_sigma_deg,
+       .help = "the same of rotation, degrees",
+       .min = 1e-6},
+      {.name = "max_prior_sigma_m",
+       .value = &o->max_prior_sigma_m,
+       .help = "a prediction less certain than this is none, m",
+       .min = 1e-6},
+      {.name = "max_num_sigmas",
+       .value = &o->max_num_sigmas,
+       .help = "a tracked fix lies within so many standard deviations of the prediction",
+       .min = 1e-6},
+      {.name = "max_num_neighbour_regions",
+       .value = &o->max_num_neighbour_regions,
+       .help = "most regions besides its own whose landmarks are looked for",
+       .min = 0},
+      {.name = "min_num_votes",
+       .value = &o->min_num_votes,
+       .help = "visible landmarks that make a region a candidate when lost",
+       .min = 1},
+      {.name = "max_num_voted_regions",
+       .value = &o->max_num_voted_regions,
+       .help = "most candidate regions whose landmarks are matched when lost",
+       .min = 1},
+  };
+}
+
+RegionTracker::RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
+                             const RegionTrackerOptions& options)
+    : map_(map), localizer_(std::move(map), localizer_options), options_(options) {}
+
+Result<Localization> RegionTracker::Track(const cv::Mat& grey, const Camera& camera) {
+  return WithoutExceptions("track", [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromImage(grey, camera));
+    return TrackQuery(query);
+  });
+}
+
+Result<Localization> RegionTracker::TrackFeatures(Features features, const Camera& camera) {
+  return WithoutExceptions("track", [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromFeatures(std::move(features), camera));
+    return TrackQuery(query);
+  });
+}
+
+std::optional<PosePrior> RegionTracker::Prediction() const {
+  if (!last_) return std::nullopt;
+  const int num_steps = num_frames_since_ + 1;
+  PosePrior prior;
+  prior.sigma_m = options_.step_sigma_m * num_steps;
+  prior.sigma_deg = options_.step_sigma_deg * num_steps;
+  if (prior.sigma_m > options_.max_prior_sigma_m) return std::nullopt;
+  prior.cam_from_world = *last_;
+  for (int i = 0; i < num_steps; ++i) prior.cam_from_world = step_ * prior.cam_from_world;
+  return prior;
+}
+
+Result<Localization> RegionTracker::TrackQuery(const Query& query) {
+  const bool has_features =
+      static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
+  const std::optional<PosePrior> prior = Prediction();
+  if (has_features && prior) {
+    CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
+    CAIRN_ASSIGN_OR_RETURN(Localization found,
+                           localizer_.LocalizeAmong(query, Scope::kTrack, std::move(expected), prior));
+    if (found.has_fix() && Agrees(found, *prior)) {
+      Update(found);
+      return found;
+    }
+  }
+  if (has_features) {
+    CAIRN_ASSIGN_OR_RETURN(auto voted, VotedLandmarks(query));
+    if (!voted.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(Localization found, localizer_.LocalizeAmong(query, Scope::kRegions,
+                                                                          std::move(voted), std::nullopt));
+      if (found.has_fix() && found.num_unguided_inliers >= localizer_.options().sure_num_unguided_inliers) {
+        Update(found);
+        return found;
+      }
+    }
+  }
+  CAIRN_ASSIGN_OR_RETURN(Localization found, localizer_.LocalizeQuery(query, std::nullopt));
+  Update(found);
+  return found;
+}
+
+Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrior& prior,
+                                                                  const Camera& camera) const {
+  const RetrieveOptions& retrieve = localizer_.options().retrieve;
+  CAIRN_ASSIGN_OR_RETURN(const auto near, RetrieveByPrior(*map_, prior, retrieve));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<RegionIdx> regions, RegionsOfCandidates(*map_, near, retrieve));
+  std::erase(regions, region_);
+  if (static_cast<int>(regions.size()) > options_.max_num_neighbour_regions)
+    regions.resize(options_.max_num_neighbour_regions);
+  if (region_ >= 0) regions.push_back(region_);
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions));
+  if (map_->head().landmark_choice == "all") {  // most landmarks belong to no region
+    std::vector<int32_t> images;
+    for (const Candidate& candidate : near) images.push_back(candidate.image);
+    CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, images));
+    landmarks.insert(landmarks.end(), of_images.begin(), of_images.end());
+    std::sort(landmarks.begin(), landmarks.end());
+    landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  }
+  // In view: within the camera's half diagonal of the optical axis, give or take what is uncertain.
+  const Pose cam_from_world = map_->head().camera_from_given * prior.cam_from_world;
+  const std::optional<Eigen::Vector3d> corner = BearingFromImage(camera, {0, 0});
+  if (!corner) return landmarks;
+  const double half_view = std::atan2(corner->head<2>().norm(), corner->z()) +
+                           RadFromDeg(options_.max_num_sigmas * prior.sigma_deg);
+  CAIRN_ASSIGN_OR_RETURN(const auto set, map_->Gather(landmarks, false));
+  std::vector<LandmarkIdx> in_view;
+  for (size_t i = 0; i < set->idx.size(); ++i) {
+    const Eigen::Vector3d point = cam_from_world * set->landmarks[i].position;
+    const double distance = point.norm();
+    const double shift = options_.max_num_sigmas * prior.sigma_m;
+    const double slack = distance > shift ? std::asin(shift / distance) : std::numbers::pi;
+    if (std::atan2(point.head<2>().norm(), point.z()) <= half_view + slack) in_view.push_back(set->idx[i]);
+  }
+  return in_view;
+}
+
+Result<std::vector<LandmarkIdx>> RegionTracker::VotedLandmarks(const Query& query) const {
+  std::vector<LandmarkIdx> none;
+  if (map_->num_landmarks() > localizer_.options().fall_back_max_num_landmarks) return none;
+  CAIRN_ASSIGN_OR_RETURN(const auto all, map_->AllLandmarks());
+  std::vector<LandmarkIdx> visible;
+  for (const Correspondence& match : MatchLandmarks(query, *all, localizer_.options().match)) {
+    visible.push_back(match.landmark);
+  }
+  std::sort(visible.begin(), visible.end());
+  visible.erase(std::unique(visible.begin(), visible.end()), visible.end());
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(*map_, visible));
+  std::vector<RegionIdx> regions;
+  for (const RegionVotes& vote : votes) {
+    if (vote.num_votes < options_.min_num_votes) break;
+    if (static_cast<int>(regions.size()) == options_.max_num_voted_regions) break;
+    regions.push_back(vote.region);
+  }
+  return LandmarksOfRegions(*map_, regions);
+}
+
+bool RegionTracker::Agrees(const Localization& found, const PosePrior& prior) const {
+  return CenterErrorM(found.cam_from_world, prior.cam_from_world) <=
+             options_.max_num_sigmas * prior.sigma_m &&
+         RotationErrorDeg(found.cam_from_world, prior.cam_from_world) <=
+             options_.max_num_sigmas * prior.sigma_deg;
+}
+
+void RegionTracker::Update(const Localization& found) {
+  if (!found.has_fix()) {
+    ++num_frames_since_;
+    return;
+  }
+  const bool is_next = found.scope == Scope::kTrack && num_frames_since_ == 0;
+  step_ = is_next ? found.cam_from_world * last_->Inverse() : Pose();
+  last_ = found.cam_from_world;
+  region_ = found.region;
+  num_frames_since_ = 0;
+}
+
+}  // namespace cairn

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "runtime/localize/localizer.h"
+
+namespace cairn {
+
+// How a stream of frames is followed, beyond the localizer's own options.
+struct RegionTrackerOptions {
+  // Standard deviation of what the motion from one frame to the next differs from the motion before, m and
+  // degrees; every frame without a fix adds as much.  REQUIRES: > 0
+  double step_sigma_m = 0.15;
+  double step_sigma_deg = 8;
+  // A prediction less certain than this is none: the robot is lost.  REQUIRES: > 0
+  double max_prior_sigma_m = 0.6;
+  // A tracked fix lies within so many standard deviations of the prediction.  REQUIRES: > 0
+  double max_num_sigmas = 4;
+  // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
+  // REQUIRES: >= 0
+  int max_num_neighbour_regions = 6;
+  // Landmarks seen that make a region a candidate [Sala06 §III: k].  REQUIRES: >= 1
+  int min_num_votes = 7;
+  // Most candidate regions whose landmarks are matched when the robot is lost.  REQUIRES: >= 1
+  int max_num_voted_regions = 3;
+};
+OptionTable DescribeOptions(RegionTrackerOptions* options);
+
+// Says where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
+// landmarks of its region and of the regions around that the motion so far (constant velocity, less certain
+// with every frame) predicts to be in view; a fix far from the prediction does not count.  When that fails,
+// the landmarks that are visible at all vote for the regions they belong to, and those of the regions with
+// most votes are matched; at last the frame is localized as if it were the first.  The latter two know
+// nothing of the frames before: a kidnapped robot is found again.  One per camera; the map is shared.
+class RegionTracker {
+ public:
+  explicit RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options = {},
+                         const RegionTrackerOptions& options = {});
+
+  // The next frame; scope kTrack: found by the prediction.  The same frames, the same results.
+  // Errors: as Localizer::Localize; the state is then as before.  No exception leaves it.
+  Result<Localization> Track(const cv::Mat& grey, const Camera& camera);
+  Result<Localization> TrackFeatures(Features features, const Camera& camera);
+
+  // Where the next frame is expected; none when lost.
+  std::optional<PosePrior> Prediction() const;
+
+ private:
+  Result<Localization> TrackQuery(const Query& query);
+  // Of its own and the neighbouring regions, ascending, those in view of the prediction.
+  Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
+  // Of the regions that the visible landmarks vote for, ascending.
+  Result<std::vector<LandmarkIdx>> VotedLandmarks(const Query& query) const;
+  bool Agrees(const Localization& found, const PosePrior& prior) const;
+  void Update(const Localization& found);
+
+  std::shared_ptr<const Map> map_;
+  Localizer localizer_;
+  RegionTrackerOptions options_;
+  std::optional<Pose> last_;  // cam_from_world of the last fix
+  Pose step_;                 // from each frame's camera to the next one's
+  RegionIdx region_ = -1;
+  int num_frames_since_ = 0;  // the last fix
+};
+
+}  // namespace cairn

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <vector>
+
+#include "core/geometry/pose.h"
+#include "core/options/options.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
+
+namespace cairn {
+
+struct RetrieveOptions {
+  // Most candidate images.  REQUIRES: >= 1
+  int max_num_candidates = 20;
+  // Candidates score at least this part of the best one's score [Mariottini11: a percentage of the maximum,
+  // not given]. REQUIRES: in [0, 1]
+  double min_score_ratio = 0.3;
+  // Without a vocabulary: largest angle between a descriptor and the landmark that is its word, radians.
+  // REQUIRES: > 0
+  double max_word_angle_rad = 0.8;
+  // And largest ratio of that angle to the one of the second nearest landmark.  REQUIRES: in (0, 1]
+  double max_word_ratio = 0.95;
+  // Most regions whose landmarks are matched first.  REQUIRES: >= 1
+  int max_num_regions = 12;
+  // With a prior: survey images within this distance and angle of it (beyond 3 of its standard deviations)
+  // are candidates.  REQUIRES: >= 0
+  double prior_distance_m = 3;
+  double prior_angle_deg = 45;
+};
+OptionTable DescribeOptions(RetrieveOptions* options);
+
+// Where the camera is believed to be: in the frame in which poses are reported.
+struct PosePrior {
+  Pose cam_from_world;
+  double sigma_m = 1;     // of its place, per axis
+  double sigma_deg = 10;  // of its rotation
+};
+
+// A survey image that may show what the query shows.
+struct Candidate {
+  int32_t image = 0;  // index of the image in the map
+  double score = 0;
+};
+
+// All of these: errors as Map::Landmarks, a damaged block.
+
+// Survey images most like the query [Mariottini11, On line 1], best first: by the vocabulary's words, or, in
+// a map without one, by the landmarks nearest to the query's descriptors, each a word of its own.
+Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
+                                               const RetrieveOptions& options);
+// Survey images taken near the prior (in the map's own frame), nearest first; score 1 / (1 + distance in m).
+Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
+                                               const RetrieveOptions& options);
+
+// Regions of the candidates' stations, those with the largest sum of scores first, at most max_num_regions.
+Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
+                                                   const RetrieveOptions& options);
+
+// Landmarks of regions, of images, ascending, each once.
+Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
+Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);
+
+// How many of these landmarks (each once) every region has [Sala06 §III: the visible features vote], most
+// first, ties to the smaller index; regions without any are left out.
+struct RegionVotes {
+  RegionIdx region = -1;
+  int num_votes = 0;
+};
+Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+
+// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
+Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
+
+// Distance from a place (in the map's own frame) to the nearest survey camera, metres; infinite without
+// images.
+Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center);
+
+}  // namespace cairn

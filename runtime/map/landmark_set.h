@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/blocks/map_rows.h"
+#include "core/features/packed_descriptors.h"
+
+namespace cairn {
+
+// Some landmarks of a map, taken out of its blocks: what a query works on.
+struct LandmarkSet {
+  std::vector<LandmarkIdx> idx;        // ascending
+  std::vector<MapLandmark> landmarks;  // of each
+  DescriptorMatrix descriptors;        // row i: idx[i]
+  PackedDescriptors packed;            // the same, for matching; empty where nobody matches the set
+
+  // REQUIRES: it is one of them
+  const MapLandmark& Find(LandmarkIdx landmark) const { return landmarks[Position(landmark)]; }
+  size_t Position(LandmarkIdx landmark) const;
+};
+
+// How many elements two ascending lists share.
+int NumShared(const std::vector<LandmarkIdx>& a, const std::vector<LandmarkIdx>& b);
+
+}  // namespace cairn

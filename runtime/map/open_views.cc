@@ -1,0 +1,34 @@
+#include "runtime/map/open_views.h"
+
+#include <array>
+#include <fstream>
+#include <string_view>
+
+#include "core/files/input_file.h"
+#include "runtime/map/map.h"
+
+namespace cairn {
+namespace {
+
+// By the application_id in SQLite's header.
+bool IsMap(const std::string& path) {
+  std::array<char, 72> head{};
+  if (!CheckInputFile(path).ok()) return false;  // reading it as views says why
+  std::ifstream file(path, std::ios::binary);
+  return file.read(head.data(), head.size()) && std::string_view(&head[68], 4) == "crmp";
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Views>> OpenViews(const std::string& path) {
+  if (!IsMap(path)) {
+    CAIRN_ASSIGN_OR_RETURN(Views views, ReadViews(path));
+    return std::make_shared<const Views>(std::move(views));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(path));
+  Result<std::shared_ptr<const Views>> views = map->FloorViews();
+  if (!views.ok()) return MakeError(views.error().code, "{}: {}", path, views.error().message);
+  return views;
+}
+
+}  // namespace cairn

@@ -1,0 +1,258 @@
+#include "runtime/map/update_map.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "core/base/no_throw.h"
+#include "core/files/file.h"
+#include "core/files/file_descriptor.h"
+#include "core/files/file_lock.h"
+#include "core/files/output_path.h"
+#include "core/files/replacement.h"
+#include "core/files/temporary.h"
+#include "core/files/write_error.h"
+#include "core/map/map_delta.h"
+#include "core/map/map_epoch.h"
+#include "core/map/map_file.h"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Holds the folder of a map against other updates and rollbacks there, until it goes.
+// Errors: Busy, NotFound, Io.
+Result<FileLock> LockFolderOf(const std::string& map_path) {
+  FileLock lock(open(FolderOf(map_path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock.descriptor() < 0) {
+    return MakeError(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo, "{}: its folder: {}", map_path,
+                     std::strerror(errno));
+  }
+  if (lock.Try(FileLock::Kind::kExclusive) == FileLock::Claim::kHeld) return lock;
+  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is at work in its folder; try again",
+                   map_path);
+}
+
+// The file itself where the path is a link to it: that is what others read.
+std::string FileOf(const std::string& map_path) {
+  std::error_code error;
+  const fs::path file = fs::canonical(map_path, error);
+  return error ? map_path : file.string();
+}
+
+// What updates that were killed have left beside a map.  REQUIRES: LockFolderOf(map_path)
+void RemoveStale(const std::string& map_path) {
+  std::error_code error;
+  const fs::path map(map_path);
+  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(map_path), error)) {
+    const std::string name = entry.path().filename().string();
+    for (const std::string& target : {map.filename().string(), PreviousMapPath(map.filename().string())}) {
+      if (IsTemporaryName(name, target)) fs::remove(entry.path(), error);
+    }
+  }
+}
+
+// Whether `next` may follow the map at `old_path`.
+Status CheckMayFollow(const MapFile& next, const std::string& next_name, const std::string& old_path,
+                      const UpdateOptions& options) {
+  CAIRN_RETURN_IF_ERROR(CheckAskedFor(next.head(), next_name, options.name, options.min_epoch));
+  const Result<MapFile> old = MapFile::Open(old_path, {.public_key = options.public_key});
+  if (!old.ok()) {
+    const ErrorCode code = old.error().code;
+    if (code == ErrorCode::kNotSigned || code == ErrorCode::kWrongKey) return Ok();
+    return old.error();
+  }
+  if (!old->seal().is_signed() || old->seal().file == next.seal().file) return Ok();
+  return CheckFollows(next.head(), next_name, old->head(), old_path, options.allow_older);
+}
+
+// The file that is to be `path`: a map made by a delta from the one at `old_path`, written and opened as a
+// robot would; what robots would refuse must not take the place of what they can open.
+Result<Replacement> WriteMap(const std::string& bytes, const std::string& path, const std::string& old_path,
+                             const std::string& delta_path, const UpdateOptions& options) {
+  CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
+  CAIRN_RETURN_IF_ERROR(file.Write(bytes));
+  const Result<MapFile> map = MapFile::Open(file.temporary(), {.public_key = options.public_key});
+  if (!map.ok()) {
+    return MakeError(map.error().code, "{}: leads to a map that cannot be opened: {}", delta_path,
+                     map.error().message);
+  }
+  CAIRN_RETURN_IF_ERROR(
+      CheckMayFollow(*map, fmt::format("{}: the map that it leads to", delta_path), old_path, options));
+  return file;
+}
+
+int Exchange(const std::string& path1, const std::string& path2) {
+  return renameat2(AT_FDCWD, path1.c_str(), AT_FDCWD, path2.c_str(), RENAME_EXCHANGE);
+}
+
+// The map in place kept as the previous one, until it is known whether another takes its place: then Confirm
+// drops what was the previous one before, else that comes back.
+class KeptMap {
+ public:
+  KeptMap(const std::string& map_path, int folder)
+      : map_path_(map_path), previous_(PreviousMapPath(map_path)), folder_(folder) {}
+  KeptMap(const KeptMap&) = delete;
+  KeptMap& operator=(const KeptMap&) = delete;
+  ~KeptMap() {
+    if (!is_kept_) return;
+    if (aside_.empty()) {
+      unlink(previous_.c_str());
+    } else if (Exchange(aside_, previous_) == 0) {
+      unlink(aside_.c_str());
+    } else {
+      rename(aside_.c_str(), previous_.c_str());
+    }
+  }
+
+  // Errors: Io, ReadOnly, DiskFull.
+  Status Keep() {
+    struct stat before = {};
+    const bool is_there = lstat(previous_.c_str(), &before) == 0;
+    if (is_there && !S_ISREG(before.st_mode) && !S_ISLNK(before.st_mode))
+      return MakeError(ErrorCode::kIo, "{}: is no file, and the map before cannot be kept there; remove it",
+                       previous_);
+    CAIRN_ASSIGN_OR_RETURN(const std::string second, SecondName());
+    if (is_there && Exchange(second, previous_) == 0) {
+      aside_ = second;
+    } else {
+      // There is nothing to keep, or the file system cannot exchange: the older one steps aside first.
+      if (is_there) {
+        const std::string aside = RandomTemporaryPath(previous_);
+        if (rename(previous_.c_str(), aside.c_str()) != 0) return CannotKeep(second, errno);
+        aside_ = aside;
+      }
+      if (rename(second.c_str(), previous_.c_str()) != 0) {
+        const int error = errno;
+        if (is_there) rename(aside_.c_str(), previous_.c_str());
+        return CannotKeep(second, error);
+      }
+    }
+    is_kept_ = true;
+    if (fsync(folder_) == 0 || errno == EINVAL) return Ok();  // EINVAL: there is nothing to sync
+    return WriteError(map_path_, "its folder cannot be synced; the map stays as it is", errno);
+  }
+
+  void Confirm() {
+    if (!aside_.empty()) unlink(aside_.c_str());  // else it only takes room, and the next update removes it
+    is_kept_ = false;
+  }
+
+ private:
+  // A second name for the map's file, or, where there can be none, a copy.
+  Result<std::string> SecondName() {
+    const std::string second = RandomTemporaryPath(previous_);
+    if (link(map_path_.c_str(), second.c_str()) == 0) return second;
+    CAIRN_ASSIGN_OR_RETURN(Replacement copy, Replacement::Begin(second, 0600));
+    CAIRN_RETURN_IF_ERROR(copy.CopyFrom(map_path_));
+    Status status = copy.FinishNew();
+    if (status.ok()) {
+      const FileDescriptor file(open(second.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+      struct stat map = {};
+      if (file.get() < 0 || stat(map_path_.c_str(), &map) != 0) return CannotKeep(second, errno);
+      status = GiveAttributes(file.get(), map, previous_);
+    }
+    if (status.ok()) return second;
+    unlink(second.c_str());
+    return status.error();
+  }
+
+  Error CannotKeep(const std::string& second, int error) const {
+    unlink(second.c_str());
+    return WriteError(previous_, "the map before cannot be kept there", error);
+  }
+
+  std::string map_path_, previous_;
+  std::string aside_;  // the previous map before this one
+  int folder_;
+  bool is_kept_ = false;
+};
+
+}  // namespace
+
+Status ApplyDelta(const std::string& old_path, const std::string& delta_path, const std::string& new_path,
+                  const UpdateOptions& options) {
+  return WithoutExceptions("ApplyDelta", [&]() -> Status {
+    if (IsSameFile(old_path, new_path)) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: is the map to start from and cannot be the one to write; --in-place replaces it and "
+          "keeps the old one beside it",
+          new_path);
+    }
+    CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(new_path, {delta_path}));
+    CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
+    CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(old_path));
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, old_path, delta_path));
+    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, new_path, old_path, delta_path, options));
+    return file.Finish();
+  });
+}
+
+Result<bool> UpdateMap(const std::string& given_path, const std::string& delta_path,
+                       const UpdateOptions& options) {
+  return WithoutExceptions("UpdateMap", [&]() -> Result<bool> {
+    const std::string map_path = FileOf(given_path);
+    CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(map_path, {delta_path}));
+    CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
+    RemoveStale(map_path);
+    CAIRN_ASSIGN_OR_RETURN(const MapDelta delta, ReadMapDelta(delta_path, options.public_key));
+    CAIRN_ASSIGN_OR_RETURN(const std::string old_bytes, ReadFile(map_path));
+    if (HashOf(old_bytes) == delta.new_hash) {
+      CAIRN_ASSIGN_OR_RETURN(const MapFile map, MapFile::Open(map_path, {.public_key = options.public_key}));
+      CAIRN_RETURN_IF_ERROR(CheckAskedFor(map.head(), map_path, options.name, options.min_epoch));
+      CAIRN_RETURN_IF_ERROR(SyncFolderOf(map_path, lock.descriptor()));
+      return false;
+    }
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ApplyMapDelta(delta, old_bytes, map_path, delta_path));
+    CAIRN_ASSIGN_OR_RETURN(Replacement file, WriteMap(bytes, map_path, map_path, delta_path, options));
+    KeptMap previous(map_path, lock.descriptor());
+    CAIRN_RETURN_IF_ERROR(previous.Keep());
+    const Status status = file.Finish();
+    if (file.is_in_place()) previous.Confirm();
+    if (!status.ok()) return status.error();
+    return true;
+  });
+}
+
+std::string PreviousMapPath(const std::string& map_path) { return map_path + ".previous"; }
+
+Status RollBackMap(const std::string& given_path, const UpdateOptions& options) {
+  return WithoutExceptions("RollBackMap", [&]() -> Status {
+    const std::string map_path = FileOf(given_path);
+    CAIRN_ASSIGN_OR_RETURN(const FileLock lock, LockFolderOf(map_path));
+    const std::string previous = PreviousMapPath(map_path);
+    struct stat status = {};
+    if (lstat(previous.c_str(), &status) != 0) {
+      if (errno != ENOENT) return WriteError(previous, "cannot be opened", errno);
+      return MakeError(
+          ErrorCode::kNotFound,
+          "{}: no such file; there is a previous map only where `cairn apply --in-place` made one", previous);
+    }
+    // A link would take the map's place.
+    if (!S_ISREG(status.st_mode))
+      return MakeError(ErrorCode::kIo, "{}: is no regular file; no update has put it there", previous);
+    CAIRN_ASSIGN_OR_RETURN(const MapFile before, MapFile::Open(previous, {.public_key = options.public_key}));
+    CAIRN_RETURN_IF_ERROR(CheckFileHash(previous));
+    CAIRN_RETURN_IF_ERROR(CheckAskedFor(before.head(), previous, options.name, options.min_epoch));
+    // The map in place may be what is wrong: one that cannot be opened is no reason to stay with it.
+    const Result<MapFile> map = MapFile::Open(map_path, {.public_key = options.public_key});
+    if (map.ok() && (map->seal().is_signed() || before.seal().is_signed())) {
+      CAIRN_RETURN_IF_ERROR(
+          CheckFollows(before.head(), previous, map->head(), map_path, /*allow_older=*/true));
+    }
+    if (Exchange(previous, map_path) != 0) {
+      if (errno == ENOENT) return MakeError(ErrorCode::kNotFound, "{}: no such file", map_path);
+      return WriteError(map_path, fmt::format("cannot be exchanged with {}", previous), errno);
+    }
+    return SyncFolderOf(map_path, lock.descriptor());
+  });
+}
+
+}  // namespace cairn

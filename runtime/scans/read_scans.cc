@@ -1,0 +1,76 @@
+#include "runtime/scans/read_scans.h"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/base/text.h"
+#include "core/files/file.h"
+
+namespace cairn {
+namespace {
+
+// No laser sees farther, metres.
+constexpr double kMaxRangeM = 1e5;
+
+Result<ScanView> ParseSegments(const std::string& text, const std::string& what, double sigma_m) {
+  ScanView view;
+  int number = 0;
+  for (const std::string_view line : SplitLines(text)) {
+    ++number;
+    const std::string_view trimmed = Trim(line);
+    if (trimmed.empty() || trimmed[0] == '#') continue;
+    const std::vector<std::string> fields = SplitFields(trimmed, ',');
+    std::vector<double> values(fields.size());
+    bool ok = fields.size() == 4 || fields.size() == 6;
+    for (size_t i = 0; i < fields.size() && ok; ++i)
+      ok = ParseNumber(fields[i], &values[i]) && std::abs(values[i]) <= kMaxRangeM;
+    if (!ok) {
+      return Corrupt(what,
+                     "line {}: {:?} is not x0,y0,x1,y1 or x0,y0,x1,y1,sigma_angle_deg,sigma_offset_m (finite "
+                     "numbers up to {:g})",
+                     number, trimmed.substr(0, 80), kMaxRangeM);
+    }
+    if (values.size() == 6 && (values[4] <= 0 || values[5] <= 0))
+      return Corrupt(what, "line {}: standard deviations {} and {}; both must be more than 0", number,
+                     values[4], values[5]);
+    ScanSegment segment;
+    segment.start = {values[0], values[1]};
+    segment.end = {values[2], values[3]};
+    const double turn = segment.start.x() * segment.end.y() - segment.start.y() * segment.end.x();
+    if (turn == 0)
+      return Corrupt(what, "line {}: a segment on a line through the robot, which cannot see it", number);
+    if (turn < 0) std::swap(segment.start, segment.end);
+    segment.sigma_offset_m = values.size() == 6 ? values[5] : sigma_m;
+    segment.sigma_angle_rad =
+        values.size() == 6 ? values[4] * std::numbers::pi / 180 : 2 * sigma_m / segment.Length();
+    view.segments.push_back(segment);
+  }
+  return view;
+}
+
+}  // namespace
+
+Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
+                                         const ScanSegmentsOptions& options) {
+  std::vector<ScanView> views;
+  const bool log = text.starts_with("FLASER ") || text.find("\nFLASER ") != std::string::npos ||
+                   text.starts_with("\x1f\x8b");
+  if (!log) {
+    CAIRN_ASSIGN_OR_RETURN(ScanView view, ParseSegments(text, what, options.sigma_range_m));
+    if (view.segments.empty())
+      return MakeError(ErrorCode::kNoData, "{}: neither FLASER lines nor segments in it", what);
+    views.push_back(std::move(view));
+    return views;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<RangeScan> scans, ParseCarmenLog(text, what));
+  for (const RangeScan& scan : scans) views.push_back({FindScanSegments(scan, options), scan.pose});
+  return views;
+}
+
+Result<std::vector<ScanView>> ReadScans(const std::string& path, const ScanSegmentsOptions& options) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  return ParseScans(text, path, options);
+}
+
+}  // namespace cairn

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/options/options.h"
+#include "runtime/visual_map/visual_estimate.h"
+
+namespace cairn {
+
+// p(x | z) over time: a Markov filter over the survey's places and headings [Sala06 §VII names it: a Markov
+// chain with the robot's motion model], for views that alone do not tell.
+struct VisualFilterOptions {
+  // What the odometry is off by: part of the way, part of the turn, and at every step besides, m and degrees.
+  // REQUIRES: >= 0
+  double odometry_way_ratio = 0.1;
+  double odometry_turn_ratio = 0.05;
+  double odometry_sigma_m = 0.02;
+  double odometry_sigma_deg = 1;
+  // Probability that the robot was carried away since the image before.  REQUIRES: in [0, 1]
+  double kidnapped_ratio = 0.01;
+};
+OptionTable DescribeOptions(VisualFilterOptions* options);
+
+// Where the robot probably is: starts knowing nothing.  One per robot; not for concurrent calls.
+class VisualFilter {
+ public:
+  explicit VisualFilter(std::shared_ptr<const VisualMap> map, const VisualFilterOptions& options = {},
+                        const VisualEstimateOptions& estimate_options = {});
+
+  // The robot drove: ahead and to the left (m, in its frame at the start), and turned left (rad).
+  // Errors: InvalidArgument for a number that is not finite.
+  Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
+  // It sees landmarks.  The result is that of this image with the belief before as its prior; its at_place,
+  // mean and entropy are those of the belief after, and where the image has a flag, position and covariance
+  // of the place too.  Errors: as EstimateVisualPose.
+  Result<VisualPose> See(const std::vector<SeenLandmark>& seen);
+
+  // Probability per place of the map; sums to 1.
+  std::vector<double> AtPlaces() const;
+
+ private:
+  std::shared_ptr<const VisualMap> map_;
+  VisualFilterOptions options_;
+  VisualEstimateOptions estimate_options_;
+  std::vector<std::vector<double>> belief_;  // per place and heading bin
+};
+
+}  // namespace cairn

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/error.h"
+#include "core/options/options.h"
+#include "core/world/landmark_model.h"
+#include "core/world/visual_map.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
+
+namespace cairn {
+
+// Localization without 3-D points and without a calibration [Sala06 §VI-C, after Sim & Dudek]: the visual map
+// has, for every landmark and heading, a model of where in the image and how large it shows from where.  It
+// is opt-in ([emit_map] visual_map = true); runtime/visual_map/visual_estimate.h finds the pose.
+
+struct VisualMapOptions {
+  // A model counts at the survey's places that see the landmark, and at those within this distance of one, in
+  // units of the survey's spacing [Sala06: the poses from which it was seen].  REQUIRES: >= 0
+  double extent_spacings = 1;
+  // Largest ratio of best to second-best descriptor angle, both ways.  REQUIRES: in (0, 1]
+  double visual_max_ratio = 0.85;
+  // Largest angle between the descriptors of a match, radians.  REQUIRES: > 0
+  double visual_max_angle_rad = 0.7;
+};
+OptionTable DescribeOptions(VisualMapOptions* options);
+
+// A keypoint that shows a landmark, as the estimator takes it: no camera.
+struct SeenLandmark {
+  LandmarkIdx landmark = 0;
+  Eigen::Vector3d seen = Eigen::Vector3d::Zero();  // x px, y px, log2 of the scale in px
+};
+
+// Where a survey was taken, and with which camera.
+struct VisualSurvey {
+  std::vector<Eigen::Vector2d> places;  // the pose lattice, each place once; floor frame, metres
+  std::vector<Eigen::Vector2d> images;  // where each image of the map was taken
+  std::vector<double> heights_m;        // and how high; empty: all as high as each other
+  int width_px = 0, height_px = 0;      // of the images
+};
+
+// Stations nearer than a centimetre are one place.
+std::vector<Eigen::Vector2d> DistinctPlaces(const std::vector<Eigen::Vector2d>& stations);
+
+// The visual map of a map, ready to use: immutable, shareable.
+class VisualMap {
+ public:
+  // What a model says at a place of the survey.
+  struct AtPlace {
+    int32_t place = 0;
+    Eigen::Vector3d seen;                  // from the image's middle
+    Eigen::Matrix<double, 3, 2> gradient;  // d seen / d place, per metre
+    Eigen::Vector3d variance;              // of seen
+    double rise = 0;                       // d seen.y / d height of the camera, px / m
+  };
+  struct Model {
+    LandmarkIdx landmark = 0;
+    int32_t heading = 0;
+    LandmarkModel interpolation;
+    Eigen::Vector3d sigma;  // as HeadingModel::sigma
+    bool predicts_badly = false;
+    std::vector<Eigen::Vector2d> sight_places;
+    std::vector<AtPlace> extent;  // ascending place
+  };
+
+  // Loads all models.  Errors: NotFound where the map has none; Corrupt (sights of an image that the map
+  // lacks, or that make no model; a camera that it lacks); Io.
+  static Result<std::shared_ptr<const VisualMap>> Load(const Map& map, const VisualMapOptions& options = {});
+  // Without descriptors: Match finds nothing.  Errors: Corrupt (no place, sights that make no model),
+  // InvalidArgument.  REQUIRES: the survey has all images of the data
+  static Result<std::shared_ptr<const VisualMap>> Make(const VisualMapData& data, VisualSurvey survey,
+                                                       const VisualMapOptions& options = {});
+
+  // Where the survey was taken, floor frame, metres: the pose lattice, each place once.
+  const std::vector<Eigen::Vector2d>& places() const { return survey_.places; }
+  // Median distance from a place to the next.
+  double spacing_m() const { return spacing_m_; }
+  const std::vector<double>& headings_deg() const { return headings_deg_; }
+  // px; where the survey does not tell how far a turn moves the image, a guess: 1.2 max(width, height).
+  double focal_px() const { return focal_px_; }
+  bool has_learnt_focal() const { return has_learnt_focal_; }
+  const VisualErrors& errors() const { return errors_; }
+  // Standard deviation of the survey's cameras' heights, m.
+  double height_sigma_m() const { return height_sigma_m_; }
+  // Size of the images that it is for.
+  int image_width_px() const { return survey_.width_px; }
+  int image_height_px() const { return survey_.height_px; }
+  Eigen::Vector2d middle_px() const { return {0.5 * survey_.width_px, 0.5 * survey_.height_px}; }
+  // Of what a model says at a place: that of left-out sights, grown with the distance from its sights.
+  Eigen::Vector3d Variance(const Model& model, const Eigen::Vector2d& position) const;
+  const std::vector<Model>& models() const { return models_; }
+  // Of a landmark: indices in models().
+  const std::vector<int32_t>& ModelsOf(LandmarkIdx landmark) const { return models_of_landmark_[landmark]; }
+  int64_t num_landmarks() const { return static_cast<int64_t>(models_of_landmark_.size()); }
+
+  // Matches by mutual nearest descriptors and ratio test with all landmarks of the map, ascending keypoint.
+  // Errors: Unsupported for an image of another size than the survey's.
+  Result<std::vector<SeenLandmark>> Match(const Query& query) const;
+
+ private:
+  VisualMap() = default;
+  static Result<std::shared_ptr<VisualMap>> MakeMutable(const VisualMapData& data, VisualSurvey survey,
+                                                        const VisualMapOptions& options);
+  Status AddModels(const VisualMapData& data);
+  void FillExtent(Model* model) const;
+
+  VisualMapOptions options_;
+  VisualSurvey survey_;
+  double height_sigma_m_ = 0;
+  double spacing_m_ = 0;
+  std::vector<double> headings_deg_;
+  double focal_px_ = 0;
+  bool has_learnt_focal_ = false;
+  VisualErrors errors_;
+  std::vector<Model> models_;
+  std::vector<std::vector<int32_t>> models_of_landmark_;
+  std::shared_ptr<const LandmarkSet> landmarks_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,159 @@
+#include "sim/render/furniture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.h"
+
+namespace cairn::sim {
+namespace {
+
+constexpr int kMaxAttemptsPerRoom = 200;
+// Kept free in front of a door, metres.
+constexpr double kDoorApproachM = 0.8;
+// Between pieces that do not touch, metres.
+constexpr double kGapM = 0.05;
+// Edge of a cell of the raster on which connectedness is tested, metres.
+constexpr double kCellM = 0.05;
+constexpr double kPillarEdgeM = 0.35;
+
+// Whether the cells of a room that keep `clearance` from its walls and obstacles are one 4-connected part and
+// hold a cell in front of each door.
+bool StaysConnected(const Rect& room, const std::vector<Rect>& obstacles, const std::vector<Rect>& approaches,
+                    double clearance) {
+  const Rect inner = room.Grown(-clearance);
+  const int cols = static_cast<int>(inner.width() / kCellM) + 1,
+            rows = static_cast<int>(inner.depth() / kCellM) + 1;
+  if (inner.width() <= 0 || inner.depth() <= 0) return false;
+  std::vector<char> is_free(static_cast<size_t>(cols) * rows, 1);
+  for (const Rect& obstacle : obstacles) {
+    const Rect grown = obstacle.Grown(clearance);
+    const int x0 = std::max(0, static_cast<int>(std::ceil((grown.x0 - inner.x0) / kCellM)));
+    const int x1 = std::min(cols - 1, static_cast<int>(std::floor((grown.x1 - inner.x0) / kCellM)));
+    const int y0 = std::max(0, static_cast<int>(std::ceil((grown.y0 - inner.y0) / kCellM)));
+    const int y1 = std::min(rows - 1, static_cast<int>(std::floor((grown.y1 - inner.y0) / kCellM)));
+    for (int y = y0; y <= y1; ++y) {
+      for (int x = x0; x <= x1; ++x) is_free[static_cast<size_t>(y) * cols + x] = 0;
+    }
+  }
+  const size_t num_free = std::count(is_free.begin(), is_free.end(), 1);
+  const auto start = std::find(is_free.begin(), is_free.end(), 1);
+  if (start == is_free.end()) return false;
+  std::vector<int> stack = {static_cast<int>(start - is_free.begin())};
+  *start = 2;
+  size_t num_reached = 0;
+  while (!stack.empty()) {
+    const int cell = stack.back();
+    stack.pop_back();
+    ++num_reached;
+    const int x = cell % cols, y = cell / cols;
+    const auto visit = [&](int nx, int ny) {
+      if (nx < 0 || ny < 0 || nx >= cols || ny >= rows) return;
+      const int next = ny * cols + nx;
+      if (is_free[next] == 1) is_free[next] = 2, stack.push_back(next);
+    };
+    visit(x - 1, y), visit(x + 1, y), visit(x, y - 1), visit(x, y + 1);
+  }
+  if (num_reached != num_free) return false;
+  return std::all_of(approaches.begin(), approaches.end(), [&](const Rect& approach) {
+    const int x =
+        std::clamp(static_cast<int>(((approach.x0 + approach.x1) / 2 - inner.x0) / kCellM), 0, cols - 1);
+    const int y =
+        std::clamp(static_cast<int>(((approach.y0 + approach.y1) / 2 - inner.y0) / kCellM), 0, rows - 1);
+    return is_free[static_cast<size_t>(y) * cols + x] == 2;
+  });
+}
+
+// The floor in front of the room's doors.
+std::vector<Rect> DoorApproaches(const Layout& layout, const Rect& room) {
+  std::vector<Rect> approaches;
+  for (const Wall& wall : layout.walls) {
+    for (const auto& [low, high] : wall.doors) {
+      const Rect& w = wall.rect;
+      const Rect approach = wall.along_x ? Rect{low, w.y0 - kDoorApproachM, high, w.y1 + kDoorApproachM}
+                                         : Rect{w.x0 - kDoorApproachM, low, w.x1 + kDoorApproachM, high};
+      const Rect part = {std::max(approach.x0, room.x0), std::max(approach.y0, room.y0),
+                         std::min(approach.x1, room.x1), std::min(approach.y1, room.y1)};
+      if (part.width() > 0.1 && part.depth() > 0.1) approaches.push_back(part);
+    }
+  }
+  return approaches;
+}
+
+// A cabinet, table or box somewhere in the room; most stand against a wall.
+Furniture ProposePiece(const Rect& room, Random& random) {
+  Furniture piece;
+  double length = 0, depth = 0;
+  const int64_t kind = random.UniformInt(0, 3);
+  if (kind == 0) {  // high cabinet
+    length = random.Uniform(0.7, 1.5), depth = random.Uniform(0.35, 0.5),
+    piece.height_m = random.Uniform(1.6, 2.0);
+  } else if (kind == 1) {  // sideboard
+    length = random.Uniform(0.8, 1.6), depth = random.Uniform(0.4, 0.55),
+    piece.height_m = random.Uniform(0.8, 1.2);
+  } else if (kind == 2) {  // table
+    length = random.Uniform(1.0, 1.6), depth = random.Uniform(0.6, 0.8),
+    piece.height_m = random.Uniform(0.6, 0.78);
+  } else {  // box
+    length = random.Uniform(0.35, 0.7), depth = random.Uniform(0.35, 0.7),
+    piece.height_m = random.Uniform(0.3, 0.9);
+  }
+  const bool along_x = random.Uniform() < 0.5;
+  const double dx = along_x ? length : depth, dy = along_x ? depth : length;
+  double x = random.Uniform(room.x0, std::max(room.x0, room.x1 - dx));
+  double y = random.Uniform(room.y0, std::max(room.y0, room.y1 - dy));
+  const bool at_wall = kind < 2 || random.Uniform() < 0.5;
+  if (at_wall && along_x) y = random.Uniform() < 0.5 ? room.y0 : room.y1 - dy;
+  if (at_wall && !along_x) x = random.Uniform() < 0.5 ? room.x0 : room.x1 - dx;
+  piece.rect = {x, y, x + dx, y + dy};
+  return piece;
+}
+
+Furniture ProposePillar(const Rect& room, double height_m, Random& random) {
+  const double x = random.Uniform(room.x0, room.x1 - kPillarEdgeM);
+  const double y = random.Uniform(room.y0, room.y1 - kPillarEdgeM);
+  return {{x, y, x + kPillarEdgeM, y + kPillarEdgeM}, height_m, true};
+}
+
+}  // namespace
+
+void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layout) {
+  for (size_t r = 0; r < layout->rooms.size(); ++r) {
+    const Room& room = layout->rooms[r];
+    if (room.is_corridor) continue;
+    Random random(MixSeed(MixSeed(seed, 2), r));
+    const std::vector<Rect> approaches = DoorApproaches(*layout, room.rect);
+    std::vector<Rect> obstacles;
+    const auto place = [&](const Furniture& piece) {
+      const Rect& rect = piece.rect;
+      if (rect.x1 > room.rect.x1 || rect.y1 > room.rect.y1) return false;
+      if (piece.height_m >= options.height_m && !piece.is_pillar) return false;
+      for (const Rect& other : obstacles) {
+        if (rect.Grown(kGapM).Overlaps(other)) return false;
+      }
+      for (const Rect& approach : approaches) {
+        if (rect.Overlaps(approach)) return false;
+      }
+      obstacles.push_back(rect);
+      if (!StaysConnected(room.rect, obstacles, approaches, options.clearance_m)) {
+        obstacles.pop_back();
+        return false;
+      }
+      layout->furniture.push_back(piece);
+      return true;
+    };
+    int num_pillars = static_cast<int>(options.pillars_per_room);
+    if (random.Uniform() < options.pillars_per_room - num_pillars) ++num_pillars;
+    double area_left = options.furniture_ratio * room.rect.area();
+    for (int attempt = 0; attempt < kMaxAttemptsPerRoom; ++attempt) {
+      if (num_pillars > 0) {
+        if (place(ProposePillar(room.rect, options.height_m, random))) --num_pillars;
+      } else if (area_left > 0) {
+        const Furniture piece = ProposePiece(room.rect, random);
+        if (piece.rect.area() <= 1.5 * area_left && place(piece)) area_left -= piece.rect.area();
+      }
+    }
+  }
+}
+
+}  // namespace cairn::sim

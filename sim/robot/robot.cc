@@ -1,0 +1,214 @@
+#include "sim/robot/robot.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.h"
+#include "core/features/descriptor_matcher.h"
+#include "core/geometry/floor_pose.h"
+#include "core/geometry/pose.h"
+#include "sim/survey/survey.h"
+
+namespace cairn::sim {
+namespace {
+
+// Turns on the spot, degrees from where it lost the target, in order.
+constexpr double kSearchDeg[] = {20, -20, 40, -40, 60, -60};
+// Commands to one image that something stops, before the robot gives up.
+constexpr int kMaxNumBlocked = 8;
+constexpr DescriptorMatcherOptions kMatcher{.max_ratio = 0.85, .max_angle_rad = 0.8};
+
+std::vector<PixelPair> MatchPixels(const Features& seen, const ServoTarget& target) {
+  std::vector<PixelPair> pairs;
+  for (const Match& match : MatchDescriptors(seen.descriptors, target.descriptors, kMatcher)) {
+    const Keypoint& keypoint = seen.keypoints[match.idx1];
+    pairs.push_back({{keypoint.x, keypoint.y}, target.pixels[match.idx2]});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(RobotOptions* o) {
+  OptionTable table = {
+      {.name = "servo",
+       .value = &o->servo,
+       .help = "how the robot gets to an image: steered by it, or put there with noise",
+       .choices = {"epipolar", "ideal"}},
+      {"ideal_noise_m", &o->ideal_noise_m, "standard deviation of the ideal servo's place, per axis, metres",
+       0, 1},
+      {"ideal_noise_deg", &o->ideal_noise_deg, "standard deviation of the ideal servo's heading, degrees", 0,
+       45},
+      {"ideal_reach_m", &o->ideal_reach_m, "the ideal servo gets to places no farther than this, metres",
+       0.01, 1000},
+      {"focal_ratio", &o->focal_ratio, "focal length that the servo assumes over the camera's", 0.5, 2},
+      {"radius_m", &o->radius_m, "radius of the robot, metres", 0, 2},
+      {"max_num_commands", &o->max_num_commands, "most commands to one image", 1},
+      {"pass_distance_ratio", &o->pass_distance_ratio,
+       "distance at which images on the way are passed, over that of the scene", 1e-4, 1},
+      {"pass_heading_deg", &o->pass_heading_deg, "turn at which images on the way are passed, degrees", 1e-3,
+       45},
+      {"image_noise", &o->image_noise, "standard deviation of grey noise, of 255", 0, 50},
+  };
+  const OptionTable sift = DescribeOptions(&o->sift);
+  table.insert(table.end(), sift.begin(), sift.end());
+  return table;
+}
+
+PlanarPose PlanarPoseOf(const Pose& cam_from_world) {
+  const FloorPose pose = FloorPoseOf(cam_from_world, Pose());
+  return {pose.position, WrapAngle(RadFromDeg(pose.heading_deg))};
+}
+
+Result<ServoTarget> TargetOfImage(const Map& map, int32_t image_idx) {
+  CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(image_idx));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(image->landmarks, false));
+  const auto camera = std::find_if(map.head().cameras.begin(), map.head().cameras.end(),
+                                   [&](const Camera& c) { return c.camera_id == image->camera_id; });
+  ServoTarget target;
+  target.pose = PlanarPoseOf(image->cam_from_world);
+  std::vector<Eigen::Index> rows;
+  for (size_t i = 0; i < landmarks->idx.size(); ++i) {
+    const auto pixel = ImageFromCamera(*camera, image->cam_from_world * landmarks->landmarks[i].position);
+    if (!pixel) continue;
+    target.pixels.push_back(*pixel);
+    rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  target.descriptors.resize(static_cast<Eigen::Index>(rows.size()), kDescriptorDim);
+  for (size_t i = 0; i < rows.size(); ++i) target.descriptors.row(i) = landmarks->descriptors.row(rows[i]);
+  return target;
+}
+
+Robot::Robot(const Building& building, const Camera& camera, double camera_height_m,
+             const RobotOptions& options, const ServoOptions& servo_options, uint64_t seed)
+    : building_(&building),
+      renderer_(building, camera),
+      camera_height_m_(camera_height_m),
+      options_(options),
+      servo_options_(servo_options),
+      seed_(seed) {}
+
+Result<Robot> Robot::Create(const Building& building, const Camera& camera, double camera_height_m,
+                            const RobotOptions& options, const ServoOptions& servo_options, uint64_t seed) {
+  RobotOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  CAIRN_ASSIGN_OR_RETURN([[maybe_unused]] const Servo servo, Servo::Create(camera, servo_options));
+  return Robot(building, camera, camera_height_m, options, servo_options, seed);
+}
+
+Features Robot::Look() {
+  PlannedImage image;
+  image.cam_from_world =
+      MakePose({pose_.position.x(), pose_.position.y(), camera_height_m_}, pose_.heading_rad);
+  image.noise = options_.image_noise;
+  const cv::Mat grey = TakeImage(renderer_, image, MixSeed(seed_, num_draws_++));
+  return *ExtractSift(grey, options_.sift);  // fails for bad options only, which Create has checked
+}
+
+Camera Robot::AssumedCamera() const {
+  Camera assumed = renderer_.camera();
+  const int num_focals = assumed.model == CameraModel::kPinhole ? 2 : 1;
+  for (int i = 0; i < num_focals; ++i) assumed.params[i] *= options_.focal_ratio;
+  return assumed;
+}
+
+int Robot::NumAgreeing(const Features& seen, const ServoTarget& target) const {
+  const ServoCommand command =
+      Servo::Create(AssumedCamera(), servo_options_)->Step(MatchPixels(seen, target));
+  return command.epipoles ? command.epipoles->num_inliers : 0;
+}
+
+RobotLeg Robot::GoTo(const ServoTarget& target, bool is_goal) {
+  return options_.servo == "ideal" ? GoIdeally(target) : Steer(target, is_goal);
+}
+
+RobotLeg Robot::GoIdeally(const ServoTarget& target) {
+  std::vector<PlanarPose> alike = {target.pose};
+  if (building_->layout.twins) {
+    const Twins& twins = *building_->layout.twins;
+    for (const double offset : {twins.offset_m, -twins.offset_m}) {
+      const double x = target.pose.position.x() + std::min(offset, 0.0);  // in the first twin
+      if (x < twins.rect.x0 || x > twins.rect.x1) continue;
+      alike.push_back({target.pose.position + Eigen::Vector2d(offset, 0), target.pose.heading_rad});
+    }
+  }
+  // It moves as the images' places do: by as much as from the last one's to this one's.
+  Eigen::Vector2d expected = pose_.position;
+  if (last_target_) expected += target.pose.position - last_target_->position;
+  const PlanarPose& nearest =
+      *std::min_element(alike.begin(), alike.end(), [&](const PlanarPose& a, const PlanarPose& b) {
+        return (a.position - expected).norm() < (b.position - expected).norm();
+      });
+  RobotLeg leg;
+  leg.steps.push_back({.pose = pose_});
+  if ((nearest.position - pose_.position).norm() > options_.ideal_reach_m) {
+    leg.why = fmt::format("nothing that looks like the image within {:g} m", options_.ideal_reach_m);
+    return leg;
+  }
+  Random random(MixSeed(seed_, num_draws_++));
+  const double x = random.Normal(0, options_.ideal_noise_m), y = random.Normal(0, options_.ideal_noise_m);
+  const double turn = RadFromDeg(random.Normal(0, options_.ideal_noise_deg));
+  const PlanarPose noisy = {nearest.position + Eigen::Vector2d(x, y), WrapAngle(nearest.heading_rad + turn)};
+  pose_ = ClearanceM(*building_, noisy.position.x(), noisy.position.y()) > 0 ? noisy : nearest;
+  leg.arrived = true;
+  last_target_ = target.pose;
+  leg.why = "put there";
+  leg.steps.back().command.state = ServoState::kArrived;
+  return leg;
+}
+
+// False where a wall stops it.
+bool Robot::Move(const ServoCommand& command) {
+  const double seconds = servo_options_.step_s, way = command.speed_m_s * seconds;
+  const double heading = pose_.heading_rad + 0.5 * command.turn_rad_s * seconds;
+  pose_.heading_rad = WrapAngle(pose_.heading_rad + command.turn_rad_s * seconds);
+  if (way == 0) return true;
+  const Eigen::Vector2d moved = pose_.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  const double before = ClearanceM(*building_, pose_.position.x(), pose_.position.y());
+  const double after = ClearanceM(*building_, moved.x(), moved.y());
+  if (after < options_.radius_m && after < before) return false;
+  pose_.position = moved;
+  return true;
+}
+
+RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
+  ServoOptions servo_options = servo_options_;
+  if (!is_goal) {
+    servo_options.arrive_distance_ratio = options_.pass_distance_ratio;
+    servo_options.arrive_heading_deg = options_.pass_heading_deg;
+  }
+  Servo servo = *Servo::Create(AssumedCamera(), servo_options);
+  RobotLeg leg;
+  int num_blocked = 0, num_searched = 0;
+  double lost_heading_rad = 0;
+  while (static_cast<int>(leg.steps.size()) < options_.max_num_commands) {
+    const std::vector<PixelPair> pairs = MatchPixels(Look(), target);
+    ServoCommand command = servo.Step(pairs);
+    command.epipoles.reset();
+    leg.steps.push_back({pose_, command, static_cast<int>(pairs.size())});
+    leg.why = command.why;
+    leg.arrived = command.state == ServoState::kArrived;
+    if (leg.arrived) return leg;
+    if (command.state == ServoState::kLost) {
+      if (num_searched == static_cast<int>(std::size(kSearchDeg))) {
+        pose_.heading_rad = lost_heading_rad;
+        return leg;
+      }
+      if (num_searched == 0) lost_heading_rad = pose_.heading_rad;
+      pose_.heading_rad = WrapAngle(lost_heading_rad + RadFromDeg(kSearchDeg[num_searched++]));
+      continue;
+    }
+    leg.seen = true;
+    num_searched = 0;
+    if (Move(command)) continue;
+    if (++num_blocked == kMaxNumBlocked) {
+      leg.why = "something stands in the way: " + leg.why;
+      return leg;
+    }
+    servo.Blocked();
+  }
+  leg.why = fmt::format("not there after {} commands: {}", options_.max_num_commands, leg.why);
+  return leg;
+}
+
+}  // namespace cairn::sim

@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "core/geometry/pose.h"
+#include "core/picture/svg.h"
+#include "sim/robot/robot_drive.h"
+
+namespace cairn::sim {
+namespace {
+
+constexpr double kWidthPx = 1000, kTopPx = 56, kMarginPx = 24, kChartPx = 150, kLegendPx = 56;
+
+class Picture {
+ public:
+  Picture(const RobotDrive& drive, const Building& building, const std::vector<PlanarPose>& node_poses)
+      : drive_(drive), building_(building), node_poses_(node_poses) {
+    const Rect& bounds = building.layout.bounds;
+    px_per_m_ = (kWidthPx - 2 * kMarginPx) / bounds.width();
+    floor_px_ = bounds.depth() * px_per_m_;
+    for (const DriveLeg& leg : drive.legs) {
+      for (const DriveHypothesis& hypothesis : leg.hypotheses) {
+        if (std::find(starts_.begin(), starts_.end(), hypothesis.start) == starts_.end())
+          starts_.push_back(hypothesis.start);
+      }
+    }
+  }
+
+  std::string Draw() {
+    const double height = kTopPx + floor_px_ + kChartPx + kLegendPx + 40;
+    text_ = BeginSvg(kWidthPx, height, 14);
+    Write(
+        "<text x=\"{:.0f}\" y=\"34\" font-size=\"18\" font-weight=\"bold\">{}; {:.1f} m, turned back {} "
+        "times, looked anew {} times</text>\n",
+        kMarginPx, drive_.error ? "not at the goal" : "at the goal", drive_.way_m, drive_.num_switches,
+        drive_.num_relocalizations);
+    DrawFloor();
+    DrawWay();
+    DrawChart();
+    return text_ + "</svg>\n";
+  }
+
+ private:
+  template <typename... Args>
+  void Write(fmt::format_string<Args...> format, Args&&... args) {
+    text_ += fmt::format(format, std::forward<Args>(args)...);
+  }
+
+  Eigen::Vector2d Pixel(const Eigen::Vector2d& place) const {
+    const Rect& bounds = building_.layout.bounds;
+    return {kMarginPx + (place.x() - bounds.x0) * px_per_m_, kTopPx + (bounds.y1 - place.y()) * px_per_m_};
+  }
+
+  const char* Colour(NodeIdx start) const {
+    const auto found = std::find(starts_.begin(), starts_.end(), start);
+    return kSvgColours[static_cast<size_t>(found - starts_.begin()) % kSvgColours.size()];
+  }
+
+  void DrawArrow(const PlanarPose& pose, double size, const std::string& paint) {
+    const Eigen::Vector2d p = Pixel(pose.position);
+    const double c = std::cos(pose.heading_rad), s = -std::sin(pose.heading_rad);
+    Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}z\" {}/>\n", p.x() + size * c,
+          p.y() + size * s, p.x() - 0.4 * size * (c + s), p.y() - 0.4 * size * (s - c),
+          p.x() - 0.4 * size * (c - s), p.y() - 0.4 * size * (s + c), paint);
+  }
+
+  void DrawFloor() {
+    Write("<g fill=\"#cccccc\">\n");
+    for (const Rect& rect : building_.obstacles) {
+      const Eigen::Vector2d p = Pixel({rect.x0, rect.y1});
+      Write("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", p.x(), p.y(),
+            rect.width() * px_per_m_, rect.depth() * px_per_m_);
+    }
+    Write("</g>\n");
+    // The ways of the starts, later ones over earlier ones.
+    for (const DriveLeg& leg : drive_.legs) {
+      if (leg.kind != "start" && leg.kind != "relocalize") continue;
+      for (const DriveHypothesis& hypothesis : leg.hypotheses) {
+        for (const NodeIdx node : hypothesis.path) {
+          DrawArrow(node_poses_[node], 7,
+                    fmt::format("fill=\"none\" stroke=\"{}\"", Colour(hypothesis.start)));
+        }
+        const Eigen::Vector2d p = Pixel(hypothesis.start_pose.position);
+        Write(
+            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"13\" fill=\"none\" stroke=\"{}\" "
+            "stroke-width=\"3\"/>\n",
+            p.x(), p.y(), Colour(hypothesis.start));
+      }
+    }
+  }
+
+  void DrawWay() {
+    for (const DriveLeg& leg : drive_.legs) {
+      std::string points;
+      const auto add = [&](const PlanarPose& pose) {
+        const Eigen::Vector2d p = Pixel(pose.position);
+        points += fmt::format("{}{:.1f},{:.1f}", points.empty() ? "" : " ", p.x(), p.y());
+      };
+      for (const RobotStep& step : leg.steps) add(step.pose);
+      add(leg.pose);
+      Write("<polyline points=\"{}\" fill=\"none\" stroke=\"#000000\" stroke-width=\"1.5\"{}/>\n", points,
+            leg.kind == "retrace" ? " stroke-dasharray=\"4 3\"" : "");
+    }
+    DrawArrow(drive_.start, 12, "fill=\"#000000\"");
+    DrawArrow(drive_.goal, 12, "fill=\"#D55E00\"");
+    const double y = kTopPx + floor_px_ + 26;
+    for (const auto& [line, text] :
+         {std::pair(0, "black arrow: start, red: goal; line: the robot's way, dashed where it turns back"),
+          std::pair(1,
+                    "rings: starts held possible, with the images of their ways; below: posteriors after "
+                    "each image")}) {
+      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", kMarginPx, y + 18 * line, text);
+    }
+  }
+
+  void DrawChart() {
+    const double top = kTopPx + floor_px_ + kLegendPx, bottom = top + kChartPx;
+    std::vector<const DriveLeg*> looked;
+    for (const DriveLeg& leg : drive_.legs) {
+      if (!leg.hypotheses.empty()) looked.push_back(&leg);
+    }
+    const double step = (kWidthPx - 2 * kMarginPx) / std::max<double>(1, looked.size());
+    Write("<path d=\"M{0:.0f} {1:.0f}v{2:.0f}h{3:.0f}\" fill=\"none\" stroke=\"#888888\"/>\n", kMarginPx, top,
+          kChartPx, kWidthPx - 2 * kMarginPx);
+    for (size_t i = 0; i < looked.size(); ++i) {
+      double y = bottom;
+      for (const DriveHypothesis& hypothesis : looked[i]->hypotheses) {
+        const double part = hypothesis.posterior * kChartPx;
+        y -= part;
+        Write(
+            "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"><title>start "
+            "{}: {:.3f}</title></rect>\n",
+            kMarginPx + static_cast<double>(i) * step + 1, y, std::max(1.0, step - 2), part,
+            Colour(hypothesis.start), hypothesis.start, hypothesis.posterior);
+      }
+      const std::string& verdict = looked[i]->verdict;
+      if (!verdict.empty() && verdict != "follow") {
+        Write("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\">{}</text>\n",
+              kMarginPx + static_cast<double>(i) * step, bottom + 14, verdict);
+      }
+    }
+  }
+
+  const RobotDrive& drive_;
+  const Building& building_;
+  const std::vector<PlanarPose>& node_poses_;
+  double px_per_m_ = 1, floor_px_ = 0;
+  std::vector<NodeIdx> starts_;
+  std::string text_;
+};
+
+}  // namespace
+
+std::string DriveSvg(const RobotDrive& drive, const Building& building,
+                     const std::vector<PlanarPose>& node_poses) {
+  return Picture(drive, building, node_poses).Draw();
+}
+
+}  // namespace cairn::sim

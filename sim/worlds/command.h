@@ -1,0 +1,10 @@
+#pragma once
+
+#include "core/line/command.h"
+
+namespace cairn::sim {
+
+// cairn simulate-worlds --setting 1..4 --seed S -o WORLD
+Command SimulateWorldsCommand();
+
+}  // namespace cairn::sim

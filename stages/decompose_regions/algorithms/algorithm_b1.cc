@@ -1,0 +1,15 @@
+// [Sala06 Fig. 4] Algorithm B.1: all open stations shrink to those that see k features, until none is open.
+#include "stages/decompose_regions/algorithms/algorithms.h"
+
+namespace cairn::decompose_regions {
+
+void AlgorithmB1(Cover* cover) {
+  FeatureChooser chooser(cover);
+  while (cover->HasOpen()) {                     // [line 2]
+    const CoreRegion region = chooser.Choose();  // [lines 3-9]
+    cover->AddComponents(region.features,
+                         region.stations);  // [lines 10-11], subject to rho; split if unconnected
+  }
+}
+
+}  // namespace cairn::decompose_regions

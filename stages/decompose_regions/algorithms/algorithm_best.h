@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/progress.h"
+#include "core/world/decomposition.h"
+#include "core/world/world.h"
+
+namespace cairn::decompose_regions {
+
+// Effort of `best`; counts, not times, so that the result does not depend on the machine.
+struct BestOptions {
+  // Exchanges of a region for another, per coverable station, while annealing (cover_annealing.h).
+  // REQUIRES: >= 0
+  int exchanges_per_station = 400;
+  // Neighbourhoods that are covered anew (cover_search.h).  REQUIRES: >= 0
+  int num_repairs = 60;
+};
+
+// Fewer regions: replaces those of `start` by at most as many that leave at most as many coverable stations
+// uncovered, and states a certified lower bound (column_generation.h).  Not in [Sala06], whose §VII asks for
+// it.  Column generation on the linear program of set cover finds regions worth having and the bound; dives
+// and simulated annealing choose among them (cover_search.h).  Time grows with the stations times the regions
+// that meet at one, and with the repairs.  Pure; told to stop, it returns what it has.
+// REQUIRES: `start` is a decomposition of the world; CheckWorld(world) is ok.
+Decomposition AlgorithmBest(const World& world, const Decomposition& start, const BestOptions& options,
+                            uint64_t seed, Progress& progress);
+
+// The lower bound alone, for a decomposition made by any algorithm.
+int CertifiedLowerBound(const World& world, const Decomposition& decomposition);
+
+}  // namespace cairn::decompose_regions

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/random.h"
+#include "stages/decompose_regions/cover/cover_lp.h"
+#include "stages/decompose_regions/cover/pricing.h"
+#include "stages/decompose_regions/cover/region_pool.h"
+
+namespace cairn::decompose_regions {
+
+// Effort of column generation; counts, not times, so that the result does not depend on the machine.
+struct ColumnGenerationOptions {
+  int num_rounds = 30;              // of greedy pricing, at most
+  int num_exact_rounds = 24;        // of exact pricing, at most
+  int num_lp_iterations = 150;      // between two greedy pricings
+  int num_exact_iterations = 1000;  // of the linear program, between two exact pricings
+  int min_new_regions = 20;         // a round adds at most this many regions, or the following share of the
+  double max_new_ratio = 0.125;     // coverable stations if that is more
+  int64_t max_work_ratio = 200;     // of the incidences that one exact pricing looks at to those of the world
+};
+
+// The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
+// the world: solves it over a pool of regions, adds regions of value above 1, again and again [Gilmore and
+// Gomory 1961].
+//
+// The bound.  Let y_v >= 0 be whole numbers, z their largest, core(R) = { v : N_tau(v) inside of R }, M >=
+// y(core(R)) for every region R with k common features.  A decomposition D that leaves at most H coverable
+// stations uncovered has
+//   |D| M  >=  sum over R in D of y(core(R))          each region is worth at most M
+//          >=  sum of y_v over covered v              each covered station is in the core of some region
+//          >=  (sum of y_v) - H z                     at most H stations, each worth at most z, are not
+//          covered
+// so |D| >= ((sum of y_v) - H z) / M, rounded up.  The values y come from the linear program, scaled and
+// rounded; none of this depends on how well it was solved.  M comes from branch and bound over all regions
+// (RegionPricer::MaxValue).
+class ColumnGeneration {
+ public:
+  // `wide` outlives this object; reduced with AreaSplit::kBeforeShrinking.
+  ColumnGeneration(const ReducedWorld& wide, int max_uncovered, const ColumnGenerationOptions& options);
+  ColumnGeneration(const ColumnGeneration&) = delete;
+
+  RegionPool& pool() { return pool_; }
+  const CoverLp& lp() const { return lp_; }
+
+  // Solves the relaxation.  REQUIRES: the pool's regions cover all but H coverable stations
+  void Run();
+  // Solves it for a smaller H, with exact pricing: the bound can only grow.  REQUIRES: Run
+  void LowerMaxUncovered(int max_uncovered);
+  // Certified least number of regions; 0 before Run.
+  int lower_bound() const { return lower_bound_; }
+  // Adds regions to the pool that the values of another program over it make worthwhile; returns how many.
+  int Price(const CoverLp& lp);
+  // Adds regions to the pool that the relaxation leaves out by little.
+  void AddNearlyAsValuable(Random* random);
+
+ private:
+  void RunExactRounds();
+  int AddMostValuable(const StationValues& values, std::vector<CoreRegion> found);
+
+  const ReducedWorld& wide_;
+  int max_uncovered_;
+  const ColumnGenerationOptions options_;
+  const int max_new_regions_;
+  RegionPool pool_;
+  RegionPricer pricer_;
+  CoverLp lp_;
+  int lower_bound_ = 0;
+};
+
+}  // namespace cairn::decompose_regions

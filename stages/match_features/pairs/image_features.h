@@ -1,0 +1,60 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera/camera.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/descriptor_matcher.h"
+#include "core/geometry/pose.h"
+
+namespace cairn::match_features {
+
+// An image to match, without its features: these stay in the database until a pair needs them.
+struct MatchImage {
+  ImageId image_id = 0;
+  std::string name;
+  CameraId camera_id = 0;
+  std::optional<Pose> cam_from_world;
+  int num_features = 0;
+};
+
+struct MatchImages {
+  std::map<CameraId, Camera> cameras;
+  std::vector<MatchImage> images;                   // those with features, ascending image_id
+  std::map<std::string, ImageId> without_features;  // those that the database has besides, by name
+
+  bool AllPosed() const;
+};
+
+// Cameras and images of a COLMAP database; poses by image name from `capture` (may be null).  Throws
+// SQLite::Exception: call it inside WithDatabaseErrors.  Errors: Corrupt (an image without camera, counts of
+// keypoints and descriptors that differ).
+Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture);
+
+// The features of one image, as matching and verification read them.
+struct ImageFeatures {
+  std::vector<Keypoint> keypoints;
+  std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
+  DescriptorMatrix descriptors;
+  PackedDescriptors packed;
+
+  // At most what the features of an image take, bytes.
+  static int64_t NumBytes(int num_features);
+};
+
+// Errors: Corrupt.  Throws like ReadMatchImages.
+Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
+                                        const Camera& camera);
+
+// Only the bearings of ImageFeatures.  Errors: Corrupt.  Throws like ReadMatchImages.
+Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
+                                                       const Camera& camera);
+
+}  // namespace cairn::match_features

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/features/features.h"
+#include "stages/match_features/pairs/select_pairs.h"
+
+namespace cairn::match_features {
+
+struct PredictPairsOptions {
+  // Fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
+  int min_num_expected_matches;
+  // Rays that differ by more show nothing alike, degrees.  REQUIRES: in (0, 180]
+  double max_ray_angle_deg;
+  // Largest distance of a ray to the epipolar plane of another that shows the same thing, pixels; as wide as
+  // the poses are wrong.  REQUIRES: > 0
+  double max_prior_error_px;
+  // A shorter baseline is none, metres.  REQUIRES: > 0
+  double min_baseline_m;
+};
+
+// Predicts which posed images show the same scene from the pairs that are matched already.  View frusta do
+// not know walls; verified matches do: where a feature f of image i matches one of image k, and that one
+// matches a feature h of image j, f and h most likely show one thing if the stated poses let them: their rays
+// meet in front of both cameras, up to the poses' error, at no more than max_ray_angle.  The matches that
+// images i and j are expected to have are the features of i from which such a chain leads to j.  Chains of
+// two matches, not whole tracks: one wrong match joins two tracks, but makes few chains.
+class PairPredictor {
+ public:
+  struct View {
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();  // world frame
+    std::vector<Eigen::Vector3f> rays;                 // of each feature, unit vectors, world frame
+    double focal_px = 0;
+  };
+  explicit PairPredictor(std::vector<View> views);
+
+  // Adds the verified matches of two views.
+  void Add(int idx1, int idx2, const std::vector<Match>& inliers);
+
+  // Pairs (idx1 < idx2, ascending) of enough expected matches that are not in `tried` (ascending).  Same for
+  // any order of the calls of Add and any number of threads.  A later call looks only at pairs that matches
+  // added since the last one lead to: others promise what they did.  REQUIRES of later calls: the same
+  // options, and in `tried` the pairs of the earlier calls.  Cost: sum over features of (matches)^2; later,
+  // of images with such pairs.  Memory: 16 bytes per match and 28 per feature.  Errors: Cancelled.
+  Result<IndexPairs> Predict(const IndexPairs& tried, const PredictPairsOptions& options, int num_threads,
+                             Progress& progress);
+
+ private:
+  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
+  struct Links {
+    std::vector<uint64_t> begin;
+    std::vector<uint32_t> feature;
+  };
+  // Of the matches from `first_match` on.
+  Links CollectLinks(size_t first_match) const;
+  // Later images to which a chain leads that has a match of `new_links`, flags per image.
+  std::vector<bool> NewlyLinked(int idx, const Links& links, const Links& new_links) const;
+  // Expected matches with every later image that is not in `settled`, flags per image.
+  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<bool>& settled,
+                                   const PredictPairsOptions& options) const;
+  bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
+  const Eigen::Vector3f& Ray(uint32_t feature) const {
+    const int idx = view_of_[feature];
+    return views_[idx].rays[feature - first_feature_[idx]];
+  }
+
+  std::vector<View> views_;
+  std::vector<uint32_t> first_feature_;  // of each view, counted over all; one more than views
+  std::vector<int> view_of_;             // of each feature
+  std::vector<std::pair<uint32_t, uint32_t>> matches_;
+  size_t num_predicted_from_ = 0;  // of matches_, at the last call of Predict
+};
+
+}  // namespace cairn::match_features

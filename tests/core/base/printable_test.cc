@@ -1,0 +1,65 @@
+#include "core/base/printable.h"
+
+#include <gtest/gtest.h>
+
+#include "core/picture/svg.h"
+
+namespace cairn {
+namespace {
+
+TEST(Printable, ShowsWhatWouldCommandATerminal) {
+  EXPECT_EQ(Printable("a\x1b[31mb"), "a\\u001b[31mb");
+  EXPECT_EQ(Printable(std::string_view("a\0b", 3)), "a\\u0000b");
+  EXPECT_EQ(Printable("a\rb\bc\x7f"), "a\\u000db\\u0008c\\u007f");
+  EXPECT_EQ(Printable("\xc2\x80 \xc2\x9b"
+                      "31m \xc2\x9f"),
+            "\\u0080 \\u009b31m \\u009f");                             // C1: CSI without ESC
+  EXPECT_EQ(Printable("\xe2\x80\xaa\xe2\x80\xae"), "\\u202a\\u202e");  // embedding, override
+  EXPECT_EQ(Printable("\xe2\x81\xa6\xe2\x81\xa9"), "\\u2066\\u2069");  // isolates
+}
+
+TEST(Printable, LeavesTextAsItIs) {
+  for (const char* text : {"", "a b\n\tc \\ ~ !", "Küche", "\xc2\xa0", "日本語", "\xf0\x9f\xa4\x96",
+                           "\xe2\x80\xa9", "\xe2\x80\xaf", "\xe2\x81\xa5", "\xe2\x81\xaa"}) {
+    EXPECT_EQ(Printable(text), text);
+  }
+}
+
+// As RFC 3629 has it: nothing longer than needed, no surrogates, nothing past U+10FFFF.
+TEST(Printable, ShowsBytesThatAreNoUtf8) {
+  EXPECT_EQ(Printable("K\xfc"
+                      "che"),
+            "K\\xfcche");
+  EXPECT_EQ(Printable("\xc3"), "\\xc3");  // cut off
+  EXPECT_EQ(Printable("\xe2\x80"), "\\xe2\\x80");
+  EXPECT_EQ(Printable("\x9b"
+                      "31m"),
+            "\\x9b31m");                           // C1 of eight bits
+  EXPECT_EQ(Printable("\xc0\x9b"), "\\xc0\\x9b");  // ESC, too long
+  EXPECT_EQ(Printable("\xe0\x80\x9b"), "\\xe0\\x80\\x9b");
+  EXPECT_EQ(Printable("\xf0\x80\x80\x9b"), "\\xf0\\x80\\x80\\x9b");
+  EXPECT_EQ(Printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // a surrogate
+  EXPECT_EQ(Printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
+  EXPECT_EQ(Printable("\xf8\x88\x80\x80\x80"), "\\xf8\\x88\\x80\\x80\\x80");
+  EXPECT_EQ(Printable("\xf8\x90\x80\x80"), "\\xf8\\x90\\x80\\x80");  // in a byte too many
+  EXPECT_EQ(Printable("\xf4\x8f\xbf\xbf"), "\xf4\x8f\xbf\xbf");      // the last one
+  EXPECT_EQ(Printable("\xc3\xc3\xbc"), "\\xc3\xc3\xbc");             // only what is wrong
+}
+
+TEST(Printable, ControlCharactersOfNamesAreSeen) {
+  EXPECT_FALSE(HasControlCharacter("a b/Küche \xfc.jpg"));
+  EXPECT_FALSE(HasControlCharacter(""));
+  for (const char c : {'\0', '\n', '\r', '\t', '\x1b', '\x1f', '\x7f'})
+    EXPECT_TRUE(HasControlCharacter(std::string("a") + c + "b")) << int{c};
+}
+
+TEST(Svg, TextIsWhatXmlCanHold) {
+  EXPECT_EQ(EscapeXml("<h2 a=\"b\" c='d'>&</h2>"),
+            "&lt;h2 a=&quot;b&quot; c=&#39;d&#39;&gt;&amp;&lt;/h2&gt;");
+  EXPECT_EQ(EscapeXml("a\x01\x1b\xffz"), "a\ufffd\ufffd\ufffdz");
+  EXPECT_EQ(EscapeXml("\xef\xbf\xbe\xef\xbf\xbf"), "\ufffd\ufffd");  // U+FFFE, U+FFFF
+  EXPECT_EQ(EscapeXml("\t\n\r Küche \xef\xbf\xbd"), "\t\n\r Küche \ufffd");
+}
+
+}  // namespace
+}  // namespace cairn

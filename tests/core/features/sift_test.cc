@@ -1,0 +1,102 @@
+#include "core/features/sift.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+namespace cairn {
+namespace {
+
+// A Gaussian blob whose centre is known in COLMAP's pixels.
+cv::Mat Blob(double x, double y, double sigma) {
+  cv::Mat image(96, 128, CV_8UC1);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const double dx = column + 0.5 - x, dy = row + 0.5 - y;
+      image.at<uint8_t>(row, column) = static_cast<uint8_t>(
+          std::lround(60 + 180 * std::exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma))));
+    }
+  }
+  return image;
+}
+
+TEST(ExtractSift, FindsTheCentreOfABlobInColmapsPixels) {
+  for (const auto& [x, y] : {std::pair(60.5, 40.5), std::pair(61.0, 40.0), std::pair(60.25, 44.75)}) {
+    const auto features = ExtractSift(Blob(x, y, 4.0), {});
+    ASSERT_TRUE(features.ok());
+    double least = 1e9;
+    Keypoint nearest;
+    for (const Keypoint& keypoint : features->keypoints) {
+      if (const double distance = std::hypot(keypoint.x - x, keypoint.y - y); distance < least) {
+        least = distance;
+        nearest = keypoint;
+      }
+    }
+    EXPECT_NEAR(nearest.x, x, 0.06);
+    EXPECT_NEAR(nearest.y, y, 0.06);
+    EXPECT_NEAR(nearest.scale, 4.0, 0.8);  // the blob's own sigma
+  }
+}
+
+TEST(ExtractSift, BlankImageHasNoFeatures) {
+  const auto features = ExtractSift(cv::Mat(50, 50, CV_8UC1, cv::Scalar(7)), {});
+  ASSERT_TRUE(features.ok());
+  EXPECT_TRUE(features->keypoints.empty());
+  EXPECT_EQ(features->descriptors.rows(), 0);
+}
+
+TEST(ExtractSift, LargeImagesAreMadeSmallerAndTheirKeypointsLargerAgain) {
+  SiftOptions options;
+  options.max_image_side_px = 80;  // of 128 x 96: a factor of 1.6
+  const auto features = ExtractSift(Blob(61.0, 40.0, 6.0), options);
+  ASSERT_TRUE(features.ok());
+  double least = 1e9;
+  Keypoint nearest;
+  for (const Keypoint& keypoint : features->keypoints) {
+    if (const double distance = std::hypot(keypoint.x - 61.0, keypoint.y - 40.0); distance < least) {
+      least = distance;
+      nearest = keypoint;
+    }
+  }
+  EXPECT_LT(least, 0.15);
+  EXPECT_NEAR(nearest.scale, 6.0, 1.2);
+}
+
+TEST(ExtractSift, CappedFeaturesAreTheStrongestOfAllWithTies) {
+  // Equal tiles: features of equal strength, of which the cap may take some and leave others.
+  cv::Mat image;
+  cv::repeat(Blob(50, 40, 5), 3, 3, image);
+  const auto all = ExtractSift(image, {});
+  // A mask that hides nothing: OpenCV's own cap is not used.
+  const cv::Mat mask(image.size(), CV_8UC1, cv::Scalar(255));
+  const size_t count = all->keypoints.size();
+  ASSERT_GT(count, 9u);
+  for (const size_t cap : {size_t{1}, size_t{4}, size_t{9}, count / 2, count - 1, count}) {
+    const SiftOptions options{.max_num_features = static_cast<int>(cap)};
+    const auto capped = ExtractSift(image, options), expected = ExtractSift(image, options, mask);
+    ASSERT_EQ(capped->keypoints.size(), cap);
+    EXPECT_EQ(capped->descriptors, expected->descriptors);
+    for (size_t i = 0; i < cap; ++i) {
+      EXPECT_EQ(capped->keypoints[i].x, expected->keypoints[i].x);
+      EXPECT_EQ(capped->keypoints[i].y, expected->keypoints[i].y);
+    }
+  }
+}
+
+TEST(ExtractSift, TinyImagesHaveNoFeatures) {
+  for (const cv::Size size :
+       {cv::Size(1, 1), cv::Size(1, 500), cv::Size(5, 5), cv::Size(6, 6), cv::Size(9, 300)}) {
+    const auto features = ExtractSift(cv::Mat(size, CV_8UC1, cv::Scalar(7)), {});
+    ASSERT_TRUE(features.ok()) << size.width << " x " << size.height;
+    EXPECT_TRUE(features->keypoints.empty());
+  }
+}
+
+TEST(ExtractSift, ColourImageIsAnError) {
+  EXPECT_EQ(ExtractSift(cv::Mat(50, 50, CV_8UC3), {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(ExtractSift(cv::Mat(), {}).error().code, ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace cairn

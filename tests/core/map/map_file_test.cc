@@ -1,0 +1,411 @@
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/blocks/map_rows.h"
+#include "core/files/database.h"
+#include "core/files/file.h"
+#include "stages/emit_map/emit_map.h"
+#include "tests/core/map/example.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+MapRows ExampleRows() {
+  const EmitExample example = MakeEmitExample();
+  const emit_map::EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  MapRows rows =
+      *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
+  rows.name = "example";
+  rows.writer = "cairn test";
+  rows.seed = 18446744073709551615u;
+  rows.stage_options["emit_map"] = "landmarks = \"regions\"\n";
+  rows.input_hashes["world.db"] = "0123";
+  rows.self_test["num_localized"] = 3;
+  rows.camera_from_given.translation = {0.1, -0.2, 0.3};
+  return rows;
+}
+
+std::string MapPath(const std::string& name) { return testing::TempDir() + "/" + name; }
+
+TEST(MapFile, RoundTripKeepsEverything) {
+  const MapRows written = ExampleRows();
+  ASSERT_TRUE(WriteMapRows(written, MapPath("round.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("round.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->name, "example");
+  EXPECT_EQ(read->writer, "cairn test");
+  EXPECT_EQ(read->seed, written.seed);
+  EXPECT_EQ(read->k, 2);
+  EXPECT_EQ(read->algorithm, "b2");
+  EXPECT_EQ(read->lower_bound, 2);
+  EXPECT_EQ(read->uncovered_limit, 1);
+  EXPECT_EQ(read->stage_options, written.stage_options);
+  EXPECT_EQ(read->input_hashes, written.input_hashes);
+  EXPECT_EQ(read->self_test, written.self_test);
+  EXPECT_EQ(read->camera_from_given.translation, written.camera_from_given.translation);
+  EXPECT_EQ(read->cameras[0].params, written.cameras[0].params);
+  EXPECT_EQ(read->station_edges, written.station_edges);
+  EXPECT_EQ(read->stations[1].heading_deg, written.stations[1].heading_deg);
+  EXPECT_FALSE(read->stations[2].is_covered);
+  EXPECT_EQ(read->regions[1].landmarks, written.regions[1].landmarks);
+  EXPECT_EQ(read->images[1].landmarks, written.images[1].landmarks);
+  EXPECT_EQ(read->images[2].station, 2);
+  EXPECT_EQ(read->descriptors, written.descriptors);
+  EXPECT_EQ(read->vocabulary.inverted_files, written.vocabulary.inverted_files);
+  EXPECT_EQ(read->regions[1].stations, written.regions[1].stations);
+  EXPECT_EQ(read->vocabulary.document_ids, written.vocabulary.document_ids);
+  EXPECT_EQ(read->vocabulary.centres, written.vocabulary.centres);
+  EXPECT_EQ(read->images[1].name, "image2.png");
+  EXPECT_EQ(read->landmarks[2].class_id, 10u);
+  EXPECT_EQ(read->landmarks[2].num_observations, 2);
+  // Standard deviations and sizes within 4.5 %.
+  EXPECT_NEAR(std::sqrt(read->landmarks[0].covariance(1, 1) / 2e-4), 1, 0.045);
+  EXPECT_NEAR(read->landmarks[0].scale_m / written.landmarks[0].scale_m, 1, 0.045);
+}
+
+TEST(MapFile, MapWithoutALowerBoundHasNone) {
+  MapRows rows = ExampleRows();
+  rows.lower_bound.reset();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("unbounded.cairn")).ok());
+  EXPECT_FALSE(ReadMapRows(MapPath("unbounded.cairn"))->lower_bound.has_value());
+}
+
+TEST(MapFile, PositionsAreQuantisedToATenthOfAMillimetre) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("quantised.cairn")).ok());
+  const MapRows read = *ReadMapRows(MapPath("quantised.cairn"));
+  EXPECT_NEAR(read.landmarks[0].position.x(), 2.1234, 1e-12);  // 2.12344 m
+}
+
+TEST(MapFile, WritingWhatWasReadGivesTheSameBytes) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("first.cairn")).ok());
+  std::filesystem::remove(MapPath("second.cairn"));
+  ASSERT_TRUE(WriteMapRows(*ReadMapRows(MapPath("first.cairn")), MapPath("second.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("first.cairn")), *ReadFile(MapPath("second.cairn")));
+}
+
+TEST(MapFile, InvalidRowsAreNotWritten) {
+  const std::string path = MapPath("invalid.cairn");
+  MapRows rows = ExampleRows();
+  rows.regions[0].landmarks = {0, 99};
+  EXPECT_EQ(WriteMapRows(rows, path).error().code, ErrorCode::kInvalidArgument);
+  rows = ExampleRows();
+  rows.landmarks[0].position.x() = std::nan("");
+  EXPECT_EQ(WriteMapRows(rows, path).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+TEST(MapFile, MissingFileIsNotFound) {
+  EXPECT_EQ(ReadMapRows(MapPath("nowhere.cairn")).error().code, ErrorCode::kNotFound);
+}
+
+TEST(MapFile, EveryKindOfOtherFileHasItsCode) {
+  const std::string path = MapPath("other.cairn");
+  const auto code = [&] { return ReadMapRows(path).error().code; };
+  ASSERT_TRUE(WriteFileAtomically(path, "this is no map").ok());
+  EXPECT_EQ(code(), ErrorCode::kNotSqlite);
+  ASSERT_TRUE(WriteFileAtomically(path, "").ok());
+  EXPECT_EQ(code(), ErrorCode::kEmptyFile);
+  ASSERT_TRUE(WriteVocabulary(MakeEmitExample().vocabulary, path).ok());
+  EXPECT_EQ(code(), ErrorCode::kForeignFile);
+  EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("not a cairn map"));
+  EXPECT_EQ(ReadMapRows(testing::TempDir()).error().code, ErrorCode::kNotSqlite);
+}
+
+TEST(MapFile, EveryTruncationIsRefused) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("whole.cairn")).ok());
+  const std::string bytes = *ReadFile(MapPath("whole.cairn"));
+  for (size_t size = 0; size < bytes.size(); size += 512) {
+    ASSERT_TRUE(WriteFileAtomically(MapPath("cut.cairn"), bytes.substr(0, size)).ok());
+    const Result<MapRows> read = ReadMapRows(MapPath("cut.cairn"));
+    ASSERT_FALSE(read.ok()) << size;
+    EXPECT_EQ(read.error().code, size == 0 ? ErrorCode::kEmptyFile : ErrorCode::kTruncated) << size;
+  }
+  ASSERT_TRUE(WriteFileAtomically(MapPath("longer.cairn"), bytes + std::string(1024, '\0')).ok());
+  EXPECT_EQ(ReadMapRows(MapPath("longer.cairn")).error().code, ErrorCode::kCorrupt);
+}
+
+TEST(MapFile, NewerMajorVersionNamesTheWriter) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("newer.cairn")).ok());
+  SQLite::Database(MapPath("newer.cairn"), SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3003");
+  const Error error = ReadMapRows(MapPath("newer.cairn")).error();
+  EXPECT_EQ(error.code, ErrorCode::kTooNew);
+  EXPECT_THAT(error.message, HasSubstr("3.3, written by cairn test"));
+  EXPECT_THAT(error.message, HasSubstr("Update the program"));
+}
+
+TEST(MapFile, NewerMinorVersionIsRead) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("minor.cairn")).ok());
+  SQLite::Database(MapPath("minor.cairn"), SQLite::OPEN_READWRITE)
+      .exec("PRAGMA user_version = 2007; CREATE TABLE later (x); INSERT INTO later VALUES (1);");
+  const Result<MapRows> read = ReadMapRows(MapPath("minor.cairn"));
+  EXPECT_TRUE(read.ok()) << read.error().message;
+}
+
+TEST(MapFile, ChangedRowsAreRefused) {
+  for (const char* sql :
+       {"UPDATE meta SET value = 'x' WHERE key = 'name'", "UPDATE self_test SET value = value + 1",
+        "UPDATE cameras SET width = -3", "DELETE FROM frames",
+        "UPDATE blocks SET bytes = x'00' WHERE block_idx = 0", "DELETE FROM blocks WHERE block_idx = 1",
+        "UPDATE directory SET entries = substr(entries, 70)", "DELETE FROM directory",
+        "UPDATE seal SET seal = zeroblob(176)", "DROP TABLE blocks",
+        "ALTER TABLE meta RENAME TO old; CREATE VIEW meta AS SELECT * FROM old",
+        "ALTER TABLE meta ADD COLUMN later AS (zeroblob(100000000))"}) {
+    ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("damaged.cairn")).ok());
+    SQLite::Database(MapPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapRows> read = ReadMapRows(MapPath("damaged.cairn"));
+    ASSERT_FALSE(read.ok()) << sql;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql << read.error().message;
+    EXPECT_THAT(read.error().message, HasSubstr("damaged.cairn")) << sql;
+    std::filesystem::remove(MapPath("damaged.cairn"));
+  }
+}
+
+TEST(MapFile, SparseMapsReadBackAsTheyWere) {
+  const EmitExample example = MakeEmitExample();
+  MapRows rows = *emit_map::EmitMap(
+      example.classes, example.world, example.decomposition, example.vocabulary,
+      {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"}, &example.appearance);
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("sparse.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("sparse.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->documents, "kept");
+  EXPECT_EQ(read->appearance, rows.appearance);
+  EXPECT_EQ(read->vocabulary.document_ids, rows.vocabulary.document_ids);
+  EXPECT_EQ(read->vocabulary.inverted_files, rows.vocabulary.inverted_files);
+  EXPECT_EQ(read->vocabulary.document_norms, rows.vocabulary.document_norms);
+
+  MapRows wrong = rows;
+  wrong.appearance[1].entropy = std::nullopt;
+  EXPECT_FALSE(WriteMapRows(wrong, MapPath("sparse.cairn")).ok()) << "a node without entropy";
+  wrong = rows;
+  wrong.appearance[0].look_alikes = {{0, 0.5}};
+  EXPECT_FALSE(WriteMapRows(wrong, MapPath("sparse.cairn")).ok()) << "a node like itself";
+  rows.appearance[0].images = {1};
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "image 1 is of two nodes";
+  rows.appearance.clear();
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("sparse.cairn")).ok()) << "nothing is kept";
+}
+
+TEST(MapFile, FloorPlansReadBackAsTheyWere) {
+  MapRows rows = ExampleRows();
+  rows.views = MakeExampleViews();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("plan.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("plan.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  const Views& found = read->views;
+  EXPECT_EQ(found.plan.vertices, rows.views.plan.vertices);
+  EXPECT_EQ(found.plan.walls[2].end, rows.views.plan.walls[2].end);
+  EXPECT_EQ(found.vertices, rows.views.vertices);
+  EXPECT_EQ(found.face_vertices, rows.views.face_vertices);
+  EXPECT_EQ(found.parents, rows.views.parents);
+  EXPECT_THAT(found.LabelSet(1), ElementsAre(0, 4, 6));
+  EXPECT_EQ(found.index[1].visible_area_m2, 1.5F);
+  EXPECT_EQ(found.links, rows.views.links);
+  std::filesystem::remove(MapPath("plan2.cairn"));
+  ASSERT_TRUE(WriteMapRows(*read, MapPath("plan2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("plan.cairn")), *ReadFile(MapPath("plan2.cairn")));
+
+  rows.views.parents[1] = 1;
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "a region is its own parent";
+  rows.views = MakeExampleViews();
+  std::swap(rows.views.face_vertices[0], rows.views.face_vertices[3]);
+  EXPECT_FALSE(WriteMapRows(rows, MapPath("plan.cairn")).ok()) << "vertices are not numbered by use";
+}
+
+TEST(MapFile, VisualMapsReadBackAsTheyWere) {
+  MapRows rows = ExampleRows();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("without.cairn")).ok());
+  rows.visual_map = MakeExampleVisualMap();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("visual.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("visual.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  const VisualMapData& found = read->visual_map;
+  EXPECT_EQ(found.camera_id, 3u);
+  EXPECT_EQ(found.focal_px, 321.5F);
+  EXPECT_EQ(found.headings_deg, rows.visual_map.headings_deg);
+  EXPECT_EQ(found.errors, rows.visual_map.errors);
+  ASSERT_EQ(found.landmarks.size(), 3u);
+  EXPECT_TRUE(found.landmarks[1].empty());
+  ASSERT_EQ(found.landmarks[2].size(), 2u);
+  const HeadingModel& model = found.landmarks[2][1];
+  EXPECT_EQ(model.heading, 2);
+  EXPECT_EQ(model.shape, (KernelShape{2, 3}));
+  EXPECT_TRUE(model.predicts_badly);
+  EXPECT_EQ(model.sights, rows.visual_map.landmarks[2][1].sights);
+  EXPECT_EQ(model.sigma, rows.visual_map.landmarks[2][1].sigma);
+  ASSERT_TRUE(WriteMapRows(*read, MapPath("visual2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("visual.cairn")), *ReadFile(MapPath("visual2.cairn")));
+  // Who does not ask for it has the same map as before.
+  rows.visual_map = {};
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("without2.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("without.cairn")), *ReadFile(MapPath("without2.cairn")));
+}
+
+TEST(MapFile, VisualMapsThatMakeNoSenseAreNotWritten) {
+  for (const auto& change : std::vector<std::function<void(VisualMapData&)>>{
+           [](VisualMapData& data) { data.landmarks.pop_back(); },
+           [](VisualMapData& data) { data.landmarks[0][0].sights[0].image = 1; },
+           [](VisualMapData& data) { data.landmarks[0][0].sights[1].seen.x() = std::nanf(""); },
+           [](VisualMapData& data) { data.landmarks[0][0].sigma.y() = -1; },
+           [](VisualMapData& data) { data.landmarks[2][0].heading = 2; },
+           [](VisualMapData& data) {
+             data.headings_deg = {90, 0, 180};
+           }}) {
+    MapRows rows = ExampleRows();
+    rows.visual_map = MakeExampleVisualMap();
+    change(rows.visual_map);
+    const Status status = WriteMapRows(rows, MapPath("bad.cairn"));
+    ASSERT_FALSE(status.ok());
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST(RoundAsStored, RefusesWhatLiesOutsideOfTheLargestImage) {
+  for (const float x : {-2049.0F, 6200.0F, std::nanf("")}) {
+    VisualMapData data = MakeExampleVisualMap();
+    data.landmarks[0][0].sights[0].seen.x() = x;
+    EXPECT_EQ(RoundAsStored(&data).error().code, ErrorCode::kUnsupported);
+  }
+}
+
+TEST(MapFile, VerticesOfAPlanAreNumberedByUse) {
+  Views views = MakeExampleViews();
+  std::vector<int32_t> mixed = {7, 3, 1, 6, 0, 4};  // and two that nothing names
+  Views other = views;
+  other.vertices.assign(8, {-5, -5});
+  for (size_t i = 0; i < mixed.size(); ++i) other.vertices[mixed[i]] = views.vertices[i];
+  for (int32_t& vertex : other.face_vertices) vertex = mixed[vertex];
+  other.links[0] = {0, 1, mixed[1], mixed[2]};
+  EXPECT_FALSE(IsNumberedByUse(other));
+  MapRows rows = ExampleRows();
+  ASSERT_TRUE(emit_map::AddViews(other, &rows).ok());
+  EXPECT_EQ(rows.views.vertices, views.vertices);
+  EXPECT_EQ(rows.views.face_vertices, views.face_vertices);
+  EXPECT_EQ(rows.views.links, views.links);
+  rows.frame.unit = "arbitrary";
+  EXPECT_EQ(emit_map::AddViews(other, &rows).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(MapFile, FailedWriteLeavesTheOldFile) {
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), MapPath("kept.cairn")).ok());
+  const std::string before = *ReadFile(MapPath("kept.cairn"));
+  MapRows broken = ExampleRows();
+  broken.regions[0].landmarks = {0, 99};
+  EXPECT_FALSE(WriteMapRows(broken, MapPath("kept.cairn")).ok());
+  EXPECT_EQ(*ReadFile(MapPath("kept.cairn")), before);
+}
+
+// Version 1.0 as the program of that version wrote the example.
+TEST(GoldenMap, Version1IsMigrated) {
+  const std::string path = GOLDEN_DIR "/map_1.0.cairn";
+  EXPECT_EQ(ReadMapRows(path).error().code, ErrorCode::kTooOld);
+  EXPECT_THAT(ReadMapRows(path).error().message, HasSubstr("cairn migrate"));
+  const Result<MapRows> old = ReadMapRowsVersion1(path);
+  ASSERT_TRUE(old.ok()) << old.error().message;
+  ASSERT_TRUE(WriteMapRows(*old, MapPath("migrated.cairn")).ok());
+  const Result<MapRows> migrated = ReadMapRows(MapPath("migrated.cairn"));
+  ASSERT_TRUE(migrated.ok()) << migrated.error().message;
+  EXPECT_EQ(migrated->name, "example");
+  EXPECT_EQ(migrated->writer, "cairn test");
+  EXPECT_EQ(migrated->lower_bound, 2);
+  EXPECT_EQ(migrated->self_test.at("num_localized"), 3);
+  EXPECT_EQ(migrated->stage_options, old->stage_options);
+  EXPECT_THAT(migrated->images[1].landmarks, ElementsAre(0, 1, 2));
+  EXPECT_EQ(migrated->images[1].name, "image2.png");
+  EXPECT_NEAR(migrated->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(migrated->descriptors, old->descriptors);
+  EXPECT_EQ(migrated->vocabulary.inverted_files, old->vocabulary.inverted_files);
+  EXPECT_EQ(ReadMapRowsVersion1(MapPath("migrated.cairn")).error().code, ErrorCode::kTooNew);
+}
+
+// Version 2.0 as the program of that version wrote the example.
+TEST(GoldenMap, Version2IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.0.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->name, "example");
+  EXPECT_THAT(rows->images[1].landmarks, ElementsAre(0, 1, 2));
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_THAT(rows->regions[1].stations, ElementsAre(0, 1));
+  EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(rows->descriptors(1, 0), 30);
+  EXPECT_EQ(rows->vocabulary.num_words(), 1);
+}
+
+// Version 2.2 as the program of that version wrote a sparse example.
+TEST(GoldenMap, Version2_2IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.2.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->documents, "kept");
+  ASSERT_EQ(rows->appearance.size(), 3u);
+  EXPECT_EQ(rows->appearance[1], (MapAppearanceNode{{1}, true, {{2, 30}}}));
+  EXPECT_THAT(rows->vocabulary.document_ids, ElementsAre(2));
+  EXPECT_THAT(rows->images[1].landmarks, ElementsAre(0, 1, 2));
+}
+
+// An example with everything that came with 2.3: ambiguity, a floor plan and its regions.
+MapRows Rows2_3() {
+  const EmitExample example = MakeEmitExample();
+  MapRows rows = *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                    {.words = "survey"}, &example.appearance);
+  rows.name = "example";
+  rows.writer = "cairn test";
+  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), &rows).ok());
+  return rows;
+}
+
+// Version 2.3 as the program of that version wrote it.
+TEST(GoldenMap, Version2_3IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.3.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  ASSERT_EQ(rows->appearance.size(), 3u);  // image 3 is none of the map's
+  EXPECT_EQ(rows->appearance[1], (MapAppearanceNode{{1}, true, {{2, 30}}, 0.5, {}}));
+  EXPECT_EQ(rows->appearance[0].look_alikes, (std::vector<MapAppearanceNode::LookAlike>{{2, 0.5}}));
+  EXPECT_EQ(rows->findings.region_entropies, Rows2_3().findings.region_entropies);
+  const Views views = MakeExampleViews();
+  EXPECT_EQ(rows->views.plan.vertices, views.plan.vertices);
+  EXPECT_EQ(rows->views.vertices, views.vertices);
+  EXPECT_EQ(rows->views.face_vertices, views.face_vertices);
+  EXPECT_EQ(rows->views.parents, views.parents);
+  EXPECT_EQ(rows->views.toggled_labels, views.toggled_labels);
+  EXPECT_EQ(rows->views.links, views.links);
+  EXPECT_EQ(rows->vocabulary.inverted_files, Rows2_3().vocabulary.inverted_files);
+}
+
+// Version 2.4 as the program of that version wrote it: findings that no hash but the file's covers.
+TEST(GoldenMap, Version2_4IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.4.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->epoch, 0u);
+  EXPECT_EQ(rows->findings_hash, "");
+  EXPECT_EQ(rows->findings.drops.size(), 1u);
+  EXPECT_EQ(rows->findings.self_test_regions.size(), 2u);
+  const VisualMapData visual_map = MakeExampleVisualMap();
+  EXPECT_EQ(rows->visual_map.focal_px, visual_map.focal_px);
+  EXPECT_EQ(rows->visual_map.landmarks[2][1].sights, visual_map.landmarks[2][1].sights);
+  // A changed finding is seen all the same.
+  std::filesystem::copy_file(GOLDEN_DIR "/map_2.4.cairn", MapPath("changed_2.4.cairn"),
+                             std::filesystem::copy_options::overwrite_existing);
+  SQLite::Database(MapPath("changed_2.4.cairn"), SQLite::OPEN_READWRITE)
+      .exec("UPDATE drop_reasons SET num_dropped = 199");
+  EXPECT_EQ(ReadMapRows(MapPath("changed_2.4.cairn")).error().code, ErrorCode::kCorrupt);
+}
+
+// Version 2.5 as the program of that version wrote and signed it, of epoch 3.
+TEST(GoldenMap, Version2_5IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.5.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->epoch, 3u);
+  EXPECT_EQ(rows->findings_hash.size(), 64u);
+  EXPECT_EQ(rows->findings, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->findings);
+  EXPECT_EQ(rows->descriptors, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->descriptors);
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,125 @@
+#include "core/blocks/map_findings.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/blocks/map_rows.h"
+#include "core/files/database.h"
+#include "core/map/map_file.h"
+#include "stages/emit_map/emit_map.h"
+#include "tests/core/map/example.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Two regions, three stations.
+MapRows RowsWithFindings() {
+  const EmitExample example = MakeEmitExample();
+  const emit_map::EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  MapRows rows =
+      *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
+  rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
+                                     {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
+  rows.findings.region_entropies = {{0, 0.125}, {1, 2.5}};
+  rows.findings.drops = {{1, "extract_features", "image", "unreadable", "cannot be read", 3, {}},
+                         {44, "decompose_regions", "station", "left_over", "...", 200, {0, 200, 1}}};
+  return rows;
+}
+
+std::string MapPath(const std::string& name) { return testing::TempDir() + "/findings_" + name; }
+
+TEST(MapFindings, RoundTripKeepsEverything) {
+  const MapRows rows = RowsWithFindings();
+  ASSERT_TRUE(WriteMapRows(rows, MapPath("round.cairn")).ok());
+  const Result<MapRows> read = ReadMapRows(MapPath("round.cairn"));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->findings, rows.findings);
+}
+
+TEST(MapFindings, RowsThatCannotBeAreNotWritten) {
+  const auto error_of = [](const RegionSelfTest& row) {
+    MapRows rows = RowsWithFindings();
+    rows.findings.self_test_regions = {row};
+    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    EXPECT_FALSE(status.ok());
+    return status.ok() ? "" : status.error().message;
+  };
+  EXPECT_THAT(error_of({2, 1, 0, 0, {}}), HasSubstr("region 2 of 2"));
+  EXPECT_THAT(error_of({0, 1, 2, 0, RegionSelfTest::Errors{}}), HasSubstr("2 localized of 1"));
+  EXPECT_THAT(error_of({0, 2, 1, 2, RegionSelfTest::Errors{}}), HasSubstr("2 gross errors"));
+  EXPECT_THAT(error_of({0, 2, 1, 0, {}}), HasSubstr("1 localized"));
+  EXPECT_THAT(error_of({0, 2, 1, 0, RegionSelfTest::Errors{-1, 0, 0, 0}}), HasSubstr("an error of -1"));
+}
+
+TEST(MapFindings, DamagedRowsAreRefused) {
+  for (const char* sql :
+       {"UPDATE self_test_regions SET region_idx = 2 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET region_idx = -2 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET region_idx = 4294967297 WHERE region_idx = 1",
+        "UPDATE self_test_regions SET num_held_out = 0",
+        "UPDATE self_test_regions SET num_held_out = 4294967300",
+        "UPDATE self_test_regions SET num_localized = 'x'",
+        "UPDATE self_test_regions SET num_gross_errors = 4",
+        "UPDATE self_test_regions SET median_error_m = NULL",
+        "UPDATE self_test_regions SET p90_error_deg = 9e999",
+        "UPDATE region_entropies SET region_idx = 2 WHERE region_idx = 1",
+        "UPDATE region_entropies SET region_idx = -1 WHERE region_idx = 1",
+        "UPDATE region_entropies SET entropy = -1",
+        "UPDATE region_entropies SET entropy = 9e999",
+        "UPDATE drop_reasons SET reason_id = -1 WHERE reason_id = 1",
+        "UPDATE drop_reasons SET num_dropped = 0",
+        "UPDATE drop_reasons SET num_dropped = 199 WHERE reason_id = 44",
+        "UPDATE drop_reasons SET at_stations = x'0000'",
+        "UPDATE drop_reasons SET at_stations = x'0000ff' WHERE reason_id = 44",
+        "UPDATE drop_reasons SET at_stations = x'0000ffffffff7f' WHERE reason_id = 44",
+        "ALTER TABLE drop_reasons DROP COLUMN text",
+        "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
+        "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
+        "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
+    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("damaged.cairn")).ok());
+    SQLite::Database(MapPath("damaged.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapRows> read = ReadMapRows(MapPath("damaged.cairn"));
+    ASSERT_FALSE(read.ok()) << sql;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt) << sql;
+    std::filesystem::remove(MapPath("damaged.cairn"));
+  }
+}
+
+// Version 2.1 as the program of that version wrote the rows above.
+TEST(GoldenMap, Version2_1IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.1.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  MapFindings expected = RowsWithFindings().findings;
+  expected.region_entropies.clear();  // came with 2.3
+  EXPECT_EQ(rows->findings, expected);
+  EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
+  EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
+  EXPECT_EQ(rows->descriptors(1, 0), 30);
+  EXPECT_EQ(rows->vocabulary.num_words(), 1);
+}
+
+TEST(MapFindings, MapOfAFormatWithoutTheTablesHasNone) {
+  const Result<MapRows> read = ReadMapRows(GOLDEN_DIR "/map_2.0.cairn");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->findings, MapFindings());
+}
+
+TEST(MapFindings, ChangedOrMissingFindingsAreRefused) {
+  for (const char* const sql :
+       {"DROP TABLE self_test_regions", "DROP TABLE region_entropies; DROP TABLE drop_reasons",
+        "UPDATE drop_reasons SET num_dropped = num_dropped + 1"}) {
+    ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("changed.cairn")).ok());
+    SQLite::Database(MapPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
+    const Result<MapFile> file = MapFile::Open(MapPath("changed.cairn"), {});  // which does not read them
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    EXPECT_EQ(file->ReadFindings().error().code, ErrorCode::kCorrupt) << sql;
+  }
+}
+
+}  // namespace
+}  // namespace cairn

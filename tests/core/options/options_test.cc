@@ -1,0 +1,108 @@
+#include "core/options/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/files/file.h"
+
+namespace cairn {
+namespace {
+
+struct Fields {
+  bool flag = true;
+  int count = 16;
+  double ratio = 0.8;
+  std::string pairs = "auto";
+  std::vector<double> up = {0, 0, 1};
+};
+
+OptionTable Describe(Fields* f) {
+  return {{.name = "flag", .value = &f->flag, .help = "a flag"},
+          {.name = "min_count", .value = &f->count, .help = "a count", .min = 1, .max = 100},
+          {.name = "max_ratio", .value = &f->ratio, .help = "a ratio", .min = 0, .max = 1},
+          {.name = "pairs", .value = &f->pairs, .help = "which", .choices = {"auto", "frustum"}},
+          {.name = "up", .value = &f->up, .help = "direction"}};
+}
+
+std::string WriteToml(const std::string& text) {
+  // One file per test: they run in parallel.
+  const std::string path = testing::TempDir() + "/options_" +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
+  EXPECT_TRUE(WriteFileAtomically(path, text).ok());
+  return path;
+}
+
+TEST(Options, TomlRoundTripKeepsEveryValue) {
+  Fields written{.flag = false, .count = 7, .ratio = 0.1, .pairs = "frustum", .up = {1, 0, 0.5}};
+  Fields read;
+  ASSERT_TRUE(ReadOptionsFile(WriteToml(OptionsToml(Describe(&written))), Describe(&read)).ok());
+  EXPECT_EQ(OptionsToml(Describe(&read)), OptionsToml(Describe(&written)));
+  EXPECT_EQ(read.ratio, 0.1);
+  EXPECT_THAT(read.up, testing::ElementsAre(1, 0, 0.5));
+}
+
+TEST(Options, UnknownKeyNamesTheNearestOne) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("flag = true\nmin_cuont = 3\n"), Describe(&fields));
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message,
+              testing::HasSubstr(":2: unknown option 'min_cuont'; did you mean 'min_count'?"));
+}
+
+TEST(Options, ValueOutsideItsRangeIsAnError) {
+  Fields fields;
+  EXPECT_THAT(SetOption(Describe(&fields)[1], "0").error().message,
+              testing::HasSubstr("must be in [1, 100]"));
+  for (const char* text : {"nan", "inf", "-inf", "1e999"})
+    EXPECT_FALSE(SetOption(Describe(&fields)[2], text).ok()) << text;
+  // Also where the range has no end.
+  double open = 1;
+  for (const char* text : {"inf", "-inf", "nan"}) {
+    EXPECT_THAT(SetOption({.name = "open", .value = &open, .min = 0}, text).error().message,
+                testing::HasSubstr("must be a finite number, at least 0"));
+    EXPECT_THAT(SetOption({.name = "open", .value = &open}, text).error().message,
+                testing::HasSubstr("must be a finite number"));
+  }
+  EXPECT_THAT(SetOption(Describe(&fields)[3], "all").error().message, testing::HasSubstr("auto, frustum"));
+}
+
+TEST(Options, WrongTypeSaysWhatWasExpected) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("min_count = \"many\"\n"), Describe(&fields));
+  EXPECT_THAT(status.error().message, testing::HasSubstr("expected an integer, found 'many'"));
+}
+
+TEST(Options, BrokenTomlNamesTheLine) {
+  Fields fields;
+  const Status status = ReadOptionsFile(WriteToml("flag = true\nup = [1,\n"), Describe(&fields));
+  EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
+}
+
+TEST(Options, ConditionsSayWhereAnOptionIsRead) {
+  Fields fields;
+  OptionTable table = Describe(&fields);
+  AddCondition({"pairs", {"frustum"}}, {"max_ratio", "min_count"}, &table);
+  AddCondition({"min_count", {"not 0"}}, {"max_ratio"}, &table);
+  const auto is_read = [&](size_t i) { return CheckIsRead(table[i], table); };
+  EXPECT_EQ(NamesOf(table), (std::vector<std::string>{"flag", "min_count", "max_ratio", "pairs", "up"}));
+  EXPECT_TRUE(is_read(0).ok());
+  EXPECT_EQ(
+      is_read(1).error().message,
+      "min_count is only read where pairs is frustum, and it is auto; leave min_count out, or change pairs");
+  EXPECT_FALSE(is_read(2).ok());
+  fields.pairs = "frustum";
+  EXPECT_TRUE(is_read(1).ok());
+  EXPECT_TRUE(is_read(2).ok());
+  fields.count = 0;  // both conditions have to hold
+  EXPECT_EQ(is_read(2).error().message,
+            "max_ratio is only read where min_count is not 0, and it is 0; leave max_ratio out, or change "
+            "min_count");
+  fields.pairs = "";
+  EXPECT_EQ(
+      is_read(1).error().message,
+      "min_count is only read where pairs is frustum, and it is empty; leave min_count out, or change pairs");
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,180 @@
+#include "pipeline/build/build_folder.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/files/file.h"
+#include "pipeline/build/build_files.h"
+#include "tests/pipeline/program/test_stages.h"
+
+namespace cairn::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class BuildFolderTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / fmt::format("build_folder_test_{}", getpid());
+    fs::create_directories(folder_ / "survey");
+    recipe_.name = "kitchen";
+    recipe_.captures = {{.name = "survey", .path = (folder_ / "survey").string()}};
+    recipe_.stages = TestStages();
+    paths_ = {.build_dir = (folder_ / "kitchen.build").string(),
+              .map = (folder_ / "kitchen.cairn").string(),
+              .program = "/proc/self/exe",
+              .recipe = (folder_ / "kitchen.toml").string()};
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string Text(const std::string& name) const { return ReadFile(paths_.build_dir + "/" + name).value(); }
+  fs::file_time_type Date(const std::string& name) const {
+    return fs::last_write_time(paths_.build_dir + "/" + name);
+  }
+
+  fs::path folder_;
+  Recipe recipe_;
+  BuildPaths paths_;
+};
+
+TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/extract_features.toml"), "max_num_features = 2000\ncontrast_threshold = 0.02\n");
+  EXPECT_EQ(Text("options/name"), "kitchen\n");
+  const std::vector<std::string> files = {"options/extract_features.toml",
+                                          "options/filter_visibility.toml",
+                                          "options/seed",
+                                          "options/name",
+                                          "options/capture",
+                                          "config.mk"};
+  std::vector<fs::file_time_type> dates;
+  for (const std::string& file : files) dates.push_back(Date(file));
+
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_TRUE(SetOption(recipe_.stages[1].table[0], "500").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/extract_features.toml"), "max_num_features = 500\ncontrast_threshold = 0.02\n");
+  EXPECT_NE(Date(files[0]), dates[0]);
+  for (size_t i = 1; i < files.size(); ++i) EXPECT_EQ(Date(files[i]), dates[i]) << files[i];
+}
+
+TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/images.txt", "").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.captures[0].path + "\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \n"));
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/queries.txt", "").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + recipe_.captures[0].path + "/queries.txt\n"));
+}
+
+TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {
+  recipe_.captures.clear();
+  recipe_.simulated = true;
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"),
+              HasSubstr("CAPTURE := " + paths_.build_dir + "/capture\nSIMULATED := yes\n"));
+}
+
+TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) {
+  const auto check = [&] { return CheckBuildFolder(paths_.build_dir); };
+  EXPECT_TRUE(check().ok());  // none yet
+  fs::create_directories(paths_.build_dir + "/options");
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/lock", "").ok());
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/notes.txt", "mine").ok());
+  EXPECT_TRUE(
+      check().ok());  // as a build leaves it that is killed early, beside a file that is nobody's business
+  for (const char* name : {"features.db", "capture", "error.json", "config.mk", "world.db.tmp-7"}) {
+    ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/" + name, "mine").ok());
+    const Status status = check();
+    ASSERT_FALSE(status.ok()) << name;
+    EXPECT_THAT(status.error().message, HasSubstr(std::string("its ") + name + " would be overwritten"));
+    fs::remove(paths_.build_dir + "/" + name);
+  }
+  paths_.recipe = "/maps/kitchen.toml";
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/features.db", "").ok());
+  EXPECT_TRUE(check().ok());
+}
+
+TEST(BuildFiles, NamesAreThoseThatABuildWrites) {
+  for (const char* name :
+       {"features.db", "matches-1-2of3.db.stamp", "poses", "capture.stamp", "map.report.json",
+        "features.db.reuse", "lock", "matches.begun", "images.d", "regions.db.tmp-12"})
+    EXPECT_TRUE(IsBuildFileName(name)) << name;
+  for (const char* name : {"notes.txt", "notes.tmp-2024", "features.db.bak", "my-features.db", "pareto", ""})
+    EXPECT_FALSE(IsBuildFileName(name)) << name;
+  for (const char* name : {"seed", "emit_map.toml", "simulate.toml", "name.tmp-1"})
+    EXPECT_TRUE(IsOptionsFileName(name)) << name;
+  for (const char* name : {"notes", "mine.toml", "seed.toml", "notes.tmp-2024", "emit_map"})
+    EXPECT_FALSE(IsOptionsFileName(name)) << name;
+}
+
+TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
+  paths_.build_dir = (folder_ / "my maps/kitchen.build").string();
+  const Status status = WriteBuildFolder(recipe_, paths_);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("has a space in its path, which Make cannot carry; rename"));
+  EXPECT_FALSE(fs::exists(folder_ / "my maps"));  // nothing is written first
+}
+
+// Every value of config.mk is refused where make would read it as something else.
+TEST_F(BuildFolderTest, NoValueOfTheConfigurationEscapesTheCheck) {
+  const std::string hostile = (folder_ / "a\n$(shell touch PWNED)\n#").string();
+  fs::create_directories(hostile);
+  const auto expect_refused = [&](const Recipe& recipe, const BuildPaths& paths, const std::string& what) {
+    const Status status = WriteBuildFolder(recipe, paths);
+    ASSERT_FALSE(status.ok()) << what;
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument) << status.error().message;
+    EXPECT_THAT(status.error().message, testing::StartsWith(what));
+    EXPECT_FALSE(fs::exists(paths_.build_dir + "/config.mk")) << what;
+  };
+  BuildPaths paths = paths_;
+  paths.build_dir = hostile;
+  expect_refused(recipe_, paths, "the build folder");
+  paths = paths_;
+  paths.map = hostile + ".cairn";
+  expect_refused(recipe_, paths, "the map");
+  paths = paths_;
+  paths.program = hostile;
+  expect_refused(recipe_, paths, "the program");
+  Recipe recipe = recipe_;
+  recipe.name = "$(shell touch PWNED)";
+  expect_refused(recipe, paths_, "the name");
+  recipe = recipe_;
+  recipe.captures[0].path = hostile;
+  expect_refused(recipe, paths_, "the capture");
+  recipe = recipe_;
+  recipe.captures[0].queries_path = hostile;
+  expect_refused(recipe, paths_, "the list of queries");
+  recipe = recipe_;
+  recipe.captures[0].floor_plan_path = hostile;
+  expect_refused(recipe, paths_, "the floor plan");
+  recipe = recipe_;
+  recipe.captures.push_back({.name = "second", .path = hostile});
+  expect_refused(recipe, paths_, "the capture");
+  recipe.captures[1].path = recipe.captures[0].path;
+  recipe.captures[1].queries_path = hostile;
+  expect_refused(recipe, paths_, "the list of queries");
+}
+
+TEST_F(BuildFolderTest, RecipesOfAnyNameAreNoPartOfTheMakefile) {
+  paths_.recipe = (folder_ / "a\n$(shell touch PWNED)\n# my.toml").string();
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("config.mk").find("PWNED"), std::string::npos);
+  EXPECT_EQ(ConfiguredRecipe(paths_.build_dir), paths_.recipe);
+  EXPECT_EQ(ConfiguredMap(paths_.build_dir), paths_.map);
+  EXPECT_EQ(ConfiguredRecipe(folder_.string()), "");
+}
+
+}  // namespace
+}  // namespace cairn::pipeline

@@ -1,0 +1,184 @@
+#include "pipeline/build/recipe.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/files/file.h"
+#include "tests/pipeline/program/test_stages.h"
+
+namespace cairn::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::EndsWith;
+using testing::HasSubstr;
+
+class RecipeTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / fmt::format("recipe_test_{}", getpid());
+    fs::create_directories(folder_ / "survey");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Result<Recipe> Read(const std::string& text) const {
+    const std::string path = (folder_ / "recipe.toml").string();
+    EXPECT_TRUE(WriteFileAtomically(path, text).ok());
+    return ReadRecipe(path, TestStages());
+  }
+
+  std::string Message(const std::string& text, ErrorCode code = ErrorCode::kInvalidArgument) const {
+    const auto recipe = Read(text);
+    if (recipe.ok()) return "no error";
+    EXPECT_EQ(recipe.error().code, code);
+    return recipe.error().message;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(RecipeTest, NameAndCaptureAreEnough) {
+  for (const char* header : {"[[capture]]", "[capture]"}) {
+    const auto recipe = Read(std::string("name = \"kitchen\"\n") + header + "\npath = \"survey\"\n");
+    ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+    EXPECT_EQ(recipe->name, "kitchen");
+    EXPECT_EQ(recipe->seed, 0u);
+    ASSERT_EQ(recipe->captures.size(), 1u);
+    EXPECT_EQ(recipe->captures[0].path, (folder_ / "survey").string());
+    EXPECT_EQ(recipe->captures[0].name, "survey");
+    EXPECT_FALSE(recipe->simulated);
+    EXPECT_EQ(OptionsToml(recipe->stages[1].table), OptionsToml(TestStages()[1].table));
+  }
+}
+
+TEST_F(RecipeTest, StageTablesOverrideDefaults) {
+  const auto recipe = Read(
+      "name = \"a\"\nseed = 7\n[simulate]\nwidth_m = 12\n"
+      "[extract_features]\ncontrast_threshold = 0.5\n[filter_visibility]\nstrict = false\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_TRUE(recipe->simulated);
+  EXPECT_EQ(recipe->seed, 7u);
+  EXPECT_EQ(OptionsToml(recipe->stages[0].table), "width_m = 12\n");
+  EXPECT_EQ(OptionsToml(recipe->stages[1].table), "max_num_features = 2000\ncontrast_threshold = 0.5\n");
+  EXPECT_EQ(OptionsToml(recipe->stages[2].table), "up = 'auto'\nstrict = false\n");
+}
+
+TEST_F(RecipeTest, UpOfTheCaptureReachesTheStageThatLaysOutTheFloor) {
+  const auto recipe = Read("name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, -1, 0.5]\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_THAT(OptionsToml(recipe->stages[2].table), HasSubstr("up = '0,-1,0.5'"));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0]\n"),
+              HasSubstr("recipe.toml:4: up"));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0, 0]\n"),
+              HasSubstr("three numbers"));
+}
+
+TEST_F(RecipeTest, GateSetsWhatAMapMustReach) {
+  const auto recipe = Read("name = \"a\"\n[simulate]\n[gate]\nmin_localized_ratio = 0.9\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_EQ(OptionsToml(recipe->stages[3].table), "min_localized_ratio = 0.9\ngross_error_m = 0.5\n");
+  EXPECT_THAT(Message("name = \"a\"\n[simulate]\n[gate]\ngross_error_m = 1\n"),
+              HasSubstr("recipe.toml:4: unknown"));
+}
+
+TEST_F(RecipeTest, UnknownKeysNameLineAndNearestValidOne) {
+  EXPECT_THAT(Message("nme = \"a\"\n"), HasSubstr("recipe.toml:1: unknown key 'nme'; did you mean 'name'?"));
+  EXPECT_THAT(Message("name = \"a\"\n[extract_feature]\n"),
+              HasSubstr("recipe.toml:2: unknown table 'extract_feature'; did you mean 'extract_features'?"));
+  EXPECT_THAT(Message("name = \"a\"\n[extract_features]\nmax_features = 3\n"),
+              HasSubstr("recipe.toml:3: unknown option 'max_features'"));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\nfloorplan = \"x\"\n"),
+              HasSubstr("recipe.toml:4: unknown key of [[capture]] 'floorplan'; did you mean 'floor_plan'?"));
+}
+
+TEST_F(RecipeTest, ValuesOutOfRangeOrOfAnotherTypeNameTheLine) {
+  EXPECT_THAT(Message("name = \"a\"\n[extract_features]\nmax_num_features = 0\n"),
+              HasSubstr("recipe.toml:3: "));
+  EXPECT_THAT(Message("name = \"a\"\n[extract_features]\nmax_num_features = \"many\"\n"),
+              HasSubstr("expected an integer, found 'many'"));
+  EXPECT_THAT(Message("name = 3\n"), HasSubstr("recipe.toml:1: name: expected a text"));
+  EXPECT_THAT(Message("name = \"a\"\nseed = -1\n"), HasSubstr("recipe.toml:2: seed: expected an integer"));
+  EXPECT_THAT(Message("name = \"a\"\nextract_features = 1\n"), HasSubstr("expected a table"));
+  EXPECT_THAT(Message("name = \"a\"\ncapture = [1]\n"), HasSubstr("expected a table"));
+}
+
+TEST_F(RecipeTest, WhatIsMissingIsSaid) {
+  EXPECT_THAT(Message(""), HasSubstr("no name; add a line such as"));
+  EXPECT_THAT(Message("name = \"a\"\n"), HasSubstr("no capture; add [[capture]]"));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\n"), HasSubstr("[[capture]] has no path"));
+  EXPECT_THAT(Message("name = \"a\"\n[simulate]\n[[capture]]\npath = \"survey\"\n"), HasSubstr("both"));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"elsewhere\"\n", ErrorCode::kNotFound),
+              HasSubstr("recipe.toml:3: path = 'elsewhere': there is no "));
+  EXPECT_THAT(Message("name = \n", ErrorCode::kCorrupt), HasSubstr("recipe.toml:1: not TOML"));
+  const auto recipe = ReadRecipe((folder_ / "none.toml").string(), TestStages());
+  EXPECT_EQ(recipe.error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(RecipeTest, FloorPlansAreOnePerMap) {
+  fs::create_directories(folder_ / "other");
+  for (const char* plan : {"a.txt", "b.txt"}) std::ofstream(folder_ / plan) << "0,0,1,0\n";
+  const std::string first = "name = \"a\"\n[[capture]]\npath = \"survey\"\nfloor_plan = \"a.txt\"\n";
+  const std::string second = "[[capture]]\npath = \"other\"\n";
+  const auto recipe = Read(first + second + "floor_plan = \"./a.txt\"\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_EQ(recipe->captures[1].floor_plan_path, (folder_ / "a.txt").string());
+  EXPECT_TRUE(Read(first + second).ok());
+  EXPECT_THAT(Message(first + second + "floor_plan = \"b.txt\"\n"), HasSubstr("a map has one plan"));
+  EXPECT_EQ(Read("name = \"a\"\n[simulate]\nfloor_plan = \"p.json\"\n")->simulated_floor_plan, "p.json");
+  EXPECT_THAT(Message("name = \"a\"\n[simulate]\nfloor_plan = \"../p.json\"\n"),
+              HasSubstr("recipe.toml:3: [simulate] floor_plan: expected the name of a file"));
+}
+
+TEST_F(RecipeTest, SeveralCapturesAreSessionsWithNames) {
+  fs::create_directories(folder_ / "second survey");
+  const auto recipe = Read(
+      "name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0, 1]\n"
+      "[[capture]]\npath = \"second survey\"\n[[capture]]\npath = \".\"\nname = \"third\"\nup = \"auto\"\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  ASSERT_EQ(recipe->captures.size(), 3u);
+  EXPECT_EQ(recipe->captures[0].name, "survey");
+  EXPECT_EQ(recipe->captures[1].name, "second_survey");
+  EXPECT_EQ(recipe->captures[2].name, "third");
+  EXPECT_EQ(recipe->up, "0,0,1");
+}
+
+TEST_F(RecipeTest, CapturesThatContradictEachOtherAreRefused) {
+  const std::string first = "name = \"a\"\n[[capture]]\npath = \"survey\"\nup = [0, 0, 1]\n";
+  fs::create_directories(folder_ / "other/survey");
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"survey\"\nname = \"b\"\n"),
+              HasSubstr("recipe.toml:5: the folder " + (folder_ / "survey").string() + " is given twice"));
+  EXPECT_THAT(
+      Message(first + "[[capture]]\npath = \"other/survey\"\n"),
+      HasSubstr("recipe.toml:5: two captures are named 'survey' (the name of the folder); give this one "
+                "another, such as name = \"survey-2\""));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other/survey\"\nname = \"survey\"\n"),
+              HasSubstr("two captures are named 'survey'; give"));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nup = [0, 1, 0]\n"),
+              HasSubstr("recipe.toml:5: up differs from that of a capture above"));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nname = \"a/b\"\n"),
+              HasSubstr("recipe.toml:7: name = "));
+  EXPECT_THAT(Message(first + "[[capture]]\npath = \"other\"\nnme = \"b\"\n"),
+              HasSubstr("recipe.toml:7: unknown key of [[capture]] 'nme'; did you mean 'name'?"));
+}
+
+TEST_F(RecipeTest, NamesThatCannotBeFileNamesAreRefused) {
+  for (const char* name : {"", "a b", "../a", ".a", "-a", "a/b", "ä"}) {
+    EXPECT_THAT(Message(std::string("name = \"") + name + "\"\n"), HasSubstr("recipe.toml:1: name = "))
+        << name;
+  }
+}
+
+TEST_F(RecipeTest, ReferenceListsEveryOptionWithItsDefault) {
+  const std::string page = RecipeReference(TestStages());
+  EXPECT_THAT(page, HasSubstr("| `max_num_features` | `2000` | at least 1 | most features |"));
+  EXPECT_THAT(page, HasSubstr("| `strict` | `true` | true, false | strict |"));
+  EXPECT_THAT(page, HasSubstr("## `[simulate]`"));
+}
+
+}  // namespace
+}  // namespace cairn::pipeline

@@ -1,0 +1,113 @@
+#include "runtime/drive/route.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/localize/retrieve.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Images 0 to 6 with a node each, but 5 of none; nodes and links, kept ones in brackets:
+//   0 - [1] - [2] - [3] - 4        0 and 4 are linked to each other in the survey, but neither is kept
+//   6 alone
+MapRows PathRows() {
+  MapRows rows;
+  Camera camera;
+  camera.width = camera.height = 100;
+  camera.params = {100, 50, 50};
+  rows.cameras = {camera};
+  for (int i = 0; i < 7; ++i) {
+    rows.images.push_back({.image_id = static_cast<ImageId>(i + 1),
+                           .name = std::string("image") + std::to_string(i),
+                           .camera_id = 1,
+                           .cam_from_world = PoseAt({static_cast<double>(i), 0, 0}, 90)});
+    rows.images.back().landmarks = {i % 2};
+  }
+  rows.landmarks.resize(2);
+  rows.descriptors = DescriptorMatrix::Zero(2, kDescriptorDim);
+  rows.descriptors.row(0).head(4).setConstant(255);
+  rows.descriptors.row(1).tail(4).setConstant(255);
+  rows.appearance = {{{0}, false, {{1, 20}}}, {{1}, true, {{2, 20}}}, {{2}, true, {{3, 20}}},
+                     {{3}, true, {{4, 20}}},  {{4}, false, {}},       {{6}, true, {}}};
+  return rows;
+}
+
+TEST(PlanRoute, GoesOverKeptImages) {
+  const auto map = *Map::FromRows(PathRows());
+  const Result<Route> route = PlanRoute(*map, 0, 4);
+  ASSERT_TRUE(route.ok()) << route.error().message;
+  EXPECT_THAT(route->images, ElementsAre(0, 1, 2, 3, 4));
+  EXPECT_EQ(route->num_links, 4);
+  EXPECT_THAT(PlanRoute(*map, 3, 1)->images, ElementsAre(3, 2, 1));
+  EXPECT_THAT(PlanRoute(*map, 2, 2)->images, ElementsAre(2));
+  EXPECT_EQ(PlanRoute(*map, 2, 2)->num_links, 0);
+}
+
+TEST(PlanRoute, DoesNotPassThroughImagesThatAreNotKept) {
+  MapRows rows = PathRows();
+  rows.appearance[2].is_kept = false;  // linked to 1 and 3, which are kept
+  const auto map = *Map::FromRows(rows);
+  EXPECT_EQ(PlanRoute(*map, 0, 4).error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(PlanRoute(*map, 0, 2)->images, ElementsAre(0, 1, 2));
+}
+
+TEST(PlanRoute, SaysWhyThereIsNone) {
+  const auto map = *Map::FromRows(PathRows());
+  EXPECT_THAT(PlanRoute(*map, 0, 6).error().message,
+              HasSubstr("no path over kept images leads from image0 to image6"));
+  EXPECT_THAT(PlanRoute(*map, 0, 5).error().message, HasSubstr("image5 is not in the appearance graph"));
+  EXPECT_EQ(PlanRoute(*map, 0, 7).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(PlanRoute(*map, -1, 0).error().code, ErrorCode::kInvalidArgument);
+  MapRows rows = PathRows();
+  rows.appearance.clear();
+  EXPECT_THAT(PlanRoute(**Map::FromRows(rows), 0, 1).error().message, HasSubstr("has no appearance graph"));
+}
+
+TEST(PlanRoute, PlacesThatAreLikeNoOtherCostNothingAndTheFewestLinksAreTaken) {
+  MapRows rows = PathRows();
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = 0, node.is_kept = true;
+  rows.appearance[0].links = {{1, 20}, {2, 20}};  // 0 - 2 as well: 1 is a detour
+  const auto map = *Map::FromRows(rows);
+  for (const auto& [from, to] : {std::pair(0, 4), std::pair(4, 0)}) {
+    const Result<Route> route = PlanRoute(*map, from, to, {.weight = "entropy"});
+    ASSERT_TRUE(route.ok()) << route.error().message;
+    EXPECT_EQ(route->num_links, 3);
+    EXPECT_EQ(route->cost, 0);
+  }
+  EXPECT_THAT(PlanRoute(*map, 1, 4, {.weight = "entropy"})->images, ElementsAre(1, 2, 3, 4));
+}
+
+TEST(PlanRoute, SeveralImagesOfOnePlaceNeedNoLink) {
+  MapRows rows = PathRows();
+  rows.appearance[4].images = {4, 5};
+  const auto map = *Map::FromRows(rows);
+  EXPECT_THAT(PlanRoute(*map, 4, 5)->images, ElementsAre(4, 5));
+  EXPECT_EQ(PlanRoute(*map, 4, 5)->num_links, 0);
+}
+
+TEST(Retrieve, SparseMapsLeadToKeptImagesAlone) {
+  MapRows rows = PathRows();
+  Features features;
+  features.keypoints = {{50, 50, 2, 0}, {20, 20, 2, 0}};
+  features.descriptors = rows.descriptors;
+  const Query query = MakeQuery(std::move(features), rows.cameras[0], {});
+  const auto images = [&](const MapRows& of) {
+    std::vector<int32_t> found;
+    const auto map = *Map::FromRows(of);
+    const Result<std::vector<Candidate>> candidates = RetrieveByWords(*map, query, {});
+    for (const Candidate& candidate : *candidates) found.push_back(candidate.image);
+    std::sort(found.begin(), found.end());
+    return found;
+  };
+  EXPECT_THAT(images(rows), ElementsAre(0, 1, 2, 3, 4, 5, 6));
+  rows.documents = "kept";
+  EXPECT_THAT(images(rows), ElementsAre(1, 2, 3, 6));
+}
+
+}  // namespace
+}  // namespace cairn

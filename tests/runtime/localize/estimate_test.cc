@@ -1,0 +1,70 @@
+#include "runtime/localize/estimate.h"
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+
+namespace cairn {
+namespace {
+
+const Pose kTruth{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.3, -1, 0.5).normalized())),
+                  {100, -20, 3}};
+
+std::vector<PoseMeasurement> MakeScene(int num_inliers, int num_outliers, uint64_t seed) {
+  Random random(seed);
+  std::vector<PoseMeasurement> measurements;
+  for (int i = 0; i < num_inliers + num_outliers; ++i) {
+    const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
+    PoseMeasurement measurement;
+    measurement.point = kTruth.Inverse() * in_cam;
+    measurement.ray.pixel_from_ray = 500 * Eigen::Matrix2d::Identity();
+    measurement.ray.ray =
+        in_cam.hnormalized() + Eigen::Vector2d(random.Normal(0, 0.002), random.Normal(0, 0.002));
+    if (i >= num_inliers) measurement.ray.ray = {random.Uniform(-0.6, 0.6), random.Uniform(-0.5, 0.5)};
+    measurements.push_back(measurement);
+  }
+  return measurements;
+}
+
+TEST(Estimate, FindsThePoseAmongNinetyPercentOutliers) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    const auto measurements = MakeScene(25, 225, seed);
+    EstimateOptions options;
+    options.max_num_ransac_iterations = 20000;
+    const auto estimate = EstimatePose(measurements, options, {}, seed);
+    ASSERT_TRUE(estimate);
+    EXPECT_LT(CenterErrorM(estimate->cam_from_world, kTruth), 0.1) << seed;
+    EXPECT_GE(estimate->inliers.size(), 24u);
+  }
+}
+
+TEST(Estimate, StopsSoonWhereAllAgree) {
+  const auto estimate = EstimatePose(MakeScene(100, 0, 1), {}, {}, 0);
+  ASSERT_TRUE(estimate);
+  EXPECT_EQ(estimate->num_iterations, EstimateOptions().min_num_ransac_iterations);
+  EXPECT_EQ(estimate->inliers.size(), 100u);
+}
+
+TEST(Estimate, SameSeedSameResult) {
+  const auto measurements = MakeScene(40, 100, 3);
+  const auto first = EstimatePose(measurements, {}, {}, 5);
+  const auto second = EstimatePose(measurements, {}, {}, 5);
+  EXPECT_EQ(first->cam_from_world.translation, second->cam_from_world.translation);
+  EXPECT_EQ(first->inliers, second->inliers);
+}
+
+TEST(Estimate, FourMatchesAreTheLeast) {
+  EXPECT_FALSE(EstimatePose(MakeScene(3, 0, 1), {}, {}, 0));
+  EXPECT_TRUE(EstimatePose(MakeScene(4, 0, 1), {}, {}, 0));
+  EXPECT_FALSE(EstimatePose({}, {}, {}, 0));
+}
+
+TEST(Estimate, EqualPointsGiveNothingOrAPoseThatFitsThem) {
+  auto measurements = MakeScene(1, 0, 1);
+  measurements.resize(30, measurements[0]);
+  const auto estimate = EstimatePose(measurements, {}, {}, 0);
+  EXPECT_TRUE(!estimate || estimate->cam_from_world.translation.allFinite());
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,416 @@
+#include "runtime/localize/localizer.h"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/files/file.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+const SyntheticRoom& Room() {
+  static const SyntheticRoom room = MakeSyntheticRoom(1);
+  return room;
+}
+
+std::shared_ptr<const Map> RoomMap() {
+  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
+  return map;
+}
+
+// The synthetic rooms' errors are independent of each other: no factor for those that are not.
+LocalizerOptions IndependentErrors() {
+  LocalizerOptions options;
+  options.refine.covariance_scale = 1;
+  return options;
+}
+
+TEST(Localizer, FindsEveryFreePoseOfACleanRoom) {
+  Localizer localizer(RoomMap());
+  Random random(5);
+  for (int i = 0; i < 30; ++i) {
+    const Pose truth = RandomPose(random);
+    const auto found = localizer.LocalizeFeatures(RenderFeatures(Room(), truth, {}, i), Room().camera);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    ASSERT_TRUE(found->has_fix()) << i << ": " << found->message;
+    EXPECT_LT(CenterErrorM(found->cam_from_world, truth), 0.05) << i;
+    EXPECT_LT(RotationErrorDeg(found->cam_from_world, truth), 0.5) << i;
+    EXPECT_EQ(found->scope, Scope::kRegions);
+    EXPECT_GE(found->region, 0);
+    EXPECT_FALSE(found->candidates.empty());
+    EXPECT_GE(found->num_inliers, found->num_unguided_inliers / 2);
+  }
+}
+
+TEST(Localizer, StandsManyWrongMatches) {
+  Localizer localizer(RoomMap());
+  Random random(6);
+  int num_fixes = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Pose truth = RandomPose(random);
+    const RenderOptions dirty{.detection_ratio = 0.6, .num_outliers = 800, .num_swapped_ratio = 0.6};
+    const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, dirty, i), Room().camera);
+    if (!found.has_fix()) continue;
+    ++num_fixes;
+    EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.2) << i;
+  }
+  EXPECT_GE(num_fixes, 18);
+}
+
+TEST(Localizer, CovarianceIsRight) {
+  // Normalised estimation error squared over independent maps and queries: mean of a chi-square of 6 degrees
+  // of freedom, variance 12 / n.  Processors round differently, so every kind of machine draws its own
+  // errors: the band is the one that a right covariance leaves once in 1000 such machines.
+  constexpr int kNumTrials = 900;
+  double sum = 0;
+  int num_fixes = 0;
+  Random random(7);
+  for (int i = 0; i < kNumTrials; ++i) {
+    Localizer localizer(*Map::FromRows(WithLandmarkNoise(Room(), 0.01, random)), IndependentErrors());
+    const Pose truth = RandomPose(random);
+    const auto found = *localizer.LocalizeFeatures(
+        RenderFeatures(Room(), truth, {.num_swapped_ratio = 0.2}, 100 + i), Room().camera);
+    if (!found.has_fix()) continue;
+    ++num_fixes;
+    const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
+    sum += error.dot(found.covariance.inverse() * error);
+  }
+  ASSERT_GT(num_fixes, 870);
+  const double band = 3.29 * std::sqrt(12.0 / num_fixes);
+  EXPECT_NEAR(sum / num_fixes, 6, band);
+}
+
+TEST(Localizer, CovarianceFollowsNoiseThatNobodyAnnounced) {
+  // Keypoints three times as noisy as the options say.
+  double sum = 0;
+  int num_fixes = 0;
+  Random random(8);
+  Localizer localizer(RoomMap(), IndependentErrors());
+  for (int i = 0; i < 200; ++i) {
+    const Pose truth = RandomPose(random);
+    const RenderOptions noisy{
+        .keypoint_sigma_px = 1.5, .keypoint_sigma_per_scale = 0.6, .detection_ratio = 0.4};
+    const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, noisy, i), Room().camera);
+    if (!found.has_fix()) continue;
+    ++num_fixes;
+    const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
+    sum += error.dot(found.covariance.inverse() * error);
+  }
+  ASSERT_GT(num_fixes, 190);
+  // The search radius cuts the largest of these errors off, so that a little is missing: within 20 %.
+  EXPECT_NEAR(sum / num_fixes, 6, 1.2);
+}
+
+TEST(Localizer, NoiseOfTheSurveysPosesWidensTheCovariance) {
+  MapRows rows = Room().rows;
+  rows.stated_pose_sigma_m = 0.03;
+  rows.stated_pose_sigma_deg = 1;
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  const auto without = *Localizer(RoomMap()).LocalizeFeatures(features, Room().camera);
+  const auto with = *Localizer(*Map::FromRows(rows)).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(with.has_fix());
+  const Vector6d added = with.covariance.diagonal() - without.covariance.diagonal();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(std::sqrt(added[i]), RadFromDeg(1), 1e-6);
+    EXPECT_NEAR(std::sqrt(added[3 + i]), 0.03, 1e-6);
+  }
+}
+
+TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  Random random(4);
+  std::vector<PoseMeasurement> measurements(100);
+  for (PoseMeasurement& measurement : measurements) {
+    measurement.point = Eigen::Vector3d(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), 3);
+    measurement.ray.ray = measurement.point.hnormalized();
+    measurement.ray.pixel_from_ray = 480 * Eigen::Matrix2d::Identity();
+  }
+  const double disc = M_PI * 36 / (640 * 480);
+  EXPECT_NEAR(ChanceOfInlier(measurements, Pose(), 6, camera), disc, disc);
+  Pose far;  // from 1000 m everything is one point, and so are the keypoints that show it
+  far.translation.z() = 1000;
+  for (PoseMeasurement& measurement : measurements)
+    measurement.ray.ray = (far * measurement.point).hnormalized();
+  EXPECT_GT(ChanceOfInlier(measurements, far, 6, camera), 0.9);
+  EXPECT_NEAR(ChanceOfInlier({}, Pose(), 6, camera), disc, 1e-12);
+}
+
+TEST(Log10ChancePoses, FollowsTheDefinition) {
+  // C(10, 3) = 120, C(7, 3) = 35
+  EXPECT_NEAR(Log10ChancePoses(10, 6, 1e-3), std::log10(120 * 35 * 1e-9), 1e-9);
+  EXPECT_GT(Log10ChancePoses(10, 3, 1e-3), 1e9);  // three matches always agree
+  EXPECT_LT(Log10ChancePoses(20, 8, 1e-3), Log10ChancePoses(40, 8, 1e-3));
+}
+
+TEST(Localizer, AnotherPlaceIsRefused) {
+  const SyntheticRoom other = MakeSyntheticRoom(99);
+  Localizer localizer(RoomMap());
+  Random random(9);
+  for (int i = 0; i < 20; ++i) {
+    const auto found =
+        *localizer.LocalizeFeatures(RenderFeatures(other, RandomPose(random), {}, i), Room().camera);
+    EXPECT_FALSE(found.has_fix()) << i;
+    EXPECT_FALSE(found.message.empty());
+    EXPECT_NE(found.reason, NoFix::kNone);
+  }
+}
+
+TEST(Localizer, MatchesThatAgreeOnNoPoseAreRefused) {
+  // Every descriptor is one of the map, every place in the image is random.
+  Localizer localizer(RoomMap());
+  Random random(10);
+  for (int i = 0; i < 10; ++i) {
+    const RenderOptions swapped{.num_swapped_ratio = 1};
+    const auto found =
+        *localizer.LocalizeFeatures(RenderFeatures(Room(), RandomPose(random), swapped, i), Room().camera);
+    EXPECT_FALSE(found.has_fix());
+    EXPECT_EQ(found.reason, NoFix::kTooFewInliers) << found.message;
+  }
+}
+
+TEST(Localizer, TwoPosesOfEqualSupportAreAmbiguous) {
+  // Half of the keypoints show the room from one place, half from another.
+  Localizer localizer(RoomMap());
+  const Features left = RenderFeatures(Room(), PoseAt({-2, 0, 1.2}, 90), {.num_outliers = 0}, 1);
+  const Features right = RenderFeatures(Room(), PoseAt({2, 0, 1.2}, -90), {.num_outliers = 0}, 2);
+  Features both = left;
+  both.keypoints.insert(both.keypoints.end(), right.keypoints.begin(), right.keypoints.end());
+  both.descriptors.conservativeResize(left.descriptors.rows() + right.descriptors.rows(), kDescriptorDim);
+  both.descriptors.bottomRows(right.descriptors.rows()) = right.descriptors;
+  LocalizerOptions options;
+  options.retrieve.max_num_regions = 8;
+  const auto found = *Localizer(RoomMap(), options).LocalizeFeatures(both, Room().camera);
+  EXPECT_EQ(found.reason, NoFix::kAmbiguous) << found.message;
+}
+
+TEST(Localizer, FewFeaturesAreNamedAsTheReason) {
+  Localizer localizer(RoomMap());
+  const auto found = *localizer.LocalizeFeatures(Features(), Room().camera);
+  EXPECT_EQ(found.reason, NoFix::kTooFewFeatures);
+  EXPECT_THAT(found.message, testing::HasSubstr("0 features"));
+  EXPECT_STREQ(NoFixName(found.reason), "too_few_features");
+}
+
+TEST(Localizer, BlankImageHasNoFix) {
+  Localizer localizer(RoomMap());
+  const auto found = *localizer.Localize(cv::Mat(480, 640, CV_8UC1, cv::Scalar(128)), Room().camera);
+  EXPECT_EQ(found.reason, NoFix::kTooFewFeatures);
+}
+
+TEST(Localizer, ImageOfAnotherSizeOrTypeIsAnError) {
+  Localizer localizer(RoomMap());
+  EXPECT_EQ(localizer.Localize(cv::Mat(100, 100, CV_8UC1), Room().camera).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(localizer.Localize(cv::Mat(480, 640, CV_8UC3), Room().camera).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(localizer.Localize(cv::Mat(), Room().camera).error().code, ErrorCode::kInvalidArgument);
+  Camera broken = Room().camera;
+  broken.params.pop_back();
+  EXPECT_EQ(localizer.LocalizeFeatures(Features(), broken).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(Localizer, FallsBackToAllLandmarksWhenRegionsAndWordsFail) {
+  MapRows rows = Room().rows;
+  rows.regions.clear();
+  for (auto& postings : rows.vocabulary.inverted_files) postings.clear();
+  WeightVocabulary(&rows.vocabulary);
+  const auto map = *Map::FromRows(rows);
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const Features features = RenderFeatures(Room(), truth, {}, 3);
+  const auto found = *Localizer(map).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_EQ(found.scope, Scope::kAll);
+  EXPECT_EQ(found.region, -1);
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+  LocalizerOptions options;
+  options.fall_back_to_all = false;
+  EXPECT_EQ(Localizer(map, options).LocalizeFeatures(features, Room().camera)->reason, NoFix::kNoCandidates);
+}
+
+TEST(Localizer, PriorLeadsToItsNeighbourhood) {
+  Localizer localizer(RoomMap());
+  const Pose truth = PoseAt({1, 1, 1.2}, 200);
+  const PosePrior prior{PoseAt({1.3, 0.8, 1.2}, 190), 0.3, 5};
+  const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, {}, 4), Room().camera, prior);
+  ASSERT_TRUE(found.has_fix());
+  EXPECT_EQ(found.scope, Scope::kPrior);
+  const PosePrior wrong{PoseAt({-3, -2, 1.2}, 20), 0.1, 1};
+  const auto rescued =
+      *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, {}, 4), Room().camera, wrong);
+  ASSERT_TRUE(rescued.has_fix()) << rescued.message;
+  EXPECT_LT(CenterErrorM(rescued.cam_from_world, truth), 0.05);
+}
+
+TEST(Localizer, ReportsPosesInTheFrameOfTheCapture) {
+  MapRows rows = Room().rows;
+  rows.camera_from_given = {Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized())),
+                            {0.2, -0.1, 0.4}};
+  const auto map = *Map::FromRows(rows);
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const Features features = RenderFeatures(Room(), truth, {}, 3);
+  const auto plain = *Localizer(RoomMap()).LocalizeFeatures(features, Room().camera);
+  const auto found = *Localizer(map).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(found.has_fix() && plain.has_fix());
+  const Pose given = rows.camera_from_given.Inverse() * truth;
+  EXPECT_LT(CenterErrorM(found.cam_from_world, given), 0.05);
+  // The same error, seen in another frame, is as likely.
+  const Vector6d error = PerturbationBetween(found.cam_from_world, given);
+  const Vector6d plain_error = PerturbationBetween(plain.cam_from_world, truth);
+  EXPECT_NEAR(error.dot(found.covariance.inverse() * error),
+              plain_error.dot(plain.covariance.inverse() * plain_error), 0.05);
+}
+
+TEST(Localizer, SameImageSameAnswerFromAnyThread) {
+  const Features features = RenderFeatures(Room(), PoseAt({0, 1, 1.2}, 120), {.num_swapped_ratio = 0.5}, 3);
+  std::vector<Localization> found(4);
+  std::vector<std::thread> threads;
+  for (Localization& one : found) {
+    threads.emplace_back([&] {
+      Localizer localizer(RoomMap());
+      for (int i = 0; i < 3; ++i) one = *localizer.LocalizeFeatures(features, Room().camera);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const Localization& one : found) {
+    ASSERT_TRUE(one.has_fix());
+    EXPECT_EQ(one.cam_from_world.translation, found[0].cam_from_world.translation);
+    EXPECT_EQ(one.covariance, found[0].covariance);
+  }
+}
+
+TEST(Localizer, WorksWithAFisheyeCamera) {
+  SyntheticRoom room = Room();
+  room.camera.model = CameraModel::kOpenCvFisheye;
+  room.camera.params = {300, 300, 320, 240, 0.02, -0.01, 0.003, -0.001};
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const auto found = *Localizer(RoomMap()).LocalizeFeatures(RenderFeatures(room, truth, {}, 3), room.camera);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+}
+
+TEST(Localizer, OptionsAreDescribedOnceEach) {
+  LocalizerOptions options;
+  std::vector<std::string> names;
+  for (const Option& option : DescribeOptions(&options)) names.push_back(option.name);
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
+  EXPECT_TRUE(CheckOptions(DescribeOptions(&options)).ok());
+}
+
+TEST(Map, CameraIsChosenBySizeOnlyIfOneFits) {
+  EXPECT_EQ(RoomMap()->CameraForSize(640, 480)->camera_id, 1u);
+  const Error error = RoomMap()->CameraForSize(1280, 720).error();
+  EXPECT_EQ(error.code, ErrorCode::kNotFound);
+  EXPECT_THAT(error.message, testing::HasSubstr("640 x 480"));
+  MapRows rows = Room().rows;
+  rows.cameras.push_back(rows.cameras[0]);
+  rows.cameras.back().camera_id = 2;
+  EXPECT_FALSE((*Map::FromRows(rows))->CameraForSize(640, 480).ok());
+}
+
+TEST(Localizer, WorksWithoutAVocabulary) {
+  MapRows rows = Room().rows;
+  rows.vocabulary = {};
+  Localizer localizer(*Map::FromRows(rows));
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  const auto found = *localizer.LocalizeFeatures(RenderFeatures(Room(), truth, {}, 3), Room().camera);
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_EQ(found.scope, Scope::kRegions);
+  EXPECT_LT(CenterErrorM(found.cam_from_world, truth), 0.05);
+}
+
+TEST(Map, OpensTheFileThatWasWritten) {
+  const std::string path = testing::TempDir() + "/room.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  const auto map = Map::Open(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  const Pose truth = PoseAt({0, 0, 1.2}, 30);
+  EXPECT_TRUE(
+      Localizer(*map).LocalizeFeatures(RenderFeatures(Room(), truth, {}, 3), Room().camera)->has_fix());
+  EXPECT_EQ(Map::Open(path + ".none").error().code, ErrorCode::kNotFound);
+}
+
+TEST(Map, FileAnswersAsTheRowsDo) {
+  const std::string path = testing::TempDir() + "/same.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  // As the file has them: rounded.
+  Localizer of_rows(*Map::FromRows(*ReadMapRows(path))), of_file(*Map::Open(path));
+  Random random(9);
+  for (int i = 0; i < 10; ++i) {
+    const Features features = RenderFeatures(Room(), RandomPose(random), {.num_swapped_ratio = 0.4}, i);
+    const Localization a = *of_rows.LocalizeFeatures(features, Room().camera);
+    const Localization b = *of_file.LocalizeFeatures(features, Room().camera);
+    EXPECT_EQ(a.has_fix(), b.has_fix());
+    EXPECT_EQ(a.cam_from_world.translation, b.cam_from_world.translation);
+    EXPECT_EQ(a.candidates, b.candidates);
+    EXPECT_EQ(a.region, b.region);
+  }
+}
+
+TEST(Map, KeepsWithinItsBudgetAndAnswersTheSame) {
+  const std::string path = testing::TempDir() + "/budget.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  const auto roomy = *Map::Open(path), tight = *Map::Open(path, {.memory_budget_bytes = 200'000});
+  Random random(10);
+  for (int i = 0; i < 8; ++i) {
+    const Features features = RenderFeatures(Room(), RandomPose(random), {}, i);
+    const Localization a = *Localizer(roomy).LocalizeFeatures(features, Room().camera);
+    const Localization b = *Localizer(tight).LocalizeFeatures(features, Room().camera);
+    EXPECT_EQ(a.cam_from_world.translation, b.cam_from_world.translation);
+    EXPECT_LE(tight->cache().num_bytes(), 200'000);
+  }
+  EXPECT_GT(roomy->cache().num_bytes(), 200'000);
+  EXPECT_GT(tight->cache().num_loads(), roomy->cache().num_loads());
+}
+
+TEST(Map, DamagedBlockIsAnErrorOfTheQueryThatNeedsIt) {
+  const std::string path = testing::TempDir() + "/hurt.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  std::string bytes = *ReadFile(path);
+  bytes[bytes.size() - 100'000] ^= 1;  // among the landmarks, which come last
+  ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
+  const auto map = Map::Open(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  const auto found =
+      Localizer(*map).LocalizeFeatures(RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3), Room().camera);
+  ASSERT_FALSE(found.ok());
+  EXPECT_EQ(found.error().code, ErrorCode::kCorrupt);
+}
+
+TEST(Map, RequiredKeyIsRequired) {
+  const std::string path = testing::TempDir() + "/keyed.cairn";
+  ASSERT_TRUE(WriteMapRows(Room().rows, path).ok());
+  const KeyPair keys = MakeKeyPair();
+  EXPECT_EQ(Map::Open(path, {.public_key = keys.public_key}).error().code, ErrorCode::kNotSigned);
+  ASSERT_TRUE(SignMap(path, keys.secret_key, path).ok());
+  EXPECT_TRUE(Map::Open(path, {.public_key = keys.public_key}).ok());
+  EXPECT_EQ(Map::Open(path, {.public_key = MakeKeyPair().public_key}).error().code, ErrorCode::kWrongKey);
+}
+
+TEST(BlockCache, EvictsWhatWasUsedLongestAgo) {
+  BlockCache cache(100);
+  const auto block = [](int value) { return std::make_shared<const int>(value); };
+  cache.Insert(1, block(1), 40);
+  cache.Insert(2, block(2), 40);
+  EXPECT_NE(cache.Find(1), nullptr);  // now 2 is the oldest
+  cache.Insert(3, block(3), 40);
+  EXPECT_EQ(cache.Find(2), nullptr);
+  EXPECT_NE(cache.Find(1), nullptr);
+  EXPECT_NE(cache.Find(3), nullptr);
+  EXPECT_EQ(cache.num_bytes(), 80);
+}
+
+TEST(BlockCache, WhatIsLargerThanTheBudgetIsNotKept) {
+  BlockCache cache(100);
+  EXPECT_NE(cache.Insert(1, std::make_shared<const int>(1), 200), nullptr);
+  EXPECT_EQ(cache.Find(1), nullptr);
+  EXPECT_EQ(cache.num_bytes(), 0);
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,106 @@
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/blocks/map_blocks.h"
+#include "runtime/localize/localizer.h"
+#include "runtime/localize/region_tracker.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+const SyntheticRoom& Room() {
+  static const SyntheticRoom room = MakeSyntheticRoom(1);
+  return room;
+}
+
+// The room, and a twin of it 30 m away that words and regions do not lead to, as the survey knows.
+MapRows TwinRooms() {
+  MapRows rows = Room().rows;
+  const auto num_images = static_cast<int32_t>(rows.images.size());
+  const auto num_landmarks = static_cast<LandmarkIdx>(rows.landmarks.size());
+  const Pose from_twin{Eigen::Quaterniond::Identity(), {-30, 0, 0}};
+  for (LandmarkIdx i = 0; i < num_landmarks; ++i) {
+    rows.landmarks.push_back(rows.landmarks[i]);
+    rows.landmarks.back().position.x() += 30;
+  }
+  const DescriptorMatrix descriptors = rows.descriptors;
+  rows.descriptors.resize(2 * num_landmarks, kDescriptorDim);
+  rows.descriptors << descriptors, descriptors;
+  for (int32_t i = 0; i < num_images; ++i) {
+    MapImage twin = rows.images[i];
+    twin.image_id += num_images;
+    twin.cam_from_world = twin.cam_from_world * from_twin;
+    twin.station = -1;
+    for (LandmarkIdx& landmark : twin.landmarks) landmark += num_landmarks;
+    rows.images.push_back(std::move(twin));
+  }
+  for (int32_t i = 0; i < 2 * num_images; ++i)
+    rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.7});
+  for (int32_t i = 0; i < num_images; ++i) rows.appearance[i].look_alikes = {{num_images + i, 1}};
+  return rows;
+}
+
+TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
+  MapRows rows = TwinRooms();
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const Features features = RenderFeatures(Room(), truth, {}, 3);
+  LocalizerOptions options;
+  options.fall_back_to_all = false;
+  const auto localize = [&](const std::optional<PosePrior>& prior) {
+    return *Localizer(*Map::FromRows(rows), options).LocalizeFeatures(features, Room().camera, prior);
+  };
+  EXPECT_EQ(localize(std::nullopt).reason, NoFix::kAmbiguous);
+  const Localization with_prior = localize(PosePrior{truth, 1, 10});
+  ASSERT_TRUE(with_prior.has_fix()) << with_prior.message;
+  EXPECT_LT(CenterErrorM(with_prior.cam_from_world, truth), 0.1);
+  EXPECT_EQ(localize(PosePrior{truth, 12, 10}).reason, NoFix::kAmbiguous) << "30 m are within the prior";
+  options.exclude_look_alikes = false;
+  EXPECT_TRUE(localize(std::nullopt).has_fix());
+  options.exclude_look_alikes = true;
+  // A twin that differs in two thirds of its landmarks explains the image less well.
+  Random random(9);
+  for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
+    if (i % 3 > 0) rows.descriptors.row(i) = RandomDescriptor(random);
+  }
+  EXPECT_TRUE(localize(std::nullopt).has_fix());
+}
+
+// The twin's landmarks look a little different, so that the visible ones vote for the room; alone they match.
+TEST(RegionTracker, WithholdsAVotedFixUntilTheLookAlikeIsExcluded) {
+  MapRows rows = TwinRooms();
+  Random random(11);
+  for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
+    for (int d = 0; d < kDescriptorDim; ++d) {
+      const double value = random.Normal(rows.descriptors(i, d), 16);
+      rows.descriptors(i, d) = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
+    }
+  }
+  const auto map = *Map::FromRows(rows);
+  const Pose truth = PoseAt({1, 0.5, 1.2}, 20);
+  const auto track = [&](RegionTracker* tracker, const Pose& pose) {
+    return *tracker->TrackFeatures(RenderFeatures(Room(), pose, {}, 3), Room().camera);
+  };
+  LocalizerOptions options;
+  options.fall_back_to_all = false;
+  RegionTracker careful(map, options);
+  EXPECT_EQ(track(&careful, truth).reason, NoFix::kAmbiguous);
+  options.exclude_look_alikes = false;
+  RegionTracker careless(map, options);
+  const Localization fix = track(&careless, truth);
+  EXPECT_TRUE(fix.has_fix()) << fix.message;
+  EXPECT_EQ(fix.scope, Scope::kRegions);
+}
+
+TEST(Map, ListsLookAlikesAtBothPlaces) {
+  std::vector<std::vector<MapAppearanceNode::LookAlike>> all = {{{1, 0.5}, {3, 0.25}}, {{2, 0.75}}, {}, {}};
+  CompleteLookAlikes(&all);
+  using List = std::vector<MapAppearanceNode::LookAlike>;
+  EXPECT_THAT(all, testing::ElementsAre(List{{1, 0.5}, {3, 0.25}}, List{{0, 0.5}, {2, 0.75}}, List{{1, 0.75}},
+                                        List{{0, 0.25}}));
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,133 @@
+#include "runtime/localize/refine.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+
+#include "core/base/random.h"
+
+namespace cairn {
+namespace {
+
+// The errors made here are independent of each other: no factor for those that are not.
+const RefineOptions kIndependent{.covariance_scale = 1};
+
+// Points in front of a camera with focal length 500 px, seen with noise of sigma_px and, in part, wrongly.
+std::vector<PoseMeasurement> MakeScene(const Pose& truth, int num_points, double sigma_px,
+                                       double outlier_ratio, Random& random) {
+  std::vector<PoseMeasurement> measurements;
+  while (static_cast<int>(measurements.size()) < num_points) {
+    const Eigen::Vector3d in_cam(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 8));
+    PoseMeasurement measurement;
+    measurement.point = truth.Inverse() * in_cam;
+    measurement.ray.pixel_from_ray = 500 * Eigen::Matrix2d::Identity();
+    measurement.ray.sigma_px = sigma_px;
+    measurement.ray.ray = in_cam.hnormalized();
+    const double sigma = random.Uniform() < outlier_ratio ? 40 : sigma_px;
+    measurement.ray.ray += Eigen::Vector2d(random.Normal(0, sigma / 500), random.Normal(0, sigma / 500));
+    measurements.push_back(measurement);
+  }
+  return measurements;
+}
+
+Pose Truth() {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized())), {1, 2, -3}};
+}
+
+Pose Disturbed() { return Perturb(Truth(), (Vector6d() << 0.02, -0.03, 0.01, 0.1, -0.05, 0.08).finished()); }
+
+TEST(Refine, PerturbationAndItsInverse) {
+  const Vector6d xi = (Vector6d() << 0.3, -0.2, 0.5, 1, 2, 3).finished();
+  EXPECT_LT((PerturbationBetween(Truth(), Perturb(Truth(), xi)) - xi).norm(), 1e-12);
+}
+
+TEST(Refine, CleanMeasurementsGiveTheTruth) {
+  Random random(1);
+  auto measurements = MakeScene(Truth(), 20, 0, 0, random);
+  for (PoseMeasurement& measurement : measurements) measurement.ray.sigma_px = 1;
+  const auto pose = RefinePose(measurements, Disturbed(), kIndependent);
+  ASSERT_TRUE(pose);
+  EXPECT_LT(PerturbationBetween(*pose, Truth()).norm(), 1e-8);
+}
+
+TEST(Refine, OutliersAreLeftOut) {
+  Random random(2);
+  const auto measurements = MakeScene(Truth(), 100, 0.5, 0.2, random);
+  const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
+  ASSERT_TRUE(refined);
+  EXPECT_LT(CenterErrorM(refined->cam_from_world, Truth()), 0.02);
+  EXPECT_LT(refined->inliers.size(), 90u);
+  EXPECT_GT(refined->inliers.size(), 70u);
+}
+
+TEST(Refine, NormalisedErrorSquaredHasMeanSix) {
+  for (const int num_points : {12, 30, 200}) {
+    for (const double claimed : {0.3, 1.0, 2.0}) {  // the real noise is 1 px, whatever the measurements claim
+      Random random(3);
+      double sum = 0;
+      int count = 0;
+      for (int i = 0; i < 600; ++i) {
+        auto measurements = MakeScene(Truth(), num_points, 1, 0, random);
+        for (PoseMeasurement& measurement : measurements) measurement.ray.sigma_px = claimed;
+        const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
+        if (!refined) continue;
+        const Vector6d error = PerturbationBetween(refined->cam_from_world, Truth());
+        sum += error.dot(refined->covariance.inverse() * error);
+        ++count;
+      }
+      EXPECT_GT(count, 570);
+      // Few points: the noise is known from few residuals, so the error's distribution has a heavier tail.
+      EXPECT_NEAR(sum / count, 6, num_points == 12 ? 1.5 : 0.45)
+          << num_points << " points, claimed " << claimed;
+    }
+  }
+}
+
+TEST(Refine, LandmarkCovarianceWeighsAndCounts) {
+  // Half of the landmarks are off by 5 cm and say so.
+  Random random(4);
+  double sum = 0;
+  for (int i = 0; i < 300; ++i) {
+    auto measurements = MakeScene(Truth(), 60, 0.5, 0, random);
+    for (size_t k = 0; k < measurements.size(); k += 2) {
+      measurements[k].point_covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
+      for (int axis = 0; axis < 3; ++axis) measurements[k].point[axis] += random.Normal(0, 0.05);
+    }
+    const auto refined = RefinePoseWithCovariance(measurements, Disturbed(), kIndependent);
+    ASSERT_TRUE(refined);
+    const Vector6d error = PerturbationBetween(refined->cam_from_world, Truth());
+    sum += error.dot(refined->covariance.inverse() * error);
+  }
+  EXPECT_NEAR(sum / 300, 6, 1.96 * std::sqrt(12.0 / 300));
+}
+
+TEST(Refine, TransformedCovarianceFitsTransformedErrors) {
+  // Oracle: perturbations drawn from C, carried through the frame change one by one.
+  Random random(5);
+  const Pose change{Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Eigen::Vector3d(0.2, 1, -0.4).normalized())),
+                    {0.5, 2, -1}};
+  Matrix6d factor;
+  for (int i = 0; i < 36; ++i) factor(i) = random.Normal(0, 1e-3);
+  const Matrix6d covariance = factor * factor.transpose();
+  Matrix6d sampled = Matrix6d::Zero();
+  constexpr int kNumSamples = 20000;
+  for (int i = 0; i < kNumSamples; ++i) {
+    Vector6d unit;
+    for (int k = 0; k < 6; ++k) unit[k] = random.Normal(0, 1);
+    const Vector6d moved = PerturbationBetween(change * Truth(), change * Perturb(Truth(), factor * unit));
+    sampled += moved * moved.transpose() / kNumSamples;
+  }
+  const Matrix6d expected = TransformCovariance(change, covariance);
+  EXPECT_LT((sampled - expected).norm(), 0.05 * expected.norm());
+}
+
+TEST(Refine, TooFewOrDegeneratePointsGiveNothing) {
+  Random random(6);
+  EXPECT_FALSE(RefinePoseWithCovariance(MakeScene(Truth(), 3, 1, 0, random), Disturbed(), {}));
+  auto same = MakeScene(Truth(), 1, 1, 0, random);
+  same.resize(20, same[0]);  // one point twenty times
+  const auto refined = RefinePoseWithCovariance(same, Disturbed(), kIndependent);
+  EXPECT_TRUE(!refined || std::sqrt(refined->covariance.diagonal().maxCoeff()) > 10);
+}
+
+}  // namespace
+}  // namespace cairn

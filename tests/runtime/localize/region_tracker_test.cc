@@ -1,0 +1,117 @@
+#include "runtime/localize/region_tracker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+const SyntheticRoom& Room() {
+  static const SyntheticRoom room = MakeSyntheticRoom(1);
+  return room;
+}
+
+std::shared_ptr<const Map> RoomMap() {
+  static const std::shared_ptr<const Map> map = *Map::FromRows(Room().rows);
+  return map;
+}
+
+// Frame i of a drive around the room's middle: 10 cm and 3 degrees a frame.
+Pose OnDrive(int i) {
+  const double angle_deg = 3.0 * i;
+  const double angle = RadFromDeg(angle_deg);
+  return PoseAt({2 * std::cos(angle), 2 * std::sin(angle), 1.2}, angle_deg + 90);
+}
+
+Result<Localization> Show(RegionTracker& tracker, const Pose& pose, int frame) {
+  return tracker.TrackFeatures(RenderFeatures(Room(), pose, {}, 500 + frame), Room().camera);
+}
+
+TEST(RegionTracker, FollowsADriveByItsPrediction) {
+  RegionTracker tracker(RoomMap());
+  EXPECT_FALSE(tracker.Prediction());
+  for (int i = 0; i < 60; ++i) {
+    const auto found = Show(tracker, OnDrive(i), i);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    ASSERT_TRUE(found->has_fix()) << i << ": " << found->message;
+    EXPECT_LT(CenterErrorM(found->cam_from_world, OnDrive(i)), 0.05) << i;
+    EXPECT_EQ(found->scope == Scope::kTrack, i > 0) << i;
+  }
+}
+
+TEST(RegionTracker, PredictsConstantVelocity) {
+  RegionTracker tracker(RoomMap());
+  ASSERT_TRUE(Show(tracker, OnDrive(0), 0)->has_fix());
+  // One fix: it may stand still.
+  EXPECT_LT(CenterErrorM(tracker.Prediction()->cam_from_world, OnDrive(0)), 0.05);
+  ASSERT_TRUE(Show(tracker, OnDrive(1), 1)->has_fix());
+  EXPECT_LT(CenterErrorM(tracker.Prediction()->cam_from_world, OnDrive(2)), 0.08);
+  EXPECT_LT(RotationErrorDeg(tracker.Prediction()->cam_from_world, OnDrive(2)), 1);
+  EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_m, RegionTrackerOptions().step_sigma_m);
+}
+
+TEST(RegionTracker, GoesOnAfterBlankFramesUntilItIsLost) {
+  RegionTracker tracker(RoomMap());
+  ASSERT_TRUE(Show(tracker, OnDrive(0), 0)->has_fix());
+  ASSERT_TRUE(Show(tracker, OnDrive(1), 1)->has_fix());
+  for (int frame = 2; frame < 4; ++frame) {
+    const auto blank = tracker.TrackFeatures({}, Room().camera);
+    ASSERT_TRUE(blank.ok());
+    EXPECT_EQ(blank->reason, NoFix::kTooFewFeatures);
+  }
+  EXPECT_DOUBLE_EQ(tracker.Prediction()->sigma_m, 3 * RegionTrackerOptions().step_sigma_m);
+  const auto again = Show(tracker, OnDrive(4), 4);
+  ASSERT_TRUE(again->has_fix());
+  EXPECT_EQ(again->scope, Scope::kTrack);
+  for (int frame = 5; frame < 10; ++frame) ASSERT_TRUE(tracker.TrackFeatures({}, Room().camera).ok());
+  EXPECT_FALSE(tracker.Prediction());
+  const auto found = Show(tracker, OnDrive(10), 10);
+  ASSERT_TRUE(found->has_fix());
+  EXPECT_NE(found->scope, Scope::kTrack);
+}
+
+TEST(RegionTracker, FindsAKidnappedRobotAtOnce) {
+  Random random(9);
+  for (int trial = 0; trial < 10; ++trial) {
+    RegionTracker tracker(RoomMap());
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(Show(tracker, OnDrive(i), i)->has_fix());
+    // Far away, or turned round where it stands.
+    Pose elsewhere = trial == 0 ? PoseAt(OnDrive(3).Center(), 3.0 * 3 + 90 + 180) : RandomPose(random);
+    if (CenterErrorM(elsewhere, OnDrive(3)) < 1.5) elsewhere = PoseAt(OnDrive(3).Center(), 279);
+    const auto found = Show(tracker, elsewhere, 100 + trial);
+    ASSERT_TRUE(found->has_fix()) << trial;
+    EXPECT_LT(CenterErrorM(found->cam_from_world, elsewhere), 0.05) << trial;
+    EXPECT_NE(found->scope, Scope::kTrack) << trial;
+    const auto next = Show(tracker, elsewhere, 200 + trial);
+    ASSERT_TRUE(next->has_fix());
+    EXPECT_EQ(next->scope, Scope::kTrack) << trial;
+  }
+}
+
+TEST(RegionTracker, BadFramesAreErrorsAndChangeNothing) {
+  RegionTracker tracker(RoomMap());
+  ASSERT_TRUE(Show(tracker, OnDrive(0), 0)->has_fix());
+  ASSERT_TRUE(Show(tracker, OnDrive(1), 1)->has_fix());
+  Features torn;
+  torn.keypoints.resize(50);
+  EXPECT_EQ(tracker.TrackFeatures(torn, Room().camera).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(tracker.Track(cv::Mat(10, 10, CV_8UC1), Room().camera).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(Show(tracker, OnDrive(2), 2)->scope, Scope::kTrack);
+}
+
+TEST(RegionTracker, VotesGoToTheRegionThatHasMost) {
+  const std::vector<MapRegion>& regions = Room().rows.regions;
+  const std::vector<LandmarkIdx> seen(regions[2].landmarks.begin(), regions[2].landmarks.begin() + 40);
+  const auto votes = *VotesForRegions(*RoomMap(), seen);
+  ASSERT_FALSE(votes.empty());
+  EXPECT_EQ(votes[0].num_votes, 40);
+  for (const RegionVotes& vote : votes) {
+    EXPECT_EQ(vote.num_votes, NumShared(regions[vote.region].landmarks, seen));
+  }
+  EXPECT_TRUE(VotesForRegions(*RoomMap(), {})->empty());
+}
+
+}  // namespace
+}  // namespace cairn

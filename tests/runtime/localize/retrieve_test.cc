@@ -1,0 +1,139 @@
+#include "runtime/localize/retrieve.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/localize/match.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+
+// Three images at three stations; regions {0, 1} and {1, 2}; two landmarks each, one shared.
+std::shared_ptr<const Map> SmallMap() {
+  MapRows rows;
+  Camera camera;
+  camera.width = 100;
+  camera.height = 100;
+  camera.params = {100, 50, 50};
+  rows.cameras = {camera};
+  for (int i = 0; i < 3; ++i) {
+    rows.stations.push_back({.position = {i, 0}});
+    rows.images.push_back({.image_id = static_cast<ImageId>(i + 1),
+                           .camera_id = 1,
+                           .cam_from_world = PoseAt({static_cast<double>(i), 0, 0}, 90),
+                           .station = i});
+    rows.landmarks.push_back({.position = {static_cast<double>(i), 2, 0}});
+  }
+  rows.descriptors = DescriptorMatrix::Zero(3, kDescriptorDim);
+  rows.images[0].landmarks = {0, 1};
+  rows.images[1].landmarks = {0, 1, 2};
+  rows.images[2].landmarks = {2};
+  rows.regions = {{.stations = {0, 1}, .landmarks = {0, 1}}, {.stations = {1, 2}, .landmarks = {2}}};
+  return *Map::FromRows(rows);
+}
+
+TEST(Retrieve, RegionsAreOrderedByTheVotesOfTheirCandidates) {
+  const auto map = SmallMap();
+  EXPECT_THAT(*RegionsOfCandidates(*map, {{0, 0.5}, {2, 0.4}}, {}), ElementsAre(0, 1));
+  EXPECT_THAT(*RegionsOfCandidates(*map, {{2, 0.5}, {0, 0.4}}, {}), ElementsAre(1, 0));
+  EXPECT_THAT(*RegionsOfCandidates(*map, {{1, 0.5}}, {}), ElementsAre(0, 1));  // tie: the smaller index
+  RetrieveOptions one;
+  one.max_num_regions = 1;
+  EXPECT_THAT(*RegionsOfCandidates(*map, {{2, 0.5}, {0, 0.4}}, one), ElementsAre(1));
+}
+
+TEST(Retrieve, LandmarksOfRegionsAndImagesAreUnions) {
+  const auto map = SmallMap();
+  EXPECT_THAT(*LandmarksOfRegions(*map, {1, 0}), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*LandmarksOfImages(*map, {0, 2}), ElementsAre(0, 1, 2));
+  EXPECT_THAT(*LandmarksOfImages(*map, {2}), ElementsAre(2));
+}
+
+TEST(Retrieve, PriorChoosesImagesByPlaceAndAngle) {
+  const auto map = SmallMap();
+  RetrieveOptions options;
+  options.prior_distance_m = 0.2;
+  options.prior_angle_deg = 20;
+  const auto near = *RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, 90), 0.3, 5}, options);
+  ASSERT_EQ(near.size(), 2u);  // within 0.2 + 3 * 0.3 = 1.1 m: images 1 and 0
+  EXPECT_EQ(near[0].image, 1);
+  EXPECT_EQ(near[1].image, 0);
+  EXPECT_TRUE(RetrieveByPrior(*map, {PoseAt({0.9, 0, 0}, -90), 0.3, 5}, options)->empty());
+}
+
+TEST(Retrieve, CovisibleLandmarksComeFromTheImagesThatShareMost) {
+  const auto map = SmallMap();
+  MatchOptions one;
+  one.guided_num_images = 1;
+  EXPECT_THAT(*CovisibleLandmarks(*map, {0, 1}, one),
+              ElementsAre(0, 1));  // images 0 and 1 tie: the smaller index
+  EXPECT_THAT(*CovisibleLandmarks(*map, {0, 1, 2}, one), ElementsAre(0, 1, 2));
+  MatchOptions two;
+  two.guided_num_images = 2;
+  EXPECT_THAT(*CovisibleLandmarks(*map, {0}, two), ElementsAre(0, 1, 2));
+}
+
+TEST(Retrieve, RegionWithMostOfTheLandmarksIsFound) {
+  const auto map = SmallMap();
+  EXPECT_EQ(*RegionWithMost(*map, {0, 1, 2}), 0);
+  EXPECT_EQ(*RegionWithMost(*map, {1, 2}), 0);  // tie: the smaller index
+  EXPECT_EQ(*RegionWithMost(*map, {2}), 1);
+  EXPECT_EQ(*RegionWithMost(*map, {}), -1);
+}
+
+TEST(Retrieve, DistanceFromSurveyIsThatOfTheNearestImage) {
+  const SyntheticRoom room = MakeSyntheticRoom(1);
+  const auto map = *Map::FromRows(room.rows);
+  Random random(1);
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d place(random.Uniform(-9, 9), random.Uniform(-9, 9), random.Uniform(-2, 4));
+    double nearest = 1e9;
+    for (const MapImage& image : room.rows.images) {
+      nearest = std::min(nearest, (image.cam_from_world.Center() - place).norm());
+    }
+    EXPECT_EQ(*DistanceFromSurvey(*map, place), nearest);
+  }
+}
+
+// The best candidate for a view of the room.
+void ExpectCandidateFromNearby(const SyntheticRoom& room, const MapRows& rows) {
+  const auto map = *Map::FromRows(rows);
+  const Pose pose = PoseAt({0.2, 0.1, 1.2}, 92);
+  const Query query = MakeQuery(RenderFeatures(room, pose, {}, 1), room.camera, {});
+  const auto candidates = *RetrieveByWords(*map, query, {});
+  ASSERT_FALSE(candidates.empty());
+  EXPECT_LE(candidates[0].score, 1);
+  EXPECT_LT(CenterErrorM(rows.images[candidates[0].image].cam_from_world, pose), 2);
+  EXPECT_LT(RotationErrorDeg(rows.images[candidates[0].image].cam_from_world, pose), 46);
+}
+
+TEST(Retrieve, WordsFindTheImageTakenFromNearby) {
+  const SyntheticRoom room = MakeSyntheticRoom(1);
+  ExpectCandidateFromNearby(room, room.rows);
+}
+
+TEST(Retrieve, LandmarksAsWordsFindTheImageTakenFromNearby) {
+  const SyntheticRoom room = MakeSyntheticRoom(1);
+  MapRows rows = room.rows;
+  rows.vocabulary = {};
+  ExpectCandidateFromNearby(room, rows);
+}
+
+TEST(Retrieve, WordsOfABlockedMapScoreAsThoseOfTheWholeVocabulary) {
+  const SyntheticRoom room = MakeSyntheticRoom(1);
+  const auto map = *Map::FromRows(room.rows);
+  const Query query = MakeQuery(RenderFeatures(room, PoseAt({0, 0, 1.2}, 30), {}, 2), room.camera, {});
+  const auto candidates = *RetrieveByWords(*map, query, {});
+  const auto scored = QueryVocabulary(room.rows.vocabulary, query.features.descriptors, 20);
+  ASSERT_FALSE(candidates.empty());
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    EXPECT_EQ(candidates[i].image, scored[i].document);
+    EXPECT_NEAR(candidates[i].score, scored[i].score, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace cairn
