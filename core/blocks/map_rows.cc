@@ -65,7 +65,8 @@ Status CheckImages(const MapRows& rows) {
 
 Status CheckRegions(const MapRows& rows) {
   for (size_t i = 0; i < rows.stations.size(); ++i) {
-    if (!(rows.stations[i].position.cwiseAbs().maxCoeff() <= kMaxExtentM) ||
+    if (!rows.stations[i].position.allFinite() ||
+        rows.stations[i].position.cwiseAbs().maxCoeff() > kMaxExtentM ||
         !std::isfinite(rows.stations[i].heading_deg.value_or(0))) {
       return Invalid("station {}: its place is not finite", i);
     }

@@ -114,8 +114,8 @@ Status RoundAsStored(VisualMapData* visual_map) {
     for (HeadingModel& model : models) {
       for (double& sigma : model.sigma) sigma = DecodeSize(EncodeSize(sigma));
       for (LandmarkSight& sight : model.sights) {
-        if (!(sight.seen.head<2>().minCoeff() >= kLeastPixel &&
-              sight.seen.head<2>().maxCoeff() <= kMostPixel)) {
+        if (!sight.seen.head<2>().allFinite() || sight.seen.head<2>().minCoeff() < kLeastPixel ||
+            sight.seen.head<2>().maxCoeff() > kMostPixel) {
           return MakeError(ErrorCode::kUnsupported,
                            "visual map: a landmark is seen at {:g}, {:g} px; images of up to 6143 px a side "
                            "can be stored: set [emit_map] visual_map = false",

@@ -84,7 +84,7 @@ void Harden(SQLite::Database& database, uint64_t num_bytes) {
 void LimitSteps(SQLite::Database& database, uint64_t num_bytes) {
   // A row takes five bytes or more, and about one step for each of its values.
   const uint64_t max_num_steps = 10'000'000 + 16 * num_bytes;
-  if (max_num_steps > INT_MAX) return;
+  if (max_num_steps > INT_MAX) return;  // SQLite counts no further: above 134 MB there is no limit
   sqlite3_progress_handler(
       database.getHandle(), static_cast<int>(max_num_steps), [](void*) { return 1; }, nullptr);
 }

@@ -180,7 +180,8 @@ double PlanSpace::CellMargin() const { return std::max(1e-3, views_.plan.grid_m)
 std::optional<GridPoint> PlanSpace::OnGrid(const Vec2& place) const {
   const FloorPlan& plan = views_.plan;
   const Vec2 point = plan.Grid(place).array().round();
-  if (!(point.cwiseAbs().maxCoeff() <= static_cast<double>(kMaxGridCoordinate))) return std::nullopt;
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > static_cast<double>(kMaxGridCoordinate))
+    return std::nullopt;
   const GridPoint on_grid{static_cast<int64_t>(point.x()), static_cast<int64_t>(point.y())};
   if (on_grid.x < plan.low.x || on_grid.y < plan.low.y || on_grid.x > plan.high.x || on_grid.y > plan.high.y)
     return std::nullopt;

@@ -91,7 +91,8 @@ Pose CamFromCam0(const Projection& P) {
 
 Status ReadCamera(const Sequence& sequence, const std::string& sensor, const std::vector<Pose>& poses,
                   const std::map<std::string, Projection>& projections, ImportedSurvey* survey) {
-  const auto projection = projections.find("P" + sensor.substr(std::min<size_t>(sensor.size(), 6)));
+  const auto projection =
+      projections.find(fmt::format("P{}", sensor.substr(std::min<size_t>(sensor.size(), 6))));
   std::error_code error;
   if (!sensor.starts_with("image_") || projection == projections.end() ||
       !fs::is_directory(sequence.folder + "/" + sensor, error)) {

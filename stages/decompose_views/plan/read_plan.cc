@@ -87,7 +87,7 @@ class GeoJsonReader {
         return Corrupt(what_, "ring {}: point {} is not [x, y] in metres", number, ring.size() + 1);
       }
       const Eigen::Vector2d place(point[0].get<double>(), point[1].get<double>());
-      if (!(place.cwiseAbs().maxCoeff() <= kMaxCoordinateM)) {
+      if (!place.allFinite() || place.cwiseAbs().maxCoeff() > kMaxCoordinateM) {
         return Corrupt(what_, "ring {}: point {} lies beyond {:g} m", number, ring.size() + 1,
                        kMaxCoordinateM);
       }

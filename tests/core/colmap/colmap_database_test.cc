@@ -171,6 +171,8 @@ TEST_F(ColmapDatabase, DamagedRowsAreNamed) {
   EXPECT_THAT(update("cameras", "height = 'tall'", "1"), HasSubstr("height is no integer"));
   EXPECT_THAT(update("images", "name = 'a.png'", "image_id = 2"),
               HasSubstr("table images, row 2: image 1 has the same name, 'a.png'"));
+  EXPECT_THAT(update("images", "name = 'a' || char(10) || 'b.png'", "image_id = 2"),
+              HasSubstr("has a control character"));
   EXPECT_THAT(update("images", "image_id = -3", "image_id = 2"),
               HasSubstr("table images, row -3: image_id is -3"));
   EXPECT_THAT(update("images", "camera_id = 99999999999", "image_id = 2"),

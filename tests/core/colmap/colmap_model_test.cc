@@ -168,6 +168,17 @@ TEST_F(ColmapModelTest, BrokenTextNamesFileAndLine) {
   EXPECT_THAT(MessageOf("/a"), HasSubstr("points3D.txt:4: expected POINT3D_ID"));
 }
 
+// A line's end in a name would make two images of one.
+TEST_F(ColmapModelTest, NamesThatNoLineCanHoldAreNotWritten) {
+  ColmapModel model = SmallModel();
+  model.images[1].name = "right/a.png\n6 1 0 0 0 0 0 0 2 b.png";
+  const Status status = WriteColmapModel(model, ModelFormat::kText, root_ + "/a");
+  EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(status.error().message, HasSubstr("images.txt"));
+  EXPECT_TRUE(fs::is_empty(root_ + "/a"));
+  EXPECT_TRUE(WriteColmapModel(model, ModelFormat::kBinary, root_ + "/a").ok());
+}
+
 TEST_F(ColmapModelTest, ReferencesToWhatIsNotThereAreErrors) {
   const auto message_of = [&](const std::function<void(ColmapModel&)>& damage) {
     ColmapModel model = SmallModel();

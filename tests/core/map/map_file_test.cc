@@ -29,6 +29,14 @@ MapRows ExampleRows() {
   rows.input_hashes["world.db"] = "0123";
   rows.self_test["num_localized"] = 3;
   rows.camera_from_given.translation = {0.1, -0.2, 0.3};
+  rows.camera_from_given.rotation = Eigen::Quaterniond(0.1, -0.2, 0.5, 0.7).normalized();
+  rows.floor_from_world.translation = {-1.5, 2.5, 0.25};
+  rows.floor_from_world.rotation = Eigen::Quaterniond(0.9, 0.1, -0.3, 0.2).normalized();
+  rows.stated_pose_sigma_m = 0.02;
+  rows.stated_pose_sigma_deg = 1.5;
+  rows.frame.anchor = GeodeticPosition{55.7, 13.2, 40.5};
+  rows.frame.source = "gps";
+  rows.frame.is_reconstructed = true;
   return rows;
 }
 
@@ -49,7 +57,18 @@ TEST(MapFile, RoundTripKeepsEverything) {
   EXPECT_EQ(read->stage_options, written.stage_options);
   EXPECT_EQ(read->input_hashes, written.input_hashes);
   EXPECT_EQ(read->self_test, written.self_test);
-  EXPECT_EQ(read->camera_from_given.translation, written.camera_from_given.translation);
+  for (const auto pose : {&MapRows::camera_from_given, &MapRows::floor_from_world}) {
+    EXPECT_EQ(((*read).*pose).translation, (written.*pose).translation);
+    EXPECT_TRUE(((*read).*pose).rotation.isApprox((written.*pose).rotation, 1e-12));
+  }
+  EXPECT_EQ(read->stated_pose_sigma_m, 0.02);
+  EXPECT_EQ(read->stated_pose_sigma_deg, 1.5);
+  ASSERT_TRUE(read->frame.anchor);
+  EXPECT_EQ(read->frame.anchor->latitude_deg, 55.7);
+  EXPECT_EQ(read->frame.anchor->longitude_deg, 13.2);
+  EXPECT_EQ(read->frame.anchor->altitude_m, 40.5);
+  EXPECT_EQ(read->frame.source, "gps");
+  EXPECT_TRUE(read->frame.is_reconstructed);
   EXPECT_EQ(read->cameras[0].params, written.cameras[0].params);
   EXPECT_EQ(read->station_edges, written.station_edges);
   EXPECT_EQ(read->stations[1].heading_deg, written.stations[1].heading_deg);
@@ -92,6 +111,7 @@ TEST(MapFile, WritingWhatWasReadGivesTheSameBytes) {
 
 TEST(MapFile, InvalidRowsAreNotWritten) {
   const std::string path = MapPath("invalid.cairn");
+  std::filesystem::remove(path);
   MapRows rows = ExampleRows();
   rows.regions[0].landmarks = {0, 99};
   EXPECT_EQ(WriteMapRows(rows, path).error().code, ErrorCode::kInvalidArgument);

@@ -165,6 +165,27 @@ TEST_F(UpdateMapTest, HostileDeltasAreRefused) {
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 0; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 512; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->old_page_size = 3; }), ErrorCode::kCorrupt);
+  // A state that no map can have is refused as that, before anything is unfolded.
+  const auto states = [&](const std::function<void(MapDelta*)>& change) {
+    MapDelta bad = good;
+    change(&bad);
+    EXPECT_TRUE(WriteFileAtomically(Path("hostile"), EncodeMapDelta(bad)).ok());
+    const Result<MapDelta> read = ReadMapDelta(Path("hostile"), std::nullopt);
+    return read.ok() ? "read" : read.error().message;
+  };
+  for (const std::function<void(MapDelta*)>& change : std::vector<std::function<void(MapDelta*)>>{
+           [](MapDelta* delta) { delta->old_num_bytes = 0; },
+           [](MapDelta* delta) { delta->new_num_bytes = 0; },
+           [](MapDelta* delta) { delta->new_num_bytes += 1; },
+           [](MapDelta* delta) { delta->new_page_size = 256; },
+           [](MapDelta* delta) { delta->new_page_size = 131072; },
+           [](MapDelta* delta) { delta->new_page_size = 3000; },
+           [](MapDelta* delta) { delta->new_num_bytes = uint64_t{1} << 40; }})
+    EXPECT_THAT(states(change), HasSubstr("states a map of"));
+  for (const uint32_t page_size : {512u, 65536u})
+    EXPECT_EQ(
+        states([&](MapDelta* delta) { delta->new_page_size = page_size, delta->new_num_bytes = 65536; }),
+        "read");
   EXPECT_EQ(code([](MapDelta* delta) { delta->old_num_bytes = delta->old_page_size; }),
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_hash[5] ^= 1; }), ErrorCode::kCorrupt);

@@ -182,6 +182,8 @@ TEST(PlanPath, APlaceOnAWallOrNearerThanTheRadiusIsNamed) {
   }
   EXPECT_TRUE(FindPath(space, {2, 3.25}, {2, 4}, {.radius_m = 0.25}).ok());
   EXPECT_EQ(FindPath(space, {1, 1}, {std::nan(""), 1}, {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(FindPath(space, {1, 1}, {1, std::nan("")}, {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(FindPath(space, {1, -INFINITY}, {1, 1}, {}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(FindPath(space, {1, 1}, {1e300, 1}, {}).error().code, ErrorCode::kInvalidArgument);
 }
 
