@@ -299,7 +299,7 @@ TEST_F(CaptureWithoutPoses, ALostImageListIsNoMissingOne) {
 }
 
 TEST_F(CaptureWithoutPoses, SessionsMayHaveCamerasOfTheirOwn) {
-  Write("sessions.txt", "day1\nday2\nday3\n");
+  Write("sessions.txt", "day0\nday1\nday2\nday3\n");  // the first without cameras, as the last
   fs::remove_all(root_ + "/images");
   for (const char* name : {"day1/1.pgm", "day1/2.pgm", "day2/1.pgm", "day3/1.pgm"})
     Write(std::string("images/") + name, kWide);

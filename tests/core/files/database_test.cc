@@ -149,13 +149,18 @@ TEST_F(HardenedDatabase, HeadersSayHowLongTheFileIs) {
   const std::string bytes = ReadFile(path).value();
   EXPECT_EQ(ReadSqliteHeader(path).page_size, 1024u);
   EXPECT_EQ(ReadSqliteHeader(path).num_pages, 3u);
-  for (const auto& [size, page_size, num_pages] : {std::tuple(17, 0u, 0u), std::tuple(18, 1024u, 0u),
-                                                   std::tuple(31, 1024u, 0u), std::tuple(32, 1024u, 3u)}) {
+  for (const auto& [size, page_size, num_pages] :
+       {std::tuple(17, 0u, 0u), std::tuple(18, 1024u, 0u), std::tuple(31, 1024u, 0u),
+        std::tuple(32, 1024u, 3u), std::tuple(100, 1024u, 3u)}) {
     const SqliteHeader header =
         ParseSqliteHeader(std::string_view(bytes).substr(0, static_cast<size_t>(size)));
     EXPECT_EQ(header.page_size, page_size) << size;
     EXPECT_EQ(header.num_pages, num_pages) << size;
   }
+}
+
+TEST_F(HardenedDatabase, NamesOfFilesAreNoOptionsOfAUri) {
+  EXPECT_EQ(DatabaseUri("/a b/k?mode=rw#c%2e.db"), "file:/a b/k%3fmode=rw%23c%252e.db");
 }
 
 TEST_F(HardenedDatabase, PipesAndDevicesAreNoDatabases) {

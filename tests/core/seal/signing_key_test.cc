@@ -101,6 +101,15 @@ TEST_F(SigningKeyTest, PipesAndFoldersAreNoKeysAndAreNotWaitedFor) {
   EXPECT_EQ(ReadPublicKey(Path("none")).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(SigningKeyTest, KeyThatIsNotThereIsNamed) {
+  Write("a file");
+  for (const char* name : {"none", "none/key", "key/inside"}) {
+    const Result<PublicKey> key = ReadPublicKey(Path(name));
+    EXPECT_EQ(key.error().code, ErrorCode::kNotFound) << name;
+    EXPECT_THAT(key.error().message, HasSubstr(std::string(name) + ": no such file"));
+  }
+}
+
 TEST_F(SigningKeyTest, OneKindOfKeyIsNotTakenForTheOtherNorShown) {
   const Result<PublicKey> as_public = ReadPublicKey(Write(std::string(kSeed) + kPublic));
   ASSERT_FALSE(as_public.ok());
