@@ -187,6 +187,18 @@ TEST(MapFile, ChangedRowsAreRefused) {
   }
 }
 
+TEST(MapFile, TablesOfTooFewColumnsAreRefused) {
+  const std::string path = MapPath("narrow.cairn");
+  ASSERT_TRUE(WriteMapRows(ExampleRows(), path).ok());
+  SQLite::Database(path, SQLite::OPEN_READWRITE)
+      .exec(
+          "CREATE TABLE narrow AS SELECT key FROM meta; DROP TABLE meta; ALTER TABLE narrow RENAME TO meta");
+  const Result<MapRows> read = ReadMapRows(path);
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kCorrupt);
+  EXPECT_THAT(read.error().message, HasSubstr("table meta has 1 columns, expected 2"));
+}
+
 TEST(MapFile, SparseMapsReadBackAsTheyWere) {
   const EmitExample example = MakeEmitExample();
   MapRows rows = *emit_map::EmitMap(

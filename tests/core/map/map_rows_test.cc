@@ -93,8 +93,8 @@ TEST(MapRows, EverySessionThatSawALandmarkIsNamedOnce) {
   std::vector<std::vector<int>> expected(rows.landmarks.size());
   expected[0] = {1}, expected[1] = {0, 1}, expected[2] = {0};
   EXPECT_EQ(LandmarkSessions(rows), expected);
-  rows.images[1].name = "1.jpg";  // of neither
-  expected[1] = {1}, expected[2] = {};
+  rows.images[0].name = "0.jpg";  // of neither
+  expected[0] = {};
   EXPECT_EQ(LandmarkSessions(rows), expected);
 }
 
