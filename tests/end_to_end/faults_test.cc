@@ -152,6 +152,20 @@ TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
   });
 }
 
+// On such a file system the map before is a copy, and as private as it was.
+TEST_F(Faults, UpdateWithoutHardLinksKeepsTheMapBeforeToo) {
+  WriteFile(work_ + "/map", Bytes("2"));
+  chmod((work_ + "/map").c_str(), 0640);
+  const ProgramRun run = RunShell(fmt::format(
+      "LD_PRELOAD='{}' FAULT_KIND=link FAULT_ERROR={} FAULT_AT=1 FAULT_FOLDER='{}' FAULT_LOG='{}' "
+      "cairn apply {}/map {} --in-place",
+      CAIRN_FAULT_LIBRARY, EPERM, Scope(), folder_ / "log", work_, folder_ / "delta"));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(fs::exists(folder_ / "log"));  // a link was tried
+  EXPECT_EQ(ContentsOf(work_), (Contents{{"map", Bytes("3")}, {"map.previous", Bytes("2")}}));
+  EXPECT_EQ(fs::status(work_ + "/map.previous").permissions(), fs::perms{0640});
+}
+
 // What stands there has the size of what is to be written: for maps and keys of one place it mostly does.
 TEST_F(Faults, OutputIsTheOldOneOrTheWholeNewOne) {
   const std::string one = folder_ / "unsigned", key = " --key " + folder_ / "key";

@@ -49,6 +49,7 @@ TEST(MapRows, ValidRowsAreValidUpToTheirLimits) {
            [](MapRows&) {},
            [](MapRows& r) { r.stated_pose_sigma_deg = 180; },
            [](MapRows& r) { r.stated_pose_sigma_m = 999.9; },
+           [](MapRows& r) { r.appearance[2].entropy = 64; },
            [](MapRows& r) { r.documents = "kept"; },
            [](MapRows& r) {
              r.sessions = {"a", "b"};
