@@ -98,6 +98,10 @@ TEST_F(ReplacementTest, SameBytesLeaveTheFileUntouchedAndNoOthersDo) {
   const ino_t inode = StatusOf(path).st_ino;
   ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
   EXPECT_EQ(StatusOf(path).st_ino, inode);
+  Result<Replacement> same = Replacement::Begin(path);
+  ASSERT_TRUE(same.ok() && same->Write(bytes).ok() && same->Finish().ok());
+  EXPECT_TRUE(same->is_in_place());
+  EXPECT_EQ(StatusOf(path).st_ino, inode);
   for (const size_t place : {size_t{0}, size_t{70'000}, bytes.size() - 1}) {
     std::string other = bytes;
     other[place] = 'b';
