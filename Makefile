@@ -1,12 +1,12 @@
-# The front door.  `make help` lists the verbs; the build itself is CMake's, the maps are `cairn compile`'s.
+# `make help` lists the targets.  CMake builds the program; `cairn compile` makes the maps.
 
 PRESET ?= release
 CAIRN := build/$(PRESET)/cairn
-# Real captures for development, beside the repository; what needs them says so in one line where they are absent.
+# Real captures for development, beside the repository; where they are absent, targets that need them print one line.
 DATA ?= ../shared/data
 PREFIX ?= /usr/local
 
-# Debian 12 packages, by who needs them.  The program:
+# Debian 12 packages, by what needs them.  The program:
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev \
@@ -14,33 +14,40 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
 # Captures without poses, Python's module, ROS's node:
 PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
     libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev
-# Tests and benchmarks: a browser for reports, a cluster, ROS at work, what builds and checks Debian packages, what checks the style.
+# Tests and benchmarks: a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
 PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
     debhelper dh-python lintian debootstrap clang libclang-rt-14-dev clang-format clang-tidy
-# Nothing fails without these.  The demo's picture as PNG; tests of the matching kernels of other processors: Intel's
-# instructions emulated, an ARM compiler and emulator.
+# Optional: the demo's picture as PNG; for tests of the matching kernels of other processors, an emulation of Intel's
+# instructions, an ARM compiler and an emulator.
 PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
 
 SOURCES = $(shell git ls-files '*.h' '*.cc' '*.c')
 
 .DEFAULT_GOAL := all
 .PHONY: all help program whole deps deps-all demo tables test bench maps compile install deb format format-check tidy docs clean
-# Verbs run one after the other, whatever MAKEFLAGS says; the steps inside of them run in parallel.
+# Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
 all: program  ## Build the program: build/release/cairn
 
-# A build folder that is there is left as it is configured: whoever has tests keeps them.
-program: deps
-	@test -f build/$(PRESET)/build.ninja || cmake --preset $(PRESET) -DCAIRN_BUILD_TESTS=OFF -DCAIRN_BUILD_PYTHON=OFF -DCAIRN_BUILD_ROS=OFF
+# ON: tests, Python's module and ROS's node too, which need more packages than the program.
+parts = -DCAIRN_BUILD_TESTS=$(1) -DCAIRN_BUILD_PYTHON=$(1) -DCAIRN_BUILD_ROS=$(1)
+
+program: deps build/$(PRESET)/build.ninja
 	@cmake --build build/$(PRESET) --target cairn
 
-whole: deps-all
-	@grep -qs CAIRN_BUILD_TESTS:BOOL=ON build/$(PRESET)/CMakeCache.txt || \
-	    cmake --preset $(PRESET) -DCAIRN_BUILD_TESTS=ON -DCAIRN_BUILD_PYTHON=ON -DCAIRN_BUILD_ROS=ON
+whole: NEW_PARTS := ON
+whole: deps-all build/$(PRESET)/build.ninja
+	@grep -q CAIRN_BUILD_TESTS:BOOL=ON build/$(PRESET)/CMakeCache.txt || cmake --preset $(PRESET) $(call parts,ON)
 	@cmake --build build/$(PRESET)
+
+# A new build folder has the parts that are asked for; one that is there keeps those that it has.
+NEW_PARTS := OFF
+build/$(PRESET)/build.ninja: CMakePresets.json
+	@cmake --preset $(PRESET) $(if $(wildcard build/$(PRESET)/CMakeCache.txt),,$(call parts,$(NEW_PARTS)))
+	@touch $@
 
 help:  ## List the verbs
 	@awk -F ':.*##' '/^[a-z-]+:.*##/ {printf "make %-14s%s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -48,7 +55,7 @@ help:  ## List the verbs
 deps:  ## Install the Debian packages that the program needs and that are missing (sudo only if needed)
 	@scripts/install_packages $(PACKAGES)
 
-deps-all:  ## Those of tests, benchmarks, packages, Python and ROS besides
+deps-all:  ## Install those for tests, benchmarks, packages, Python and ROS, too
 	@scripts/install_packages $(PACKAGES) $(PACKAGES_TEST) -- $(PACKAGES_OPTIONAL)
 
 demo: program  ## Render a survey, compile its map, ask where held-out images were taken, draw the floor, write the report
@@ -89,7 +96,7 @@ tidy: whole  ## Run clang-tidy over all sources
 	@run-clang-tidy -quiet -p build/$(PRESET) '$(CURDIR)/(core|runtime|sim|stages|pipeline)/.*\.cc' | grep -v '^clang-tidy-'
 
 docs: program  ## Write docs/recipe.md from the options that the stages declare
-	@$(CAIRN) recipe-reference > docs/recipe.md
+	@$(CAIRN) manual -o build/manual && cp build/manual/recipe.md docs/recipe.md
 
 clean:  ## Remove everything that was built, maps included
 	@rm -rf build maps/*.cairn maps/*.build maps/*.report.json maps/*.pareto.csv maps/*.svg maps/*.png

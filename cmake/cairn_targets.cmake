@@ -5,18 +5,28 @@ function(cairn_precompile target)
   target_precompile_headers(${target} REUSE_FROM cairn_robot_core)
 endfunction()
 
-# cairn_library(NAME SOURCES file... LIBS target...): the library cairn_NAME of what needs the compiler's core and arguments.
+# cairn_unite(TARGET): its sources are compiled eight at a time, which parses headers and instantiates templates once for
+# all eight.  Names in their unnamed namespaces have to differ; the other presets compile each source alone.
+function(cairn_unite target)
+  if(CAIRN_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
+endfunction()
+
+# cairn_library(NAME SOURCES file... LIBS target...): the library cairn_NAME, which needs the compiler's core and arguments.
 function(cairn_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   add_library(cairn_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(cairn_${name} PUBLIC cairn_core cairn_command ${ARG_LIBS})
   cairn_precompile(cairn_${name})
+  cairn_unite(cairn_${name})
 endfunction()
 
-# cairn_stage(NAME SOURCES file... LIBS target...): the library cairn_NAME of stages/NAME.
-macro(cairn_stage)
-  cairn_library(${ARGN})
-endmacro()
+# cairn_stage(NAME SOURCES file... LIBS target...): the library cairn_NAME of stages/NAME, which the program links.
+function(cairn_stage name)
+  cairn_library(${name} ${ARGN})
+  set_property(GLOBAL APPEND PROPERTY CAIRN_STAGES cairn_${name})
+endfunction()
 
 # cairn_test(NAME SOURCES file... LIBS target... [LABEL slow]): the test program NAME; its tests are found by ctest.
 function(cairn_test name)

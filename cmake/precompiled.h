@@ -1,6 +1,6 @@
 // What most sources include, parsed once (cairn_precompile).  Sources include what they use as if this were
-// not here: all presets but release build without it.  CLI11 and nlohmann's JSON cost more here than they
-// save.
+// not here: all presets but release build without it.  CLI11 and nlohmann's JSON cost more here than
+// they save.
 
 #include <algorithm>
 #include <array>

@@ -15,20 +15,20 @@ $(OUT):
 	mkdir -p $@
 
 $(OUT)/regions%.db: $(BUILD)/world.db $(BUILD)/options/decompose_regions.toml $(CAIRN) | $(OUT)
-	$(CAIRN) decompose-regions $< --classes $(BUILD)/classes.db $(REGIONS) --k $* -o $@ --log-level error > /dev/null
+	$(CAIRN) stage decompose-regions $< --classes $(BUILD)/classes.db $(REGIONS) --k $* -o $@ --log-level error > /dev/null
 	touch $@
 
 MAP_INPUTS := $(BUILD)/classes.db $(BUILD)/vocabulary.db
 
 $(OUT)/all.cairn: $(OUT)/regions40.db $(MAP_INPUTS)
-	$(CAIRN) emit-map --classes $(BUILD)/classes.db --world $(BUILD)/world.db --vocabulary $(BUILD)/vocabulary.db \
+	$(CAIRN) stage emit-map --classes $(BUILD)/classes.db --world $(BUILD)/world.db --vocabulary $(BUILD)/vocabulary.db \
 	    --regions $< --name all --landmarks all -o $@ > /dev/null
 	touch $@
 
 $(OUT)/k%.cairn: $(OUT)/regions%.db $(MAP_INPUTS)
-	$(CAIRN) emit-map --classes $(BUILD)/classes.db --world $(BUILD)/world.db --vocabulary $(BUILD)/vocabulary.db \
+	$(CAIRN) stage emit-map --classes $(BUILD)/classes.db --world $(BUILD)/world.db --vocabulary $(BUILD)/vocabulary.db \
 	    --regions $< --name k$* --landmarks regions -o $@ > /dev/null
 	touch $@
 
 $(OUT)/%.json: $(OUT)/%.cairn $(CAPTURE)/queries.txt
-	$(CAIRN) check-map $< --capture $(CAPTURE) --queries $(CAPTURE)/queries.txt $(addprefix --foreign ,$(FOREIGN)) --json > $@
+	$(CAIRN) check $< --capture $(CAPTURE) --queries $(CAPTURE)/queries.txt $(addprefix --foreign ,$(FOREIGN)) --json > $@

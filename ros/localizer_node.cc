@@ -1,5 +1,5 @@
-// A ROS node that says where a camera is in a cairn map: image in, pose out.  docs/ros.md tells its topics
-// and parameters.
+// A ROS node that finds where a camera is in a cairn map: image in, pose out.  docs/ros.md describes its
+// topics and parameters.
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -26,7 +26,7 @@ struct NodeParameters : Parameters {
 };
 
 // Numbers separated by blanks, commas and brackets, as "[0.1, 0, 0.8]": roscpp takes lists from rosparam and
-// launch files, but on its command line only texts.
+// launch files, but only texts from its command line.
 bool ParseNumbers(const std::string& text, std::vector<double>* numbers) {
   static const char* const kBetween = " ,[]";
   for (size_t begin = text.find_first_not_of(kBetween); begin != std::string::npos;) {
@@ -40,7 +40,7 @@ bool ParseNumbers(const std::string& text, std::vector<double>* numbers) {
   return true;
 }
 
-// Reads the node's parameters; what is set, but to another type, is not passed over in silence.
+// Reads the node's parameters; a parameter that is set to another type is reported.
 class ParameterReader {
  public:
   template <typename Value>
@@ -97,7 +97,7 @@ class LocalizerNode {
     ros::NodeHandle node;
     poses_ = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 1);
     diagnostics_ = node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 1);
-    // The newest image only: what waits is old.
+    // Only the newest image: queued ones would be old.
     images_ = node.subscribe("image", 1, &LocalizerNode::OnImage, this, ros::TransportHints().tcpNoDelay());
   }
 
@@ -130,7 +130,7 @@ class LocalizerNode {
     poses_.publish(message);
   }
 
-  // At most once in a period, but at once when it gets better or worse.
+  // At most once per period, but immediately when it gets better or worse.
   void PublishDiagnostics(const sensor_msgs::Image& image, const Answer& answer, double node_ms) {
     Diagnostic status;
     status.name = ros::this_node::getName() + ": localization";
@@ -174,7 +174,7 @@ class LocalizerNode {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cairn_localizer");
-  const ros::NodeHandle alive;  // connects, so that what follows can be logged and parameters read
+  const ros::NodeHandle alive;  // connects, so that logging and parameters work from here on
   cairn_ros::NodeParameters parameters;
   int code = 0;
   std::string message;

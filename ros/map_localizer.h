@@ -6,18 +6,18 @@
 #include <string>
 #include <vector>
 
-// The runtime as the node sees it, in C++17: ROS 1's messages do not compile as C++20, the runtime's headers
-// as nothing less.
+// The node's interface to the runtime, in C++17: ROS 1's messages do not compile as C++20, and the runtime's
+// headers need C++20.
 namespace cairn_ros {
 
 // The node's parameters, by their names.
 struct Parameters {
   std::string map;              // path
-  int memory_budget_mib = 256;  // what is loaded of the map and kept, at most
+  int memory_budget_mib = 256;  // limit for loaded parts of the map that are kept
   std::string public_key;       // file of `cairn keygen`; maps that this key has not signed are refused
   bool follow = true;           // from frame to frame; false: every image as if it were the first
-  // Where the camera's optical frame is mounted on the robot: x y z (m), qx qy qz qw; empty: the pose is the
-  // camera's.
+  // Where the camera's optical frame is mounted on the robot: x y z (m), qx qy qz qw; empty: the pose is
+  // the camera's.
   std::vector<double> camera_in_robot;
   std::string camera_model;  // COLMAP's name; empty: the map's camera of the image's size
   std::vector<double> camera_params;
@@ -44,7 +44,7 @@ struct Answer {
 
 class MapLocalizer {
  public:
-  // Null on a failure: then `code` and `message` say why.
+  // Null on failure; `code` and `message` then say why.
   static std::unique_ptr<MapLocalizer> Open(const Parameters& parameters, int* code, std::string* message);
   ~MapLocalizer();
 

@@ -7,15 +7,15 @@
 
 namespace cairn {
 
-// A robot in the map frame as geometry_msgs/PoseWithCovariance states it.
+// A robot's pose in the map frame, with the conventions of geometry_msgs/PoseWithCovariance.
 struct RobotPose {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // x, y, z (m), rotation about the map's fixed x, y, z (rad)
 };
 
-// From a fix.  A map knows cameras: without a mounting (`robot_from_camera` = identity) it is the pose of the
-// camera's optical frame, x right, y down, z forward.
+// From a fix.  A map gives poses of cameras: without a mounting (`robot_from_camera` = identity) it is the
+// pose of the camera's optical frame, x right, y down, z forward.
 //
 // Our covariance is (rotation r, translation t) of the left perturbation of cam_from_world.  With W =
 // world_from_cam, of rotation R, to first order

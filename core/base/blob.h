@@ -47,7 +47,7 @@ class BlobReader {
   std::string ZeroTerminated();
   // The next bytes; empty past the end.
   std::string_view Bytes(size_t num_bytes);
-  // What was read makes no sense: from now on as after a read past the end.
+  // Marks what was read as invalid: from now on every read fails, as past the end.
   void Fail() { ok_ = false; }
   size_t num_left() const { return bytes_.size() - position_; }
   bool ok() const { return ok_; }

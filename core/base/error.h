@@ -13,7 +13,7 @@ namespace cairn {
 // Why an operation failed.  The values are the program's exit codes: append only, never renumber.
 enum class ErrorCode : int {
   kFailed = 1,           // anything that has no code of its own
-  kInvalidArgument = 2,  // an option, a key or a call that cannot be meant
+  kInvalidArgument = 2,  // an option, a key or a call with a value that is not allowed
   kNotFound = 3,         // a file, an image or a row that does not exist
   kCorrupt = 4,          // a file that is truncated, damaged or not what its name says
   kUnsupported = 5,      // a format, a version or a camera model that this program does not read
@@ -22,10 +22,10 @@ enum class ErrorCode : int {
   kGate = 8,             // a map below its recipe's [gate]
   kBusy = 9,             // another process holds the file or the folder
   kCancelled = 10,       // the user stopped it
-  // Files that a robot opens, or that a map is written to, where kCorrupt or kIo would not say what to do.
+  // For files that a robot opens or a map is written to: kCorrupt and kIo would not tell the user what to do.
   kEmptyFile = 11,    // no bytes at all
   kTruncated = 12,    // shorter than it says
-  kNotSqlite = 13,    // no SQLite database, but should be one
+  kNotSqlite = 13,    // not a SQLite database, but should be one
   kForeignFile = 14,  // a SQLite database of another program
   kTooNew = 15,       // a map of a later format than this program reads
   kTooOld = 16,       // a map of an earlier format: `cairn migrate`
@@ -33,10 +33,10 @@ enum class ErrorCode : int {
   kWrongKey = 18,     // signed with another key, or the signature is false
   kReadOnly = 19,     // the folder or file may not be written
   kDiskFull = 20,     // no space is left
-  kLost = 21,         // a robot that does not know any more where it is
+  kLost = 21,         // a robot that no longer knows where it is
   // Signed maps that are right in themselves, but not what this robot may take.
-  kNotNewer = 22,  // of an epoch that is not after that of the map in place, or below the least one asked for
-  kOtherMap = 23,  // of another name: another site's
+  kNotNewer = 22,  // its epoch is not later than that of the map in place, or below the requested minimum
+  kOtherMap = 23,  // it has another name: the map of another site
 };
 
 // Stable lower-case name of a code, as it stands in error.json ("corrupt", "no_data", ...).
@@ -53,7 +53,7 @@ Error MakeError(ErrorCode code, fmt::format_string<Args...> format, Args&&... ar
   return Error{code, fmt::format(format, std::forward<Args>(args)...)};
 }
 
-// `what` (a file, or a part of it) is not what was written there.
+// `what` (a file, or a part of it) does not hold what was written to it.
 template <typename... Args>
 Error Corrupt(const std::string& what, fmt::format_string<Args...> format, Args&&... args) {
   return Error{ErrorCode::kCorrupt, what + ": " + fmt::format(format, std::forward<Args>(args)...)};

@@ -10,8 +10,8 @@ int NumThreads(int requested);
 
 // Calls body(i) for every i in [0, num_items), on up to `num_threads` threads (NumThreads() of it); items are
 // handed out in ascending order, one at a time.  The body writes to slots of its own item only, so that
-// results do not depend on the number of threads.  An exception from a body is rethrown here, after all have
-// stopped.
+// results do not depend on the number of threads.  An exception from a body is rethrown here, after all
+// have stopped.
 void ParallelFor(int64_t num_items, int num_threads, const std::function<void(int64_t)>& body);
 
 }  // namespace cairn

@@ -9,7 +9,7 @@ namespace {
 
 bool IsBetween(char32_t code, char32_t first, char32_t last) { return code >= first && code <= last; }
 
-// C0, DEL and C1; embeddings, overrides and isolates of the direction of writing.
+// C0, DEL and C1; Unicode's embeddings, overrides and isolates, which change the direction of writing.
 bool IsCommand(char32_t code) {
   if (code == '\n' || code == '\t') return false;
   return code < 0x20 || IsBetween(code, 0x7f, 0x9f) || IsBetween(code, 0x202a, 0x202e) ||
@@ -23,7 +23,7 @@ Utf8Character FirstCharacter(std::string_view text) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
   if (byte(0) < 0x80) return {byte(0), 1};
   const int num_bytes = IsBetween(byte(0), 0xc0, 0xdf) ? 2 : IsBetween(byte(0), 0xe0, 0xef) ? 3 : 4;
-  if (byte(0) < 0xc2 || byte(0) > 0xf4 || text.size() < static_cast<size_t>(num_bytes)) return {};
+  if (byte(0) < 0xc0 || byte(0) > 0xf7 || text.size() < static_cast<size_t>(num_bytes)) return {};
   char32_t code = byte(0) & (0x7f >> num_bytes);
   for (int i = 1; i < num_bytes; ++i) {
     if ((byte(i) & 0xc0) != 0x80) return {};

@@ -5,8 +5,8 @@
 
 namespace cairn {
 
-// Text that comes from a file or from a name may hold what a terminal, a list or an XML reader takes for a
-// command.
+// Text that comes from a file or from a name may hold what a terminal, a list or an XML reader takes for
+// a command.
 
 // The first character of a text.
 struct Utf8Character {
@@ -16,13 +16,13 @@ struct Utf8Character {
 // REQUIRES: !text.empty()
 Utf8Character FirstCharacter(std::string_view text);
 
-// The text as a terminal may show it: control characters (but '\n' and '\t') and those that turn the
-// direction of writing are shown as \u001b, which in a string of JSON is the same character; bytes that are
-// no UTF-8 as \xff.
+// The text as a terminal may show it.  Control characters (except '\n' and '\t') and those that change the
+// direction of writing become escapes such as \u001b, which is the same character in a JSON string; bytes
+// that are not UTF-8 become escapes such as \xff.
 std::string Printable(std::string_view text);
 
-// Whether any of its bytes is an ASCII control character, a line's end among them.  Names that have one are
-// no names for a list of one name per line, nor for a person.
+// Whether any of its bytes is an ASCII control character, such as a line end.  A name that has one breaks a
+// list of one name per line and misleads a reader.
 bool HasControlCharacter(std::string_view text);
 
 }  // namespace cairn

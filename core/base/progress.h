@@ -6,8 +6,8 @@
 namespace cairn {
 
 // Where long work reports how far it is.  A stage calls Begin, Advance from any thread, End; what is shown (a
-// bar, lines, JSON, nothing) is the caller's choice.  Cancelled() is asked between items: true means "stop
-// soon".
+// bar, lines, JSON, nothing) is the caller's choice.  Cancelled() is asked between items: true means
+// "stop soon".
 class Progress {
  public:
   virtual ~Progress() = default;

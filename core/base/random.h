@@ -17,7 +17,7 @@ inline uint64_t MixSeed(uint64_t seed, uint64_t stream) {
 }
 
 // Random numbers that are the same with every standard library: the engine is specified by the standard, the
-// distributions are our own.  Cheap to copy a stream by seed; not for cryptography.
+// distributions are our own.  A stream is cheap to make again from its seed.  Not for cryptography.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}

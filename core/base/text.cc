@@ -1,6 +1,7 @@
 #include "core/base/text.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace cairn {
 namespace {
@@ -45,6 +46,16 @@ std::vector<std::string_view> SplitLines(std::string_view text) {
     begin = end + 1;
   }
   return lines;
+}
+
+std::optional<std::vector<double>> ParseNumbers(std::string_view text) {
+  std::vector<double> numbers;
+  for (const std::string& field : SplitFields(text, ',')) {
+    double number = 0;
+    if (!ParseNumber(field, &number) || !std::isfinite(number)) return std::nullopt;
+    numbers.push_back(number);
+  }
+  return numbers;
 }
 
 }  // namespace cairn

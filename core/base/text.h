@@ -1,6 +1,7 @@
 #pragma once
 
 #include <charconv>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,5 +26,8 @@ bool ParseNumber(std::string_view text, T* value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
   return error == std::errc() && end == text.data() + text.size();
 }
+
+// The numbers between commas: "1, 2.5" is {1, 2.5}.  Nothing where one is missing, or is not a finite number.
+std::optional<std::vector<double>> ParseNumbers(std::string_view text);
 
 }  // namespace cairn

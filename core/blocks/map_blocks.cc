@@ -126,7 +126,7 @@ Result<StationBlock> DecodeStationBlock(std::string_view bytes, const BlockEntry
     for (double& coordinate : station.position) {
       const int64_t code = UnZigZag(reader.Varint());
       if (std::abs(static_cast<double>(code)) > kMaxCoordinate) {
-        return Corrupt(what, "station {} lies more than 200 km off", entry.first + i);
+        return Corrupt(what, "station {} lies more than 200 km from the origin", entry.first + i);
       }
       coordinate = DecodeLength(code);
     }
@@ -135,7 +135,7 @@ Result<StationBlock> DecodeStationBlock(std::string_view bytes, const BlockEntry
     if ((flags & 2) != 0) {
       const int64_t heading = UnZigZag(reader.Varint());
       if (std::abs(static_cast<double>(heading)) > kMaxHeading) {
-        return Corrupt(what, "station {}: its heading is none", entry.first + i);
+        return Corrupt(what, "station {}: its heading is not valid", entry.first + i);
       }
       station.heading_deg = static_cast<double>(heading) * kHeadingUnitDeg;
     }
@@ -276,7 +276,7 @@ Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const Blo
   std::vector<float> norms(entry.count);
   for (float& norm : norms) {
     norm = reader.Float32();
-    if (!(norm >= 0) || !std::isfinite(norm)) return Corrupt(what, "a norm is no number");
+    if (!(norm >= 0) || !std::isfinite(norm)) return Corrupt(what, "a norm is not a valid number");
   }
   if (!reader.Finished()) return Corrupt(what, "{} bytes are not {} numbers", bytes.size(), entry.count);
   return norms;

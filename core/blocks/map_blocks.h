@@ -20,7 +20,7 @@ namespace cairn {
 // BLAKE2b, 256 bits.
 using Hash = std::array<uint8_t, 32>;
 
-// The values stand in files: append only.
+// The values are stored in files: append only.
 enum class BlockKind : uint8_t {
   kStations = 1,
   kRegions = 2,
@@ -113,7 +113,7 @@ struct AppearanceBlock {
   std::vector<MapAppearanceNode> nodes;
 };
 
-// How well the places of nodes are told from others: their entropies and look-alikes.
+// How well the places of nodes can be told from others: their entropies and look-alikes.
 struct AmbiguityBlock {
   struct Node {
     double entropy = 0;
@@ -123,8 +123,8 @@ struct AmbiguityBlock {
   std::vector<Node> nodes;
 };
 
-// Maps store every pair of look-alikes once, at the smaller node: adds it at the other one too.  Per node,
-// ascending.  REQUIRES: nodes in range
+// Maps store every pair of look-alikes once, at the smaller node; this adds it at the larger one too.
+// Ascending at each node.  REQUIRES: nodes in range
 void CompleteLookAlikes(std::vector<std::vector<MapAppearanceNode::LookAlike>>* look_alikes);
 
 // View-invariant regions first, first + 1, ...
@@ -138,7 +138,7 @@ struct ViewBlock {
     std::vector<ViewLink> links;  // of which this is `a`, ascending
   };
   FaceIdx first = 0;
-  int32_t first_vertex = 0;         // so many are named by the blocks before
+  int32_t first_vertex = 0;         // number of vertices that the blocks before name
   std::vector<GridPoint> vertices;  // named here for the first time, in that order
   std::vector<Region> regions;
 };
@@ -163,8 +163,8 @@ std::string EncodeFloorPlan(const FloorPlan& plan);
 std::string EncodeVocabularyTree(const Vocabulary& vocabulary);
 std::string EncodeDocumentNorms(const std::vector<float>& norms);
 
-// And back.  `entry` is one of the directory's, `what` names the block in messages.  Every length, index and
-// number is checked against the directory.  Errors: Corrupt.
+// The inverse.  `entry` is one of the directory's, `what` names the block in messages.  Every length, index
+// and number is checked against the directory.  Errors: Corrupt.
 Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEntry& entry,
                                           const MapDirectory& directory, const std::string& what);
 Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& entry,
@@ -183,7 +183,7 @@ Result<ViewBlock> DecodeViewBlock(std::string_view bytes, const BlockEntry& entr
                                   const MapDirectory& directory, const std::string& what);
 Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& entry,
                                       const MapDirectory& directory, const std::string& what);
-// All that CheckFloorPlan asks.
+// Checks what CheckFloorPlan checks.
 Result<FloorPlan> DecodeFloorPlan(std::string_view bytes, const BlockEntry& entry,
                                   const MapDirectory& directory, const std::string& what);
 // A tree with empty inverted files.
@@ -192,7 +192,7 @@ Result<Vocabulary> DecodeVocabularyTree(std::string_view bytes, const BlockEntry
 Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const BlockEntry& entry,
                                                const std::string& what);
 
-// Puts the regions of a block after those that `views` has.  The whole is for CheckViews to check.
+// Puts the regions of a block after those that `views` has.  Call CheckViews on the whole afterwards.
 // Errors: Corrupt where they do not follow one another.
 Status AppendRegions(const ViewBlock& block, const std::string& what, Views* views);
 
@@ -200,7 +200,7 @@ Status AppendRegions(const ViewBlock& block, const std::string& what, Views* vie
 // headings differ.
 Status AppendModels(const VisualBlock& block, const std::string& what, VisualMapData* visual_map);
 
-// Memory that a block takes once it is decoded, about.
+// Approximate memory that a decoded block takes, bytes.
 int64_t NumBytes(const LandmarkBlock& block);
 int64_t NumBytes(const ImageBlock& block);
 int64_t NumBytes(const StationBlock& block);

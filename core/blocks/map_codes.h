@@ -31,7 +31,7 @@ Eigen::Matrix3d DecodeCovariance(uint64_t code);
 // A rotation in 13 bytes, off by less than 1e-8 rad: which of w, x, y, z is largest, and the others as int32
 // times 2^-31, signed so that the largest is positive.
 void WriteRotation(const Eigen::Quaterniond& rotation, BlobWriter* writer);
-Eigen::Quaterniond ReadRotation(BlobReader* reader);  // ok() is false too when the three are too long
+Eigen::Quaterniond ReadRotation(BlobReader* reader);  // ok() is also false when the three are too long
 
 // Most list elements that a block decodes to: bounds what a few bytes of runs allocate.
 inline constexpr int64_t kMaxListElements = 1 << 22;
@@ -39,7 +39,8 @@ inline constexpr int64_t kMaxListElements = 1 << 22;
 // Strictly ascending numbers >= 0 as runs of consecutive ones: a varint of the number of runs, then per run a
 // varint of 2 * gap + (1 if it is longer than one), and then its length less 2.
 void WriteRuns(const std::vector<int32_t>& values, BlobWriter* writer);
-// False when they do not lie in [0, limit) or are more than `*max_num_values`, from which they are taken.
+// False when a value is outside [0, limit) or there are more than `*max_num_values`; subtracts their number
+// from it.
 bool ReadRuns(BlobReader* reader, int64_t limit, int64_t* max_num_values, std::vector<int32_t>* values);
 
 // Signed numbers with small magnitudes as small unsigned ones: 0, -1, 1, -2, ...

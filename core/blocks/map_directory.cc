@@ -144,7 +144,7 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
       }
       const bool is_single = kind == BlockKind::kVocabularyTree || kind == BlockKind::kDocumentNorms ||
                              kind == BlockKind::kFloorPlan;
-      if (is_single && directory.NumBlocks(kind) > 0) return corrupt("there may be one of its kind only");
+      if (is_single && directory.NumBlocks(kind) > 0) return corrupt("only one block of its kind is allowed");
       if (kind == BlockKind::kImages &&
           !(entry.centers.min().allFinite() && entry.centers.max().allFinite())) {
         return corrupt("its box of camera centres is not finite");

@@ -6,11 +6,11 @@
 
 namespace cairn {
 
-// Whether each image is one that retrieval finds, by `documents`.  REQUIRES: images of the nodes exist
+// For each image, whether retrieval finds it, by `documents`.  REQUIRES: images of the nodes exist
 std::vector<char> DocumentImages(const MapRows& rows);
 
-// Fills the empty inverted files of a map's tree: which of the images, where they are documents, sees how
-// many of a word's landmarks.
+// Fills the empty inverted files of a map's tree: for each word, the documents that see landmarks of it, and
+// how many.
 void AddDocuments(const DescriptorMatrix& landmark_descriptors, const std::vector<MapImage>& images,
                   const std::vector<char>& is_document, Vocabulary* tree);
 

@@ -26,11 +26,11 @@ struct RegionSelfTest {
   int num_held_out = 0;
   int num_localized = 0;
   int num_gross_errors = 0;      // of those localized: farther off than the self-test's limits
-  std::optional<Errors> errors;  // of those localized; none where there is none
+  std::optional<Errors> errors;  // of those localized; empty where none was localized
 
   // REQUIRES: num_held_out > 0
   double LocalizedRatio() const { return static_cast<double>(num_localized) / num_held_out; }
-  // Part of the fixes that are right; 1 where there is none.
+  // Share of the fixes that are right; 1 where there are no fixes.
   double PrecisionRatio() const {
     return num_localized > 0 ? 1 - static_cast<double>(num_gross_errors) / num_localized : 1;
   }
@@ -50,15 +50,15 @@ struct DropCount {
   friend bool operator==(const DropCount&, const DropCount&) = default;
 };
 
-// How well a region's places are told from others.
+// How well a region's places can be told from others.
 struct RegionEntropy {
   RegionIdx region = 0;
   double entropy = 0;  // mean of the images' at its stations, nats
   friend bool operator==(const RegionEntropy&, const RegionEntropy&) = default;
 };
 
-// What the compilation found out about a map, for who judges it (schemas/map_findings.sql).  A robot does not
-// need it to localize.
+// What the compilation found out about a map, for people who assess it (schemas/map_findings.sql).  A robot
+// does not need it to localize.
 struct MapFindings {
   std::vector<RegionSelfTest> self_test_regions;  // those with held-out images, ascending region
   std::vector<RegionEntropy> region_entropies;    // those with images of the appearance graph, ascending
@@ -66,8 +66,8 @@ struct MapFindings {
   friend bool operator==(const MapFindings&, const MapFindings&) = default;
 };
 
-// Errors: InvalidArgument, naming the row: one out of order, of no such region, or with numbers that cannot
-// be.
+// Errors: InvalidArgument, naming the row: a row out of order, of a region that does not exist, or with
+// impossible numbers.
 Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations);
 
 }  // namespace cairn

@@ -21,7 +21,7 @@ class MapLayout {
 
   // The block of an entry as it is stored.
   std::string Encode(const BlockEntry& entry) const;
-  // The same before that.  REQUIRES: its kind
+  // The same before it is encoded.  REQUIRES: `entry` is of its kind
   LandmarkBlock MakeLandmarkBlock(const BlockEntry& entry) const;
   ImageBlock MakeImageBlock(const BlockEntry& entry) const;
   StationBlock MakeStationBlock(const BlockEntry& entry) const;
@@ -31,7 +31,7 @@ class MapLayout {
   AmbiguityBlock MakeAmbiguityBlock(const BlockEntry& entry) const;
   ViewBlock MakeViewBlock(const BlockEntry& entry) const;
   VisualBlock MakeVisualBlock(const BlockEntry& entry) const;
-  // Per image; 0 for one that is no document.
+  // Per image; 0 for an image that is not a document.
   std::vector<float> MakeDocumentNorms() const;
 
  private:

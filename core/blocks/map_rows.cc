@@ -43,7 +43,7 @@ Status CheckImages(const MapRows& rows) {
     if (!camera_ids.contains(image.camera_id))
       return Invalid("image {} has camera {}, which the map lacks", image.image_id, image.camera_id);
     if (!IsPose(image.cam_from_world) || image.cam_from_world.translation.cwiseAbs().maxCoeff() > kMaxExtentM)
-      return Invalid("image {}: its pose is none", image.image_id);
+      return Invalid("image {}: its pose is not valid", image.image_id);
     if (image.station < -1 || image.station >= static_cast<StationIdx>(rows.stations.size())) {
       return Invalid("image {}: station {} of {}", image.image_id, image.station, rows.stations.size());
     }
@@ -65,8 +65,7 @@ Status CheckImages(const MapRows& rows) {
 
 Status CheckRegions(const MapRows& rows) {
   for (size_t i = 0; i < rows.stations.size(); ++i) {
-    if (!rows.stations[i].position.allFinite() ||
-        rows.stations[i].position.cwiseAbs().maxCoeff() > kMaxExtentM ||
+    if (!(rows.stations[i].position.array().abs() <= kMaxExtentM).all() ||  // nor NaN, which maxCoeff misses
         !std::isfinite(rows.stations[i].heading_deg.value_or(0))) {
       return Invalid("station {}: its place is not finite", i);
     }
@@ -87,7 +86,7 @@ Status CheckRegions(const MapRows& rows) {
   if (rows.regions.size() > rows.stations.size())
     return Invalid("{} regions of {} stations", rows.regions.size(), rows.stations.size());
   for (size_t i = 0; i < rows.regions.size(); ++i) {
-    if (rows.regions[i].stations.empty()) return Invalid("region {}: is of no station", i);
+    if (rows.regions[i].stations.empty()) return Invalid("region {} has no station", i);
     if (!IsAscending(rows.regions[i].stations, rows.stations.size()) ||
         !IsAscending(rows.regions[i].landmarks, rows.landmarks.size())) {
       return Invalid("region {}: its stations or landmarks are not ascending below {} and {}", i,
@@ -186,10 +185,11 @@ Status CheckMapHead(const MapHead& head) {
   if (head.sessions.size() > kMaxNumSessions)
     return Invalid("{} sessions, at most {} are stored", head.sessions.size(), kMaxNumSessions);
   for (size_t i = 0; i < head.sessions.size(); ++i) {
-    if (!IsSessionName(head.sessions[i])) return Invalid("session '{}' has no valid name", head.sessions[i]);
+    if (!IsSessionName(head.sessions[i]))
+      return Invalid("session '{}': the name is not valid", head.sessions[i]);
     const auto place = head.sessions.begin() + static_cast<std::ptrdiff_t>(i);
     if (std::find(head.sessions.begin(), place, head.sessions[i]) != place)
-      return Invalid("session '{}' stands twice", head.sessions[i]);
+      return Invalid("session '{}' is listed twice", head.sessions[i]);
   }
   for (size_t i = 0; i < head.cameras.size(); ++i) {
     CAIRN_RETURN_IF_ERROR(CheckCamera(head.cameras[i]));
@@ -198,10 +198,10 @@ Status CheckMapHead(const MapHead& head) {
     }
   }
   if (!IsPose(head.floor_from_world) || !IsPose(head.camera_from_given))
-    return Invalid("a frame's rotation is none");
+    return Invalid("the rotation of a frame is not valid");
   if (!(head.stated_pose_sigma_m >= 0 && head.stated_pose_sigma_m < 1e3) ||
       !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
-    return Invalid("the noise of the stated poses is no valid number");
+    return Invalid("the noise of the stated poses is not a valid number");
   }
   if (head.documents != "all" && head.documents != "kept")
     return Invalid("documents = '{}', expected all or kept", head.documents);
@@ -227,7 +227,7 @@ Status CheckMapRows(const MapRows& rows) {
     const MapLandmark& landmark = rows.landmarks[i];
     if (!landmark.position.allFinite() || !landmark.covariance.allFinite() || !(landmark.scale_m >= 0) ||
         (landmark.covariance.diagonal().array() < 0).any()) {
-      return Invalid("landmark {}: its position, covariance or scale is no valid number", i);
+      return Invalid("landmark {}: its position, covariance or scale is not a valid number", i);
     }
     if (landmark.position.cwiseAbs().maxCoeff() > kMaxExtentM || landmark.scale_m > kMaxExtentM) {
       return Invalid("landmark {} lies more than 200 km from the origin of its frame", i);

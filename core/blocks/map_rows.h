@@ -24,8 +24,8 @@ namespace cairn {
 
 using LandmarkIdx = int32_t;
 
-// The contents of a map file as plain values, the same for who writes and who reads it: schemas/FORMAT.md
-// says what each means on disk.
+// The contents of a map file as plain values, the same for writers and readers.  schemas/FORMAT.md says what
+// each means on disk.
 
 struct MapLandmark {
   ClassId class_id = 0;
@@ -55,8 +55,8 @@ struct MapRegion {
   std::vector<LandmarkIdx> landmarks;  // ascending
 };
 
-// A node of the appearance graph: images of one place between which, and those of linked nodes, the relative
-// pose can be recovered.
+// A node of the appearance graph: images of one place.  The relative pose can be recovered between any two of
+// them, and between them and images of linked nodes.
 struct MapAppearanceNode {
   struct Link {
     int32_t node = 0;
@@ -66,7 +66,7 @@ struct MapAppearanceNode {
   // A node that looks like this one and lies elsewhere.
   struct LookAlike {
     int32_t node = 0;
-    double score = 0;  // of one as a query for the other, in (0, 1]
+    double score = 0;  // of one node as a query for the other, in (0, 1]
     friend bool operator==(const LookAlike&, const LookAlike&) = default;
   };
   std::vector<int32_t> images;  // by index, ascending; no image is of two nodes
@@ -83,14 +83,15 @@ struct MapAppearanceNode {
 struct MapHead {
   std::string name;
   std::string writer;  // program and version, "cairn 0.1.0"
-  // Of the processor that found the features: another one's may differ in the last bits.
+  // Of the processor that extracted the features: with another set the last bits may differ.
   std::string instruction_set;
   uint64_t seed = 0;    // of the compilation
   bool sealed = false;  // checked, with its self-test figures
-  // Counts the releases of a map of this name: a robot takes no map of an epoch that is not later than what
-  // it has (docs/updates.md).  0: never counted.
+  // Counts the releases of a map of this name: a robot takes only a map with a later epoch than its own
+  // (docs/updates.md).  0: not counted.
   uint64_t epoch = 0;
-  // Of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4 or earlier.
+  // Hash of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4
+  // or earlier.
   std::string findings_hash;
   // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
   std::string landmark_choice = "regions";
@@ -111,11 +112,12 @@ struct MapHead {
 
   // What the world frame's coordinates mean: their unit, and where on the Earth they are.
   CaptureFrame frame;
-  // The surveys that the map is made from, where it was several: the image SESSION/NAME is of one of them.
+  // The surveys that the map is made from, if there are several: the image SESSION/NAME belongs to
+  // one of them.
   std::vector<std::string> sessions;
   Pose floor_from_world;
-  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up to
-  // noise.
+  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up
+  // to noise.
   Pose camera_from_given;
   // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
   double stated_pose_sigma_m = 0;
@@ -137,7 +139,8 @@ struct MapRows : MapHead {
   // The place's floor plan and its view-invariant regions, floor frame; no walls: not known.  Vertices are
   // numbered by use (NumberVerticesByUse).
   Views views;
-  // How landmarks look from where; its images are indices in `images`.  No landmarks: not in the map.
+  // How landmarks look from different places; its images are indices in `images`.  No landmarks: not
+  // in the map.
   VisualMapData visual_map;
   MapFindings findings;
 };
@@ -149,7 +152,7 @@ inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;
 
 // Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
-// strictly ascending, a number that is not finite, a rotation that is none, sizes that differ.
+// strictly ascending, a number that is not finite, an invalid rotation, sizes that differ.
 Status CheckMapRows(const MapRows& rows);
 // The same for the head alone.
 Status CheckMapHead(const MapHead& head);
@@ -158,16 +161,16 @@ Status CheckMapHead(const MapHead& head);
 // one survey.  O(observations).
 std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows);
 
-// Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io, DiskFull,
-// ReadOnly.
+// Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io,
+// DiskFull, ReadOnly.
 Status WriteMapRows(const MapRows& rows, const std::string& path);
 
 // Reads a whole map file; every hash, length, index and number is checked, and nothing larger than the file
 // states is allocated.  Errors: as MapFile::Open (core/map/map_file.h).
 Result<MapRows> ReadMapRows(const std::string& path);
 
-// Reads a map of format 1.x, which today's runtime does not: for `cairn migrate`.  Errors: NotFound; Corrupt;
-// Unsupported (another version).
+// Reads a map of format 1.x, which today's runtime does not read: for `cairn migrate`.  Errors: NotFound;
+// Corrupt; Unsupported (another version).
 Result<MapRows> ReadMapRowsVersion1(const std::string& path);
 
 }  // namespace cairn

@@ -14,7 +14,7 @@ void WriteStep(const GridPoint& point, GridPoint* before, BlobWriter* writer) {
   *before = point;
 }
 
-// A point that is off the grid fails the reader.
+// A point off the grid makes the reader fail.
 GridPoint ReadStep(GridPoint* before, BlobReader* reader) {
   const int64_t x = UnZigZag(reader->Varint()), y = UnZigZag(reader->Varint());
   constexpr int64_t kMaxStep = 2 * kMaxGridCoordinate;

@@ -56,7 +56,7 @@ Status CheckModel(const HeadingModel& model, size_t landmark, int64_t num_images
     return Invalid("landmark {}: there is no kernel {}, {}", landmark, model.shape.length, model.shape.noise);
   }
   if (!model.sigma.allFinite() || (model.sigma.array() < 0).any())
-    return Invalid("landmark {}: its errors are no valid numbers", landmark);
+    return Invalid("landmark {}: its errors are not valid numbers", landmark);
   if (model.sights.size() < kMinNumSights || model.sights.size() > kMaxNumSights)
     return Invalid("landmark {}: a model of {} sights, expected {} to {}", landmark, model.sights.size(),
                    kMinNumSights, kMaxNumSights);
@@ -64,7 +64,7 @@ Status CheckModel(const HeadingModel& model, size_t landmark, int64_t num_images
   for (const LandmarkSight& sight : model.sights) {
     if (sight.image <= before || sight.image >= num_images)
       return Invalid("landmark {}: its images are not ascending below {}", landmark, num_images);
-    if (!sight.seen.allFinite()) return Invalid("landmark {}: a sight is no valid number", landmark);
+    if (!sight.seen.allFinite()) return Invalid("landmark {}: a sight is not a valid number", landmark);
     before = sight.image;
   }
   return Ok();
@@ -114,8 +114,8 @@ Status RoundAsStored(VisualMapData* visual_map) {
     for (HeadingModel& model : models) {
       for (double& sigma : model.sigma) sigma = DecodeSize(EncodeSize(sigma));
       for (LandmarkSight& sight : model.sights) {
-        if (!sight.seen.head<2>().allFinite() || sight.seen.head<2>().minCoeff() < kLeastPixel ||
-            sight.seen.head<2>().maxCoeff() > kMostPixel) {
+        const auto seen = sight.seen.head<2>().array();
+        if (!(seen >= kLeastPixel && seen <= kMostPixel).all()) {
           return MakeError(ErrorCode::kUnsupported,
                            "visual map: a landmark is seen at {:g}, {:g} px; images of up to 6143 px a side "
                            "can be stored: set [emit_map] visual_map = false",
@@ -132,9 +132,10 @@ Status CheckVisualMap(const VisualMapData& visual_map, int64_t num_landmarks, in
   if (visual_map.landmarks.empty()) return Ok();
   if (static_cast<int64_t>(visual_map.landmarks.size()) != num_landmarks)
     return Invalid("models of {} landmarks of {}", visual_map.landmarks.size(), num_landmarks);
-  if (!(visual_map.focal_px >= 0 && visual_map.focal_px < 1e6F)) return Invalid("its focal length is none");
+  if (!(visual_map.focal_px >= 0 && visual_map.focal_px < 1e6F))
+    return Invalid("its focal length is not valid");
   for (const float value : ValuesOf(visual_map.errors)) {
-    if (!(value >= 0 && value < 1e6F)) return Invalid("its errors are no valid numbers");
+    if (!(value >= 0 && value < 1e6F)) return Invalid("its errors are not valid numbers");
   }
   const std::vector<double>& headings = visual_map.headings_deg;
   if (headings.empty() || headings.size() > kMaxNumHeadings || !(headings.front() >= 0) ||
@@ -187,7 +188,7 @@ Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& 
     if (code >= 36000) return Corrupt(what, "heading {} is {} hundredths of a degree", i, code);
     block.part.headings_deg.push_back(static_cast<double>(code) * kHeadingUnitDeg);
   }
-  if (camera_id != block.part.camera_id) return Corrupt(what, "camera {} is none", camera_id);
+  if (camera_id != block.part.camera_id) return Corrupt(what, "camera {} is not valid", camera_id);
   int64_t max_num_values = kMaxListElements;
   for (uint32_t i = 0; i < entry.count; ++i) {
     std::vector<int32_t> headings;

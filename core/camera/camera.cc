@@ -37,7 +37,7 @@ constexpr std::array<ModelRow, 12> kModels = {{
     {CameraModel::kEquirectangular, "EQUIRECTANGULAR", 0, 0, Projection::kEquirectangular},
 }};
 
-// Largest angle off the axis that is told as (x/z, y/z), rad.
+// Largest angle off the axis that is expressed as (x/z, y/z), rad.
 constexpr double kMaxForwardAngle = 1.5;
 // Largest tangent of the angle off the axis of a perspective camera.
 constexpr double kMaxTangent = 1e3;
@@ -142,7 +142,7 @@ std::optional<Eigen::Vector2d> DistortedFromCamera(const Camera& camera, const E
     if (IsUndistorted(camera)) return p.hnormalized();
     return DistortionOf(camera).Apply(p.hnormalized());
   }
-  // The direction off the axis, opposite to the view, is no direction.
+  // Exactly behind the camera the direction off the axis is not defined.
   if (!p.allFinite() || (off_axis == 0 && !(p.z() > 0))) return std::nullopt;
   if (camera.model != CameraModel::kFov) {
     const double angle = std::atan2(off_axis, p.z());

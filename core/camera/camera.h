@@ -58,8 +58,8 @@ struct Camera {
 // Errors: InvalidArgument for a wrong number of parameters, a size or focal length that is not positive, NaN.
 Status CheckCamera(const Camera& camera);
 
-// A pinhole camera that nobody calibrated: f = 1.2 max(w, h), principal point in the middle, has_focal_prior
-// false.
+// A pinhole camera that nobody calibrated: f = 1.2 max(w, h), principal point in the middle,
+// has_focal_prior false.
 Camera GuessCamera(CameraId camera_id, int width, int height);
 
 // Pixel at which a point of the camera frame is seen, inside the image or not.  Nothing when the model does
@@ -69,7 +69,7 @@ std::optional<Eigen::Vector2d> ImageFromCamera(const Camera& camera, const Eigen
 
 // Direction, a unit vector of the camera frame, of the ray through a pixel; beyond 90 degrees off the axis
 // too for FOV, fisheye and equirectangular models.  Distortion is inverted to 1e-12 of the normalised
-// coordinates. Nothing when no ray before the distortion's fold meets the pixel.
+// coordinates.  Nothing when no ray before the distortion's fold meets the pixel.
 std::optional<Eigen::Vector3d> BearingFromImage(const Camera& camera, const Eigen::Vector2d& pixel);
 
 // The same ray as normalised coordinates (x/z, y/z).  Nothing also when it lies more than 86 degrees (1.5

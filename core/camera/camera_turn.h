@@ -6,9 +6,9 @@
 
 namespace cairn {
 
-// How a thing shows after the camera has turned (x, y from the image's middle, px; log2 of its scale in px):
-// what the pinhole of `focal_px` makes of the rotation turned_from_camera.  The scale changes as the root of
-// the area.  Nothing where the thing is no longer in front (80 degrees off the axis).
+// How a thing appears after the camera has turned (x, y from the image's middle, px; log2 of its scale in
+// px): the rotation turned_from_camera applied to the image of a pinhole camera of `focal_px`.  The scale
+// changes as the root of the area.  Nothing where the thing is no longer in front (80 degrees off the axis).
 std::optional<Eigen::Vector3d> TurnedSight(const Eigen::Vector3d& seen,
                                            const Eigen::Matrix3d& turned_from_camera, double focal_px);
 // The rotation of a camera that turns left, then looks up, then rolls clockwise.

@@ -53,8 +53,7 @@ Status CheckPanoramaOptions(const PanoramaOptions& options) {
   if (options.num_panorama_views * options.panorama_view_deg >= 360) return Ok();
   return MakeError(
       ErrorCode::kInvalidArgument,
-      "option panorama_view_deg = {:g}: {} views of it leave gaps in a panorama; expected at least "
-      "{:g}",
+      "option panorama_view_deg = {:g}: {} views of it leave gaps in a panorama; expected at least {:g}",
       options.panorama_view_deg, options.num_panorama_views, 360.0 / options.num_panorama_views);
 }
 

@@ -29,8 +29,8 @@ OptionTable DescribeOptions(PanoramaOptions* options);
 // Errors: InvalidArgument when the views leave gaps.
 Status CheckPanoramaOptions(const PanoramaOptions& options);
 
-// Name of a view in databases and maps, NAME#2of6 for view 2 of 0 .. 5: whoever knows the panorama's pose can
-// tell the view's.
+// Name of a view in databases and maps, NAME#2of6 for view 2 of 0 .. 5: the view's pose follows from the
+// panorama's and the name.
 std::string PanoramaViewName(const std::string& panorama_name, int view, int num_views);
 
 // The inverse.
@@ -55,7 +55,7 @@ Camera PanoramaViewCamera(const Camera& panorama, const PanoramaOptions& options
 // The image of one view, bilinear; exact to the last bit of a float in position.  8-bit grey.
 cv::Mat CutPanoramaView(const cv::Mat& panorama, const Camera& view_camera, int view, int num_views);
 
-// Takes away the features that another view shows nearer to its axis: none is found twice.
+// Removes the features that another view shows nearer to its axis, so that none is found twice.
 void KeepSectorOfView(const Camera& view_camera, int num_views, Features* features);
 
 }  // namespace cairn

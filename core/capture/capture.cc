@@ -45,7 +45,7 @@ std::vector<std::string> ListImages(const std::string& folder, const std::vector
   return names;
 }
 
-// Whether there is something of that name, be it a link to nothing: whoever put it there wants it read.
+// Whether something of that name exists, even a broken link: it was put there to be read.
 bool IsThere(const std::string& path) {
   std::error_code error;
   return fs::exists(fs::symlink_status(path, error));
@@ -60,7 +60,7 @@ struct KnownCameras {
   std::optional<List> of_all;
   std::map<int, List> of_session;
 
-  // Those that may have taken a session's images (-1: of none); null where nothing is known of them.
+  // Cameras that may have taken the images of a session (-1: of no session); null where none are known.
   const List* Of(int session) const {
     if (const auto found = of_session.find(session); found != of_session.end()) return &found->second;
     return of_all ? &*of_all : nullptr;
@@ -82,8 +82,8 @@ Result<KnownCameras> ReadKnownCameras(const std::string& root, const std::vector
   return known;
 }
 
-// The camera of an image of this size; null: none has it.  Errors: InvalidArgument (several have it and
-// differ).
+// The camera of an image of this size; null: no camera has this size.  Errors: InvalidArgument (several have
+// this size and differ).
 Result<const Camera*> CameraOfSize(const KnownCameras::List& list, const std::string& name, int width,
                                    int height) {
   const Camera* found = nullptr;
@@ -149,7 +149,7 @@ class FlatFolderCameras {
     capture_.images.push_back({name, camera_id, std::nullopt});
   }
 
-  // The id of what `key` names; `make` tells the camera where it is new.
+  // The id of the camera that `key` names; `make` returns the camera where it is new.
   template <typename Key, typename Make>
   CameraId NewCamera(std::map<Key, CameraId>& ids, const Key& key, const Make& make) {
     const auto [entry, is_new] =

@@ -32,7 +32,7 @@ struct Capture {
   std::map<CameraId, Camera> cameras;
   std::vector<CaptureImage> images;   // the survey, ascending by name
   std::vector<CaptureImage> queries;  // held out, never compiled; ascending by name
-  std::vector<Reject> rejects;        // named in images.txt, but missing or with a pose that is none
+  std::vector<Reject> rejects;        // named in images.txt, but missing or with an invalid pose
   std::vector<std::string> warnings;  // e.g. image files that neither list names
   bool has_poses = false;
   std::optional<CaptureFrame> frame;  // of frame.json, if there is one

@@ -16,13 +16,13 @@ struct CaptureFrame {
   std::optional<GeodeticPosition> anchor;
   // Where scale and axes come from: "survey", "gps", "control_points", "distances", "mixed" or "none".
   std::string source = "survey";
-  // The poses come from the images themselves: they are the best that fit them, and not refined again.
+  // The poses come from the images themselves: they already fit them best and are not refined again.
   bool is_reconstructed = false;
 };
 
 inline constexpr const char* kCaptureFrameFile = "frame.json";
 
-// Errors: InvalidArgument for a unit or an anchor that is none.
+// Errors: InvalidArgument for an invalid unit or anchor.
 Status CheckCaptureFrame(const CaptureFrame& frame);
 std::string CaptureFrameJson(const CaptureFrame& frame);
 // Errors: NotFound, Corrupt (the file, and what was expected).

@@ -7,7 +7,7 @@
 
 namespace cairn {
 
-// What of an image file's EXIF block a capture uses.
+// The tags of an image file's EXIF block that a capture uses.
 struct ExifTags {
   double focal_length_35mm_mm = 0;  // 35 mm equivalent focal length; 0 where there is none
   // Where the camera says that it stood.  Empty without a latitude and a longitude in range: a receiver
@@ -16,7 +16,7 @@ struct ExifTags {
   bool has_altitude = false;  // false: gps->altitude_m is 0 because no valid altitude was found
 };
 
-// Reads what there is; a file without EXIF, or with a damaged block, has no tags.
+// Reads the tags that are there; a file without EXIF, or with a damaged block, has no tags.
 ExifTags ReadExif(const std::string& path);
 
 }  // namespace cairn

@@ -35,10 +35,10 @@ Status CheckSessions(const std::vector<CaptureSession>& sessions) {
   std::set<std::string> names;
   for (const CaptureSession& session : sessions) {
     if (!IsSessionName(session.name)) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "session '{}': a name has 1 to 100 letters, digits, '-', '_' and '.', and begins with none of '-.'",
-          session.name);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "session '{}': a name has 1 to 100 letters, digits, '-', '_' and '.', and does not "
+                       "begin with '-' or '.'",
+                       session.name);
     }
     if (!names.insert(session.name).second) {
       return MakeError(ErrorCode::kInvalidArgument,
@@ -63,8 +63,8 @@ Status CheckSessions(const std::vector<CaptureSession>& sessions) {
     const CaptureSession& unposed = HasPoses(first) ? session : first;
     return MakeError(ErrorCode::kInvalidArgument,
                      "'{}' ({}) has poses (images.txt), '{}' ({}) has none: give '{}' poses in the frame of "
-                     "'{}', or use folders of "
-                     "images without images.txt for all, so that all are reconstructed together",
+                     "'{}', or use folders of images without images.txt for all, so that all are "
+                     "reconstructed together",
                      posed.name, posed.root, unposed.name, unposed.root, unposed.name, posed.name);
   }
   return Ok();
@@ -91,8 +91,9 @@ Result<CameraIds> AddCameras(const CaptureSession& session, std::map<CameraId, C
   return ids;
 }
 
-// Appends a session's image list: names after the session's, cameras renumbered, the pose's numbers as they
-// stand there. A camera that the session lacks becomes `no_camera`, which the joined capture lacks too.
+// Appends a session's image list: names with the session's in front, cameras renumbered, the pose's numbers
+// as they are written there.  A camera that the session lacks becomes `no_camera`, which the joined capture
+// lacks too.
 Status AppendImageList(const std::string& path, const CaptureSession& session, const CameraIds& cameras,
                        CameraId no_camera, int* num_images, std::string* text) {
   return VisitImageList(path, [&](const ListedImage& listed) {
@@ -150,7 +151,7 @@ Result<CaptureFrame> JoinFrames(const std::vector<CaptureSession>& sessions,
   return joined;
 }
 
-// The cameras of sessions without poses that give any.
+// Writes the cameras.txt of sessions without poses that have one.
 Status WriteSessionCameras(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   for (const CaptureSession& session : sessions) {
     const std::string given = session.root + "/cameras.txt";

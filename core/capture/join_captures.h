@@ -23,19 +23,19 @@ struct JoinedCapture {
 };
 
 // Writes a capture that holds all `sessions`, in their order, and copies no image:
-//   images/SESSION   link to the images of each
-//   cameras.txt      renumbered 1, 2, ...; cameras that are equal in all become one
+//   images/SESSION             link to the images of each
+//   cameras.txt                renumbered 1, 2, ...; cameras that are equal in all become one
 //   images.txt, queries.txt    the lines of each with the name SESSION/NAME; poses as they are written
-//   frame.json       what all coordinates mean (CaptureFrame)
-//   sessions.txt     SESSION and its folder, a line each
+//   frame.json                 what all coordinates mean (CaptureFrame)
+//   sessions.txt               SESSION and its folder, a line each
 // Captures without poses have only images/, sessions.txt and, for each that has cameras.txt,
-// cameras/SESSION.txt.  The folder is replaced as a whole
-// (ReplaceFolderAtomically): files that keep their bytes keep their date.  What one capture alone would
-// reject is kept, and rejected by who reads the result.
+// cameras/SESSION.txt.  The folder is replaced as a whole (ReplaceFolderAtomically): files that keep their
+// bytes keep their date.  An image that one capture alone would reject is kept; the reader of the result
+// rejects it.
 //
-// All poses must be in one frame.  Errors: InvalidArgument (fewer than one session, a name that is none or
-// stands twice, captures with poses beside ones without, frames of different units or anchors;
-// `folder` holds something else); NotFound, Corrupt, Io.
+// All poses must be in one frame.  Errors: InvalidArgument (fewer than one session, a name that is invalid or
+// listed twice, captures with poses beside ones without, frames of different units or anchors; `folder` holds
+// something else); NotFound, Corrupt, Io.
 Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, const std::string& folder);
 
 }  // namespace cairn

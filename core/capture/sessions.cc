@@ -24,12 +24,14 @@ Result<std::vector<std::string>> ReadSessionsText(const std::string& path) {
     const std::vector<std::string> words = SplitWords(line);
     if (words.empty() || words[0][0] == '#') continue;
     if (!IsSessionName(words[0])) {
-      return MakeError(ErrorCode::kCorrupt,
-                       "{}:{}: session '{}': expected letters, digits, '-', '_' and '.', none of '-.' first",
-                       path, line_number, words[0]);
+      return MakeError(
+          ErrorCode::kCorrupt,
+          "{}:{}: session '{}': expected letters, digits, '-', '_' and '.', not beginning with '-' or '.'",
+          path, line_number, words[0]);
     }
     if (std::find(sessions.begin(), sessions.end(), words[0]) != sessions.end())
-      return MakeError(ErrorCode::kCorrupt, "{}:{}: session '{}' stands twice", path, line_number, words[0]);
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: session '{}' is listed twice", path, line_number,
+                       words[0]);
     if (sessions.size() == kMaxNumSessions) {
       return MakeError(ErrorCode::kCorrupt, "{}: more than {} sessions; join the later ones to another map",
                        path, kMaxNumSessions);

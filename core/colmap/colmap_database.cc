@@ -43,7 +43,7 @@ Error BadRow(const SQLite::Database& database, const std::string& table, int64_t
                    problem);
 }
 
-// The columns of one row, and the first that cannot be.
+// Reads the columns of one row and keeps what is wrong with the first invalid one.
 class RowReader {
  public:
   explicit RowReader(SQLite::Statement& statement) : statement_(statement) {}
@@ -205,12 +205,11 @@ Result<DescriptorMatrix> ReadDatabaseDescriptors(SQLite::Database& database, Ima
   const int64_t columns = row.Integer(1, INT32_MIN, INT32_MAX);
   const int64_t rows = row.Integer(0, 0, kMaxKeypoints);
   if (row.ok() && rows > 0 && (type != 0 || columns == kDescriptorDim * int64_t{sizeof(float)})) {
-    return MakeError(
-        ErrorCode::kUnsupported,
-        "{}: table descriptors, row {}: {} bytes a descriptor{}: not SIFT's 128 bytes; learned and "
-        "float descriptors are not read, extract SIFT features",
-        DatabasePath(database), image_id, columns,
-        type != 0 ? fmt::format(", of extractor type {}", type) : "");
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: table descriptors, row {}: {} bytes a descriptor{}: not SIFT's 128 bytes; learned "
+                     "and float descriptors are not read; extract SIFT features",
+                     DatabasePath(database), image_id, columns,
+                     type != 0 ? fmt::format(", of extractor type {}", type) : "");
   }
   if (row.ok() && rows > 0 && columns != kDescriptorDim)
     row.Fail(fmt::format("{} columns, expected {}", columns, kDescriptorDim));
@@ -245,7 +244,7 @@ std::string PairProblem(const TwoViewGeometry& geometry,
   if (geometry.image_id1 >= geometry.image_id2 || image1 == num_keypoints.end() ||
       image2 == num_keypoints.end()) {
     return fmt::format(
-        "a pair of the images {} and {}: they must be two of the table images, the smaller first",
+        "a pair of the images {} and {}: expected two ids of the table images, the smaller first",
         geometry.image_id1, geometry.image_id2);
   }
   for (const Match& match : geometry.inliers) {

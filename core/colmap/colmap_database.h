@@ -17,7 +17,7 @@ namespace cairn {
 
 // COLMAP's database.  features.db and matches.db are such files, with the schema of version 3.8
 // (src/base/database.cc there) and tables of our own beside COLMAP's (prefix cairn_), which COLMAP ignores.
-// Those of COLMAP 3.0 to 4.0 are read: docs/colmap.md says what of them.
+// Databases of COLMAP 3.0 to 4.0 are read; docs/colmap.md says which parts.
 
 struct DatabaseImage {
   ImageId image_id = 0;
@@ -35,7 +35,7 @@ enum class TwoViewConfig : int {
   kPanoramic = 5,
   kPlanarOrPanoramic = 6,
   kWatermark = 7,
-  kMultiple = 8,  // several objects that move: of COLMAP's databases, never of ours
+  kMultiple = 8,  // several moving objects: only in COLMAP's databases, never in ours
 };
 
 // The verified matches of two images, image_id1 < image_id2.
@@ -56,11 +56,11 @@ std::pair<ImageId, ImageId> ImageIdsFromPairId(int64_t pair_id);
 // CREATE TABLE statements of COLMAP 3.8's schema (user_version 3800 set).
 extern const char* const kColmapSchema;
 
-// Opens a database of COLMAP, or of whoever writes its schema, without changing it: waits up to 5 s for a
-// program that writes to it, reads what lies in a write-ahead log, checks that the tables are there.  What
-// is read is one state of it, whatever others write meanwhile.  Errors: NotFound; Corrupt (not SQLite, not
-// COLMAP's, truncated); Unsupported (a version of the schema that is not known; names table and column);
-// Busy (another program writes to it, or died while it did).
+// Opens a database of COLMAP, or of another program with its schema, without changing it: waits up to 5 s for
+// a program that writes to it, reads what lies in a write-ahead log, checks that the tables are there.  All
+// reads see one state of it, whatever others write meanwhile.  Errors: NotFound; Corrupt (not SQLite, not
+// COLMAP's, truncated); Unsupported (a version of the schema that is not known; names table and column); Busy
+// (another program writes to it, or died while it did).
 Result<SQLite::Database> OpenColmapDatabase(const std::string& path);
 
 // Copies an open database into a new file, in rollback-journal mode, with the columns of

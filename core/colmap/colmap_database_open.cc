@@ -22,9 +22,9 @@ struct Table {
   std::vector<const char*> columns;
 };
 
-// What is read, in every version of COLMAP's schema since 3.0; what else there may be is left alone: the
-// columns images.prior_* (to 3.9), the tables pose_priors (3.10), rigs, rig_sensors, frames and frame_data
-// (3.12), the column descriptors.type (4.0).
+// What is read; every version of COLMAP's schema since 3.0 has it.  Other parts are ignored: the columns
+// images.prior_* (to 3.9), the tables pose_priors (3.10), rigs, rig_sensors, frames and frame_data (3.12),
+// the column descriptors.type (4.0).
 const std::vector<Table>& ReadTables() {
   static const std::vector<Table> kTables = {
       {"cameras", {"camera_id", "model", "width", "height", "params", "prior_focal_length"}},
@@ -83,7 +83,7 @@ uint64_t NumBytes(const std::string& path) {
 
 bool IsFilled(const std::string& path) { return NumBytes(path) > 0; }
 
-// Opens copies of a database and its write-ahead log in a folder that vanishes at once.
+// Opens copies of a database and its write-ahead log in a folder that is removed at once.
 SQLite::Database OpenCopy(const std::string& path) {
   std::string name = fs::temp_directory_path() / "cairn-XXXXXX";
   if (mkdtemp(name.data()) == nullptr)
@@ -102,7 +102,7 @@ SQLite::Database OpenCopy(const std::string& path) {
   return database;
 }
 
-// Honours the locks of a program that writes, reads what it has committed to a write-ahead log, and changes
+// Respects the locks of a program that writes, reads what it has committed to a write-ahead log, and changes
 // neither the file nor what lies beside it.
 SQLite::Database OpenUnchanged(const std::string& path) {
   if (IsInWalMode(path)) {

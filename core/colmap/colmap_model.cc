@@ -72,10 +72,10 @@ Status NormalizePose(Pose* pose) {
 
 Result<ColmapModel> ReadColmapModel(const std::string& folder) {
   if (!IsColmapModel(folder)) {
-    return MakeError(ErrorCode::kNotFound,
-                     "{}: no COLMAP model: neither cameras.bin and images.bin nor cameras.txt and images.txt "
-                     "are there",
-                     folder);
+    return MakeError(
+        ErrorCode::kNotFound,
+        "{}: not a COLMAP model: it has neither cameras.bin and images.bin nor cameras.txt and images.txt",
+        folder);
   }
   CAIRN_ASSIGN_OR_RETURN(ColmapModel model, HasFiles(folder, ".bin") ? ReadColmapModelBinary(folder)
                                                                      : ReadColmapModelText(folder));

@@ -56,16 +56,16 @@ enum class ModelFormat { kText, kBinary };
 bool IsColmapModel(const std::string& folder);
 
 // Reads a model; the binary files where there are both, as COLMAP does.  Without points3D it has no points.
-// Errors, naming file and line, byte or element: NotFound; Corrupt (truncated, a number that is none, a pose
-// that is none, a reference to a camera, image, keypoint or point that is not there, an id listed twice);
-// Unsupported (camera model).
+// Errors, naming file and line, byte or element: NotFound; Corrupt (truncated, an invalid number or pose, a
+// reference to a camera, image, keypoint or point that is not there, an id listed twice); Unsupported
+// (camera model).
 Result<ColmapModel> ReadColmapModel(const std::string& folder);
 
 // Writes cameras, images and points3D into an existing folder.  Numbers read back to the same bits.
 Status WriteColmapModel(const ColmapModel& model, ModelFormat format, const std::string& folder);
 
 // The first line of an image in images.txt: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME.  The quaternion is
-// as it stands there, of any norm.  Errors: Corrupt, without the file's name.
+// as written, of any norm.  Errors: Corrupt, without the file's name.
 Result<ModelImage> ParseImageLine(std::string_view line);
 
 // Normalises the quaternion.  Errors: Corrupt when the pose is not finite, or the quaternion's norm differs

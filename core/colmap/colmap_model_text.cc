@@ -17,7 +17,7 @@ class NumberReader {
   explicit NumberReader(std::string_view line) : rest_(Trim(line)) {}
 
   bool AtEnd() const { return rest_.empty(); }
-  // 0, and not ok() from then on, where the next word is no number of this type.
+  // 0, and not ok() from then on, where the next word is not a number of this type.
   template <typename T>
   T Next() {
     const size_t end = std::min(rest_.find_first_of(" \t"), rest_.size());

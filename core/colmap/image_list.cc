@@ -24,10 +24,10 @@ bool IsPointsLine(const std::vector<std::string>& words) {
 
 Status CheckListedName(const std::string& path, const std::string& name) {
   if (!HasControlCharacter(name)) return Ok();
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: cannot list the image '{}': its name has a control character, such as a line's end; "
-                   "rename it",
-                   path, name);
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{}: cannot list the image '{}': its name has a control character, such as a line end; rename it", path,
+      name);
 }
 
 Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit) {

@@ -8,10 +8,10 @@
 
 namespace cairn {
 
-// An image as a list in COLMAP's images.txt form has it.
+// An image of a list in COLMAP's images.txt form.
 struct ListedImage {
   int line_number = 0;    // from 1 on
-  std::string pose_text;  // "QW QX QY QZ TX TY TZ", as they stand there
+  std::string pose_text;  // "QW QX QY QZ TX TY TZ", as written
   ModelImage image;       // as ParseImageLine gives it, without keypoints
 };
 
@@ -20,7 +20,7 @@ struct ListedImage {
 Status VisitImageList(const std::string& path, const std::function<void(ListedImage)>& visit);
 
 // Whether an image of this name can stand in a list of one image per line, `path`.  Errors: InvalidArgument
-// (a control character, such as a line's end, which would make two lines of one).
+// (a control character, such as a line end, which would make one line into two).
 Status CheckListedName(const std::string& path, const std::string& name);
 
 }  // namespace cairn

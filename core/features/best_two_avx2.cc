@@ -30,7 +30,7 @@ struct Avx2 : Avx2Keys {
 };
 
 // Values whose products fit: rows less 64 are signed 8-bit (values up to 191), every pair of products fits
-// into 16 bits, and 16 of them, made up for the 64 and less 2^15 by the bias, do so again.
+// into 16 bits, and so do 16 of them, as the bias compensates for the 64 and subtracts 2^15.
 struct Avx2Small : Avx2Keys {
   static constexpr int kRowOffset = 64;
   static constexpr int kNumBias = 4;

@@ -7,8 +7,8 @@
 
 namespace cairn {
 
-// All dot products of a block of rows with a block of columns, and the best two of each row and of each
-// column.
+// All dot products of a block of rows with a block of columns, and the best two of each row and of
+// each column.
 //
 // Layout of both sides: descriptors in groups of `lanes`; a group is 32 chunks x lanes words, a word being
 // four consecutive 8-bit values of one (permuted) descriptor.  So a vector load yields one chunk of `lanes`
@@ -16,13 +16,13 @@ namespace cairn {
 //
 // A result is a key: dot << index_bits | (2^index_bits - 1 - index within the block).  The largest key is the
 // largest product with the smallest index, and two maxima and a minimum keep the best two.  0 means none; the
-// caller sees to it that indices stay below 2^index_bits - 1 and dot products below 2^(key bits -
-// index_bits).
+// caller makes sure that indices stay below 2^index_bits - 1 and dot products below 2^(key bits
+// - index_bits).
 struct BestTwoSweep {
   const uint32_t* rows = nullptr;     // num_row_groups x 32 x lanes, values less the kernel's row offset
   const uint32_t* columns = nullptr;  // num_column_groups x 32 x lanes
-  // What a kernel with a row offset starts its sums from, to make up for it: num_column_groups x bias words
-  // x lanes.
+  // What a kernel with a row offset starts its sums from, to compensate for the offset: num_column_groups x
+  // bias words x lanes.
   const uint32_t* bias = nullptr;
   int num_row_groups = 0;
   int num_column_groups = 0;
@@ -44,10 +44,10 @@ struct BestTwoKernel {
 // Chunks whose products the kernels for small values sum in 16 bits.
 inline constexpr int kBestTwoPartialChunks = 8;
 
-// For descriptors of which every sum of 16 products that shares a 16-bit lane is exact: see FitsIn16Bits.
+// For descriptors for which every sum of 16 products in one 16-bit lane is exact: see FitsIn16Bits.
 extern const BestTwoKernel kBestTwoPortableSmall;
 extern const BestTwoKernel kBestTwoAvx2Small;
-// For all.
+// For all descriptors.
 extern const BestTwoKernel kBestTwoPortable;
 extern const BestTwoKernel kBestTwoAvx2;
 extern const BestTwoKernel kBestTwoAvxVnni;

@@ -19,7 +19,7 @@ namespace cairn::best_two_internal {
 inline constexpr int kNumChunks = 32;
 
 // The functions below name every element of `sums` by a constant, through folds over index packs, and never
-// through a closure: only so does g++ 12 keep the array in registers.
+// through a closure: otherwise g++ 12 does not keep the array in registers.
 template <int N>
 using Sequence = std::make_integer_sequence<int, N>;
 template <int... kIdx>

@@ -2,7 +2,7 @@
 
 namespace cairn {
 
-// Compiled twice where the processor may know wider integers; the sum is the same.
+// Compiled twice where the processor may have wider integer instructions; the sum is the same.
 #if defined(__x86_64__) && defined(__GNUC__)
 __attribute__((target_clones("avx2", "default")))
 #endif

@@ -11,7 +11,7 @@ namespace cairn {
 // Squared norm of a RootSIFT descriptor, up to rounding.
 inline constexpr double kSquaredDescriptorNorm = 512.0 * 512.0;
 
-// Of two descriptors of kDescriptorDim entries.
+// Dot product of two descriptors of kDescriptorDim entries.
 int32_t DescriptorDot(const uint8_t* a, const uint8_t* b);
 
 // The angle between two RootSIFT descriptors of this dot product, radians in [0, pi / 2].

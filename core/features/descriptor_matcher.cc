@@ -40,7 +40,7 @@ const uint32_t* OffsetRows(const GroupRange& range, const BestTwoKernel& kernel,
   return scratch->data();
 }
 
-// Offers the best two of a sweep, as keys, to a descriptor of image `range` is not of.
+// Offers the best two of a sweep, as keys, to a descriptor of the other image than that of `range`.
 void Offer(uint32_t best_key, uint32_t second_key, int index_bits, const GroupRange& range, int lanes,
            BestTwo* kept) {
   const uint32_t last = (uint32_t{1} << index_bits) - 1;

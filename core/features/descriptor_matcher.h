@@ -21,7 +21,7 @@ struct DescriptorMatcherOptions {
 // Matches of two sets of RootSIFT descriptors by exact search over all dot products (kernels chosen at run
 // time, same results).  Ties go to the smaller index.  Ascending idx1.  Cost: size1 * size2 * 128
 // multiply-adds; memory O(size1 + size2).  Reading a set from main memory takes under 1 % of a pair's time:
-// callers need not order pairs for the sake of the caches, only for that of what they keep packed.
+// callers need not order pairs for the processor's caches, only to keep few descriptors packed.
 // REQUIRES: both packed for the same kernel.
 std::vector<Match> MatchDescriptors(const PackedDescriptors& descriptors1,
                                     const PackedDescriptors& descriptors2,
@@ -38,7 +38,7 @@ struct BestTwo {
   int32_t second = -1;
 };
 // Best two of 2 for every descriptor of 1 (rows), and best two of 1 for every one of 2 (columns), in one
-// sweep. REQUIRES: both packed for the same kernel.
+// sweep.  REQUIRES: both packed for the same kernel.
 void FindBestTwo(const PackedDescriptors& descriptors1, const PackedDescriptors& descriptors2,
                  std::vector<BestTwo>* rows, std::vector<BestTwo>* columns);
 void FindBestTwo(const DescriptorMatrix& descriptors1, const DescriptorMatrix& descriptors2,

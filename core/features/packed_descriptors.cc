@@ -47,9 +47,9 @@ Values Reorder(const uint8_t* values) {
   return reordered;
 }
 
-// Whether the kernels for small values are exact for this descriptor with any other of which that holds.  By
-// Cauchy and Schwarz it suffices to bound the norms of what is multiplied: of pairs, one of them less the row
-// offset of 64 in signed 8 bits (signed 16-bit sums), and of subsets (unsigned 16-bit sums).
+// Whether the kernels for small values are exact for this descriptor and any other one that passes this test.
+// By Cauchy and Schwarz it suffices to bound the norms of what is multiplied: of pairs, one of them less the
+// row offset of 64 in signed 8 bits (signed 16-bit sums), and of subsets (unsigned 16-bit sums).
 bool FitsIn16Bits(const Values& values) {
   std::array<int, kNumSubsets> subset_norms{};
   for (int i = 0; i < kDescriptorDim; i += 2) {
@@ -61,7 +61,7 @@ bool FitsIn16Bits(const Values& values) {
   return *std::max_element(subset_norms.begin(), subset_norms.end()) <= 65535;
 }
 
-// Makes up for the row offset: of the whole sum, or of each subset's, less 2^15 there.
+// Compensates for the row offset: in the whole sum, or in each subset's sum, where it also subtracts 2^15.
 void SetBias(const Values& values, const BestTwoKernel& kernel, uint32_t* bias) {
   std::array<uint32_t, kNumSubsets> sums{};
   for (int i = 0; i < kDescriptorDim; ++i)

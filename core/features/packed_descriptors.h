@@ -18,7 +18,7 @@ inline constexpr std::array kMatchKernels = {MatchKernel::kPortable, MatchKernel
                                              MatchKernel::kNeonDot};
 // "portable", "avx2", "avx_vnni", "avx512_vnni", "neon_dot".
 std::string_view NameOf(MatchKernel kernel);
-// Whether this program has it and this processor runs it.
+// Whether this program contains it and this processor can run it.
 bool IsKernelSupported(MatchKernel kernel);
 // The fastest one that is supported.
 MatchKernel FastestKernel();
@@ -26,7 +26,7 @@ MatchKernel FastestKernel();
 // Words that vector loads find aligned, in whole cache lines.
 class AlignedWords {
  public:
-  // All zero.
+  // New words are zero.
   void Resize(int64_t num_words) { lines_.resize((num_words + 15) / 16); }
   uint32_t* data() { return lines_.empty() ? nullptr : lines_.front().words; }
   const uint32_t* data() const { return lines_.empty() ? nullptr : lines_.front().words; }
@@ -40,8 +40,8 @@ class AlignedWords {
 };
 
 // Descriptors in the layout of core/features/best_two_kernel.h, values in an order that mixes the cells and
-// directions of SIFT: 16-bit sums of the products of neighbours are then exact for nearly all RootSIFT
-// descriptors.
+// directions of SIFT: 16-bit sums of the products of neighbours are then exact for nearly all
+// RootSIFT descriptors.
 struct DescriptorBlock {
   std::vector<int32_t> idx;  // of each descriptor in its image, ascending
   AlignedWords words;
@@ -61,9 +61,10 @@ class PackedDescriptors {
   // Number of descriptors.
   int size() const { return static_cast<int>(small_.idx.size() + other_.idx.size()); }
   MatchKernel kernel() const { return kernel_; }
-  // Memory that it holds.
+  // Memory that it holds, bytes.
   int64_t num_bytes() const;
-  // At most what `num_descriptors` descriptors take once packed, by any kernel: for memory budgets.
+  // Upper limit of the bytes that `num_descriptors` packed descriptors take, for any kernel: for
+  // memory budgets.
   static int64_t NumBytes(int64_t num_descriptors) { return 160 * num_descriptors + 16384; }
 
   // Those that the kernel for small values may take (none if there is no such kernel), and the others.
@@ -76,7 +77,7 @@ class PackedDescriptors {
   DescriptorBlock other_;
 };
 
-// The kernel for any values, and the one for small ones, null where the first is as fast.
+// The kernel for any values, and the one for small values (null where the first is as fast).
 const BestTwoKernel& KernelForAll(MatchKernel kernel);
 const BestTwoKernel* KernelForSmall(MatchKernel kernel);
 

@@ -100,8 +100,9 @@ Result<Features> ExtractSift(const cv::Mat& grey, const SiftOptions& options, co
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   try {
-    // OpenCV's own cap keeps all that are as strong as the weakest kept: ours follows, in an order to rely
-    // on, but the rest is spared its descriptors.  OpenCV caps before it masks, so not with a mask.
+    // OpenCV's own limit keeps all that are as strong as the weakest one kept.  Ours follows, in a fixed
+    // order, but OpenCV's saves computing the other descriptors.  OpenCV applies its limit before the mask,
+    // so it is not used with a mask.
     const int cap = mask.empty() ? options.max_num_features : 0;
     cv::SIFT::create(cap, 3, options.contrast_threshold, options.edge_threshold, 1.6, CV_32F)
         ->detectAndCompute(grey, mask, keypoints, descriptors);

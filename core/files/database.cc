@@ -22,7 +22,7 @@ uint64_t BigEndian(std::string_view bytes) {
   return value;
 }
 
-// Steps between two looks at what is left.
+// Steps between two checks of how many are left.
 constexpr int kStepsPerLook = 1000;
 // Some 3000 tables and indices.
 constexpr int64_t kMaxSchemaSteps = 20'000;
@@ -60,7 +60,7 @@ SqliteHeader ReadSqliteHeader(const std::string& path) {
 
 std::string DatabaseUri(const std::string& path) {
   std::string uri = "file:";
-  for (const unsigned char c : path) {  // percent-encodes what has a meaning in a URI's path
+  for (const unsigned char c : path) {  // percent-encodes characters with a meaning in a URI's path
     if (c == '%' || c == '?' || c == '#') {
       uri += fmt::format("%{:02x}", c);
     } else {
@@ -131,7 +131,7 @@ Status CheckSqliteFile(const std::string& path) {
   if (page_size == 0 || num_bytes % page_size == 0) return Ok();
   return MakeError(
       ErrorCode::kCorrupt,
-      "{}: a truncated SQLite database: {} bytes, which are not whole pages of {}; copy it again", path,
+      "{}: a truncated SQLite database: {} bytes, not a multiple of the page size {}; copy it again", path,
       num_bytes, page_size);
 }
 

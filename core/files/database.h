@@ -32,14 +32,14 @@ auto WithDatabaseErrors(const std::string& path, Body&& body) -> std::invoke_res
     if (code == SQLITE_INTERRUPT) {
       return MakeError(error,
                        "{}: shows more rows than a file of its size can hold: it is damaged, or made to "
-                       "stall its readers; get it again from whoever made it",
+                       "stall its readers; get it again from its source",
                        path);
     }
     return MakeError(error, "{}: SQLite says: {}", path, exception.what());
   }
 }
 
-// What the header of a SQLite database states; 0 what it does not reach to.
+// What the header of a SQLite database states; 0 for fields beyond the end of `head`.
 struct SqliteHeader {
   uint64_t page_size = 0;  // bytes 16, 17
   uint64_t num_pages = 0;  // bytes 28 to 31
@@ -55,17 +55,18 @@ std::string DatabaseUri(const std::string& path);
 // calls no function of its schema that could do harm, checks its cells, maps none of it into memory, and
 // allocates no value longer than the `num_bytes` of the file (at least 100 kB).  Every connection to a file
 // that this process has not written itself is made safe first: OpenImmutable, OpenDatabaseReadOnly and
-// OpenColmapDatabase do it. Throws SQLite::Exception: call it inside WithDatabaseErrors.
+// OpenColmapDatabase do it.  Throws SQLite::Exception: call it inside WithDatabaseErrors.
 void Harden(SQLite::Database& database, uint64_t num_bytes);
 
 // Ends each statement that takes more steps than reading all of a file of `num_bytes` can need: a file whose
-// pages refer to each other can show rows without end.  The steps of a statement add up over its runs: not
-// for one that is kept for a program's life.  Such a statement fails as SQLite's "interrupted".
+// pages refer to each other can show rows without end.  The steps of a statement add up over its runs, so do
+// not use it for a statement that is kept for the program's life.  Such a statement fails as
+// SQLite's "interrupted".
 void LimitSteps(SQLite::Database& database, uint64_t num_bytes);
 
-// While it lives, all that SQLite does on a connection may take so many steps of its machine together, then
-// it ends with SQLITE_INTERRUPT: pages of a hostile file may lead to one another, so that few bytes show more
-// rows than anybody can read.  (LimitSteps is for connections that live for one reading.)
+// While it lives, all statements on a connection together may take this many steps of SQLite's virtual
+// machine, then they end with SQLITE_INTERRUPT: pages of a hostile file may lead to one another, so that few
+// bytes show more rows than can ever be read.  (LimitSteps is for connections that live for one reading.)
 class StepLimit {
  public:
   StepLimit(SQLite::Database& database, int64_t max_num_steps);
@@ -83,10 +84,10 @@ class StepLimit {
 void ReadSchema(SQLite::Database& database);
 
 // Hardened, its schema read.  Takes no lock, looks for no -wal or -shm beside it, and is wrong if somebody
-// writes meanwhile. Throws SQLite::Exception: call it inside WithDatabaseErrors.
+// writes meanwhile.  Throws SQLite::Exception: call it inside WithDatabaseErrors.
 SQLite::Database OpenImmutable(const std::string& path);
 
-// Errors: NotFound, Corrupt (empty, no regular file, without SQLite's magic bytes, or not whole pages).
+// Errors: NotFound, Corrupt (empty, not a regular file, without SQLite's magic bytes, or not whole pages).
 Status CheckSqliteFile(const std::string& path);
 
 // Opens an existing database immutable, hardened and with limited steps, and checks it.

@@ -19,12 +19,12 @@ Result<std::string> ReadFile(const std::string& path) {
     return MakeError(ErrorCode::kIo, "{}: {}: {}", path, what, std::strerror(errno));
   };
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
-  // What took the file's place since does not hold us up.
+  // Non-blocking: what has replaced the file since may be a pipe.
   const FileDescriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (file.get() < 0) return error("cannot be read");
   struct stat status = {};
   if (fstat(file.get(), &status) != 0) return error("cannot be read");
-  if (!S_ISREG(status.st_mode)) return MakeError(ErrorCode::kIo, "{}: is no regular file any more", path);
+  if (!S_ISREG(status.st_mode)) return MakeError(ErrorCode::kIo, "{}: is no longer a regular file", path);
   // One byte more than the file has, so that its end is seen at once; files of /proc say 0.
   std::string contents(static_cast<size_t>(status.st_size) + 1, '\0');
   size_t num_bytes = 0;

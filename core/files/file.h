@@ -9,16 +9,15 @@
 
 namespace cairn {
 
-// Errors: NotFound, Io (also where not all of it can be read).
+// Errors: NotFound, Io (also when only a part of it can be read).
 Result<std::string> ReadFile(const std::string& path);
 
-// Writes through a temporary file in the target's folder (core/files/replacement.h): whoever looks sees the
-// old file or the whole new one.  A target that has the same bytes already is left untouched, its date
-// included.
+// Writes through a temporary file in the target's folder (core/files/replacement.h): a reader sees the old
+// file or the whole new one.  A target that has the same bytes already is left untouched, its date included.
 Status WriteFileAtomically(const std::string& path, std::string_view contents);
 
-// The same for a file that somebody else writes: `write` gets the path of the temporary, an empty file;
-// on its error the temporary is removed and the target stays as it was.
+// The same for a file that other code writes: `write` gets the path of the temporary, an empty file; on its
+// error the temporary is removed and the target stays as it was.
 Status ReplaceFileAtomically(const std::string& path,
                              const std::function<Status(const std::string& temporary)>& write);
 

@@ -4,7 +4,7 @@
 
 namespace cairn {
 
-// An open file's descriptor, or what open() gave instead; closed when it goes.
+// An open file's descriptor, or the -1 that open() returned; closed by the destructor.
 class FileDescriptor {
  public:
   explicit FileDescriptor(int descriptor) : descriptor_(descriptor) {}

@@ -2,8 +2,8 @@
 
 namespace cairn {
 
-// What processes keep each other out with, as long as the object lives: an flock on an open file or folder.
-// Child processes that inherit the descriptor hold the lock too.
+// A lock between processes, held as long as the object lives: an flock on an open file or folder.  Child
+// processes that inherit the descriptor hold the lock too.
 class FileLock {
  public:
   enum class Kind { kShared, kExclusive };
@@ -18,7 +18,8 @@ class FileLock {
   int descriptor() const { return descriptor_; }
   // One try, which does not wait.
   Claim Try(Kind kind);
-  // Turns an exclusive lock into a shared one; for a moment it is none, and another process may come first.
+  // Turns an exclusive lock into a shared one; for a moment nothing is locked, and another process may
+  // come first.
   void Share();
   void Release();
 

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAside = "-old";  // after a temporary's name: the old folder, which stepped aside
+constexpr const char* kAside = "-old";  // after a temporary's name: the old folder, moved aside
 
 // `sync`: fsync for the folder's own entries, syncfs for all that was written to its file system.
 Status Sync(const std::string& folder, int (*sync)(int)) {
@@ -37,8 +37,8 @@ bool Exists(const std::string& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-// Puts the whole folder `temporary` in the place of `path`, in one step where the file system can; what was
-// there before is then at `*old_folder`, "" if nothing was.
+// Puts the whole folder `temporary` in the place of `path`, in one step where the file system can.  What was
+// there before is then at `*old_folder`; "" if there was nothing.
 Status Exchange(const std::string& temporary, const std::string& path, std::string* old_folder) {
   if (!Exists(path)) {
     // A folder that appeared meanwhile is not empty and stays.
@@ -47,7 +47,7 @@ Status Exchange(const std::string& temporary, const std::string& path, std::stri
   }
   *old_folder = temporary;
   if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) return Ok();
-  // File systems that cannot exchange: the old folder steps aside first, and comes back if need be.
+  // File systems that cannot exchange: the old folder is moved aside first, and moved back if that fails.
   *old_folder = temporary + kAside;
   if (std::rename(path.c_str(), old_folder->c_str()) != 0)
     return WriteError(path, "cannot be replaced", errno);
@@ -73,8 +73,8 @@ Status PutInPlace(const std::string& temporary, const std::string& path) {
                    path, old_folder);
 }
 
-// Clears away what killed processes left beside `path`.  One that died between two renames left the old
-// folder aside: it comes back.
+// Removes what killed processes left beside `path`.  A process that died between two renames left the old
+// folder aside: it is moved back.
 void RemoveLeftovers(const std::string& path, const std::string& kind) {
   const fs::path target(path);
   std::vector<std::string> leftovers;
@@ -94,7 +94,7 @@ void RemoveLeftovers(const std::string& path, const std::string& kind) {
   }
 }
 
-// Refuses to replace what is not cairn's.
+// Refuses to replace a folder that cairn did not make.
 Status CheckTarget(const std::string& path, const std::string& kind) {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(path, error);
@@ -127,7 +127,8 @@ Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
   Status status = BeginOwnFolder(temporary, kind);
   if (status.ok()) status = write(temporary);
   if (status.ok()) status = FinishOwnFolder(temporary, kind);
-  // What holds the same already keeps its date; what has become another's while this one was made stays.
+  // A folder that already holds the same keeps its date; one that others changed while this one was
+  // made stays.
   const bool is_same = status.ok() && HoldsTheSame(target, temporary);
   if (status.ok() && !is_same) status = CheckTarget(target, kind);
   if (status.ok() && !is_same) return PutInPlace(temporary, target);

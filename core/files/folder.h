@@ -12,10 +12,9 @@ namespace cairn {
 // stays as it was.  A folder that exists is replaced only if it is empty, or cairn made it as one of `kind`
 // ("a capture") and nobody has added to it or changed it since: nothing else is ever removed, and the old
 // contents only after the new ones are in place.  A folder that would hold the same is left alone, its date
-// included; a file that would hold the same keeps its date.  Temporary folders that killed processes left
-// are removed where they are cairn's by the same rule.
-// Errors: InvalidArgument (a folder with something else in it, or a file or link instead of one), Io, or that
-// of `write`.
+// included; a file that would hold the same keeps its date.  Temporary folders that killed processes left are
+// removed where they are cairn's by the same rule.  Errors: InvalidArgument (a folder with something else in
+// it, or a file or link instead of a folder), Io, or the error of `write`.
 Status ReplaceFolderAtomically(const std::string& path, const std::string& kind,
                                const std::function<Status(const std::string& temporary)>& write);
 

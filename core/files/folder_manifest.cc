@@ -26,7 +26,7 @@ struct Manifest {
   Entries entries;
 };
 
-// A path may hold what ends a line.
+// A path may contain line ends.
 std::string Escaped(const std::string& path) {
   std::string text;
   for (const char c : path) {
@@ -50,7 +50,7 @@ size_t NumFields(std::string_view line) {
   return line.starts_with("folder ") ? 1 : 0;
 }
 
-// Nothing where it is not whole: then the folder counts as one that cairn did not make.
+// Nothing where it is not complete: then the folder counts as one that cairn did not make.
 std::optional<Manifest> ParseManifest(std::string_view text) {
   if (!text.starts_with(kHead) || !text.ends_with('\n')) return std::nullopt;
   text.remove_prefix(kHead.size());
@@ -82,8 +82,8 @@ std::optional<Manifest> ReadManifest(const std::string& folder) {
   return text.ok() ? ParseManifest(*text) : std::nullopt;
 }
 
-// What an entry of a folder is, as its manifest has it; `expected` spares the hash of a file of another size.
-// Nothing for what cairn makes never: a pipe, a socket, a device.
+// What an entry of a folder is, in the manifest's form; with `expected`, a file of another size is not
+// hashed.  Nothing for what cairn never makes: a pipe, a socket, a device.
 Result<std::optional<std::string>> Describe(const fs::directory_entry& entry, const std::string* expected) {
   std::error_code error;
   const fs::file_status status = entry.symlink_status(error);
@@ -106,8 +106,7 @@ bool IsOfManifest(const std::string& path) {
   return path == kFolderManifestFile || IsTemporaryName(path, kFolderManifestFile);
 }
 
-// Visits all that a folder holds by its escaped path, and stops at the first error; its manifest is no part
-// of that.
+// Visits all that a folder holds by its escaped path, and stops at the first error; its manifest is left out.
 template <typename Visit>
 Status VisitEntries(const std::string& folder, const Visit& visit) {
   std::error_code error;
@@ -165,7 +164,7 @@ bool RemoveWithManifest(const std::string& folder) {
   return fs::remove(folder, error);
 }
 
-// The listed files, then the folders that they leave empty, each after what is inside of it.
+// Removes the listed files, then the folders that they leave empty, each after its contents.
 bool RemoveEntries(const std::string& folder, const Manifest& manifest) {
   std::vector<fs::path> paths;
   const Status visited =
@@ -202,13 +201,12 @@ Status CheckOwnFolder(const std::string& folder, const std::string& kind) {
   const std::optional<Manifest> manifest = ReadManifest(folder);
   if (!manifest) {
     const fs::directory_iterator first(folder, error);
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: holds {}, and nothing tells that cairn made it (there is no whole {} in it, which "
-                     "folders of earlier versions lack); nothing was changed: name another folder, or move "
-                     "this one away",
-                     folder,
-                     error || first == fs::directory_iterator() ? "files" : first->path().filename().string(),
-                     kFolderManifestFile);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: holds {}, and nothing shows that cairn made it (there is no complete {} in it, which folders of "
+        "earlier versions lack); nothing was changed: name another folder, or move this one away",
+        folder, error || first == fs::directory_iterator() ? "files" : first->path().filename().string(),
+        kFolderManifestFile);
   }
   if (manifest->kind != kind) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -217,7 +215,7 @@ Status CheckOwnFolder(const std::string& folder, const std::string& kind) {
   }
   if (!manifest->is_finished) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: was never finished, so nothing tells what in it is cairn's; nothing was changed: "
+                     "{}: was never finished, so nothing shows what in it is cairn's; nothing was changed: "
                      "name another folder, or move this one away",
                      folder);
   }
@@ -239,7 +237,7 @@ void KeepDates(const std::string& folder, const std::string& old_folder) {
   for (const auto& [path, what] : manifest->entries) {
     const auto same = old->entries.find(path);
     if (same == old->entries.end() || same->second != what || !what.starts_with("file ")) continue;
-    std::error_code error;  // a date is not worth more than a try
+    std::error_code error;  // a date that cannot be set is no error
     const auto date = fs::last_write_time(fs::path(old_folder) / path, error);
     if (!error) fs::last_write_time(fs::path(folder) / path, date, error);
   }

@@ -37,7 +37,7 @@ Status CheckInputFile(const std::string& path) {
       return MakeError(ErrorCode::kIo, "{}: cannot be read: {}", path, error.message());
     default:
       return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: is {}, expected a file; save what it gives in a file first", path,
+                       "{}: is {}, expected a file; save its contents to a file first", path,
                        KindText(status.type()));
   }
 }

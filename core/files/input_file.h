@@ -7,9 +7,8 @@
 namespace cairn {
 
 // Whether `path` leads, perhaps through links, to a regular file: the only kind of input that is opened.  A
-// pipe would wait for its writer for ever, and to open a device may do something.
-// Errors: NotFound (nothing there, or a folder), InvalidArgument (a pipe, a socket or a device), Io; each
-// says what was found.
+// pipe would wait for its writer for ever, and opening a device may have effects.  Errors: NotFound
+// (nothing there, or a folder), InvalidArgument (a pipe, a socket or a device), Io; each says what was found.
 Status CheckInputFile(const std::string& path);
 
 }  // namespace cairn

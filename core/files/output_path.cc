@@ -30,7 +30,7 @@ Status CheckCanBeReplaced(const std::string& path) {
   }
   const fs::file_status status = fs::status(path, error);
   if (fs::is_directory(status)) return MakeError(ErrorCode::kIo, "{}: is a folder, expected a file", path);
-  // A new file would take its name: who may, would lose /dev/null.
+  // A new file would take its name: root would lose /dev/null.
   if (fs::exists(status) && !fs::is_regular_file(status))
     return MakeError(ErrorCode::kIo, "{}: is a device or a pipe, expected a file", path);
   if (access(folder.c_str(), W_OK) != 0)

@@ -32,7 +32,7 @@ ssize_t ReadFully(int descriptor, std::vector<char>* buffer) {
   return static_cast<ssize_t>(num_read);
 }
 
-// Whether the file at `path` has the bytes of the open one.  What cannot be read is not the same.
+// Whether the file at `path` has the bytes of the open one.  A file that cannot be read counts as different.
 bool HasBytesOf(const std::string& path, int file) {
   const FileDescriptor target(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat new_status = {}, old_status = {};
@@ -60,7 +60,8 @@ bool IsNameOf(const std::string& path, int file) {
          named.st_ino == opened.st_ino;
 }
 
-// On file systems that cannot do it in one step, a second name, which is none where there is a file.
+// Fails where a file exists.  On file systems that cannot do it in one step: a second name (link), which
+// also fails.
 int RenameToNew(const std::string& from, const std::string& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return -1;
@@ -132,7 +133,7 @@ Status Replacement::CopyFrom(const std::string& source_path) {
 
 Status Replacement::Finish() {
   if (!HasBytesOf(path_, file_)) return PutInPlace(/*may_replace=*/true);
-  is_in_place_ = true;  // it was before, but whoever put it there may not have synced the folder
+  is_in_place_ = true;  // it already was, but whoever put it there may not have synced the folder
   return SyncFolderOf(path_, folder_);
 }
 
@@ -144,14 +145,15 @@ Status Replacement::PutInPlace(bool may_replace) {
                      temporary_);
   if (may_replace && replaced_) CAIRN_RETURN_IF_ERROR(GiveAttributes(file_, *replaced_, path_));
   if (fsync(file_) != 0) return WriteError(path_, "cannot be synced", errno);
-  // What was kept back until now, some file systems report here.
+  // Some file systems report delayed errors only here.
   if (close(std::exchange(file_, -1)) != 0 && errno != EINTR)
     return WriteError(path_, "cannot be written", errno);
   if (may_replace) {
     if (rename(temporary_.c_str(), path_.c_str()) != 0) return WriteError(path_, "cannot be replaced", errno);
   } else if (RenameToNew(temporary_, path_) != 0) {
     if (errno != EEXIST) return WriteError(path_, "cannot be created", errno);
-    return MakeError(ErrorCode::kInvalidArgument, "{}: exists already and is not overwritten", path_);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: already exists and is not overwritten; choose another name", path_);
   }
   temporary_.clear();
   is_in_place_ = true;
@@ -174,13 +176,12 @@ Status GiveAttributes(int descriptor, const struct stat& attributes, const std::
   const bool all_read = (mode & S_IROTH) != 0;
   const bool group_reads = (mode & S_IRGRP) != 0;
   if ((!has_owner && !all_read && !(has_group && group_reads)) || (!has_group && group_reads && !all_read)) {
-    return MakeError(
-        ErrorCode::kReadOnly,
-        "{}: is of user {} and group {} with mode {:o}, which user {} cannot give to a new file: they could "
-        "not read it any more; run this as its owner or as root",
-        path, attributes.st_uid, attributes.st_gid, mode, geteuid());
+    return MakeError(ErrorCode::kReadOnly,
+                     "{}: is of user {} and group {} with mode {:o}, which user {} cannot give to a new "
+                     "file: they could no longer read it; run this as its owner or as root",
+                     path, attributes.st_uid, attributes.st_gid, mode, geteuid());
   }
-  // Another group may do what all may.
+  // The other group gets the permissions that everybody has.
   if (!has_group) mode = (mode & ~mode_t{070}) | (mode & 07) << 3;
   if ((own.st_mode & 0777) != mode && fchmod(descriptor, mode) != 0)
     return WriteError(path, fmt::format("a new file cannot be given mode {:o}", mode), errno);

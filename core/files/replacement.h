@@ -11,8 +11,8 @@
 namespace cairn {
 
 // A file on its way to its place: it is written beside it, under a name of its own, and put there in one step
-// when it is whole.  Whoever looks sees the old file or the new one.  Goes without a trace when it is
-// destroyed before that.
+// when it is whole.  A reader sees the old file or the new one.  Leaves nothing behind when it is destroyed
+// before that.
 class Replacement {
  public:
   // Creates the temporary file, empty.  `new_mode`, less the umask: permissions where no file is replaced;
@@ -23,7 +23,7 @@ class Replacement {
   Replacement& operator=(Replacement&&) = delete;
   ~Replacement();
 
-  // What is to be written: through Write and CopyFrom, or by others who open it.
+  // The file to be written: through Write and CopyFrom, or by others who open it.
   const std::string& temporary() const { return temporary_; }
   Status Write(std::string_view bytes);
   // All bytes of another file.  Errors: also NotFound.
@@ -31,12 +31,13 @@ class Replacement {
 
   // Puts the file in place: synced, with owner, group and mode of the file that it replaces, the folder
   // synced afterwards.  A target that has the same bytes already is left untouched, its date included.
-  // Errors: ReadOnly, DiskFull, Io; ReadOnly also where owner or group cannot be kept and could then no
-  // longer read it.  Where only the last step fails, the file stays in place, and the message says so.
+  // Errors: ReadOnly, DiskFull, Io; ReadOnly also where owner or group cannot be kept, and the old ones could
+  // then no longer read it.  Where only the last step fails, the file stays in place, and the
+  // message says so.
   Status Finish();
   // The same for a file that must not exist yet.  Errors: also InvalidArgument (it does).
   Status FinishNew();
-  // Whether the target has the new contents: after an error of Finish, too, it may.
+  // Whether the target has the new contents: possible also after an error of Finish.
   bool is_in_place() const { return is_in_place_; }
 
  private:
@@ -45,16 +46,17 @@ class Replacement {
 
   std::string path_, temporary_;
   int file_ = -1, folder_ = -1;
-  std::optional<struct stat> replaced_;  // where there was a file when this began
+  std::optional<struct stat> replaced_;  // set where there was a file when this began
   bool is_in_place_ = false;
 };
 
-// Gives an open file owner, group and mode of another one, as far as this process may.  Who could read the
-// other one can read it.  `path` is for messages.  Errors: ReadOnly (owner or group cannot be kept, and could
-// then no longer read it), Io.
+// Gives an open file the owner, group and mode of another one, as far as this process may.  Everyone who
+// could read the other one can read it.  `path` is for messages.  Errors: ReadOnly (owner or group cannot be
+// kept, and the old ones could then no longer read it), Io.
 Status GiveAttributes(int descriptor, const struct stat& attributes, const std::string& path);
 
-// Syncs an open folder after `path` in it was put in place.  Errors: Io, and what says that it is in place.
+// Syncs an open folder after `path` in it was put in place.  Errors: Io, with a message that says that it is
+// in place.
 Status SyncFolderOf(const std::string& path, int folder_descriptor);
 
 }  // namespace cairn

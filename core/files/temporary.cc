@@ -17,7 +17,7 @@ namespace cairn {
 namespace {
 
 constexpr std::string_view kTemporaryMark = ".tmp-";
-// Names that are taken, one after the other, before giving up: more than chance can bring.
+// Tries of names that are already taken before giving up: more than can happen by chance.
 constexpr int kMaxNumTries = 100;
 
 }  // namespace
@@ -27,7 +27,7 @@ std::string TemporaryPath(const std::string& target) {
 }
 
 std::string RandomTemporaryPath(const std::string& target) {
-  uint64_t number = 0;  // should the system have none: whoever finds the name taken tries again, or fails
+  uint64_t number = 0;  // if the system gives none: a caller that finds the name taken tries again or fails
   (void)!getrandom(&number, sizeof(number), 0);
   return fmt::format("{}-{:016x}", TemporaryPath(target), number);
 }

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kMinCosine = 0.5;  // 60 degrees off the axis
 // USAC's estimators are written for pixels (one degeneracy test has its threshold in them): perspective
-// coordinates are multiplied by a focal length that makes them such.
+// coordinates are multiplied by a focal length to get pixels.
 constexpr double kPixels = 1000;
 
 struct PointPairs {
@@ -117,6 +117,7 @@ std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& corr
   for (int iteration = 0; iteration < num_wanted; ++iteration) {
     for (int i = 0; i < kSampleSize; ++i)
       std::swap(sample[i], sample[random.UniformInt(i, ahead.size() - 1)]);
+    // [Booij06 §III] "the standard 3D reconstruction 8-point algorithm", here in RANSAC
     const auto model =
         FitEightPoints(Select(pairs, {sample.begin(), sample.begin() + kSampleSize}), is_essential);
     if (!model) continue;
@@ -128,7 +129,7 @@ std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& corr
     if (good > 1e-12)
       num_wanted = std::min(num_wanted, good < 1 ? std::log(1 - kConfidence) / std::log1p(-good) : 0);
   }
-  // Estimated again as long as that finds more inliers.
+  // Estimate again as long as that finds more inliers.
   while (best_inliers.size() > kSampleSize) {
     const auto again = FitEightPoints(Select(pairs, best_inliers), is_essential);
     if (!again) break;

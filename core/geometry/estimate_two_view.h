@@ -8,11 +8,11 @@
 
 namespace cairn {
 
-// Models of two views from matches alone, but for eight points through OpenCV's USAC (MAGSAC++ scores
+// Models of two views from matches alone, all but the eight-point one through OpenCV's USAC (MAGSAC++ scores
 // [Barath20], local optimisation), with a fixed seed: same matches, same model.  They act on bearings, up to
-// scale: b2' M b1 = 0, b2 ~ H b1.  Sampled are the matches whose bearings lie within 60 degrees of both
-// optical axes, where perspective coordinates still have usable errors; callers count, and refine, over all
-// of them. Nothing comes back for too few or degenerate matches (all on a line, all the same).
+// scale: b2' M b1 = 0, b2 ~ H b1.  Samples are drawn from the matches whose bearings lie within 60 degrees of
+// both optical axes, where perspective coordinates still have usable errors; callers count inliers and refine
+// over all matches.  Returns nothing for too few or degenerate matches (all on a line, all the same).
 struct EstimateModelOptions {
   double max_error_rad = 0;
   int max_num_iterations = 5000;
@@ -29,7 +29,8 @@ std::optional<Eigen::Matrix3d> EstimateFundamentalMatrix(const Correspondences& 
 // made equal.
 std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& correspondences,
                                                      bool is_essential, const EstimateModelOptions& options);
-// Four points: a plane, or a camera that only turned.  Its sign takes most bearings to the front.
+// Four points: a plane, or a camera that only turned.  Its sign is such that it takes most bearings to
+// the front.
 std::optional<Eigen::Matrix3d> EstimateHomography(const Correspondences& correspondences,
                                                   const EstimateModelOptions& options);
 

@@ -8,7 +8,7 @@
 
 namespace cairn {
 
-// Where a camera stands on the floor and whereto it looks.
+// Where a camera stands on the floor and in which direction it looks.
 struct FloorPose {
   Eigen::Vector2d position;  // floor frame, metres
   double heading_deg;        // counter-clockwise from +x, [0, 360)
@@ -16,7 +16,7 @@ struct FloorPose {
 
 inline double AngleBetweenDeg(double a, double b) { return std::abs(std::remainder(a - b, 360.0)); }
 
-// A camera that looks straight up or down heads where its image's top points.
+// The heading of a camera that looks straight up or down is the direction of its image's top.
 FloorPose FloorPoseOf(const Pose& cam_from_world, const Pose& floor_from_world);
 
 }  // namespace cairn

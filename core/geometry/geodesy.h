@@ -4,8 +4,8 @@
 
 namespace cairn {
 
-// A place on the Earth, WGS84.  Altitude as its source means it (EXIF: above sea level; the undulation of the
-// geoid is not known here and nearly constant over a map).
+// A place on the Earth, WGS84.  Altitude as its source defines it (EXIF: above sea level; the undulation of
+// the geoid is not known here and nearly constant over a map).
 struct GeodeticPosition {
   double latitude_deg = 0;   // north positive
   double longitude_deg = 0;  // east positive

@@ -9,7 +9,7 @@
 
 namespace cairn {
 
-// Matches of two images as unit bearings in their camera frames; `match_idx` tells the match behind each.
+// Matches of two images as unit bearings in their camera frames; `match_idx` is the match behind each.
 struct Correspondences {
   std::vector<Eigen::Vector3d> bearings1, bearings2;
   std::vector<int> match_idx;

@@ -13,7 +13,7 @@ std::string Dashed(std::string name) {
 
 const char* TypeText(const Option& option) {
   static constexpr const char* kTypes[] = {"true|false", "INT", "FLOAT", "TEXT", "LIST"};
-  return kTypes[option.value.index()];
+  return option.choices.empty() ? kTypes[option.value.index()] : "WORD";
 }
 
 std::string HelpText(const Option& option) {
@@ -30,27 +30,29 @@ std::string HelpText(const Option& option) {
 
 }  // namespace
 
-void OptionArguments::Add(CLI::App& app, OptionTable table) {
+void OptionArguments::Add(ArgumentParser& parser, OptionTable table, const std::vector<std::string>& shown) {
   table_ = std::move(table);
   texts_.resize(table_.size());
-  app.add_option("--options", options_file_,
-                 "TOML file with this stage's options; the command line goes before it")
-      ->type_name("FILE.toml");
   for (size_t i = 0; i < table_.size(); ++i) {
-    arguments_.push_back(app.add_option("--" + Dashed(table_[i].name), texts_[i], HelpText(table_[i]))
-                             ->type_name(TypeText(table_[i]))
-                             ->group("Stage options"));
+    const bool is_shown =
+        shown.empty() || std::find(shown.begin(), shown.end(), table_[i].name) != shown.end();
+    arguments_.push_back(parser.Add("--" + Dashed(table_[i].name), texts_[i], HelpText(table_[i]))
+                             .Type(TypeText(table_[i]))
+                             .Group(is_shown ? "Tuning" : kMoreOptionsHeading));
   }
+  parser.Add("--options", options_file_, "TOML file with these options; the command line overrides it")
+      .Type("FILE.toml")
+      .OnlyInHelpAll();
 }
 
 Status OptionArguments::Apply() const {
   if (!options_file_.empty()) CAIRN_RETURN_IF_ERROR(ReadOptionsFile(options_file_, table_));
   for (size_t i = 0; i < table_.size(); ++i) {
-    if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(SetOption(table_[i], texts_[i]));
+    if (arguments_[i].IsGiven()) CAIRN_RETURN_IF_ERROR(SetOption(table_[i], texts_[i]));
   }
   CAIRN_RETURN_IF_ERROR(CheckOptions(table_));
   for (size_t i = 0; i < table_.size(); ++i) {
-    if (arguments_[i]->count() > 0) CAIRN_RETURN_IF_ERROR(CheckIsRead(table_[i], table_));
+    if (arguments_[i].IsGiven()) CAIRN_RETURN_IF_ERROR(CheckIsRead(table_[i], table_));
   }
   return Ok();
 }
@@ -58,7 +60,7 @@ Status OptionArguments::Apply() const {
 Status OptionArguments::RefuseGiven(const std::vector<std::string>& names, const std::string& reason) const {
   for (size_t i = 0; i < table_.size(); ++i) {
     const bool is_named = std::find(names.begin(), names.end(), table_[i].name) != names.end();
-    if (is_named && arguments_[i]->count() > 0) {
+    if (is_named && arguments_[i].IsGiven()) {
       return MakeError(ErrorCode::kInvalidArgument, "--{}: {}", Dashed(table_[i].name), reason);
     }
   }

@@ -62,15 +62,15 @@ Status CheckMemory(const std::string& work, int64_t num_bytes, int64_t memory_mi
   if (needed_mib <= memory_mib) return Ok();
   return MakeError(
       ErrorCode::kFailed,
-      "{} takes about {} MiB of memory, but --memory allows {}; give it more, or use a larger machine", work,
-      needed_mib, memory_mib);
+      "{} takes about {} MiB of memory, but --memory allows {} MiB; allow more, or use a larger machine",
+      work, needed_mib, memory_mib);
 }
 
 Status CheckMemoryForFile(const std::string& work, const std::string& path, double bytes_per_file_byte,
                           int64_t memory_mib) {
   std::error_code error;
   const auto num_bytes = static_cast<double>(std::filesystem::file_size(path, error));
-  if (error) return Ok();  // whoever reads the file tells why it cannot be read
+  if (error) return Ok();  // the reader of the file says why it cannot be read
   return CheckMemory(fmt::format("{} of {}", work, path), std::llround(bytes_per_file_byte * num_bytes),
                      memory_mib);
 }

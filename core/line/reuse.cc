@@ -19,7 +19,7 @@ constexpr size_t kIdentityBytes = 32;
 constexpr size_t kEntryBytes = 48;
 constexpr size_t kHashBytes = 16;
 constexpr size_t kMinBytes = kMagic.size() + kIdentityBytes + sizeof(uint64_t) + kHashBytes;
-// Databases that are held open at a time.
+// Databases that are open at the same time.
 constexpr int kMaxNumOpen = 64;
 
 void WriteHash(const ContentHash& hash, BlobWriter* blob) {
@@ -73,9 +73,10 @@ Result<std::vector<ReuseEntry>> ReadReuseFile(const std::string& output_path) {
   const std::string_view contents = view.substr(0, view.size() - kHashBytes);
   BlobReader end(view.substr(contents.size()));
   if (ReadHash(&end) != HashContents(contents))
-    return MakeError(ErrorCode::kCorrupt, "{}: damaged: its hash is another", path);
+    return MakeError(ErrorCode::kCorrupt, "{}: damaged: its hash does not fit its contents", path);
   if (contents.substr(kMagic.size(), kIdentityBytes) != ProgramIdentity())
-    return MakeError(ErrorCode::kUnsupported, "{}: of another program, or of another machine's", path);
+    return MakeError(ErrorCode::kUnsupported, "{}: written by another program, or on another kind of machine",
+                     path);
   BlobReader reader(contents.substr(kMagic.size() + kIdentityBytes));
   const uint64_t num_entries = reader.UInt64();
   if (reader.num_left() % kEntryBytes != 0 || reader.num_left() / kEntryBytes != num_entries)

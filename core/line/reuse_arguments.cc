@@ -4,18 +4,20 @@
 
 namespace cairn {
 
-void ReuseArguments::Add(CLI::App& app, const std::string& results) {
-  CLI::Option* const reuse =
-      app.add_option("--reuse", files_,
-                     "Earlier output of this command: unchanged " + results +
-                         " are taken over from it, as from the file at -o; may be given more than once")
-          ->type_name("FILE")
-          ->allow_extra_args(false);
-  app.add_flag("--no-reuse", no_reuse_, "Compute everything anew")->excludes(reuse);
-  app.add_option("--shard", shard_,
-                 "Compute only the I-th of N shares of the " + results +
-                     " that no --reuse file has, and write only these; a run without --shard merges")
-      ->type_name("I/N");
+void ReuseArguments::Add(ArgumentParser& parser, const std::string& results) {
+  const Argument reuse =
+      parser
+          .Add("--reuse", files_,
+               "Earlier output of this command: unchanged " + results +
+                   " are taken over from it, as from the file at -o; may be given more than once")
+          .Type("FILE")
+          .OneAtATime();
+  parser.AddFlag("--no-reuse", no_reuse_, "Compute everything again").Excludes(reuse);
+  parser
+      .Add("--shard", shard_,
+           "Compute only the I-th of N shares of the " + results +
+               " that no --reuse file has, and write only these; a run without --shard merges")
+      .Type("I/N");
 }
 
 Result<ReuseOptions> ReuseArguments::Apply(const std::string& output_path) const {
@@ -24,11 +26,10 @@ Result<ReuseOptions> ReuseArguments::Apply(const std::string& output_path) const
   CAIRN_ASSIGN_OR_RETURN(options.shard, ParseShard(shard_));
   for (const std::string& file : files_) {
     if (!IsSameFile(file, output_path)) continue;
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "--reuse {} is also the output: a shard holds only its own share, the rest of the file would "
-        "be lost; choose another -o",
-        file);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--reuse {} is also the output: a shard holds only its own share, so the rest of the "
+                     "file would be lost; choose another -o",
+                     file);
   }
   return options;
 }

@@ -3,9 +3,8 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "core/base/error.h"
+#include "core/line/arguments.h"
 #include "core/line/reuse.h"
 
 namespace cairn {
@@ -14,8 +13,8 @@ namespace cairn {
 class ReuseArguments {
  public:
   // `results`: what the stage takes over, for --help ("images", "pairs").
-  void Add(CLI::App& app, const std::string& results);
-  // Errors: InvalidArgument (a shard that is none, or that would replace a file it reads).
+  void Add(ArgumentParser& parser, const std::string& results);
+  // Errors: InvalidArgument (an invalid shard, or one that would replace a file that it reads).
   Result<ReuseOptions> Apply(const std::string& output_path) const;
 
  private:

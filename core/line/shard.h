@@ -17,8 +17,8 @@ struct Shard {
 // "3/64".  Errors: InvalidArgument.
 Result<Shard> ParseShard(const std::string& text);
 
-// The shard's items of `num_items`: [first, second).  The shares of all shards are contiguous, ascending,
-// differ by at most one item, and are everything together.
+// The shard's items of `num_items`: [first, second).  The shares of all shards are contiguous and ascending,
+// differ in size by at most one item, and together are all items.
 std::pair<int64_t, int64_t> ShareOf(const Shard& shard, int64_t num_items);
 
 }  // namespace cairn

@@ -10,10 +10,10 @@
 
 namespace cairn {
 
-// What a stage tells about its run beside its result: for the table that ends `cairn compile` and for the
-// build report (docs/build_report.md).  No stage reads it, nothing of it enters a map.
+// What a stage reports about its run besides its result: for the table that ends `cairn compile` and for the
+// build report (docs/build_report.md).  No stage reads it, and nothing of it enters a map.
 struct StageReport {
-  // How many of what (a plural noun), in the order in which it is shown.
+  // Numbers of things, each with a plural noun, in the order in which they are shown.
   using Counts = std::vector<std::pair<std::string, int64_t>>;
 
   // Things left out of the result for one reason.
@@ -21,12 +21,12 @@ struct StageReport {
     std::string what;  // "images", "classes"
     std::string reason;
     int64_t count = 0;
-    std::vector<std::string> names;  // of all of them, or empty where they have none
+    std::vector<std::string> names;  // names of all of them, or empty where they have no names
   };
 
   Counts in;          // what the stage was given
   Counts out;         // what it made of it
-  Counts taken_over;  // what of its result stood in its previous one already and was not computed again
+  Counts taken_over;  // what of it was taken from an earlier result and not computed again
   std::vector<Rejected> rejected;
 };
 

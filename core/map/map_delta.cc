@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view kMagic("cairn map delta1", 16);
 constexpr size_t kLinkBytes = 4;
 constexpr uint32_t kMaxPageSize = 65536;
-// Strong enough to find what is the same; levels beyond it take several times as long for about a percent.
+// Strong enough to find the common parts; higher levels take several times as long and gain about a percent.
 constexpr int kCompressionLevel = 12;
 
 std::string ShortHex(const Hash& hash) {
@@ -51,7 +51,7 @@ std::string UnlinkPages(std::string_view file, size_t page_size) {
   return contents + links.Take();
 }
 
-// And back.  REQUIRES: whole pages
+// The inverse.  REQUIRES: whole pages
 std::string LinkPages(std::string_view unlinked, size_t page_size) {
   const size_t num_pages = unlinked.size() / page_size;
   std::string file(unlinked.substr(0, page_size));
@@ -65,7 +65,7 @@ std::string LinkPages(std::string_view unlinked, size_t page_size) {
   return file;
 }
 
-// Looking back from the last byte of the new map to the first of the old one.
+// A window that reaches from the last byte of the new map back to the first of the old one.
 int WindowLog(size_t num_bytes) {
   const ZSTD_bounds bounds = ZSTD_cParam_getBounds(ZSTD_c_windowLog);
   return std::clamp<int>(std::bit_width(num_bytes), bounds.lowerBound, bounds.upperBound);
@@ -106,19 +106,20 @@ Result<std::string> Decompress(const std::string& from, const std::string& paylo
                      ZSTD_getErrorName(found));
   }
   if (found != num_bytes) {
-    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, stated are {}", what, found,
+    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, but its head states {}", what, found,
                      num_bytes);
   }
   return to;
 }
 
-// A map's bytes, all of which its seal states.
+// A map's bytes, checked against the file hash of its seal.
 Result<std::string> ReadWholeMap(const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
   CAIRN_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
   if (bytes.size() > static_cast<size_t>(MapDelta::kMaxMapBytes)) {
-    return MakeError(ErrorCode::kUnsupported, "{}: {} bytes, deltas are of maps of at most {}; send it whole",
-                     path, bytes.size(), MapDelta::kMaxMapBytes);
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: {} bytes, but deltas are made of maps of at most {} bytes; send it whole", path,
+                     bytes.size(), MapDelta::kMaxMapBytes);
   }
   return bytes;
 }
@@ -188,7 +189,7 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
                        path);
     }
     return MakeError(ErrorCode::kUnsupported,
-                     "{}: is no delta of maps; `cairn delta OLD NEW -o D` makes them", path);
+                     "{}: not a delta of maps; make one with `cairn update delta OLD NEW -o D`", path);
   }
   BlobReader reader(bytes);
   MapDelta delta;
@@ -210,18 +211,18 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
   const uint32_t name_size = reader.UInt32();
   delta.map_name = reader.Bytes(name_size);
   if (!reader.ok()) {
-    return MakeError(ErrorCode::kTruncated, "{}: {} bytes, its head alone has more; copy it again", path,
-                     bytes.size());
+    return MakeError(ErrorCode::kTruncated, "{}: {} bytes, fewer than its head alone has; copy it again",
+                     path, bytes.size());
   }
   delta.payload = reader.Bytes(reader.num_left());
   if (HashOf(delta.map_name + '\0' + delta.payload) != payload_hash) {
     return MakeError(ErrorCode::kCorrupt,
-                     "{}: its payload has not the hash that its head states: it was cut off, damaged or "
-                     "changed; copy it again",
+                     "{}: its payload does not have the hash that its head states: it was cut off, damaged "
+                     "or changed; copy it again",
                      path);
   }
   CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(delta), delta.public_key, delta.signature, path, required,
-                                         "make it with `cairn delta --key`"));
+                                         "make it with `cairn update delta --key`"));
   for (const auto& [num_bytes, page_size] : {std::pair(delta.old_num_bytes, delta.old_page_size),
                                              std::pair(delta.new_num_bytes, delta.new_page_size)}) {
     if (!IsPageSize(page_size) || num_bytes % page_size != 0 || num_bytes == 0 ||
@@ -240,8 +241,7 @@ Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_
     const Result<MapFile> map = MapFile::Open(old_path, {});
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: {} of {} bytes with the hash {}..., but {} leads from one of {} bytes with {}... "
-                     "to map '{}'; ask "
-                     "for a delta from this map, or for the new map as a whole",
+                     "to map '{}'; ask for a delta from this map, or for the new map as a whole",
                      old_path, map.ok() ? fmt::format("map '{}'", map->head().name) : "a file",
                      old_bytes.size(), ShortHex(found), delta_path, delta.old_num_bytes,
                      ShortHex(delta.old_hash), delta.map_name);
@@ -251,7 +251,7 @@ Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_
                                     delta.new_num_bytes, delta_path));
   std::string new_bytes = LinkPages(unlinked, delta.new_page_size);
   if (HashOf(new_bytes) != delta.new_hash) {
-    return MakeError(ErrorCode::kCorrupt, "{}: leads to other bytes than it states; ask for it again",
+    return MakeError(ErrorCode::kCorrupt, "{}: gives other bytes than it states; ask for it again",
                      delta_path);
   }
   return new_bytes;

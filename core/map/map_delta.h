@@ -9,20 +9,26 @@
 
 namespace cairn {
 
-// What a robot that has one map needs to make another, byte for byte: only what differs travels.  Regions
+// What a robot that has one map needs to make another, byte for byte: only the differences are sent.  Regions
 // that did not change cost next to nothing, since their blocks are the same bytes in both files, wherever
 // they lie.
 //
-//   0       16         48         80          88          96          100         104          136 168 232 |
-//   magic | old hash | new hash | old bytes | new bytes | old page  | new page  | payload    | public key |
-//   signature | name, then
-//             BLAKE2b-256 of the whole files     u64         u32         u32        BLAKE2b-256  Ed25519, 0:
-//             not signed   the payload
+//   byte   bytes
+//      0      16   magic
+//     16      32   BLAKE2b-256 of the whole old map
+//     48      32   BLAKE2b-256 of the whole new map
+//     80       8   number of bytes of the old map, u64
+//     88       8   number of bytes of the new map, u64
+//     96       4   page size of the old map, u32
+//    100       4   page size of the new map, u32
+//    104      32   BLAKE2b-256 of the name, a zero byte and the payload
+//    136      32   public key; 0: not signed
+//    168      64   Ed25519 signature of bytes 0 to 167; 0: not signed
+//    232           length of the name (u32), the new map's name, then the payload
 //
-// The signature is of bytes 0 to 167.  name: its length (u32), then the map's name.  Payload: a Zstandard
-// frame with the old file as its prefix.  Both files are taken as their pages without the first four bytes of
-// each but the first, then these as u32 less the page's number: SQLite links the pages of a block by them, so
-// without them a block is contiguous, whatever the pages are.
+// Payload: a Zstandard frame with the old file as its prefix.  Both files are taken as their pages without
+// the first four bytes of each but the first, then these as u32 less the page's number: SQLite links the
+// pages of a block by them, so without them a block is contiguous, whatever the pages are.
 struct MapDelta {
   static constexpr int64_t kMaxMapBytes = int64_t{1} << 30;  // of either map: what Zstandard can look back to
 
@@ -41,19 +47,19 @@ struct MapDelta {
 };
 
 // Both are whole maps.  With a key, signed.  Same maps, same key and same version of libzstd, same bytes.
-// Errors: as MapFile::Open and CheckFileHash; Unsupported (a map of more than kMaxMapBytes); of two signed
-// maps what a robot would say (CheckFollows); Corrupt (the key: PublicKeyOf).
+// Errors: as MapFile::Open and CheckFileHash; Unsupported (a map of more than kMaxMapBytes); for two signed
+// maps those of CheckFollows, as on a robot; Corrupt (the key: PublicKeyOf).
 Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& new_path,
                               const std::optional<SecretKey>& key, bool allow_older = false);
 
 std::string EncodeMapDelta(const MapDelta& delta);
 // Reads a delta and checks every byte of it, and its signature: that of `required`, or, without it, of the
-// key that it names.  Errors: NotFound, Io, EmptyFile, Truncated, Corrupt, Unsupported (no delta, or of a
-// later format), NotSigned (required only), WrongKey.
+// key that it names.  Errors: NotFound, Io, EmptyFile, Truncated, Corrupt, Unsupported
+// (not a delta, or of a later format), NotSigned (required only), WrongKey.
 Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required);
 
-// The bytes of the new map, from those of the old one; the paths are for messages.  Takes memory for both,
-// twice. Errors: InvalidArgument (it is not the map that the delta leads from: names both), Corrupt.
+// The bytes of the new map, from those of the old one; the paths are for messages.  Takes twice the memory of
+// both.  Errors: InvalidArgument (it is not the map that the delta leads from: names both), Corrupt.
 Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_bytes,
                                   const std::string& old_path, const std::string& delta_path);
 

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What lies behind a hash is out of a fuzzer's reach: built for one, any hash will do.
+// A fuzzer cannot get past a hash: built for fuzzing, any hash is accepted.
 template <typename T>
 bool SameHash(const T& found, const T& stated) {
 #ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
@@ -30,7 +30,7 @@ bool SameHash(const T& found, const T& stated) {
 #endif
 }
 
-// What the header of a regular file says, and its length; never waits for a pipe.
+// Checks the header of a regular file and its length; never waits for a pipe.
 Status CheckContainer(const std::string& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) {
@@ -53,7 +53,7 @@ Status CheckContainer(const std::string& path) {
   if (!head.starts_with(std::string_view("SQLite format 3", 16))) {
     return MakeError(
         ErrorCode::kNotSqlite,
-        "{}: not a SQLite database, which a map is ({} bytes without the magic 'SQLite format 3')", path,
+        "{}: not a SQLite database, and so not a map ({} bytes without the magic 'SQLite format 3')", path,
         num_bytes);
   }
   const SqliteHeader header = ParseSqliteHeader(head);
@@ -82,7 +82,7 @@ Error DamagedHead(const std::string& path) {
                  "copy it again");
 }
 
-// What `read` gives, or SQLite's error, also for more steps than the file can ask for.
+// The result of `read`, or SQLite's error, also for more steps than reading such a file takes.
 template <typename Read>
 auto WithinSteps(SQLite::Database& database, const std::string& path, int64_t num_bytes, Read&& read)
     -> std::invoke_result_t<Read> {
@@ -113,7 +113,7 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
     file.path_ = path;
     file.num_bytes_ = static_cast<int64_t>(fs::file_size(path, error));
     SQLite::Database database = OpenImmutable(path);
-    database.exec("PRAGMA cache_size = -256");  // what is read is kept decoded: memory for it would be lost
+    database.exec("PRAGMA cache_size = -256");  // what is read is kept decoded: more would be wasted
     CAIRN_RETURN_IF_ERROR(WithinSteps(database, path, file.num_bytes_,
                                       [&]() -> Status { return file.ReadHead(database, options); }));
     file.connection_ = std::make_unique<Connection>(std::move(database));
@@ -121,7 +121,7 @@ Result<MapFile> MapFile::Open(const std::string& path, const MapFileOptions& opt
   });
 }
 
-// Everything that is used comes from what is hashed here, and from nothing that is read a second time.
+// Everything that is used comes from the rows that are hashed here; nothing is read a second time.
 Status MapFile::ReadHead(SQLite::Database& database, const MapFileOptions& options) {
   CAIRN_RETURN_IF_ERROR(CheckMapVersion(database, path_, kMapVersionMajor));
   minor_version_ = database.execAndGet("PRAGMA user_version").getInt() % 1000;

@@ -25,8 +25,8 @@ struct MapFileOptions {
 class MapFile {
  public:
   // Errors: NotFound; EmptyFile; Truncated; NotSqlite; ForeignFile; TooNew (names the writer); TooOld;
-  // NotSigned; WrongKey; Corrupt (damaged: head and directory do not have the hash that is sealed, or make no
-  // sense); Io.
+  // NotSigned; WrongKey; Corrupt (damaged: head and directory do not have the sealed hash, or are
+  // invalid); Io.
   static Result<MapFile> Open(const std::string& path, const MapFileOptions& options);
   MapFile(MapFile&&) noexcept;
   ~MapFile();
@@ -36,14 +36,14 @@ class MapFile {
   const MapHead& head() const { return head_; }
   const MapDirectory& directory() const { return directory_; }
   const Seal& seal() const { return seal_; }
-  // Minor version of the file's format: for people.  Nothing is read otherwise because of it, since no hash
-  // but the whole file's covers it.
+  // Minor version of the file's format, for people.  Nothing is read differently because of it, since only
+  // the hash of the whole file covers it.
   int minor_version() const { return minor_version_; }
 
-  // The bytes of directory().blocks()[block].  Errors: Corrupt (not those whose hash the directory has), Io.
+  // The bytes of directory().blocks()[block].  Errors: Corrupt (their hash is not the directory's), Io.
   Result<std::string> ReadBlock(int64_t block) const;
-  // What the compilation found out, checked against the hash that the head has of it, or, of earlier formats,
-  // that of the file.  To be checked with CheckMapFindings.  Errors: Corrupt, Io.
+  // What the compilation found out, checked against its hash in the head or, for earlier formats, the hash of
+  // the file.  Not yet checked with CheckMapFindings.  Errors: Corrupt, Io.
   Result<MapFindings> ReadFindings() const;
   // "PATH: block 7", for messages.
   std::string NameOf(int64_t block) const;

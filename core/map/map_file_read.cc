@@ -6,8 +6,8 @@
 namespace cairn {
 namespace {
 
-// Memory that a map's blocks may take, in bytes per byte of the file, beyond a start; the largest seen of
-// maps that were compiled is 20, of stations alone.
+// Memory that a map's blocks may take, in bytes per byte of the file, beyond a start; the largest ratio seen
+// in compiled maps is 20, of a block of stations.
 constexpr int64_t kMostUnfolding = 64;
 constexpr int64_t kSmallMapBytes = int64_t{64} << 20;
 
@@ -52,7 +52,7 @@ class RowsReader {
         return Take(DecodeDocumentNorms(bytes, entry, what), [](const std::vector<float>&) { return Ok(); });
       case BlockKind::kWords:
         return Take(DecodeWordBlock(bytes, entry, directory, what), [&](WordBlock words) -> Status {
-          // The tree stands before the words.
+          // The tree comes before the words.
           if (rows_.vocabulary.nodes.empty())
             return MakeError(ErrorCode::kCorrupt, "{}: words without a tree", what);
           std::move(words.postings.begin(), words.postings.end(),
@@ -72,7 +72,7 @@ class RowsReader {
           std::move(part.nodes.begin(), part.nodes.end(), std::back_inserter(rows_.appearance));
           return Ok();
         });
-      case BlockKind::kAmbiguity:  // stands after the nodes
+      case BlockKind::kAmbiguity:  // comes after the nodes
         return Take(DecodeAmbiguityBlock(bytes, entry, directory, what),
                     [&](AmbiguityBlock block) { return AddAmbiguity(std::move(block)); });
       case BlockKind::kFloorPlan:
@@ -90,7 +90,7 @@ class RowsReader {
     return Ok();  // of a later minor version
   }
 
-  // Lets `add` have a decoded block, if there is memory left for it: a few bytes of a block can stand for
+  // Passes a decoded block to `add` if there is memory left for it: a few bytes of a block can stand for
   // lists of millions.
   template <typename Block, typename Add>
   Status Take(Result<Block> block, Add&& add) {
@@ -98,13 +98,13 @@ class RowsReader {
     num_bytes_left_ -= NumBytes(*block);
     if (num_bytes_left_ < 0) {
       return MakeError(ErrorCode::kCorrupt,
-                       "{}: its blocks unfold to more than {} times its size: no map that cairn wrote",
+                       "{}: its blocks decode to more than {} times its size: not a map that cairn wrote",
                        file_.path(), kMostUnfolding);
     }
     return add(*std::move(block));
   }
 
-  // Postings name images in a file, documents in rows.
+  // Postings name images in a file, but documents in rows.
   Status NameDocuments() {
     const std::vector<char> is_document = DocumentImages(rows_);
     std::vector<int32_t> document_of_image(rows_.images.size(), -1);
@@ -170,7 +170,7 @@ Result<MapRows> ReadMapRows(const MapFile& file) {
   MapRows rows;
   const Status status = RowsReader(file, &rows).Read();
   if (status.ok()) return rows;
-  // CheckMapRows does not know the file.
+  // CheckMapRows does not know the file's name.
   const bool names_file = status.error().message.find(file.path()) != std::string::npos;
   return MakeError(ErrorCode::kCorrupt, "{}{}", names_file ? "" : file.path() + ": ", status.error().message);
 }

@@ -31,8 +31,8 @@ Result<std::string> WriteBlocks(SQLite::Database& database, const MapRows& rows)
   for (BlockEntry entry : layout.entries()) {
     const std::string bytes = layout.Encode(entry);
     if (bytes.size() > 500'000'000) {
-      return MakeError(ErrorCode::kInvalidArgument, "map: a block of {} bytes, at most 500 MB are stored",
-                       bytes.size());
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "map: a block of {} bytes, but at most 500 MB can be stored", bytes.size());
     }
     entry.num_bytes = static_cast<uint32_t>(bytes.size());
     entry.hash = HashOf(bytes);
@@ -47,7 +47,7 @@ Result<std::string> WriteBlocks(SQLite::Database& database, const MapRows& rows)
   return entries;
 }
 
-// Everything but the hashes of the seal; returns the root.
+// Writes everything except the hashes of the seal; returns the root.
 Result<Hash> WriteTables(SQLite::Database& database, const MapRows& rows, const std::string& path) {
   constexpr int64_t kAnyNumBytes = std::numeric_limits<int64_t>::max();
   InsertBlob(database, "INSERT INTO seal VALUES (?)", EncodeSeal(Seal()));

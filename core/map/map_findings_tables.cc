@@ -9,7 +9,7 @@ namespace {
 
 constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
 
-// What a map may have of these tables: earlier formats lack some.
+// The tables that a map may have: earlier formats lack some.
 const std::vector<StoredTable>& FindingsTables() {
   static const std::vector<StoredTable> tables = {
       {"drop_reasons", 7, 4096}, {"region_entropies", 2, 1 << 24}, {"self_test_regions", 8, 1 << 24}};

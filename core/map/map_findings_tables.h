@@ -8,14 +8,14 @@
 
 namespace cairn {
 
-// The tables of schemas/map_findings.sql inside a map file.  These throw SQLite::Exception: call them inside
-// WithDatabaseErrors.
+// The tables of schemas/map_findings.sql inside a map file.  These throw SQLite::Exception: call them
+// inside WithDatabaseErrors.
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings);
-// Those of the tables that the file has, as ReadStoredRows: earlier formats lack some.
+// Reads those of the tables that the file has, as ReadStoredRows: earlier formats lack some.
 Result<StoredRows> ReadFindingsRows(SQLite::Database& database, const std::string& path,
                                     int64_t max_num_bytes);
 
-// What the rows say; to be checked with CheckMapFindings.  Errors: Corrupt.
+// The findings in the rows; not yet checked with CheckMapFindings.  Errors: Corrupt.
 Result<MapFindings> DecodeMapFindings(const StoredRows& rows, const std::string& path);
 
 }  // namespace cairn

@@ -35,7 +35,7 @@ void WriteTexts(SQLite::Database& database, const char* sql,
   }
 }
 
-// Rows of `meta` that say what the world frame means.
+// Rows of `meta` that describe the world frame.
 std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
   std::map<std::string, std::string> texts = {{"unit", frame.unit},
                                               {"frame_source", frame.source},
@@ -70,7 +70,7 @@ Result<Pose> PoseOf(const StoredRow& row, size_t first) {
               {values[4], values[5], values[6]}};
 }
 
-// Of a map without these rows, the frame is a survey's, in metres.
+// Without these rows, the frame is a survey's, in metres.
 Status ReadFrame(std::map<std::string, std::string> meta, const std::string& path, CaptureFrame* frame) {
   if (meta.count("unit") > 0) frame->unit = meta["unit"];
   if (meta.count("frame_source") > 0) frame->source = meta["frame_source"];
@@ -259,7 +259,7 @@ Status CheckMapVersion(SQLite::Database& database, const std::string& path, int 
                    "{}: map version {}.{}, written by {}; {}.x is read here. {}", path, found, version % 1000,
                    writer, major,
                    found > major ? "Update the program, or compile the map with this one."
-                                 : "Make a new one of it with `cairn migrate`, or compile the map again.");
+                                 : "Convert it with `cairn migrate`, or compile the map again.");
 }
 
 Status DecodeMapHead(const StoredRows& rows, const std::string& path, MapHead* head) {

@@ -9,7 +9,7 @@
 
 namespace cairn {
 
-// The small tables of a map, which every format has: meta, stage_options, inputs, frames, cameras, self_test.
+// The small tables of a map that every format has: meta, stage_options, inputs, frames, cameras, self_test.
 // All of these throw SQLite::Exception: call them inside WithDatabaseErrors.
 
 // From the rows of HeadTables().  Errors: Corrupt.

@@ -124,8 +124,8 @@ Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string&
   int64_t num_bytes = 0;
   for (const StoredTable& table : tables) {
     CAIRN_RETURN_IF_ERROR(CheckPlainTable(database, path, table.name));
-    // No ORDER BY: the order is that of the table's b-tree, and a sorter would keep all rows before the
-    // first.
+    // No ORDER BY: the order is that of the table's b-tree, and a sorter would keep all rows before
+    // the first.
     SQLite::Statement query(database, fmt::format("SELECT * FROM {} NOT INDEXED", table.name));
     const auto num_columns = static_cast<size_t>(query.getColumnCount());
     if (num_columns < table.min_num_columns) {

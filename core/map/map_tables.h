@@ -13,10 +13,10 @@
 namespace cairn {
 
 // Rows of a map's small tables, each read once and by position: what is hashed is what is used.  SQLite may
-// answer a second question about a table otherwise than the first: from an index that states other values, or
-// under column names that somebody exchanged.  So nobody asks twice.
+// answer a second query of a table differently from the first: from an index with other values, or under
+// column names that somebody exchanged.  So no table is queried twice.
 
-// A value as SQLite hands it out.
+// A value as SQLite returns it.
 struct StoredText {
   std::string text;
 };
@@ -48,7 +48,7 @@ class StoredRow {
   std::vector<StoredValue> values_;
 };
 
-// What is expected of a table.  Later minor versions add columns at the end.
+// The expected form of a table.  Later minor versions add columns at the end.
 struct StoredTable {
   const char* name;
   size_t min_num_columns;
@@ -59,23 +59,23 @@ using StoredRows = std::map<std::string, std::vector<StoredRow>>;  // by table
 // The tables that a robot reads when it opens a map.
 const std::vector<StoredTable>& HeadTables();
 
-// Reads tables in the order of their primary keys, in which they lie in the file: no index is asked. Texts
-// and blobs of more than `max_num_bytes` together, which a file of that size holds only where its parts stand
-// for several at once, are refused.  Throws SQLite::Exception: call it inside WithDatabaseErrors. Errors:
-// Corrupt (no plain table, too few columns, too many rows or bytes).
+// Reads tables in the order of their primary keys, in which they lie in the file: no index is used.  Refuses
+// texts and blobs of more than `max_num_bytes` together: a file of that size holds more only where several
+// values share the same bytes.  Throws SQLite::Exception: call it inside WithDatabaseErrors.  Errors: Corrupt
+// (not a plain table, too few columns, too many rows or bytes).
 Result<StoredRows> ReadStoredRows(SQLite::Database& database, const std::string& path,
                                   const std::vector<StoredTable>& tables, int64_t max_num_bytes);
 
 // BLAKE2b over tables, in the order of their names, as schemas/FORMAT.md says.
 Hash TablesHash(const StoredRows& rows);
-// The same over the head's tables and then the directory: what a map's signature stands for.
+// The same over the head's tables and then the directory: the hash that a map's signature covers.
 Hash RootHash(const StoredRows& head, std::string_view directory);
 
-// Whether `table` is a plain one: no view, no virtual table, no generated column, which could run a program
-// of whoever made the file.  Errors: Corrupt.
+// Checks that `table` is a plain one: not a view or a virtual table, and without a generated column, which
+// could run code of the file's maker.  Errors: Corrupt.
 Status CheckPlainTable(SQLite::Database& database, const std::string& path, const char* table);
 
-// More steps than it takes to read the head, the findings or a block of a map of this size.
+// Limit of steps: more than reading the head, the findings or a block of a map of this size takes.
 int64_t MaxStepsFor(int64_t num_bytes);
 
 }  // namespace cairn

@@ -1,4 +1,4 @@
-// Maps signed: the epoch set, then the seal made anew over what the file has become.
+// Signing maps: the epoch is set, then the seal is made again over the changed file.
 #include <algorithm>
 #include <filesystem>
 
@@ -12,7 +12,7 @@
 namespace cairn {
 namespace {
 
-// Of all that a robot reads at opening but the epoch.
+// Hash of all that a robot reads when it opens the map, except the epoch.
 Hash HashWithoutEpoch(StoredRows rows) {
   std::erase_if(rows.at("meta"), [](const StoredRow& row) {
     const Result<std::string> key = row.Text(0);
@@ -21,7 +21,7 @@ Hash HashWithoutEpoch(StoredRows rows) {
   return TablesHash(rows);
 }
 
-// Writes the epoch into a map file; returns the root of what it has become, in which nothing else may differ.
+// Writes the epoch into a map file; returns the new root.  Nothing else may change.
 Result<Hash> SetEpoch(const std::string& path, uint64_t epoch) {
   return WithDatabaseErrors(path, [&]() -> Result<Hash> {
     std::error_code error;
@@ -55,7 +55,7 @@ Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const st
   const uint64_t own_epoch = map.head().epoch;
   const uint64_t wanted = epoch.value_or(std::max<uint64_t>(own_epoch, 1));
   if (wanted == 0)
-    return MakeError(ErrorCode::kInvalidArgument, "{}: epoch 0 is that of a map never counted; count from 1",
+    return MakeError(ErrorCode::kInvalidArgument, "{}: epoch 0 means a map without an epoch; count from 1",
                      signed_path);
   CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(signed_path));
   CAIRN_RETURN_IF_ERROR(file.CopyFrom(path));

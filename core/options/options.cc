@@ -122,7 +122,7 @@ Status CheckIsRead(const Option& option, const OptionTable& table) {
 std::string NearestWord(const std::string& word, const std::vector<std::string>& candidates) {
   std::string nearest;
   size_t least =
-      std::max<size_t>(2, word.size() / 3) + 1;  // farther than a third of the word is no suggestion
+      std::max<size_t>(2, word.size() / 3) + 1;  // a word that differs in more than a third is not suggested
   for (const std::string& candidate : candidates) {
     std::vector<size_t> row(candidate.size() + 1);  // Levenshtein distance, one row at a time
     std::iota(row.begin(), row.end(), size_t{0});

@@ -10,7 +10,7 @@
 
 namespace cairn {
 
-// That an option has one of these values, as OptionValueText has them; "not X": any but X.
+// The condition that an option has one of these values, as OptionValueText writes them; "not X": any but X.
 struct OptionCondition {
   std::string option;
   std::vector<std::string> values;
@@ -25,8 +25,8 @@ struct Option {
   double min = -std::numeric_limits<double>::infinity();  // numbers: inclusive range
   double max = std::numeric_limits<double>::infinity();
   std::vector<std::string> choices;  // strings: the allowed values; empty = any
-  // Where others of the table have other values, nothing reads this one: then it is refused on the command
-  // line, and warned of in a recipe.
+  // Where the other options have other values, this one has no effect: it is then refused on the command
+  // line, and a warning is given for it in a recipe.
   std::vector<OptionCondition> only_where = {};
 };
 using OptionTable = std::vector<Option>;
@@ -40,18 +40,18 @@ std::string OptionValueText(const Option& option);
 Status CheckOptions(const OptionTable& table);
 
 std::vector<std::string> NamesOf(const OptionTable& table);
-// Adds a condition to options of the table.  REQUIRES: all are in it
+// Adds a condition to options of the table.  REQUIRES: the table has all of them
 void AddCondition(const OptionCondition& condition, const std::vector<std::string>& names,
                   OptionTable* table);
-// Whether something reads this option of the table, by its conditions.
-// Errors: InvalidArgument, naming the condition that does not hold.
+// Whether this option of the table has an effect, by its conditions.  Errors: InvalidArgument, naming the
+// condition that does not hold.
 Status CheckIsRead(const Option& option, const OptionTable& table);
 
 // Sets options from the keys of a TOML file (a stage's options file: one table, no headers).
-// Errors: NotFound, Corrupt (not TOML; line), InvalidArgument (unknown key, with the nearest valid one; wrong
-// type).
+// Errors: NotFound, Corrupt (not TOML; line), InvalidArgument (unknown key, with the nearest valid one;
+// wrong type).
 Status ReadOptionsFile(const std::string& path, const OptionTable& table);
-// The table as a TOML document, every key with its value in the table's order: canonical, equal options give
+// The table as a TOML document, every key with its value in the table's order.  Canonical: equal options give
 // equal bytes.
 std::string OptionsToml(const OptionTable& table);
 

@@ -1,4 +1,4 @@
-// Options in TOML: apart from the options themselves, which a robot has too.
+// Options in TOML: in a file of its own, since a robot needs the options but not TOML.
 #include <algorithm>
 #include <sstream>
 

@@ -17,6 +17,11 @@ struct GridPoint {
   auto operator<=>(const GridPoint&) const = default;
 };
 
+// In the plane, in units of the grid.
+inline Eigen::Vector2d Real(const GridPoint& point) {
+  return {static_cast<double>(point.x), static_cast<double>(point.y)};
+}
+
 // Largest coordinate on the grid: products of differences then fit into 64 bits, predicates are exact.
 inline constexpr int64_t kMaxGridCoordinate = int64_t{1} << 29;
 

@@ -11,8 +11,6 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
 }  // namespace
 
 void ToggleLabels(const LabelIdx* first, const LabelIdx* last, std::vector<LabelIdx>* labels) {
@@ -112,7 +110,7 @@ Status CheckViews(const Views& views, const std::string& what) {
 
 namespace {
 
-// New number of every vertex by first use; -1: of no use.  REQUIRES: CheckViews(views)
+// New number of every vertex by first use; -1: not used.  REQUIRES: CheckViews(views)
 std::vector<int32_t> NumbersByUse(const Views& views) {
   std::vector<int32_t> numbers(views.vertices.size(), -1);
   int32_t next = 0;

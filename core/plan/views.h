@@ -11,25 +11,25 @@ namespace cairn {
 
 using FaceIdx = int32_t;
 
-// Numbers that tell regions apart, of one region's views [Simsarian96 §2.3].  Lengths and areas are seen from
-// the centroid of the region.
+// Numbers that describe the views of one region and tell regions apart [Simsarian96 §2.3].  Lengths and areas
+// are seen from the centroid of the region.
 struct ViewIndex {
   int32_t num_labels = 0;      // visible walls; the same everywhere in the region
-  float wall_length_m = 0;     // their whole length; the same everywhere in the region
-  float visible_length_m = 0;  // length of what is visible of them
-  float visible_area_m2 = 0;   // area of what lies before them
+  float wall_length_m = 0;     // their total length; the same everywhere in the region
+  float visible_length_m = 0;  // length of their visible parts
+  float visible_area_m2 = 0;   // area between the viewer and them
   float longest_m = 0;         // length of the longest visible stretch of one wall
 };
 
-// Two regions with a common border that is no wall.
+// Two regions with a common border that is not a wall.
 struct ViewLink {
   FaceIdx a = 0, b = 0;        // a < b
   int32_t start = 0, end = 0;  // vertices of the border; a lies to its left
   auto operator<=>(const ViewLink&) const = default;
 };
 
-// Where a laser can tell it is: the view-invariant regions (VIRs) of a floor plan.  From all points of one
-// the same walls' sides (labels) are visible.
+// The regions that a laser can tell apart: the view-invariant regions (VIRs) of a floor plan.  From all
+// points of one region the same sides of walls (labels) are visible.
 //
 // Label sets are stored as differences along a tree over the adjacency graph: a region's set is its parent's
 // with some labels toggled; regions without a parent toggle the empty set, and there is one every so often.
@@ -42,8 +42,8 @@ struct Views {
   std::vector<int64_t> face_offsets{0};
   std::vector<int32_t> face_vertices;
   std::vector<FaceIdx> parents;  // -1: none
-  // Labels that differ from the parent's: toggled_labels[toggle_offsets[i] .. toggle_offsets[i + 1]),
-  // ascending.
+  // Labels that differ from the parent's: toggled_labels[toggle_offsets[i] .. toggle_offsets[i
+  // + 1]), ascending.
   std::vector<int64_t> toggle_offsets{0};
   std::vector<LabelIdx> toggled_labels;
   std::vector<ViewIndex> index;
@@ -60,12 +60,12 @@ struct Views {
   Eigen::Vector2d Centroid(FaceIdx face) const;
 };
 
-// Errors: Corrupt where a reference leads out of range, a parent does not come first, or lists are out of
-// order.
+// Errors: Corrupt where a reference leads out of range, a parent does not come first, or lists are out
+// of order.
 Status CheckViews(const Views& views, const std::string& what);
 
-// Numbers the vertices in the order in which regions name them: each region's corners, then what
-// else its links (those of which it is `a`) end at, by place.  Vertices that nothing names go.
+// Numbers the vertices in the order in which regions name them: each region's corners, then the other ends of
+// its links (those of which it is `a`), by place.  Unused vertices are removed.
 void NumberVerticesByUse(Views* views);
 bool IsNumberedByUse(const Views& views);
 
@@ -73,7 +73,7 @@ bool IsNumberedByUse(const Views& views);
 // Errors: NotFound, Corrupt, Unsupported (another version).
 Result<Views> ReadViews(const std::string& path);
 
-// Which region a point lies in.
+// Finds the region that a point lies in.
 class FaceLocator {
  public:
   // `views` outlives this.

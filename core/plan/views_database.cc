@@ -30,7 +30,7 @@ std::vector<int32_t> Flat(const std::vector<GridPoint>& points) {
 
 Result<std::vector<GridPoint>> ReadPoints(const SQLite::Column& column, const std::string& what) {
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int32_t> values, BlobToVector<int32_t>(column, what));
-  if (values.size() % 2 != 0) return Corrupt(what, "{} numbers are no pairs", values.size());
+  if (values.size() % 2 != 0) return Corrupt(what, "{} numbers are not pairs", values.size());
   std::vector<GridPoint> points(values.size() / 2);
   for (size_t i = 0; i < points.size(); ++i) points[i] = {values[2 * i], values[2 * i + 1]};
   return points;
@@ -141,7 +141,7 @@ Status ReadPlanTables(SQLite::Database& database, const std::string& path, Views
     plan.walls.push_back({{walls.getColumn(1).getDouble(), walls.getColumn(2).getDouble()},
                           {walls.getColumn(3).getDouble(), walls.getColumn(4).getDouble()}});
     CAIRN_ASSIGN_OR_RETURN(const std::vector<int32_t> ends, BlobToVector<int32_t>(walls.getColumn(5), what));
-    if (ends.size() % 2 != 0) return Corrupt(what, "{} ends of pieces are no pairs", ends.size());
+    if (ends.size() % 2 != 0) return Corrupt(what, "{} ends of pieces are not pairs", ends.size());
     for (size_t i = 0; i < ends.size(); i += 2) plan.pieces.push_back({ends[i], ends[i + 1], idx});
   }
   return Ok();
@@ -166,7 +166,7 @@ Status ReadRegions(SQLite::Database& database, const std::string& path, Views* v
       label += static_cast<int64_t>(step);
       views->toggled_labels.push_back(static_cast<LabelIdx>(label));
     }
-    if (!reader.Finished()) return Corrupt(path, "region {}: its labels are no list", face);
+    if (!reader.Finished()) return Corrupt(path, "region {}: its labels are not a valid list", face);
     views->toggle_offsets.push_back(static_cast<int64_t>(views->toggled_labels.size()));
     views->index.push_back({.num_labels = rows.getColumn(4).getInt(),
                             .wall_length_m = static_cast<float>(rows.getColumn(5).getDouble()),
@@ -182,7 +182,8 @@ Status ReadLinks(SQLite::Database& database, const std::string& path, Views* vie
   while (rows.executeStep()) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<int32_t> values,
                            BlobToVector<int32_t>(rows.getColumn(0), path + ": links"));
-    if (values.size() % 4 != 0) return Corrupt(path, "links: {} numbers are no fours", values.size());
+    if (values.size() % 4 != 0)
+      return Corrupt(path, "links: {} numbers are not groups of four", values.size());
     for (size_t i = 0; i < values.size(); i += 4)
       views->links.push_back({values[i], values[i + 1], values[i + 2], values[i + 3]});
   }

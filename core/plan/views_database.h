@@ -11,7 +11,7 @@
 namespace cairn {
 
 // Writes views.db; ReadViews (core/plan/views.h) reads it.  `fill_changes` fills the table plan_changes.
-// Errors: those of the file, Cancelled (nothing is left of it).
+// Errors: those of the file, Cancelled (no file is left).
 Status WriteViews(const Views& views, const std::string& path, Progress& progress,
                   const std::function<Status(SQLite::Database&)>& fill_changes);
 

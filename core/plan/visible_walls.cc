@@ -13,7 +13,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 constexpr double kPi = std::numbers::pi;
-// Directions closer than this are one, rad.
+// Directions closer than this count as equal, rad.
 constexpr double kSameDirection = 1e-11;
 
 struct Side {
@@ -81,6 +81,7 @@ std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::v
     if (to - event.angle < kSameDirection) continue;
     const double middle = 0.5 * (event.angle + to);
     const Vec2 direction(std::cos(middle), std::sin(middle));
+    // [Simsarian96 §2] of the edges in a direction the nearest is visible
     const Side* nearest = nullptr;
     double nearest_distance = std::numeric_limits<double>::infinity();
     for (const int index : ahead) {
@@ -103,7 +104,7 @@ std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::v
     }
     open = true;
   }
-  // The first and the last may be one.
+  // The first and the last may be the same stretch.
   if (stretches.size() > 1 && open && stretches.front().label == stretches.back().label &&
       (stretches.front().start - stretches.back().end).norm() < 1e-6) {
     stretches.front().start = stretches.back().start;

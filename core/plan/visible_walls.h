@@ -17,9 +17,10 @@ struct VisibleStretch {
   double Length() const { return (end - start).norm(); }
 };
 
-// Stretches of the walls of `labels` that are visible from a point, counter-clockwise, if nothing but these
-// walls hid one another: with the label set of the point's region, what is visible.  A label seen through
-// several windows has as many stretches.  O(n log n + n k) for n pieces of their walls, k in one direction.
+// Stretches of the walls of `labels` that are visible from a point, counter-clockwise, if only these walls
+// hide one another.  With the label set of the point's region these are all visible stretches.  A label seen
+// through several windows has as many stretches.  O(n log n + n k) for n pieces of their walls, k in
+// one direction.
 std::vector<VisibleStretch> VisibleStretches(const FloorPlan& plan, const std::vector<LabelIdx>& labels,
                                              const Eigen::Vector2d& place);
 

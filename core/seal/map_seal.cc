@@ -31,7 +31,7 @@ crypto_generichash_state* StateOf(std::array<uint8_t, 384>* bytes) {
   return reinterpret_cast<crypto_generichash_state*>(bytes->data());
 }
 
-// What a signature is of.
+// The bytes that a signature covers.
 std::string SignedBytes(const Seal& seal) { return EncodeSeal(seal).substr(0, kSignedBytes); }
 
 // A map file open for its seal.
@@ -73,7 +73,8 @@ class SealedFile {
     return Ok();
   }
 
-  // Of all bytes, those from the file hash to the end of the seal taken as zero; the seal's head as `head`.
+  // Hash of all bytes, with those from the file hash to the end of the seal taken as zero, and `seal`'s bytes
+  // before them.
   Result<Hash> HashFile(const Seal& seal) const {
     const std::string head =
         EncodeSeal(seal).substr(0, kFileOffset) + std::string(Seal::kNumBytes - kFileOffset, '\0');

@@ -12,15 +12,15 @@
 
 namespace cairn {
 
-// What makes a map one that nobody changed since: 176 bytes at a fixed place in the file, its page 2.
+// Shows that nobody has changed a map since it was made: 176 bytes at a fixed place in the file, its page 2.
 //
 //   0            16         48         80            112          176
 //   | magic      | root     | file     | public key  | signature  |
 //
 // root: BLAKE2b over the tables that a robot reads when it opens the map, and over the directory with the
-// hash of every block: whoever has checked root and signature can check a block when it is loaded.  file:
-// BLAKE2b over all bytes of the file, those of `file` to `signature` taken as zero.  signature: Ed25519 over
-// magic, root and file; key and signature are zero in a map that nobody has signed.
+// hash of every block: a reader that has checked root and signature can check each block when it is loaded.
+// file: BLAKE2b over all bytes of the file, those of `file` to `signature` taken as zero.  signature: Ed25519
+// over magic, root and file; key and signature are zero in a map that nobody has signed.
 struct Seal {
   static constexpr size_t kNumBytes = 176;
   Hash root = {};
@@ -31,7 +31,7 @@ struct Seal {
   bool is_signed() const { return public_key != PublicKey() || signature != Signature(); }
 };
 
-// BLAKE2b-256 of parts one after the other.
+// BLAKE2b-256 of several parts in turn.
 class Hasher {
  public:
   Hasher();
@@ -57,14 +57,14 @@ Status SignFile(const std::string& path, const Hash& root, const SecretKey& key)
 Result<Seal> ReadSeal(const std::string& path);
 // Errors: Corrupt when the bytes of the file do not have the hash that its seal states.
 Status CheckFileHash(const std::string& path);
-// Whether the signature is that of `required`, or, without it, of the key that the seal has.
-// Errors: NotSigned (required only), WrongKey.
+// Whether the signature is by `required` or, without it, by the key in the seal.  Errors: NotSigned (required
+// only), WrongKey.
 Status CheckSignature(const Seal& seal, const std::string& path, const std::optional<PublicKey>& required);
 
-// Writes a signed copy of a map, of this epoch; the old file stays.  Without an epoch: of the map's own, or 1
-// where it was never counted.  Returns the epoch.  What is put in place was opened with the key before; same
+// Writes a signed copy of a map, of this epoch; the old file stays.  Without an epoch: the map's own, or 1
+// where it has none.  Returns the epoch.  The copy is opened with the key before it is put in place; same
 // map, epoch and key, same bytes.  Errors: as MapFile::Open; InvalidArgument (epoch 0); Corrupt (the map's
-// own hash is wrong: what nobody has checked is not signed; or the key: PublicKeyOf); as Replacement::Finish.
+// own hash is wrong: an unchecked map is not signed; or the key: PublicKeyOf); as Replacement::Finish.
 Result<uint64_t> SignMap(const std::string& path, const SecretKey& key, const std::string& signed_path,
                          std::optional<uint64_t> epoch = std::nullopt);
 

@@ -12,18 +12,19 @@ bool IsSignatureOf(std::string_view bytes, const PublicKey& public_key, const Si
 
 }  // namespace
 
-// A signature takes in both halves of the key.  Two of the same bytes, one with a public half that is not the
-// seed's, give away what signs: so no half is taken on trust, and what comes out is checked.
+// A signature uses both halves of the key.  Two signatures of the same bytes, one made with a public half
+// that does not belong to the seed, reveal the secret key: so neither half is trusted, and the result
+// is checked.
 Result<Signature> SignBytes(std::string_view bytes, const SecretKey& key) {
   CAIRN_ASSIGN_OR_RETURN(const PublicKey public_key, PublicKeyOf(key));
   Signature signature;
   crypto_sign_detached(signature.data(), nullptr, reinterpret_cast<const uint8_t*>(bytes.data()),
                        bytes.size(), key.data());
   if (IsSignatureOf(bytes, public_key, signature)) return signature;
-  return MakeError(ErrorCode::kFailed,
-                   "a signature that was just made is not one of key {}: this machine miscalculates; nothing "
-                   "is signed",
-                   HexOf(public_key));
+  return MakeError(
+      ErrorCode::kFailed,
+      "a signature that was just made is not valid for key {}: this machine miscalculates; nothing is signed",
+      HexOf(public_key));
 }
 
 Status CheckSignatureOf(std::string_view bytes, const PublicKey& public_key, const Signature& signature,
@@ -39,7 +40,7 @@ Status CheckSignatureOf(std::string_view bytes, const PublicKey& public_key, con
                      HexOf(public_key), HexOf(*required));
   }
   if (IsSignatureOf(bytes, public_key, signature)) return Ok();
-  return MakeError(ErrorCode::kWrongKey, "{}: its signature is not that of key {}: it was changed since",
+  return MakeError(ErrorCode::kWrongKey, "{}: its signature is not valid for key {}: it was changed since",
                    path, HexOf(public_key));
 }
 

@@ -22,7 +22,7 @@ static_assert(crypto_sign_PUBLICKEYBYTES == 32 && crypto_sign_SECRETKEYBYTES == 
 constexpr size_t kNumSecretDigits = 2 * crypto_sign_SECRETKEYBYTES;
 constexpr size_t kNumPublicDigits = 2 * crypto_sign_PUBLICKEYBYTES;
 
-// Some text, overwritten when it goes.  One more than what is read of a key's file: longer is no key.
+// A text that is overwritten when it is destroyed.  Longer than any key: a file that fills it is not a key.
 struct SecretText {
   ~SecretText() { sodium_memzero(characters.data(), characters.size()); }
   std::array<char, 512> characters = {};
@@ -53,11 +53,10 @@ Status ReadKeyText(const std::string& path, bool is_secret, SecretText* text) {
                      "{}: not a regular file, expected a key from `cairn keygen`", path);
   }
   if (is_secret && (status.st_mode & 077) != 0) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: others than its owner may use it (mode {:04o}), expected a secret key of mode 0600; "
-        "`chmod 600 {}`, and make a new key if somebody may have read it",
-        path, status.st_mode & 07777, path);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: users other than its owner may use it (mode {:04o}), expected a secret key of mode "
+                     "0600; `chmod 600 {}`, and make a new key if somebody may have read it",
+                     path, status.st_mode & 07777, path);
   }
   while (text->size < text->characters.size()) {
     const ssize_t num_read =
@@ -100,7 +99,8 @@ Status WriteKeyPair(const KeyPair& keys, const std::string& path) {
   for (const std::string& file : {path, public_path}) {
     struct stat status = {};
     if (lstat(file.c_str(), &status) == 0)
-      return MakeError(ErrorCode::kInvalidArgument, "{}: exists already; keys are not overwritten", file);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: already exists; keys are not overwritten: choose another name", file);
   }
   SecretText text;
   sodium_bin2hex(text.characters.data(), text.characters.size(), keys.secret_key.data(),
@@ -113,7 +113,7 @@ Status WriteKeyPair(const KeyPair& keys, const std::string& path) {
   CAIRN_RETURN_IF_ERROR(public_file.Write(HexOf(keys.public_key) + "\n"));
   Status status = public_file.FinishNew();
   if (status.ok()) status = secret_file.FinishNew();
-  // Of a pair that nobody has used yet, half is worth nothing, and would be in the way of the next.
+  // Half of a pair that nobody has used yet is useless, and would block the next one.
   if (public_file.is_in_place() && !secret_file.is_in_place()) unlink(public_path.c_str());
   return status;
 }
@@ -122,9 +122,9 @@ Result<SecretKey> ReadSecretKey(const std::string& path) {
   SecretText text;
   CAIRN_RETURN_IF_ERROR(ReadKeyText(path, /*is_secret=*/true, &text));
   if (text.size == kNumPublicDigits && IsHex(text.view())) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: is a public key; what signs is the secret one, which `cairn keygen KEY` wrote as KEY", path);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: is a public key; sign with the secret one, which `cairn keygen KEY` wrote as KEY",
+                     path);
   }
   if (text.size != kNumSecretDigits || !IsHex(text.view()))
     return NotAKey(path, "secret key", text.size, kNumSecretDigits);
@@ -136,7 +136,7 @@ Result<SecretKey> ReadSecretKey(const std::string& path) {
 }
 
 Result<PublicKey> ReadPublicKey(const std::string& path) {
-  SecretText text;  // for all we know
+  SecretText text;  // it may hold a secret key
   CAIRN_RETURN_IF_ERROR(ReadKeyText(path, /*is_secret=*/false, &text));
   if (text.size == kNumSecretDigits && IsHex(text.view())) {
     return MakeError(ErrorCode::kInvalidArgument,

@@ -11,7 +11,8 @@ namespace cairn {
 using PublicKey = std::array<uint8_t, 32>;
 using Signature = std::array<uint8_t, 64>;
 
-// libsodium's: a seed of 32 bytes, then the public key that follows from it.  Overwritten when it goes.
+// libsodium's: a seed of 32 bytes, then the public key that follows from it.  Overwritten when it
+// is destroyed.
 struct SecretKey : std::array<uint8_t, 64> {
   SecretKey() : std::array<uint8_t, 64>{} {}
   SecretKey(const SecretKey&) = default;
@@ -29,14 +30,14 @@ KeyPair MakeKeyPair();
 // Errors: InvalidArgument when one exists; as Replacement::Finish.
 Status WriteKeyPair(const KeyPair& keys, const std::string& path);
 
-// A key that signs.  Errors: NotFound; Io; InvalidArgument (no regular file; group or others may read it; a
-// public key); Corrupt (not a key, or as PublicKeyOf).
+// A key that signs.  Errors: NotFound; Io; InvalidArgument (not a regular file; group or others may read it;
+// a public key); Corrupt (not a key, or as PublicKeyOf).
 Result<SecretKey> ReadSecretKey(const std::string& path);
-// Errors: NotFound; Io; InvalidArgument (no regular file, or a secret key); Corrupt.
+// Errors: NotFound; Io; InvalidArgument (not a regular file, or a secret key); Corrupt.
 Result<PublicKey> ReadPublicKey(const std::string& path);
 
-// The public key of a secret one, which follows from its seed.  Errors: Corrupt where the key states another:
-// it is damaged, and whoever had a signature by each of the two could sign as well.
+// The public key of a secret one, which follows from its seed.  Errors: Corrupt where the key states another
+// one: it is damaged, and anyone with a signature by each of the two could sign too.
 Result<PublicKey> PublicKeyOf(const SecretKey& key);
 
 std::string HexOf(const PublicKey& key);

@@ -43,6 +43,7 @@ std::vector<double> ScoreDocuments(const Vocabulary& vocabulary, const BagOfWord
   }
   const double norm = std::sqrt(squared_norm);
   for (size_t i = 0; i < scores.size(); ++i) {
+    // [Mariottini11 §IV] q . d = 1 - |q - d|^2 / 2 of the normalised vectors, where the source has |q - d|^2
     if (scores[i] > 0) scores[i] = std::min(1.0, scores[i] / (norm * vocabulary.document_norms[i]));
   }
   return scores;
@@ -61,6 +62,7 @@ std::vector<double> ProbabilitiesOfScores(const std::vector<double>& scores, dou
   if (best <= 0) return probabilities;
   double sum = 0;
   for (size_t i = 0; i < scores.size(); ++i) {
+    // [Mariottini11 §IV] "normalised so as to represent a pdf": how is not given
     probabilities[i] = std::pow(scores[i] / best, exponent);  // at least one is 1: no overflow, no zero sum
     sum += probabilities[i];
   }
@@ -71,6 +73,7 @@ std::vector<double> ProbabilitiesOfScores(const std::vector<double>& scores, dou
 double Entropy(const std::vector<double>& probabilities) {
   double entropy = 0;
   for (const double p : probabilities) {
+    // [Mariottini11 eq. 1] H = -sum_j p_j log p_j, in nats
     if (p > 0) entropy -= p * std::log(p);
   }
   return std::max(0.0, entropy);
@@ -82,6 +85,7 @@ double JeffreyDivergence(const std::vector<double>& p, const std::vector<double>
   for (size_t i = 0; i < p.size(); ++i) {
     if (p[i] == q[i]) continue;
     const double a = (1 - uniform_ratio) * p[i] + floor, b = (1 - uniform_ratio) * q[i] + floor;
+    // [Mariottini11 eq. 6-7] D(h || h') + D(h' || h), with D(h || h') = sum h log(h / h'), bin by bin
     divergence += (a - b) * std::log(a / b);
   }
   return divergence;

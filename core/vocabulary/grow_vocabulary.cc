@@ -34,6 +34,7 @@ Status GrowTree(const DescriptorMatrix& training, const GrowVocabularyOptions& o
   vocabulary->nodes.resize(1);
   size_t first_node = 0;  // of the level
   progress.Begin("training vocabulary", training.rows() * vocabulary->depth, "descriptors");
+  // [Mariottini11 §IV] hierarchical k-means, L levels of at most k children
   for (int depth = 0; depth < vocabulary->depth; ++depth) {
     std::vector<std::vector<NodeChild>> children(level.size());
     const bool parallel_nodes = static_cast<int>(level.size()) >= 4 * NumThreads(num_threads);

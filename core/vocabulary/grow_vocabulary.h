@@ -17,7 +17,7 @@ struct GrowVocabularyOptions {
   // Most children of a node [Mariottini11: k = 10].  REQUIRES: in [2, 256]
   int branching = 10;
   // Levels below the root [Mariottini11: L = 4]; 0: the depth at which a word gets nearest to
-  // descriptors_per_word. REQUIRES: in [0, 8]
+  // descriptors_per_word.  REQUIRES: in [0, 8]
   int depth = 0;
   // Descriptors that a word should hold on average when the depth is chosen (on a logarithmic scale).
   // REQUIRES: >= 1

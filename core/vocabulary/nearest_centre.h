@@ -7,7 +7,8 @@
 namespace cairn {
 
 // Index of the row of `centres` (kDescriptorDim bytes each) with the largest dot product with a descriptor,
-// ties to the smaller.  Wider instructions where the processor has them, the same answer.  REQUIRES: >= 1 row
+// ties to the smaller.  Uses wider instructions where the processor has them, with the same
+// result.  REQUIRES: >= 1 row
 int NearestCentre(const uint8_t* centres, int num_centres, const uint8_t* descriptor);
 
 // sums[d] += descriptor[d].

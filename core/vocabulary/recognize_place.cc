@@ -7,7 +7,7 @@
 namespace cairn {
 namespace {
 
-// A word of the image: what sharing it is worth, -ln of its probability p.
+// A word of the image and the worth of sharing it, -ln of its probability p.
 struct Chance {
   double p = 0;
   double worth = 0;
@@ -37,7 +37,7 @@ OptionTable DescribeOptions(PlaceOptions* o) {
   return {
       {.name = "min_num_words",
        .value = &o->min_num_words,
-       .help = "an image with fewer descriptors whose word scores is of no place",
+       .help = "an image with fewer descriptors whose words score shows no place of the survey",
        .min = 1},
       {.name = "max_log10_chance",
        .value = &o->max_log10_chance,

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/deciles.h"
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
@@ -58,7 +58,7 @@ double BaselineRatio(const Pose& cam2_from_cam1, const Correspondences& c) {
     const double across = cam2_from_cam1.translation.cross(c.bearings2[i]).norm();
     ratios.push_back(ray1.cross(c.bearings2[i]).norm() / std::max(across, 1e-9));
   }
-  return Median(std::move(ratios));
+  return UpperMedian(std::move(ratios));
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ OptionTable DescribeOptions(RerankOptions* o) {
   return {
       {.name = "num_candidates",
        .value = &o->num_candidates,
-       .help = "images most alike by their words that are verified",
+       .help = "number of images that are verified: those most alike by their words",
        .min = 0},
       {.name = "max_ratio",
        .value = &o->max_ratio,

@@ -11,18 +11,19 @@
 
 namespace cairn {
 
-// Words find images that show the same things.  Of these the one taken nearest is the place: its features
-// obey one geometry with the query's, and that geometry tells how far apart the two stand, in units of the
-// distance to what they see.  Each candidate scores
+// Words find images that show the same things.  Of these, the image taken nearest shows the place: its
+// features obey one geometry with the query's, and that geometry gives the distance between the two cameras,
+// in units of the distance to what they see.  Each candidate scores
 //
 //   s = n / sqrt(f_q f_c) * exp(-r / r_0)
 //
-// with n matches that agree with one essential matrix, or one rotation where no fewer do, f_q and f_c
-// features of query and candidate, r the length of the baseline over the median distance of the agreeing
-// features from the query, and r_0 an option.  The first factor alone, as a cosine, favours views from
-// farther back, which show more of the same.  The source takes the words' order as it is [Mariottini11 §IV].
+// with n matches that agree with one essential matrix, or with one rotation where at least as many agree with
+// it, f_q and f_c features of query and candidate, r the length of the baseline over the median distance of
+// the agreeing features from the query, and r_0 an option.  The first factor alone, a cosine, favours views
+// from farther back, which show more of the same things.  The source keeps the words' order
+// [Mariottini11 §IV].
 struct RerankOptions {
-  // As many of the candidates, the first ones, are looked at.  REQUIRES: >= 0
+  // Number of candidates, from the first on, that are verified.  REQUIRES: >= 0
   int num_candidates = 20;
   // Largest ratio of best to second-best descriptor angle, both ways, and largest angle of a match, radians.
   // REQUIRES: in (0, 1], > 0
@@ -31,7 +32,7 @@ struct RerankOptions {
   // Largest distance of an agreeing match from its epipolar line, pixels of the query (Sampson distance).
   // REQUIRES: > 0
   double max_epipolar_error_px = 2;
-  // With fewer agreeing matches a candidate is not verified.  REQUIRES: >= 6: five always agree
+  // With fewer agreeing matches a candidate is not verified.  REQUIRES: >= 6 (five always agree)
   int min_num_inliers = 15;
   // r_0: baseline, in median distances of what is seen, at which the score falls to 1 / e.  REQUIRES: > 0
   double baseline_ratio = 0.33;
@@ -40,7 +41,7 @@ struct RerankOptions {
 };
 OptionTable DescribeOptions(RerankOptions* options);
 
-// An image as geometry sees it.
+// What verification reads of an image.
 struct PlaceView {
   std::vector<Eigen::Vector3d> bearings;  // per descriptor: unit vector, camera frame; NaN: undefined
   PackedDescriptors packed;
@@ -57,13 +58,12 @@ struct RerankedPlace {
   bool is_verified() const { return num_inliers > 0; }
 };
 
-// Where one candidate stands, or that it is not verified.  Same views, same result.  O(f_q * f_c).
+// Verifies one candidate.  Same views, same result.  O(f_q * f_c).
 RerankedPlace VerifyPlace(const PlaceView& query, const PlaceView& candidate, const RerankOptions& options);
 
 // The candidates, given as the words rank them, best first: those verified by descending score, then the
-// others as they were given; ties as given.  The same for any number of threads.  A focal length that is
-// only guessed costs inliers, not the order.
-// Errors: InvalidArgument (an option).
+// others in the given order; ties in the given order.  The same for any number of threads.  A focal length
+// that is only guessed costs inliers, not the order.  Errors: InvalidArgument (an option).
 Result<std::vector<RerankedPlace>> RerankPlaces(const PlaceView& query,
                                                 const std::vector<const PlaceView*>& candidates,
                                                 const RerankOptions& options, int num_threads);

@@ -31,8 +31,8 @@ Eigen::Matrix<uint8_t, 1, kDescriptorDim> CentreFromSums(const Sums& sums) {
   return centre;
 }
 
-// k-means++: each next seed is drawn with a probability proportional to the squared distance from the nearest
-// one.
+// k-means++: each next seed is drawn with a probability proportional to the squared distance from the
+// nearest one.
 DescriptorMatrix DrawSeeds(const DescriptorRows& members, int num_seeds, uint64_t seed, int num_threads) {
   Random random(seed);
   const int64_t num_members = members.rows();
@@ -57,7 +57,7 @@ DescriptorMatrix DrawSeeds(const DescriptorRows& members, int num_seeds, uint64_
   return seeds;
 }
 
-// The members side by side in memory, which all rounds run over.
+// Copies the members side by side in memory, since all rounds run over them.
 DescriptorMatrix Gather(const DescriptorMatrix& descriptors, const std::vector<int32_t>& members) {
   DescriptorMatrix gathered(static_cast<Eigen::Index>(members.size()), kDescriptorDim);
   for (size_t i = 0; i < members.size(); ++i) {
@@ -88,6 +88,7 @@ std::vector<NodeChild> SplitNode(const DescriptorMatrix& descriptors, const std:
       sums[chunk].resize(num_centres);  // value-initialised: zeros
       for (int64_t i = chunk * kChunk; i < std::min(num_members, (chunk + 1) * kChunk); ++i) {
         const uint8_t* descriptor = rows.row(i).data();
+        // [Mariottini11 §IV] k-means, one level of it; on directions instead of distances
         const int centre = NearestCentre(centres.data(), num_centres, descriptor);
         changed[chunk] |= centre != nearest[i];
         nearest[i] = centre;

@@ -43,6 +43,7 @@ void WeightVocabulary(Vocabulary* vocabulary) {
   for (int word = 0; word < vocabulary->num_words(); ++word) {
     const std::vector<Posting>& postings = vocabulary->inverted_files[word];
     if (postings.empty()) continue;
+    // [Mariottini11 §IV] inverse document frequency; |v_d| to normalise by
     vocabulary->idf[word] =
         static_cast<float>(std::log(num_documents / static_cast<double>(postings.size())));
     for (const Posting& posting : postings) {
@@ -59,6 +60,7 @@ void WeightVocabulary(Vocabulary* vocabulary) {
 
 WordIdx QuantizeDescriptor(const Vocabulary& vocabulary, const uint8_t* descriptor) {
   if (vocabulary.nodes.empty()) return -1;
+  // [Mariottini11 §IV] the leaf that a descriptor's path ends at is its word
   const VocabularyNode* node = &vocabulary.nodes[0];
   while (node->num_children > 0) {
     const uint8_t* centres =

@@ -64,7 +64,7 @@ struct ScoredDocument {
 std::vector<WordIdx> QuantizeDescriptors(const Vocabulary& vocabulary, const DescriptorMatrix& descriptors);
 
 // Documents with a positive score for `words` (ascending, in the tree), best first, ties by document, at most
-// `max_num_documents`.  Touches shared words only.
+// `max_num_documents`.  Reads shared words only.
 std::vector<ScoredDocument> RankDocuments(const Vocabulary& vocabulary, const std::vector<WordIdx>& words,
                                           int max_num_documents);
 // The same for the words of descriptors.

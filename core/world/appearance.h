@@ -15,7 +15,7 @@ namespace cairn {
 // Entropies and scores are stored as integers.
 inline int64_t Thousandths(double value) { return std::llround(value * 1000); }
 inline double OfThousandths(int64_t thousandths) { return static_cast<double>(thousandths) / 1000; }
-// Of a distribution over more places than there are, nats.
+// Larger than that of any distribution over places, nats.
 inline constexpr double kMaxEntropy = 64;
 
 // Why a node is kept, or not.
@@ -29,7 +29,7 @@ struct AppearanceNode {
   std::vector<ImageId> images;  // ascending
   int component = 0;
   NodeRole role = NodeRole::kDropped;
-  // How many places it could be taken for, as the entropy of its look-alikes' distribution, nats, in
+  // How many places it could be mistaken for: the entropy of its look-alikes' distribution, nats, in
   // thousandths [Mariottini11 eq. 1]; none: not computed.
   std::optional<double> entropy;
   friend bool operator==(const AppearanceNode&, const AppearanceNode&) = default;
@@ -39,7 +39,7 @@ struct AppearanceNode {
 struct ConfusablePair {
   NodeIdx node1 = 0;
   NodeIdx node2 = 0;
-  double score = 0;  // of one as a query for the other, in (0, 1], in thousandths
+  double score = 0;  // of one node as a query for the other, in (0, 1], in thousandths
   friend bool operator==(const ConfusablePair&, const ConfusablePair&) = default;
 };
 
@@ -47,7 +47,8 @@ struct ConfusablePair {
 struct Appearance {
   std::vector<AppearanceNode> nodes;
   AppearanceGraph graph;
-  // Per component: every connected set that meets its nodes' demands has at least so many; 0: not computed.
+  // Per component: every connected set that meets its nodes' demands has at least this many nodes; 0:
+  // not computed.
   std::vector<int> lower_bounds;
   std::vector<ConfusablePair> confusable;  // ascending
   int num_dominators = 1;
@@ -57,7 +58,7 @@ struct Appearance {
   std::vector<NodeIdx> Kept() const;        // ascending
   std::vector<ImageId> KeptImages() const;  // ascending
   int NumComponents() const { return static_cast<int>(lower_bounds.size()); }
-  int LowerBound() const;  // of all components; 0: of some not computed
+  int LowerBound() const;  // of all components; 0: not computed for some
 };
 
 // appearance.db (schemas/appearance.sql).

@@ -100,8 +100,8 @@ Status ReadNodes(SQLite::Database& database, const std::string& path, int64_t nu
   for (NodeIdx i = 0; rows.executeStep(); ++i) {
     const std::string what = fmt::format("{}: table nodes, node {}", path, i);
     if (rows.getColumn(0).getInt64() != i || i >= num_nodes) {
-      return MakeError(ErrorCode::kCorrupt, "{}: missing, or more than the {} nodes that the file says", what,
-                       num_nodes);
+      return MakeError(ErrorCode::kCorrupt, "{}: missing, or more than the {} nodes that the file states",
+                       what, num_nodes);
     }
     AppearanceNode node;
     node.component = rows.getColumn(1).getInt();

@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-// A region [Sala06 §III]: connected stations that all see each of `features`.
+// A region [Sala06 Def. 3.4]: connected stations that all see each of `features`.
 struct Region {
   std::vector<FeatureIdx> features;  // ascending; at least k
   std::vector<StationIdx> stations;  // ascending; the tau-grown region

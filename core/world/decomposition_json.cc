@@ -13,7 +13,7 @@ namespace {
 constexpr char kFormat[] = "cairn-regions";
 constexpr int kVersion = 1;
 
-// nlohmann::json would cut 1.5 and 99999999999 down to some int.
+// nlohmann::json would truncate 1.5 and 99999999999 to some int.
 int IntegerOf(const nlohmann::json& value) {
   const bool fits =
       value.is_number_unsigned()

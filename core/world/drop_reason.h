@@ -5,7 +5,7 @@
 
 namespace cairn {
 
-// Why a stage let something go.  The numbers stand in the stages' files and in maps: append only, never
+// Why a stage dropped something.  The numbers are stored in the stages' files and in maps: append only, never
 // renumber.  What each means is said once, in drop_reason.cc and in schemas/drops.md.
 enum class DropReason : int {
   // extract_features
@@ -45,8 +45,8 @@ enum class DropReason : int {
 //   image, pair, station    as in the glossary
 //   feature                 a scene feature: a track, a feature class or a feature of a world, by the stage
 //   keypoint                of a class that stays
-//   view                    a class that stays and a station that saw it: the class does not count as visible
-//   there
+//   view                    a class that stays and a station that saw it, but where it does not count as
+//                           visible
 enum class DropKind { kImage, kPair, kFeature, kKeypoint, kView, kStation };
 const char* DropKindName(DropKind kind);  // "image"
 
@@ -55,7 +55,7 @@ struct DropReasonEntry {
   const char* stage;  // "group_classes"
   DropKind kind;
   const char* name;  // "few_observations": unique
-  const char* text;  // why, in a sentence's rest: "the track has fewer keypoints than ..."
+  const char* text;  // why, as the rest of a sentence: "its track has fewer keypoints than ..."
 };
 
 // All reasons, ascending.

@@ -19,15 +19,14 @@ struct Classes;
 struct Decomposition;
 struct World;
 
-// One thing that a stage dropped.  Which number names it and what `seen_at` lists depends on the reason
-// (schemas/drops.md):
+// One thing that a stage dropped.  Which number names it and what `seen_at` lists depends on the
+// reason (schemas/drops.md):
 //   image    image_id
 //   pair     COLMAP's pair_id                 found: matches before verification
-//   feature  group_classes: track_idx         seen_at: keypoints of the track, image_id and keypoint_idx by
-//   turns
+//   feature  group_classes: track_idx         seen_at: keypoints, image_id and keypoint_idx in turn
 //            filter_visibility: class_id      found: stations that see it
 //            decompose_regions: feature_idx   found: stations that see it
-//   keypoint class_id                         seen_at: keypoints, image_id and keypoint_idx by turns
+//   keypoint class_id                         seen_at: keypoints, image_id and keypoint_idx in turn
 //   view     class_id                         seen_at: station_idx
 //   station  station_idx                      found: features visible from it
 struct DroppedItem {
@@ -38,7 +37,7 @@ struct DroppedItem {
   friend bool operator==(const DroppedItem&, const DroppedItem&) = default;
 };
 
-// The table of a stage's own file, and its name in COLMAP's databases, whose schema has no place for it.
+// Name of the table in a stage's own file, and in COLMAP's databases, whose schema has no such table.
 inline constexpr char kDroppedItemsTable[] = "dropped_items";
 inline constexpr char kColmapDroppedItemsTable[] = "cairn_dropped_items";
 inline constexpr char kColmapDroppedItemsSchema[] =
@@ -57,7 +56,7 @@ Status WriteWorldDatabase(const World& world, const std::string& path,
 Status WriteDecomposition(const Decomposition& decomposition, const std::string& path,
                           const std::vector<DroppedItem>& dropped_items);
 
-// All rows, in the order in which they were written; none where the file has no such table.  Errors: as
+// All rows, in the order in which they were written; empty where the file has no such table.  Errors: as
 // OpenDatabaseReadOnly; Corrupt (an unknown reason, a number out of range, a list of odd length).
 Result<std::vector<DroppedItem>> ReadDroppedItems(const std::string& path, const char* table);
 

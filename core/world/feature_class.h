@@ -36,7 +36,7 @@ struct SurveyImage {
   std::string name;
   CameraId camera_id = 0;
   Pose cam_from_world;        // refined; in the capture's world frame
-  Pose given_cam_from_world;  // as the capture states it
+  Pose given_cam_from_world;  // as stated by the capture
 };
 
 // The mean of RootSIFT descriptors with this sum, renormalised to norm 512 and rounded.
@@ -56,8 +56,8 @@ struct Classes {
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
   Pose camera_from_given;
   // Where poses were refined: how far they moved from the stated ones, root mean square per axis of the
-  // camera's place and rotation.  An error that the survey's poses share with whoever is localized against
-  // them.
+  // camera's place and rotation.  The survey's poses share this error with every pose that is localized
+  // against them.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
   DropCounts dropped;  // classes, by reason

@@ -12,7 +12,7 @@ namespace {
 // Fewer places than this, or places within this distance of a line, have no slope.
 constexpr int kMinNumForSlope = 6;
 constexpr double kMinSpreadM = 0.05;
-// An error of one octave of scale counts like this many pixels when shapes are compared.
+// An error of one octave of scale counts as this many pixels when shapes are compared.
 constexpr double kPxPerOctave = 20;
 
 Eigen::Vector2d MiddleOf(const std::vector<Sight>& sights) {
@@ -66,6 +66,7 @@ std::optional<Eigen::Matrix3Xd> LeftOutErrors(const Eigen::MatrixXd& squared_dis
   const Eigen::Index n = seen.rows();
   const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd inverse_basis = inverse * basis;
+  // [Sala06 §VI-C: after Sim & Dudek] leave-one-out cross-validation, in closed form (landmark_model.h)
   const Eigen::MatrixXd q =
       inverse - inverse_basis * (basis.transpose() * inverse_basis).inverse() * inverse_basis.transpose();
   const Eigen::Matrix3Xd errors =
@@ -104,6 +105,7 @@ std::optional<LandmarkModel> LandmarkModel::Make(const std::vector<Sight>& sight
 }
 
 LandmarkModel::Prediction LandmarkModel::Predict(const Eigen::Vector2d& place) const {
+  // [Sala06 §VI-C: after Sim & Dudek] f(x), by a trend and a Gaussian process instead of their interpolation
   const Eigen::Vector2d from_middle = place - middle_;
   Prediction prediction{trend_.col(0) + trend_.rightCols<2>() * from_middle, trend_.rightCols<2>()};
   for (size_t i = 0; i < places_.size(); ++i) {

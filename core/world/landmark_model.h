@@ -8,7 +8,7 @@
 namespace cairn {
 
 // How a landmark's image depends on where the camera stands, for one heading: a generative model
-// z(x) = f(x) + e of the visual map [Sala06 §VI-C, after Sim & Dudek].  No 3-D point and no calibration: it
+// z(x) = f(x) + e of the visual map [Sala06 §VI-C: after Sim & Dudek].  No 3-D point and no calibration: it
 // interpolates what the survey saw.  Here f is a linear trend plus a Gaussian process with a squared
 // exponential kernel, which has the reference's scattered-data interpolation as the limit of no noise, and
 // whose cross-validation has a closed form.
@@ -19,8 +19,8 @@ struct Sight {
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();   // x px, y px, log2 of the scale in px
 };
 
-// The kernel: k(a, b) = exp(-|a - b|^2 / (2 length^2)) + noise (a = b); a small choice, so that it is stored
-// as numbers of its values.
+// The kernel: k(a, b) = exp(-|a - b|^2 / (2 length^2)) + noise (a = b); chosen from few values, so that
+// indices of the values are stored.
 struct KernelShape {
   int length = 0;  // index in kKernelLengthsM
   int noise = 0;   // index in kKernelNoises

@@ -11,11 +11,11 @@
 
 namespace cairn {
 
-// Most sights of one model: what a query solves grows with their cube.
+// Most sights of one model: the cost of a query grows with their cube.
 inline constexpr int kMaxNumSights = 512;
 
-// What a map stores of its visual map [Sala06 §VI-C]: the sights of which LandmarkModel makes the generative
-// model of every landmark, and how well it predicts.  schemas/FORMAT.md, block 12.
+// What a map stores of its visual map [Sala06 §VI-C]: the sights from which LandmarkModel makes the
+// generative model of every landmark, and how well it predicts.  schemas/FORMAT.md, block 12.
 
 // A landmark in a survey image, by the image's index.
 struct LandmarkSight {
@@ -34,14 +34,14 @@ struct HeadingModel {
   std::vector<LandmarkSight> sights;  // ascending image, kMinNumSights to kMaxNumSights
 };
 
-// What the survey's own images say about how good its visual map is: they are placed by models that were
-// shown nothing from within a spacing of the survey around them.
+// What the survey's own images say about the quality of its visual map: they are localized with models that
+// used no sight from within one spacing of the survey around them.
 struct VisualErrors {
-  // Standard deviation of what landmarks' errors share (heights of cameras, ways between places): per axis,
-  // and of the heading.  It does not average out over landmarks.
+  // Standard deviation of the part that landmarks' errors share (heights of cameras, ways between places):
+  // per axis, and of the heading.  It does not average out over landmarks.
   float shared_m = 0, shared_rad = 0;
-  // A model's standard deviation at a distance d from the nearest of its sights: sigma sqrt(1 + (growth
-  // d)^2).
+  // A model's standard deviation at a distance d from the nearest of its sights: sigma sqrt(1 +
+  // (growth d)^2).
   float growth_per_m = 0;
   // Pitch and roll of the survey's cameras, root mean square.  Sights are stored as a level camera's.
   float tilt_rad = 0;
@@ -49,10 +49,10 @@ struct VisualErrors {
 };
 
 struct VisualMapData {
-  // The camera of all sights; queries are its images too.
+  // The camera of all sights; queries must come from it too.
   CameraId camera_id = 0;
-  // What a turn of the camera does to an image, as the survey itself shows it: that of a pinhole with this
-  // focal length, px; 0: the survey does not tell.
+  // How a turn of the camera changes an image, as the survey itself shows it: as for a pinhole camera with
+  // this focal length, px; 0: not known from the survey.
   float focal_px = 0;
   VisualErrors errors;
   // The headings of models, floor frame, degrees, ascending in [0, 360).  Sights from headings between are
@@ -62,12 +62,12 @@ struct VisualMapData {
   std::vector<std::vector<HeadingModel>> landmarks;
 };
 
-// As the file stores it: nothing changes when it is stored and read again.
-// Errors: Unsupported for a position outside of [-2048, 6143] px.
+// Rounds to the values that the file stores: storing and reading again changes nothing.  Errors: Unsupported
+// for a position outside of [-2048, 6143] px.
 Status RoundAsStored(VisualMapData* visual_map);
 
-// Errors: InvalidArgument, naming the landmark: lists that are not ascending, an image that is not there, too
-// few sights, a number that is none.
+// Errors: InvalidArgument, naming the landmark: lists that are not ascending, an image that does not exist,
+// too few sights, an invalid number.
 Status CheckVisualMap(const VisualMapData& visual_map, int64_t num_landmarks, int64_t num_images);
 
 }  // namespace cairn

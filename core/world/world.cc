@@ -189,6 +189,7 @@ void WriteTables(SQLite::Database& database, const World& world) {
 
 }  // namespace
 
+// [Sala06 Def. 3.2] F_v, from the visibility areas {v : f in F_v}
 std::vector<std::vector<FeatureIdx>> VisibilitySets(const World& world) {
   std::vector<std::vector<FeatureIdx>> sets(world.num_stations());
   for (FeatureIdx feature = 0; feature < world.num_features(); ++feature) {
@@ -197,6 +198,7 @@ std::vector<std::vector<FeatureIdx>> VisibilitySets(const World& world) {
   return sets;
 }
 
+// [Sala06 Def. 3.1] G = (V, E)
 std::vector<std::vector<StationIdx>> AdjacencyLists(const World& world) {
   std::vector<std::vector<StationIdx>> neighbours(world.num_stations());
   for (const auto& [u, v] : world.edges) {

@@ -13,12 +13,12 @@
 
 namespace cairn {
 
-// A world instance <G, F, {F_v}> [Sala06 §III]: stations, their adjacency, and the visibility area of every
-// feature. Memory is proportional to the number of incidences (station sees feature).
+// A world instance <G, F, {F_v}> [Sala06 Def. 3.3]: stations, their adjacency, and the visibility area of
+// every feature.  Memory is proportional to the number of incidences (station sees feature).
 struct World {
-  // Station's place on the floor, metres.
+  // Places of the stations on the floor, metres.
   std::vector<Eigen::Vector2d> positions;
-  // Station's heading, degrees counter-clockwise from +x; empty where a station sees all around.
+  // Headings of the stations, degrees counter-clockwise from +x; empty where stations see all around.
   std::vector<double> headings_deg;
   // Undirected edges of contiguous stations, u < v, ascending, no duplicates.
   std::vector<std::pair<StationIdx, StationIdx>> edges;
@@ -29,8 +29,8 @@ struct World {
   // taken at each station.
   std::vector<ClassId> class_ids;
   std::vector<std::vector<ImageId>> station_images;
-  // Edge length of a lattice survey, metres; 0 where stations are cells of a driven survey or the world is
-  // synthetic.
+  // Edge length of a lattice survey, metres; 0 where stations are cells of a driven survey or the world
+  // is synthetic.
   double lattice_spacing_m = 0;
   // Floor frame (z up; x, y and heading of stations, plans and pictures) from the capture's world frame.
   Pose floor_from_world;

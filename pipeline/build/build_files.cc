@@ -1,18 +1,21 @@
 #include "pipeline/build/build_files.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <regex>
 #include <set>
 
 #include "core/files/temporary.h"
 #include "pipeline/build/build_folder.h"
+#include "pipeline/build/line.h"
 
 namespace cairn::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-// The name without what a temporary of it has at its end.
+// The name without the suffix that a temporary file of it has.
 std::string WithoutTemporaryMark(const std::string& name) {
   return IsTemporaryName(name, "") ? name.substr(0, name.rfind(".tmp-")) : name;
 }
@@ -20,21 +23,25 @@ std::string WithoutTemporaryMark(const std::string& name) {
 }  // namespace
 
 bool IsBuildFileName(const std::string& name) {
-  static const std::regex kStageFile(
-      "(capture|images|features|matches|poses|classes|world|regions|vocabulary|appearance|views|unsealed|map)"
-      "([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
+  static const std::regex kStageFile = [] {
+    std::string stems = "images";
+    for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
+    return std::regex(
+        "(" + stems +
+        ")([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
+  }();
   static const std::set<std::string> kOthers = {"config.mk", "recipe", "check.json", "error.json", "lock"};
   const std::string stem = WithoutTemporaryMark(name);
   return kOthers.contains(stem) || std::regex_match(stem, kStageFile);
 }
 
 bool IsOptionsFileName(const std::string& name) {
-  static const std::regex kOptionsFile(
-      "seed|name|capture|queries|program|floor_plan|"
-      "(simulate|extract_features|match_features|reconstruct|group_classes|filter_visibility|decompose_"
-      "regions|"
-      "build_vocabulary|link_appearance|decompose_views|emit_map|check_map)\\.toml");
-  return std::regex_match(WithoutTemporaryMark(name), kOptionsFile);
+  static const std::set<std::string> kOthers = {"seed",    "name",    "capture",
+                                                "queries", "program", "floor_plan"};
+  const std::string stem = WithoutTemporaryMark(name);
+  return kOthers.contains(stem) ||
+         std::any_of(std::begin(kLine), std::end(kLine),
+                     [&](const LineStage& stage) { return stem == std::string(stage.name) + ".toml"; });
 }
 
 Status CheckBuildFolder(const std::string& build_dir) {
@@ -43,13 +50,13 @@ Status CheckBuildFolder(const std::string& build_dir) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(build_dir, error)) {
     const std::string name = entry.path().filename().string();
-    if (name == "lock") continue;  // all that a build leaves which is killed before it has written config.mk
+    if (name == "lock") continue;  // the only file of a build that was killed before it wrote config.mk
     if (IsBuildFileName(name)) theirs.insert(name);
   }
   if (theirs.empty()) return Ok();
   return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: is no build folder of cairn (nothing in it says that cairn wrote config.mk), and its "
-                   "{} would be overwritten; name another with --build-dir, or move this one away",
+                   "{}: not a build folder of cairn (nothing in it says that cairn wrote config.mk), and its "
+                   "{} would be overwritten; name another folder with --build-dir, or move this one away",
                    build_dir, *theirs.begin());
 }
 

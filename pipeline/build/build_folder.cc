@@ -51,7 +51,7 @@ std::string OptionText(const Recipe& recipe, const std::string& stage_name, cons
   return "";
 }
 
-// Files that tell where images stand, beside the capture's own.
+// Files with known places of images, besides the capture's own.
 Result<std::vector<std::string>> KnownPlaces(const Recipe& recipe, const std::string& capture) {
   std::vector<std::string> files;
   for (const char* name : {"control_points", "distances"}) {
@@ -131,7 +131,7 @@ std::string QueriesPath(const Recipe& recipe, const std::string& capture, const 
   return recipe.simulated || is_any ? capture + "/queries.txt" : "";
 }
 
-// Of the place; empty = none.
+// The floor plan of the place; empty = none.
 std::string FloorPlanPath(const Recipe& recipe, const std::string& capture) {
   if (!recipe.simulated_floor_plan.empty()) return capture + "/" + recipe.simulated_floor_plan;
   for (const RecipeCapture& given : recipe.captures) {
@@ -159,7 +159,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
     CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
   }
   CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
-  // Before anything is written: what make would not take for a name is refused.
+  // Before anything is written, names that make cannot read are refused.
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
   MakeVariables config;

@@ -7,7 +7,7 @@
 
 namespace cairn::pipeline {
 
-// Where a recipe is compiled to and by what; all paths absolute.
+// Where a recipe is compiled to, and by which program; all paths are absolute.
 struct BuildPaths {
   std::string build_dir;  // the build folder: options, stage files, stamps
   std::string map;        // NAME.cairn
@@ -23,15 +23,15 @@ bool HasFloorPlan(const Recipe& recipe);
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
 //   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
-//   options/program       hash of the program: another one redoes every stage, whatever its date
+//   options/program       hash of the program: another program redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
 //                         QUERIES, NAME, SEED, PROGRAM and VOCABULARY_TREE for map.mk
-//   recipe                path of the recipe, for people and for `cairn clean`: no part of a Makefile
-// Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names beside several captures), NotFound
+//   recipe                path of the recipe, for people and for `cairn clean`; not part of a Makefile
+// Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names, with several captures), NotFound
 // (a file that [reconstruct] names), Io.
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths);
 
-// The map and the recipe that a folder was last configured for; empty where it is no build folder.
+// The map and the recipe that a folder was last configured for; empty where it is not a build folder.
 std::string ConfiguredMap(const std::string& build_dir);
 std::string ConfiguredRecipe(const std::string& build_dir);
 

@@ -11,9 +11,11 @@
 #include <toml++/toml.h>
 
 #include "core/files/file.h"
+#include "core/line/json_report.h"
 #include "core/line/program_version.h"
 #include "core/options/toml_options.h"
 #include "pipeline/build/folder_lock.h"
+#include "pipeline/build/line.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -22,11 +24,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kBuildReportVersion = 1;
-constexpr const char* kLine[] = {
-    "simulate",        "join_captures",     "extract_features",  "match_features",   "reconstruct",
-    "group_classes",   "filter_visibility", "decompose_regions", "build_vocabulary", "link_appearance",
-    "decompose_views", "emit_map",          "check_map"};
-
 struct StageFile {
   size_t place = 0;  // in the line
   std::string name;  // of what the stage wrote: "features.db"
@@ -37,9 +34,8 @@ struct StageFile {
 };
 
 Result<Json> ReadJson(const std::string& path) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  Json document = Json::parse(text, nullptr, false);
-  if (document.is_object() && document.contains("stage") && document["stage"].is_string()) return document;
+  CAIRN_ASSIGN_OR_RETURN(Json document, ReadJsonReport(path, "a stage's report"));
+  if (document.contains("stage") && document["stage"].is_string()) return document;
   return MakeError(ErrorCode::kCorrupt, "{}: not a stage's report; remove it", path);
 }
 
@@ -56,7 +52,9 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
         (stage == "reconstruct" && !run.reconstructed) || (stage == "decompose_views" && !run.has_floor_plan))
       continue;
     name.resize(name.size() - std::string_view(kReportSuffix).size());
-    const size_t place = std::find(std::begin(kLine), std::end(kLine), stage) - std::begin(kLine);
+    const size_t place = std::find_if(std::begin(kLine), std::end(kLine),
+                                      [&](const LineStage& of_line) { return stage == of_line.name; }) -
+                         std::begin(kLine);
     files.push_back({place, name, std::move(report)});
   }
   std::sort(files.begin(), files.end());

@@ -10,7 +10,7 @@
 
 namespace cairn::pipeline {
 
-// What `cairn compile` knows of its run when it ends.
+// What `cairn compile` knows about its run when it ends.
 struct BuildRun {
   std::string build_dir;
   std::string recipe;  // as given
@@ -25,7 +25,7 @@ struct BuildRun {
 };
 
 // The build report (docs/build_report.md), keys in a fixed order: the reports that the stages left in the
-// build folder, in the order of the line, with their options and whether they ran this time. Errors: Io,
+// build folder, in the order of the line, with their options and whether they ran this time.  Errors: Io,
 // Corrupt (a stage's report).
 Result<nlohmann::ordered_json> MakeBuildReport(const BuildRun& run);
 

@@ -48,7 +48,7 @@ Json RejectedJson(const std::vector<StageReport::Rejected>& rejected) {
 double Seconds(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * time.tv_usec; }
 double Milliseconds(double seconds) { return std::round(seconds * 1000) / 1000; }
 
-// Over the first bytes of a file that is there; nothing new is asked of the disk.
+// Writes over the first bytes of an existing file, which needs no new space on the disk.
 bool WriteInPlace(const std::string& path, const std::string& text) {
   const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC);
   if (fd < 0) return false;

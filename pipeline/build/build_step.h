@@ -11,20 +11,20 @@
 
 namespace cairn::pipeline {
 
-// A failing stage leaves {code, name, stage, message} there, in its build folder: make flattens exit codes to
-// 2, so `cairn compile` reads the failed stage's from it.
+// A failing stage leaves {code, name, stage, message} in this file of its build folder: make turns every exit
+// code into 2, so `cairn compile` reads the code of the failed stage from the file.
 inline constexpr const char* kErrorFile = "/error.json";
 
-// One rule of map.mk at work: `cairn STAGE ... --stamp BUILD/X.stamp`.  Holds the build folder and, when the
-// stage has succeeded, leaves the stamp with the date at which it began: inputs that change meanwhile are
-// newer.
+// The run of one rule of map.mk: `cairn STAGE ... --stamp BUILD/X.stamp`.  Holds the build folder and, when
+// the stage has succeeded, leaves the stamp with the date at which it began: inputs that change meanwhile
+// are newer.
 class BuildStep {
  public:
-  // Errors: Busy (another build is at work there), Io, InvalidArgument (`stamp` does not end in .stamp).
+  // Errors: Busy (another build uses the folder), Io, InvalidArgument (`stamp` does not end in .stamp).
   static Result<BuildStep> Begin(const std::string& stamp);
   BuildStep(BuildStep&& other) noexcept;
   BuildStep& operator=(BuildStep&&) = delete;
-  ~BuildStep();  // without the stamp, if End has not left it
+  ~BuildStep();  // leaves no stamp unless End was called
 
   // "BUILD/X.report.json": where the step's report goes.
   std::string ReportPath() const;
@@ -37,7 +37,7 @@ class BuildStep {
   std::string temporary_;  // empty once it is in place
 };
 
-// What a process has done: a stage's report and what it took.
+// What a process has done: a stage's report, and the time and threads that it took.
 struct StageRun {
   std::string stage;  // "match_features"
   double seconds = 0;
@@ -52,8 +52,8 @@ struct StageRun {
 // those of the programs that it started.
 nlohmann::ordered_json StageRunJson(const StageRun& run);
 
-// Leaves error.json in a build folder.  Where the disk is full, a file that is there already is written over
-// in place: `cairn compile` keeps room in one.
+// Leaves error.json in a build folder.  Where the disk is full, an existing file is overwritten in place:
+// `cairn compile` makes one in advance to reserve its space.
 Status WriteErrorFile(const std::string& build_dir, const std::string& stage, const Error& error);
 Status ReserveErrorFile(const std::string& build_dir);
 

@@ -27,22 +27,22 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kLockFile = "/lock";
-// Others of the own session hold the folder alone only while they remove stale temporaries.
+// Other processes of the same session hold the folder exclusively only while they remove stale temporaries.
 constexpr std::chrono::seconds kWaitForOwnSession{30};
-// Another session may be on its way out, or look at the lock and be refused as well.  What was killed takes
-// long to die on a busy machine.
+// Another session may be about to end, or may try the lock and be refused as well.  A killed process takes
+// long to end on a busy machine.
 constexpr std::chrono::seconds kWaitForOtherSession{3};
 
 using Claim = FileLock::Claim;
 
-// Temporaries of what `is_ours` knows by its name; folders only where they are cairn's.
+// Removes temporaries whose names `is_ours` accepts; folders only where they are cairn's.
 template <typename IsOurs>
 void RemoveTemporariesIn(const fs::path& folder, const IsOurs& is_ours) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (!IsTemporaryName(name, "") || !is_ours(name)) continue;
-    std::error_code remove_error;  // one that cannot be removed only takes room
+    std::error_code remove_error;  // one that cannot be removed only takes space
     if (entry.is_directory(remove_error) && !entry.is_symlink(remove_error))
       RemoveOwnFolder(entry.path().string());
     else
@@ -80,8 +80,8 @@ bool IsRemoved(int fd) {
   return fstat(fd, &status) == 0 && status.st_nlink == 0;
 }
 
-// One try.  Turning an exclusive lock into a shared one lets go of it for a moment: whoever's name stands in
-// the file afterwards has it.
+// One try.  Turning an exclusive lock into a shared one releases it for a moment: the session whose name is
+// in the file afterwards has it.
 Result<Claim> TryToClaim(FileLock& lock, const std::string& build_dir, const std::string& session) {
   const Claim alone = lock.Try(FileLock::Kind::kExclusive);
   if (alone == Claim::kNoLocks) return alone;
@@ -134,13 +134,13 @@ Result<FolderLock> FolderLock::Acquire(const std::string& build_dir, const std::
   while (true) {
     CAIRN_ASSIGN_OR_RETURN(const Claim claim, TryToClaim(lock, build_dir, session));
     if (claim == Claim::kHeld && !IsRemoved(lock.descriptor())) return FolderLock(std::move(lock));
-    if (claim == Claim::kHeld) {  // `cairn clean` has been there in between
+    if (claim == Claim::kHeld) {  // `cairn clean` removed the lock file
       CAIRN_ASSIGN_OR_RETURN(lock, OpenLockFile(build_dir));
       continue;
     }
     if (claim == Claim::kNoLocks) {
       spdlog::warn(
-          "{}: this file system has no locks; see to it yourself that one build at a time works there",
+          "{}: this file system has no locks; make sure that only one build at a time uses this folder",
           build_dir);
       return FolderLock(std::move(lock));
     }

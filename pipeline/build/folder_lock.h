@@ -20,19 +20,19 @@ std::string NewBuildSession();
 inline constexpr const char* kReportSuffix = ".report.json";
 std::string ReportPath(const std::string& map);
 
-// Removes what killed runs left: temporaries in the build folder, in its options, and beside its map.
-// REQUIRES: nobody else is at work there.
+// Removes the temporaries that killed runs left in the build folder, in its options, and beside its map.
+// REQUIRES: no other process uses the folder.
 void RemoveStaleTemporaries(const std::string& build_dir);
 
 // Holds a build folder for the processes of one session at a time, as long as the object lives, on this
 // machine or over a network file system.  Child processes inherit the lock: it also lasts as long as a stage
-// that a killed compile left behind.  Whoever comes first removes stale temporaries.
+// that a killed compile left behind.  The first process removes stale temporaries.
 //
-// BUILD/lock has the session's name; its processes hold a shared flock on it, taken by way of an exclusive
-// one where nobody else does.
+// BUILD/lock has the session's name; its processes hold a shared flock on it.  A process that finds no lock
+// takes an exclusive one first.
 class FolderLock {
  public:
-  // Makes the folder if there is none.  Where the file system has no locks, warns and goes on without.
+  // Makes the folder if there is none.  Where the file system has no locks, warns and continues without one.
   // Errors: Busy (says which session has it), Io.
   static Result<FolderLock> Acquire(const std::string& build_dir, const std::string& session);
 

@@ -9,7 +9,7 @@ constexpr std::string_view kSpecialInPaths = "$#%:;&|<>()[]{}*?'\"`\\=!";
 // A launcher's words may be options and lists of nodes: --mem=4G, node[1-4], A:B, 50%.
 constexpr std::string_view kSpecialInLaunchers = "$#;&|<>()*?'\"`\\!";
 
-// The first character that make or a shell would not take for a name's, in words; empty: none.
+// Describes the first character that make or a shell would not read as part of a name; empty: none.
 std::string FindSpecial(const std::string& text, std::string_view special) {
   for (const char c : text) {
     if (c == '\n' || c == '\r') return "a line break";
@@ -25,10 +25,9 @@ std::string FindSpecial(const std::string& text, std::string_view special) {
 Status CheckMakePath(const std::string& what, const std::string& path) {
   const std::string found = FindSpecial(path, kSpecialInPaths);
   if (found.empty()) return Ok();
-  return MakeError(
-      ErrorCode::kInvalidArgument,
-      "{} '{}' has {} in its path, which Make cannot carry; rename the folder or put it elsewhere", what,
-      path, found);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{} '{}' has {} in its path, which Make cannot handle; rename the folder or move it", what,
+                   path, found);
 }
 
 Status MakeVariables::Set(const std::string& variable, const std::string& what,
@@ -58,8 +57,8 @@ Status MakeVariables::SetLauncher(const std::string& variable, const std::string
     const std::string word = words.substr(begin, end - begin);
     if (const std::string found = FindSpecial(word, kSpecialInLaunchers); !found.empty()) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "{} '{}' has {}: it is words put before a command, which no shell reads; write what "
-                       "needs a shell into a script and name that",
+                       "{} '{}' has {}: these words are put before a command and no shell reads them; move "
+                       "what needs a shell into a script and give its name",
                        what, words, found);
     }
     if (!word.empty()) value += (value.empty() ? "" : " ") + word;

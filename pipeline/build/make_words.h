@@ -8,18 +8,18 @@
 
 namespace cairn::pipeline {
 
-// What is written into a Makefile or handed to make is read again, by make and by the shell that it starts.
-// Nothing gets there but words that both take for what they are: by way of CheckMakePath and MakeVariables.
+// Text that is written into a Makefile or passed to make is read again, by make and by the shell that it
+// starts.  CheckMakePath and MakeVariables let through only words that both read unchanged.
 
-// Errors: InvalidArgument when a path has characters that Make or a shell would not take for a name's: white
-// space, control characters and $#%:;&|<>()[]{}*?'"`\=!
+// Errors: InvalidArgument when a path has characters that Make or a shell would not read as part of a name:
+// white space, control characters and $#%:;&|<>()[]{}*?'"`\=!
 Status CheckMakePath(const std::string& what, const std::string& path);
 
 // Variables for make, in the order in which they were set.  `what` names a value in messages.
 // Errors of all three: InvalidArgument.
 class MakeVariables {
  public:
-  // Paths, numbers or names, each as CheckMakePath demands.
+  // Paths, numbers or names, each as CheckMakePath requires.
   Status Set(const std::string& variable, const std::string& what, const std::vector<std::string>& words);
   // The same for FIRST=SECOND words.
   Status SetPairs(const std::string& variable, const std::string& what,

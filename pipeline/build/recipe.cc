@@ -34,8 +34,8 @@ constexpr Key kCaptureKeys[] = {
      "capture's queries.txt, if there is one."},
     {"floor_plan", "text",
      "Floor plan of the place (GeoJSON polygons, or lines x0,y0,x1,y1 of walls; metres), relative to the "
-     "recipe: the map then has its view-invariant regions ([floor plans](views.md)). One for all captures. "
-     "Default: none."},
+     "recipe: the map then has its view-invariant regions ([floor plans](views.md)). One plan serves all "
+     "captures. Default: none."},
     {"up", "text or list",
      "\"auto\" (the mean of the cameras' up), or the up direction in the capture's frame as [x, y, z]; the "
      "same for all captures that give one. Default \"auto\"."},
@@ -64,7 +64,7 @@ Status CheckName(const std::string& path, const toml::node& node, const std::str
   if (valid) return Ok();
   return MakeError(
       ErrorCode::kInvalidArgument,
-      "{}: name = '{}': must be 1 to 100 letters, digits, '-', '_' and '.', and begin with none of '-.'",
+      "{}: name = '{}': must be 1 to 100 letters, digits, '-', '_' and '.', and not begin with '-' or '.'",
       TomlPlace(path, node), name);
 }
 
@@ -236,7 +236,7 @@ class RecipeReader {
     return AddCapture(table, std::move(capture));
   }
 
-  // Sessions go by their names.
+  // Sessions are identified by their names.
   Status AddCapture(const toml::table& table, RecipeCapture capture) {
     const bool is_named = !capture.name.empty();
     if (!is_named) capture.name = NameOfFolder(capture.path);
@@ -368,11 +368,11 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
       "enough:\n\n"
       "```toml\nname = \"kitchen\"\n[[capture]]\npath = \"captures/kitchen\"\n```\n\n"
       "Everything else has a default. A key that is not below is an error that names the nearest valid one.\n"
-      "This page is printed by `cairn recipe-reference`, from the options that the stages declare.\n\n"
+      "This page is written by `cairn manual`, from the options that the stages declare.\n\n"
       "## Top of the file\n";
   AppendKeys(&page, kTopKeys);
   page +=
-      "\n## `[[capture]]`\n\nOne survey, once or several times: sessions, cameras, days, all "
+      "\n## `[[capture]]`\n\nOne survey. Several of these tables are several sessions (cameras, days), all "
       "in one frame ([captures](captures.md)). A recipe has either this or `[simulate]`.\n";
   AppendKeys(&page, kCaptureKeys);
   page += "\n## `[gate]`\n\nBelow these figures no map is written. They are options of `[check_map]`.\n";
@@ -381,7 +381,7 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
     page += fmt::format("\n## `[{}]`\n", stage.stage);
     if (stage.stage == "simulate")
       page += fmt::format(
-          "\nThe capture is rendered first; an empty table takes all defaults. Beside the options below: "
+          "\nThe capture is rendered first; an empty table takes all defaults. Besides the options below: "
           "`{}` ({}). {}\n",
           kSimulateFloorPlanKey.name, kSimulateFloorPlanKey.type, kSimulateFloorPlanKey.help);
     AppendOptions(&page, stage.table);

@@ -47,13 +47,13 @@ struct Recipe {
 // up directions.  Each names the file and the line.
 Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> stages);
 
-// Keys of the recipe that no stage reads beside its others: a line for each, with its place and the reason.
-// One recipe may serve several captures, so that they are told and not refused.  `skipped`: stages that do
-// not run, and why.
+// Keys of the recipe that no stage reads, given its other keys: a line for each, with its place and the
+// reason.  One recipe may serve several captures, so these keys are reported and not refused.  `skipped`:
+// stages that do not run, and why.
 std::vector<std::string> UnreadKeys(const Recipe& recipe,
                                     const std::vector<std::pair<std::string, std::string>>& skipped);
 
-// The name that a map or a session has by its folder: what a name cannot have becomes '_'.
+// The name that a map or a session gets from its folder: characters that a name must not have become '_'.
 std::string NameOfFolder(const std::string& path);
 
 // The reference page of recipes (docs/recipe.md): every key with its default, range and meaning, in Markdown.

@@ -30,20 +30,20 @@ bool HoldsImages(const std::string& folder) {
 Status CheckIsCapture(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder + "/config.mk", error) && fs::is_directory(folder + "/options", error)) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: the build folder of a map, no capture; {}", folder,
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the build folder of a map, not a capture; {}", folder,
                      kWhatIsCompiled);
   }
   if (HoldsImages(folder)) return Ok();
-  std::string hint = "does it lie elsewhere?";
+  std::string hint = "are the images in another folder?";
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() == ".toml")
-      hint = fmt::format("is {} the recipe that is meant?", entry.path().string());
+      hint = fmt::format("did you mean the recipe {}?", entry.path().string());
   }
   return MakeError(ErrorCode::kInvalidArgument, "{}: a folder without an image; {}; {}", folder,
                    kWhatIsCompiled, hint);
 }
 
-// A file that is plainly something else than a text is named as what it is.
+// A file that is clearly not a text gets a message which says what it is.
 Status CheckIsText(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) {
@@ -65,18 +65,18 @@ Status CheckIsText(const std::string& path) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a compiled map; `cairn inspect` shows it, and {}",
                        path, kWhatIsCompiled);
     }
-    return MakeError(ErrorCode::kInvalidArgument, "{}: a database, of COLMAP or of a stage, no recipe; {}",
+    return MakeError(ErrorCode::kInvalidArgument, "{}: a database of COLMAP or of a stage, not a recipe; {}",
                      path, kWhatIsCompiled);
   }
   if (HasImageSuffix(path)) {
     const std::string folder = fs::absolute(path).lexically_normal().parent_path().string();
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: an image, no recipe; to compile its folder: cairn compile {}", path, folder);
+                     "{}: an image, not a recipe; to compile its folder: cairn compile {}", path, folder);
   }
   return Ok();
 }
 
-// The recipe that compiles a folder with defaults.  The path has no character that TOML would want escaped.
+// The recipe that compiles a folder with defaults.  The path has no character that TOML needs escaped.
 std::string DefaultRecipe(const std::string& name, const std::string& folder) {
   return fmt::format(
       "# Every key that is not here has its default; docs/recipe.md lists them.\n"
@@ -103,7 +103,7 @@ Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map
   source.recipe = recipe.string();
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the capture", folder.string()));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the map", source.map));
-  // Where the two are moved together they still fit.
+  // A relative path: recipe and capture can be moved together.
   const fs::path beside = fs::absolute(recipe).lexically_normal().parent_path();
   const std::string text = DefaultRecipe(name, folder.lexically_relative(beside).string());
   if (!fs::exists(fs::symlink_status(recipe, error))) {
@@ -113,11 +113,10 @@ Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map
   }
   const auto there = ReadFile(source.recipe);
   if (there.ok() && *there == text) return source;
-  return MakeError(
-      ErrorCode::kInvalidArgument,
-      "{}: is there and is not the recipe that compiles {} with defaults; compile it (cairn compile {} "
-      "-o {}), or give another -o",
-      source.recipe, given, source.recipe, source.map);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: exists and is not the recipe that compiles {} with defaults; compile it (cairn "
+                   "compile {} -o {}), or give another -o",
+                   source.recipe, given, source.recipe, source.map);
 }
 
 }  // namespace cairn::pipeline

@@ -32,7 +32,7 @@ Result<std::string> RulesPath(const std::string& program) {
     if (fs::exists(path)) return path.string();
   }
   return MakeError(ErrorCode::kNotFound,
-                   "share/cairn/map.mk is neither beside {} nor one folder up; install the program again",
+                   "{}: share/cairn/map.mk is neither beside it nor one folder up; install the program again",
                    program);
 }
 

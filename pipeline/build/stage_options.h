@@ -8,9 +8,10 @@
 
 namespace cairn::pipeline {
 
-// The options of one stage as a recipe sees them: a table into a struct that this object keeps alive.
+// The options of one stage as a recipe sees them: a table that points into a struct which this object
+// keeps alive.
 struct StageOptions {
-  std::string stage;  // "extract_features": the stage's folder, subcommand and table in a recipe
+  std::string stage;  // "extract_features": the stage's folder, command and table in a recipe
   OptionTable table;
   std::shared_ptr<void> options;
 };

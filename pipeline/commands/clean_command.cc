@@ -17,14 +17,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct CleanArguments {
   std::string target;
   std::string build_dir;
   bool all = false;
   bool dry_run = false;
 };
 
-// What is to go: files first, then the folders that they leave empty, each after those inside of it.
+// What is removed: files first, then the folders that they leave empty, each after the folders inside it.
 struct Removal {
   std::vector<fs::path> files, folders;
   std::vector<fs::path> kept;  // not cairn's
@@ -100,7 +100,7 @@ Status Remove(const Removal& removal) {
     if (error) return MakeError(ErrorCode::kIo, "{}: cannot be removed: {}", path.string(), error.message());
   }
   for (const fs::path& path : removal.folders) {
-    std::error_code error;  // one with somebody else's files in it stays
+    std::error_code error;  // a folder that still has files stays
     fs::remove(path, error);
   }
   return Ok();
@@ -120,7 +120,7 @@ std::vector<std::string> BuildFoldersOf(const std::string& recipe) {
   return {found.begin(), found.end()};
 }
 
-Status CleanBuildFolder(const std::string& build_dir, const fs::path& map, const Arguments& arguments,
+Status CleanBuildFolder(const std::string& build_dir, const fs::path& map, const CleanArguments& arguments,
                         std::ostream& out) {
   std::error_code error;
   Removal removal;
@@ -142,7 +142,7 @@ Status CleanBuildFolder(const std::string& build_dir, const fs::path& map, const
   return arguments.dry_run ? Ok() : Remove(removal);
 }
 
-Status Clean(const Arguments& arguments, std::ostream& out) {
+Status Clean(const CleanArguments& arguments, std::ostream& out) {
   const fs::path target = fs::absolute(arguments.target).lexically_normal();
   std::error_code error;
   if (target.extension() == ".cairn") {
@@ -182,23 +182,23 @@ Status Clean(const Arguments& arguments, std::ostream& out) {
 }  // namespace
 
 Command CleanCommand() {
-  const auto arguments = std::make_shared<Arguments>();
-  return {
-      .name = "clean",
-      .summary = "Remove the build folder of a map, but no file in it that cairn did not make",
-      .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("target", arguments->target,
-                           "The map, its build folder, or its recipe (its build folders here and beside it)")
-                ->required()
-                ->type_name("NAME.cairn|DIR|RECIPE.toml");
-            app.add_option("--build-dir", arguments->build_dir, "Build folder [NAME.build beside the map]")
-                ->type_name("DIR");
-            app.add_flag("--all", arguments->all, "Remove the map and its build report as well");
-            app.add_flag("-n,--dry-run", arguments->dry_run, "Only print what would be removed");
-          },
-      .run =
-          [arguments](const CommandEnvironment& environment) { return Clean(*arguments, *environment.out); }};
+  const auto arguments = std::make_shared<CleanArguments>();
+  return {.name = "clean",
+          .summary = "Remove the build folder of a map, but no file in it that cairn did not make",
+          .add_arguments =
+              [arguments](ArgumentParser& parser) {
+                parser
+                    .Add("target", arguments->target,
+                         "The map, its build folder, or its recipe (its build folders here and beside it)")
+                    .Required()
+                    .Type("NAME.cairn|DIR|RECIPE.toml");
+                parser.Add("--build-dir", arguments->build_dir, "Build folder [NAME.build beside the map]")
+                    .Type("FOLDER");
+                parser.AddFlag("--all", arguments->all, "Remove the map and its build report as well");
+                parser.AddFlag("-n,--dry-run", arguments->dry_run, "Only print what would be removed");
+              },
+          .run = [arguments](
+                     const CommandEnvironment& environment) { return Clean(*arguments, *environment.out); }};
 }
 
 }  // namespace cairn::pipeline

@@ -1,5 +1,8 @@
 #include "pipeline/commands/commands.h"
 
+#include <string>
+#include <utility>
+
 #include "sim/worlds/command.h"
 #include "stages/build_vocabulary/command.h"
 #include "stages/check_map/command.h"
@@ -15,51 +18,55 @@
 #include "stages/simulate/command.h"
 
 namespace cairn::pipeline {
+namespace {
+
+// `cairn NAME WORD`: commands of one subject.
+Command Family(const std::string& name, const std::string& summary, std::vector<Command> subcommands) {
+  return {.name = name, .summary = summary, .subcommands = std::move(subcommands)};
+}
+
+Command StageFamily() {
+  return Family("stage", "One stage alone, as Makefiles call it",
+                {ConfigureCommand(), simulate::SimulateCommand(), extract_features::ExtractFeaturesCommand(),
+                 match_features::MatchFeaturesCommand(), reconstruct::ReconstructCommand(),
+                 group_classes::GroupClassesCommand(), filter_visibility::FilterVisibilityCommand(),
+                 decompose_regions::DecomposeRegionsCommand(), build_vocabulary::BuildVocabularyCommand(),
+                 link_appearance::LinkAppearanceCommand(), emit_map::EmitMapCommand(),
+                 decompose_regions::CheckRegionsCommand(), link_appearance::CheckAppearanceCommand(),
+                 sim::SimulateWorldsCommand()});
+}
+
+Command PlanFamily() {
+  return Family(
+      "plan", "Floor plans and laser scans: where a scan was taken, paths, look-alike places",
+      {decompose_views::DecomposeViewsCommand(), LocateScanCommand(), PlanPathCommand(), TellApartCommand()});
+}
+
+Command UpdateFamily() {
+  return Family("update", "Bring a robot's map from one release to the next, or back",
+                {DeltaCommand(), ApplyCommand(), RollbackCommand()});
+}
+
+}  // namespace
 
 std::vector<Command> AllCommands() {
-  return {
-      simulate::SimulateCommand(),
-      extract_features::ExtractFeaturesCommand(),
-      match_features::MatchFeaturesCommand(),
-      reconstruct::ReconstructCommand(),
-      group_classes::GroupClassesCommand(),
-      filter_visibility::FilterVisibilityCommand(),
-      decompose_regions::DecomposeRegionsCommand(),
-      decompose_regions::CheckRegionsCommand(),
-      build_vocabulary::BuildVocabularyCommand(),
-      emit_map::EmitMapCommand(),
-      check_map::CheckMapCommand(),
-      LocalizeCommand(),
-      ImportCommand(),
-      ExportCommand(),
-      InspectCommand(),
-      sim::SimulateWorldsCommand(),
-      CompileCommand(),
-      ConfigureCommand(),
-      RecipeReferenceCommand(),
-      CleanCommand(),
-      JoinCapturesCommand(),
-      VerifyCommand(),
-      KeygenCommand(),
-      SignCommand(),
-      MigrateCommand(),
-      link_appearance::LinkAppearanceCommand(),
-      link_appearance::CheckAppearanceCommand(),
-      RouteCommand(),
-      decompose_views::DecomposeViewsCommand(),
-      LocateScanCommand(),
-      PlanPathCommand(),
-      TellApartCommand(),
-      DriveCommand(),
-      ExplainCommand(),
-      DiffCommand(),
-      DeltaCommand(),
-      ApplyCommand(),
-      RollbackCommand(),
-      ParetoCommand(),
-      ReportCommand(),
-      ManualCommand(),
+  const std::vector<std::pair<std::string, std::vector<Command>>> groups = {
+      {"Maps from surveys",
+       {ImportCommand(), JoinCommand(), CompileCommand(), ParetoCommand(), CleanCommand(), StageFamily()}},
+      {"What a map holds",
+       {InspectCommand(), check_map::CheckMapCommand(), ReportCommand(), DiffCommand(), ExportCommand()}},
+      {"Where a robot is", {LocalizeCommand(), PlanFamily(), RouteCommand(), DriveCommand()}},
+      {"Releases", {VerifyCommand(), KeygenCommand(), SignCommand(), UpdateFamily(), MigrateCommand()}},
+      {"", {ManualCommand()}},
   };
+  std::vector<Command> commands;
+  for (const auto& [heading, of_group] : groups) {
+    for (const Command& command : of_group) {
+      commands.push_back(command);
+      commands.back().heading = heading;
+    }
+  }
+  return commands;
 }
 
 }  // namespace cairn::pipeline

@@ -18,6 +18,7 @@
 #include "pipeline/build/build_report.h"
 #include "pipeline/build/build_step.h"
 #include "pipeline/build/folder_lock.h"
+#include "pipeline/build/line.h"
 #include "pipeline/build/recipe.h"
 #include "pipeline/build/recipe_source.h"
 #include "pipeline/build/run_make.h"
@@ -28,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct CompileArguments {
   std::string recipe;
   std::string output;
   std::string build_dir;
@@ -39,20 +40,7 @@ struct Arguments {
   bool no_space_check = false;
 };
 
-// Stage -> the file that it writes.
-struct StageFile {
-  const char* stage;
-  const char* file;
-};
-constexpr StageFile kStageFiles[] = {
-    {"simulate", "capture.stamp"},        {"extract_features", "features.db"},
-    {"match_features", "matches.db"},     {"reconstruct", "poses"},
-    {"group_classes", "classes.db"},      {"filter_visibility", "world.db"},
-    {"decompose_regions", "regions.db"},  {"build_vocabulary", "vocabulary.db"},
-    {"link_appearance", "appearance.db"}, {"decompose_views", "views.db"},
-    {"emit_map", "unsealed.cairn"}};
-
-Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
+Result<BuildPaths> ResolvePaths(const CompileArguments& arguments) {
   const fs::path map = fs::absolute(arguments.output).lexically_normal();
   if (map.extension() != ".cairn") {
     return MakeError(ErrorCode::kInvalidArgument, "-o {}: a map's name ends in .cairn", arguments.output);
@@ -73,8 +61,8 @@ Result<BuildPaths> ResolvePaths(const Arguments& arguments) {
                     .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
 }
 
-// Puts in what was not given: the recipe of a folder, the map's name.
-Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, Arguments* arguments) {
+// Fills in what was not given: the recipe of a folder, the map's name.
+Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, CompileArguments* arguments) {
   CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipe(arguments->recipe, arguments->output));
   if (source.was_written) {
     *environment.out << fmt::format(
@@ -103,11 +91,12 @@ Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, con
                      until);
   }
   std::vector<std::string> stages;
-  for (const StageFile& file : kStageFiles) {
-    if (stage == file.stage) return paths.build_dir + "/" + file.file;
-    stages.emplace_back(file.stage);
+  for (const LineStage& of_line : kLine) {
+    const std::string file = of_line.file;
+    if (std::string(of_line.name) == "join_captures") continue;
+    if (stage == of_line.name) return paths.build_dir + "/" + (file == "capture" ? "capture.stamp" : file);
+    stages.emplace_back(of_line.name);
   }
-  stages.emplace_back("check_map");
   const std::string nearest = NearestWord(stage, stages);
   return MakeError(
       ErrorCode::kInvalidArgument, "--until {}: no such stage; {}", until,
@@ -127,10 +116,11 @@ std::map<std::string, fs::file_time_type> StampDates(const std::string& build_di
 // The stage has printed its message already.
 Error StageError(const BuildPaths& paths) {
   const std::optional<StageFailure> failure = ReadErrorFile(paths.build_dir);
-  if (failure) return MakeError(failure->code, "{} failed; {} was not written", failure->stage, paths.map);
+  if (failure)
+    return MakeError(failure->code, "stage {} failed; {} was not written", failure->stage, paths.map);
   return MakeError(
       ErrorCode::kFailed,
-      "a stage was ended before it could say why (for want of memory? see --memory); {} was not written",
+      "a stage was killed before it could report why (out of memory? see --memory); {} was not written",
       paths.map);
 }
 
@@ -155,7 +145,7 @@ Status TellOfRun(const BuildRun& run, const BuildPaths& paths, std::ostream& out
   return Ok();
 }
 
-// Keys that the recipe has and nothing reads.
+// Keys of the recipe that no stage reads.
 void WarnOfUnreadKeys(const Recipe& recipe) {
   std::vector<std::pair<std::string, std::string>> skipped;
   if (!IsReconstructed(recipe)) skipped.emplace_back("reconstruct", "the capture has poses of its own");
@@ -163,7 +153,7 @@ void WarnOfUnreadKeys(const Recipe& recipe) {
   for (const std::string& line : UnreadKeys(recipe, skipped)) spdlog::warn("{}", line);
 }
 
-Status Compile(Arguments arguments, const CommandEnvironment& environment) {
+Status Compile(CompileArguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   const auto begin = std::chrono::steady_clock::now();
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
@@ -216,7 +206,7 @@ Status Compile(Arguments arguments, const CommandEnvironment& environment) {
   return Ok();
 }
 
-Status Configure(Arguments arguments, const CommandEnvironment& environment) {
+Status Configure(CompileArguments arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
   CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
   WarnOfUnreadKeys(recipe);
@@ -224,67 +214,61 @@ Status Configure(Arguments arguments, const CommandEnvironment& environment) {
   return WriteBuildFolder(recipe, paths);
 }
 
-void AddRecipeArguments(CLI::App& app, Arguments* arguments) {
-  app.add_option("recipe", arguments->recipe,
-                 "Recipe of the map (docs/recipe.md), or the folder of a capture: then it is compiled with "
-                 "defaults, by the recipe NAME.toml that is written beside the map")
-      ->required()
-      ->type_name("RECIPE.toml|FOLDER");
-  app.add_option("-o,--output", arguments->output,
-                 "Map to write [by the name of the recipe or the folder, in the current folder]")
-      ->type_name("NAME.cairn");
-  app.add_option("--build-dir", arguments->build_dir,
-                 "Folder for the stages' files [NAME.build beside the map]")
-      ->type_name("DIR");
+void AddRecipeArguments(ArgumentParser& parser, CompileArguments* arguments) {
+  parser
+      .Add("recipe", arguments->recipe,
+           "Recipe of the map (docs/recipe.md), or the folder of a capture: then it is compiled with "
+           "defaults, by the recipe NAME.toml that is written beside the map")
+      .Required()
+      .Type("RECIPE.toml|FOLDER");
+  parser
+      .Add("-o,--output", arguments->output,
+           "Map to write [by the name of the recipe or the folder, in the current folder]")
+      .Type("NAME.cairn");
+  parser.Add("--build-dir", arguments->build_dir, "Folder for the stages' files [NAME.build beside the map]")
+      .Type("FOLDER");
 }
 
 }  // namespace
 
 Command CompileCommand() {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CompileArguments>();
   return {
       .name = "compile",
-      .summary = "Compile a recipe, or the folder of a capture, into a map; what is up to date is not redone",
+      .summary = "Compile a recipe, or the folder of a capture, into a map, or redo what changed",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            AddRecipeArguments(app, arguments.get());
-            app.add_option("--until", arguments->until, "Stop after this stage")->type_name("STAGE");
-            app.add_option("--shards", arguments->num_shards,
-                           "Parts in which features and matches are made, each by a process of its own [1]")
-                ->check(CLI::Range(1, 100000))
-                ->type_name("N");
-            app.add_option("--launch", arguments->launcher,
-                           "Words put before every stage's command, for a cluster: 'srun -n1 -c2' "
-                           "(docs/cluster.md)")
-                ->type_name("WORDS");
-            app.add_option("-j,--jobs", arguments->num_jobs,
-                           "Stages or shards to run side by side [as many as --shards]")
-                ->check(CLI::Range(1, 100000))
-                ->type_name("N");
-            app.add_flag("--no-space-check", arguments->no_space_check,
-                         "Begin even if the disk seems too full for the stages' files");
+          [arguments](ArgumentParser& parser) {
+            AddRecipeArguments(parser, arguments.get());
+            parser.Add("--until", arguments->until, "Stop after this stage").Type("STAGE");
+            parser
+                .Add("--shards", arguments->num_shards,
+                     "Parts in which features and matches are made, each by a process of its own [1]")
+                .Range(1, 100000)
+                .Type("N");
+            parser
+                .Add("--launch", arguments->launcher,
+                     "Words put before every stage's command, for a cluster: 'srun -n1 -c2' "
+                     "(docs/cluster.md)")
+                .Type("WORDS");
+            parser
+                .Add("-j,--jobs", arguments->num_jobs,
+                     "Stages or shards to run side by side [as many as --shards]")
+                .Range(1, 100000)
+                .Type("N");
+            parser.AddFlag("--no-space-check", arguments->no_space_check,
+                           "Begin even if the disk seems too full for the stages' files");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Compile(*arguments, environment); }};
 }
 
 Command ConfigureCommand() {
-  const auto arguments = std::make_shared<Arguments>();
-  return {.name = "configure",
-          .summary = "Split a recipe into a build folder, for Makefiles that include map.mk",
-          .add_arguments = [arguments](CLI::App& app) { AddRecipeArguments(app, arguments.get()); },
-          .run = [arguments](
-                     const CommandEnvironment& environment) { return Configure(*arguments, environment); }};
-}
-
-Command RecipeReferenceCommand() {
-  return {.name = "recipe-reference",
-          .summary = "Print every key that a recipe can have (docs/recipe.md)",
-          .add_arguments = [](CLI::App&) {},
-          .run =
-              [](const CommandEnvironment& environment) {
-                *environment.out << RecipeReference(AllStageOptions());
-                return Ok();
-              }};
+  const auto arguments = std::make_shared<CompileArguments>();
+  return {
+      .name = "configure",
+      .summary = "Split a recipe into a build folder, for Makefiles that include map.mk",
+      .add_arguments = [arguments](ArgumentParser& parser) { AddRecipeArguments(parser, arguments.get()); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return Configure(*arguments, environment); }};
 }
 
 }  // namespace cairn::pipeline

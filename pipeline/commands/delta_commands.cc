@@ -10,14 +10,13 @@
 #include "core/files/file.h"
 #include "core/map/map_delta.h"
 #include "core/map/map_file.h"
-#include "pipeline/commands/epoch_argument.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/map/update_map.h"
 
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct DeltaArguments {
   std::string old_path;
   std::string new_path;
   std::string delta_path;
@@ -28,7 +27,7 @@ struct Arguments {
   bool in_place = false;
 };
 
-// Blocks of a map that the other one has too.
+// The number of blocks of a map that the other one has too.
 size_t NumSharedBlocks(const MapFile& map, const MapFile& other) {
   std::set<Hash> hashes;
   for (const BlockEntry& entry : other.directory().blocks()) hashes.insert(entry.hash);
@@ -36,7 +35,7 @@ size_t NumSharedBlocks(const MapFile& map, const MapFile& other) {
                        [&](const BlockEntry& entry) { return hashes.contains(entry.hash); });
 }
 
-Status MakeDelta(const Arguments& arguments, const CommandEnvironment& environment) {
+Status MakeDelta(const DeltaArguments& arguments, const CommandEnvironment& environment) {
   std::optional<SecretKey> key;
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(key, ReadSecretKey(arguments.key_path));
@@ -61,7 +60,7 @@ Status MakeDelta(const Arguments& arguments, const CommandEnvironment& environme
   return Ok();
 }
 
-Result<UpdateOptions> ReadUpdateOptions(const Arguments& arguments) {
+Result<UpdateOptions> ReadUpdateOptions(const DeltaArguments& arguments) {
   UpdateOptions options = {
       .allow_older = arguments.allow_older, .name = arguments.name, .min_epoch = arguments.min_epoch};
   if (!arguments.key_path.empty()) {
@@ -70,7 +69,7 @@ Result<UpdateOptions> ReadUpdateOptions(const Arguments& arguments) {
   return options;
 }
 
-Status Apply(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Apply(const DeltaArguments& arguments, const CommandEnvironment& environment) {
   if (arguments.in_place != arguments.new_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "apply: give -o NEW to write the new map, or --in-place to replace {}",
@@ -89,7 +88,7 @@ Status Apply(const Arguments& arguments, const CommandEnvironment& environment) 
   return Ok();
 }
 
-Status Rollback(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Rollback(const DeltaArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const UpdateOptions options, ReadUpdateOptions(arguments));
   CAIRN_RETURN_IF_ERROR(RollBackMap(arguments.old_path, options));
   *environment.out << fmt::format("{}: the map before; the one that it replaces is {}\n", arguments.old_path,
@@ -97,35 +96,32 @@ Status Rollback(const Arguments& arguments, const CommandEnvironment& environmen
   return Ok();
 }
 
-void AddDemands(CLI::App& app, Arguments* arguments, const char* key_help) {
-  app.add_option("--public-key", arguments->key_path, key_help)->type_name("KEY.pub");
-  app.add_option("--name", arguments->name, "What the map that takes the place must be called")
-      ->type_name("NAME");
-  AddEpochArgument(app, "--min-epoch", &arguments->min_epoch, 0, "Least epoch that it may have");
+void AddDemands(ArgumentParser& parser, DeltaArguments* arguments, const char* key_help) {
+  parser.Add("--public-key", arguments->key_path, key_help).Type("KEY.pub");
+  parser.Add("--name", arguments->name, "Name that the replacing map must have").Type("NAME");
+  parser.Add("--min-epoch", arguments->min_epoch, "Smallest epoch that the replacing map may have")
+      .Type("N")
+      .WholeNumber(0);
 }
 
 }  // namespace
 
 Command DeltaCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DeltaArguments>();
   return {
       .name = "delta",
-      .summary = "Writes what a robot with one map needs to make another, byte for byte",
+      .summary = "Write what a robot with one map needs to make another, byte for byte",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("old", arguments->old_path, "Map that the robot has")
-                ->required()
-                ->type_name("OLD");
-            app.add_option("new", arguments->new_path, "Map that it is to have; sign it before")
-                ->required()
-                ->type_name("NEW");
-            app.add_option("-o,--output", arguments->delta_path, "Delta to write")
-                ->required()
-                ->type_name("D");
-            app.add_option("--key", arguments->key_path, "Secret key from keygen, to sign the delta with")
-                ->type_name("KEY");
-            app.add_flag("--allow-older", arguments->allow_older,
-                         "Also to a map of an earlier or the same epoch, which robots refuse unless told so");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("old", arguments->old_path, "Map that the robot has").Required().Type("OLD");
+            parser.Add("new", arguments->new_path, "Map that the robot is to get; sign it first")
+                .Required()
+                .Type("NEW");
+            parser.Add("-o,--output", arguments->delta_path, "Delta to write").Required().Type("D");
+            parser.Add("--key", arguments->key_path, "Secret key from keygen, to sign the delta with")
+                .Type("KEY");
+            parser.AddFlag("--allow-older", arguments->allow_older,
+                           "Allow a NEW of an earlier or the same epoch, which robots refuse by default");
           },
       .run =
           [arguments](const CommandEnvironment& environment) { return MakeDelta(*arguments, environment); },
@@ -133,41 +129,39 @@ Command DeltaCommand() {
 }
 
 Command ApplyCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DeltaArguments>();
   return {
       .name = "apply",
-      .summary = "Makes the new map from the old one and a delta; refuses any other map",
+      .summary = "Make the new map from the old one and a delta",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("old", arguments->old_path, "Map that the delta leads from")
-                ->required()
-                ->type_name("OLD");
-            app.add_option("delta", arguments->delta_path, "What cairn delta wrote")
-                ->required()
-                ->type_name("D");
-            app.add_option("-o,--output", arguments->new_path, "Map to write")->type_name("NEW");
-            app.add_flag("--in-place", arguments->in_place,
-                         "Replace OLD in one step and keep it as OLD.previous, for cairn rollback");
-            app.add_flag("--allow-older", arguments->allow_older,
-                         "Let a map of an earlier or the same epoch take a signed map's place");
-            AddDemands(app, arguments.get(), "Key whose signature the delta and the new map must have");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("old", arguments->old_path, "Map that the delta starts from").Required().Type("OLD");
+            parser.Add("delta", arguments->delta_path, "Delta that cairn update delta wrote")
+                .Required()
+                .Type("D");
+            parser.Add("-o,--output", arguments->new_path, "Map to write").Type("NEW");
+            parser.AddFlag("--in-place", arguments->in_place,
+                           "Replace OLD in one step and keep it as OLD.previous, for cairn update rollback");
+            parser.AddFlag("--allow-older", arguments->allow_older,
+                           "Let a map of an earlier or the same epoch replace a signed map");
+            AddDemands(parser, arguments.get(), "Key whose signature the delta and the new map must have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Apply(*arguments, environment); },
-      .may_be_output = {"old", "--name"},  // of the map, it says what to do instead
+      .may_be_output = {"old", "--name"},  // Apply has its own message where these are the output
   };
 }
 
 Command RollbackCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DeltaArguments>();
   return {
       .name = "rollback",
-      .summary = "Exchanges a map and the one that apply --in-place replaced",
+      .summary = "Swap a map and the one that it replaced (apply --in-place)",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->old_path, "Map; MAP.previous takes its place")
-                ->required()
-                ->type_name("MAP");
-            AddDemands(app, arguments.get(), "Key whose signature the previous map must have");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->old_path, "Map; MAP.previous takes its place")
+                .Required()
+                .Type("MAP");
+            AddDemands(parser, arguments.get(), "Key whose signature the previous map must have");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Rollback(*arguments, environment); },
   };

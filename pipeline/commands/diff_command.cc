@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kMaxLines = 20;
 
-struct Arguments {
+struct DiffArguments {
   std::string path_a;
   std::string path_b;
   bool json = false;
   CompareMapsOptions options;
 };
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunDiff(const DiffArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const MapRows a, ReadMapRows(arguments.path_a));
   CAIRN_ASSIGN_OR_RETURN(const MapRows b, ReadMapRows(arguments.path_b));
   if (a.frame.unit != b.frame.unit) {
@@ -43,28 +43,28 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command DiffCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DiffArguments>();
   return {
       .name = "diff",
-      .summary =
-          "Shows what changed between two maps of one place: landmarks, regions, coverage, options, "
-          "self-test",
+      .summary = "Compare two maps of one place: landmarks, regions, coverage, options, figures",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("a", arguments->path_a, "Map")->required()->type_name("A");
-            app.add_option("b", arguments->path_b, "Map in the same frame")->required()->type_name("B");
-            app.add_flag("--json", arguments->json, "Print JSON");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("a", arguments->path_a, "Map").Required().Type("A");
+            parser.Add("b", arguments->path_b, "Map in the same frame").Required().Type("B");
+            parser.AddFlag("--json", arguments->json, "Print JSON");
             CompareMapsOptions& options = arguments->options;
-            app.add_option("--max-landmark-distance", options.max_landmark_distance_m,
-                           "Farther apart, landmarks are not the same, m")
-                ->check(CLI::Range(1e-4, 100.0))
-                ->capture_default_str();
-            app.add_option("--max-station-distance", options.max_station_distance_m,
-                           "Farther apart, stations are not the same, m")
-                ->check(CLI::Range(1e-4, 100.0))
-                ->capture_default_str();
+            parser
+                .Add("--max-landmark-distance", options.max_landmark_distance_m,
+                     "Landmarks farther apart than this are not the same, m")
+                .Range(1e-4, 100.0)
+                .ShowDefault();
+            parser
+                .Add("--max-station-distance", options.max_station_distance_m,
+                     "Stations farther apart than this are not the same, m")
+                .Range(1e-4, 100.0)
+                .ShowDefault();
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run = [arguments](const CommandEnvironment& environment) { return RunDiff(*arguments, environment); },
   };
 }
 

@@ -20,7 +20,7 @@
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct DriveArguments {
   std::string map_path, building_path, start, goal, kidnap;
   std::string output_path, picture_path;
   sim::RobotDriveOptions options;
@@ -29,14 +29,12 @@ struct Arguments {
 
 // "x,y,heading": metres, metres, degrees.
 Result<PlanarPose> ParsePose(const std::string& text, const char* option) {
-  double x = 0, y = 0, heading_deg = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &heading_deg, &rest) != 3 || !std::isfinite(x) ||
-      !std::isfinite(y) || !std::isfinite(heading_deg)) {
+  const auto numbers = ParseNumbers(text);
+  if (!numbers || numbers->size() != 3) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} {}: expected X,Y,HEADING in metres and degrees, as in 1.5,0.8,90", option, text);
   }
-  return PlanarPose{{x, y}, WrapAngle(RadFromDeg(heading_deg))};
+  return PlanarPose{{(*numbers)[0], (*numbers)[1]}, WrapAngle(RadFromDeg((*numbers)[2]))};
 }
 
 // "LEG:x,y,heading"; nothing for an empty text.
@@ -44,9 +42,7 @@ Result<std::optional<sim::Kidnapping>> ParseKidnapping(const std::string& text) 
   if (text.empty()) return std::optional<sim::Kidnapping>();
   sim::Kidnapping kidnapping;
   const size_t colon = text.find(':');
-  char rest = 0;
-  if (colon == std::string::npos ||
-      std::sscanf(text.substr(0, colon).c_str(), "%d%c", &kidnapping.before_leg, &rest) != 1 ||
+  if (colon == std::string::npos || !ParseNumber(text.substr(0, colon), &kidnapping.before_leg) ||
       kidnapping.before_leg < 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--kidnap {}: expected STEP:X,Y,HEADING, as in 3:1.5,0.8,90", text);
@@ -120,7 +116,7 @@ void Print(const sim::RobotDrive& drive, std::ostream* out) {
                       drive.way_m);
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunDrive(const DriveArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const PlanarPose start, ParsePose(arguments.start, "--start"));
   CAIRN_ASSIGN_OR_RETURN(const auto kidnapping, ParseKidnapping(arguments.kidnap));
@@ -157,34 +153,37 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command DriveCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DriveArguments>();
   return {
       .name = "drive",
-      .summary = "Lets a robot that does not know where it stands go to a survey image, in simulation",
+      .summary = "Drive a robot that does not know where it is to a survey image, in simulation",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map, with an appearance graph and words = \"survey\"")
-                ->required()
-                ->type_name("MAP");
-            app.add_option("--building", arguments->building_path,
-                           "Recipe whose [simulate] table the map's survey was rendered from")
-                ->required()
-                ->type_name("RECIPE");
-            app.add_option("--start", arguments->start, "Where the robot stands: X,Y,HEADING (m, m, degrees)")
-                ->required()
-                ->type_name("POSE");
-            app.add_option("--goal", arguments->goal, "Survey image to go to")
-                ->required()
-                ->type_name("IMAGE");
-            app.add_option("--kidnap", arguments->kidnap,
-                           "STEP:X,Y,HEADING: put elsewhere before it goes to its STEP-th image, from 0 on")
-                ->type_name("STEP:POSE");
-            app.add_option("-o,--output", arguments->output_path, "JSON file to write: every step")
-                ->type_name("RUN.json");
-            app.add_option("--picture", arguments->picture_path, "SVG file to write")->type_name("RUN.svg");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->map_path, "Map, with an appearance graph and words = \"survey\"")
+                .Required()
+                .Type("MAP");
+            parser
+                .Add("--building", arguments->building_path,
+                     "Recipe whose [simulate] table the map's survey was rendered from")
+                .Required()
+                .Type("RECIPE");
+            parser.Add("--start", arguments->start, "Where the robot starts: X,Y,HEADING (m, m, degrees)")
+                .Required()
+                .Type("POSE");
+            parser.Add("--goal", arguments->goal, "Survey image to go to").Required().Type("IMAGE");
+            parser
+                .Add("--kidnap", arguments->kidnap,
+                     "STEP:X,Y,HEADING: move the robot there before it goes to its STEP-th image, counted "
+                     "from 0")
+                .Type("STEP:POSE");
+            parser.Add("-o,--output", arguments->output_path, "JSON file to write: every step")
+                .Type("RUN.json");
+            parser.Add("--svg", arguments->picture_path, "SVG file to write").Type("RUN.svg");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options),
+                                            {"max_num_legs", "servo", "radius_m", "max_speed_m_s",
+                                             "max_turn_deg_s", "image_noise", "on_switch", "weight"});
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run = [arguments](const CommandEnvironment& environment) { return RunDrive(*arguments, environment); },
   };
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kClassesApplicationId = 0x6372636c;  // 'crcl', schemas/classes.sql
 
-struct Arguments {
+struct ExportArguments {
   std::string input;
   std::string output;
   std::string matches;
@@ -38,12 +38,12 @@ Result<ImageKeypoints> ReadKeypoints(const std::string& path) {
   });
 }
 
-Result<ColmapModel> ReadModel(const Arguments& arguments) {
+Result<ColmapModel> ReadModel(const ExportArguments& arguments) {
   CAIRN_ASSIGN_OR_RETURN(const bool holds_classes, HoldsClasses(arguments.input));
   if (!holds_classes) {
     if (!arguments.matches.empty())
-      return MakeError(ErrorCode::kInvalidArgument, "--matches goes with classes.db; {} is none",
-                       arguments.input);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: not a classes.db, which --matches is for; leave --matches out", arguments.input);
     CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.input));
     return ModelFromMap(rows);
   }
@@ -57,7 +57,7 @@ Result<ColmapModel> ReadModel(const Arguments& arguments) {
   return model;
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunExport(const ExportArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const ColmapModel model, ReadModel(arguments));
   const ModelFormat format = arguments.text ? ModelFormat::kText : ModelFormat::kBinary;
   CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(
@@ -74,26 +74,26 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command ExportCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ExportArguments>();
   return {
       .name = "export",
-      .summary = "Writes a map, or a survey's feature classes, as a COLMAP model",
+      .summary = "Write a map, or a survey's feature classes, as a COLMAP model",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("input", arguments->input, "Map, or classes.db for full tracks")
-                ->required()
-                ->type_name("MAP|classes.db");
-            app.add_option("-o,--output", arguments->output, "Model folder to write")
-                ->required()
-                ->type_name("FOLDER");
-            app.add_option("--matches", arguments->matches,
-                           "classes.db only: database whose keypoints the model shall number [only those in "
-                           "tracks]")
-                ->type_name("matches.db");
-            auto* text = app.add_flag("--text", arguments->text, "Write .txt files");
-            app.add_flag("--binary", arguments->binary, "Write .bin files (the default)")->excludes(text);
+          [arguments](ArgumentParser& parser) {
+            parser.Add("input", arguments->input, "Map, or classes.db for full tracks")
+                .Required()
+                .Type("MAP|classes.db");
+            parser.Add("-o,--output", arguments->output, "Model folder to write").Required().Type("FOLDER");
+            parser
+                .Add("--matches", arguments->matches,
+                     "classes.db only: database whose keypoints the model lists, with their numbers [only "
+                     "keypoints in tracks]")
+                .Type("matches.db");
+            const Argument text = parser.AddFlag("--text", arguments->text, "Write .txt files");
+            parser.AddFlag("--binary", arguments->binary, "Write .bin files (the default)").Excludes(text);
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunExport(*arguments, environment); },
   };
 }
 

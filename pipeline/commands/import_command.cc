@@ -12,7 +12,7 @@
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   std::string source;
   std::string output;
   ImportOptions options;
@@ -20,7 +20,7 @@ struct Arguments {
   std::string link = "symbolic";
 };
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(ImportedSurvey survey, ReadSurvey(arguments.source, arguments.options));
   CAIRN_RETURN_IF_ERROR(ChooseQueries(arguments.hold_out, &survey));
   const ImageTransfer transfer = arguments.link == "copy"   ? ImageTransfer::kCopy
@@ -40,57 +40,59 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   return Ok();
 }
 
-void AddArguments(CLI::App& app, Arguments* arguments) {
-  app.add_option("source", arguments->source, "Folder of the data set, or of a COLMAP model")
-      ->required()
-      ->type_name("SOURCE");
-  app.add_option("-o,--output", arguments->output, "Capture folder to write")
-      ->required()
-      ->type_name("CAPTURE");
-  app.add_option("--format", arguments->options.layout,
-                 "auto|colmap|tum|7scenes|kitti|euroc|kapture; auto: by the files that are there [auto]")
-      ->check(CLI::IsMember({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture"}))
-      ->type_name("FORMAT");
-  app.add_option("--camera", arguments->options.camera,
-                 "Camera of all images, in COLMAP's pixels [as the data set states]")
-      ->type_name("MODEL,W,H,P...");
-  app.add_option("--images", arguments->options.images_folder,
-                 "colmap: folder of the images [images/ in or beside the model]")
-      ->type_name("FOLDER");
-  app.add_option("--sequence", arguments->options.sequence, "kitti: the sequence [the only one]")
-      ->type_name("NN");
-  app.add_option(
-         "--sensors", arguments->options.sensors,
-         "Cameras to import: kitti image_0,image_1,.., euroc cam0,cam1, kapture sensor ids [the first; "
-         "kapture: all]")
-      ->delimiter(',')
-      ->type_name("NAME,...");
-  app.add_option(
-         "--max-time-gap-s", arguments->options.max_time_gap_s,
-         "tum, euroc: a frame's pose lies between stated poses at most this far from it, seconds [0.02]")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("FLOAT");
-  app.add_option("--every", arguments->hold_out.every, "Hold out every N-th image as a query [none]")
-      ->check(CLI::Range(2, 1000000000))
-      ->type_name("N");
-  app.add_option("--queries", arguments->hold_out.queries_path,
-                 "Hold out the images that this file names, one a line [7scenes: TestSplit.txt]")
-      ->type_name("FILE");
-  app.add_option("--link", arguments->link,
-                 "symbolic|hard|copy: how image files come into the capture [symbolic]")
-      ->check(CLI::IsMember({"symbolic", "hard", "copy"}))
-      ->type_name("HOW");
+void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
+  parser.Add("source", arguments->source, "Folder of the data set, or of a COLMAP model")
+      .Required()
+      .Type("SOURCE");
+  parser.Add("-o,--output", arguments->output, "Capture folder to write").Required().Type("CAPTURE");
+  parser
+      .Add("--format", arguments->options.layout,
+           "auto|colmap|tum|7scenes|kitti|euroc|kapture; auto: by the files that are there [auto]")
+      .OneOf({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture"})
+      .Type("FORMAT");
+  parser
+      .Add("--camera", arguments->options.camera,
+           "Camera of all images, in COLMAP's pixels [as the data set states]")
+      .Type("MODEL,W,H,P...");
+  parser
+      .Add("--images", arguments->options.images_folder,
+           "colmap: folder of the images [images/ in or beside the model]")
+      .Type("FOLDER");
+  parser.Add("--sequence", arguments->options.sequence, "kitti: the sequence [the only one]").Type("NN");
+  parser
+      .Add("--sensors", arguments->options.sensors,
+           "Cameras to import: kitti image_0,image_1,.., euroc cam0,cam1, kapture sensor ids [the first; "
+           "kapture: all]")
+      .SeparatedByCommas()
+      .Type("NAME,...");
+  parser
+      .Add("--max-time-gap-s", arguments->options.max_time_gap_s,
+           "tum, euroc: a frame's pose lies between stated poses at most this far from it, seconds [0.02]")
+      .NonNegative()
+      .Type("FLOAT");
+  parser.Add("--every", arguments->hold_out.every, "Hold out every N-th image as a query [none]")
+      .Range(2, 1000000000)
+      .Type("N");
+  parser
+      .Add("--queries", arguments->hold_out.queries_path,
+           "Hold out the images that this file names, one per line [7scenes: TestSplit.txt]")
+      .Type("FILE");
+  parser
+      .Add("--link", arguments->link, "symbolic|hard|copy: how image files come into the capture [symbolic]")
+      .OneOf({"symbolic", "hard", "copy"})
+      .Type("HOW");
 }
 
 }  // namespace
 
 Command ImportCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ImportArguments>();
   return {
       .name = "import",
-      .summary = "Makes a capture of a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture data",
-      .add_arguments = [arguments](CLI::App& app) { AddArguments(app, arguments.get()); },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .summary = "Make a capture of a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture",
+      .add_arguments = [arguments](ArgumentParser& parser) { AddArguments(parser, arguments.get()); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunImport(*arguments, environment); },
   };
 }
 

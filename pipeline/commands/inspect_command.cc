@@ -18,6 +18,7 @@
 #include "core/map/map_file.h"
 #include "core/world/decomposition.h"
 #include "pipeline/commands/inspect_ambiguity.h"
+#include "pipeline/commands/inspect_place.h"
 #include "pipeline/explain/block_bytes.h"
 #include "pipeline/explain/inspect_drops.h"
 #include "pipeline/program/json_text.h"
@@ -32,23 +33,22 @@ constexpr int kMaxRegionLines = 30;
 constexpr int kMaxStationLines = 10;
 constexpr int kMaxPlaceLines = 10;
 
-struct Arguments {
-  std::string map_path;
-  bool json = false;
+struct InspectArguments {
+  PlaceQuestion question;
   std::string svg_path;
   std::string ambiguity_svg_path;
 };
 
-// Bytes of the pages of each table (its indices included), largest first; the file's remainder is SQLite's
-// own.
+// Bytes of the pages of each table (its indices included), largest first; the file's remainder is
+// SQLite's own.
 Result<std::vector<std::pair<std::string, int64_t>>> BytesPerTable(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::vector<std::pair<std::string, int64_t>>> {
     std::vector<std::pair<std::string, int64_t>> tables;
-    // A table of that name would stand in the way of SQLite's own.
+    // A table of that name would hide SQLite's own.
     if (database.execAndGet("SELECT count(*) FROM sqlite_master WHERE name = 'dbstat' COLLATE NOCASE")
             .getInt() > 0)
-      return Corrupt(path, "has a table or view 'dbstat', which is no map's");
+      return Corrupt(path, "has a table or view 'dbstat', which no map has");
     SQLite::Statement query(
         database,
         "SELECT coalesce(s.tbl_name, d.name), sum(d.pgsize) FROM dbstat d LEFT JOIN sqlite_master s "
@@ -90,7 +90,7 @@ nlohmann::ordered_json SessionsJson(const MapRows& rows) {
   return sessions;
 }
 
-// Models of landmarks, of how many sights, and how long they are.
+// Counts of landmark models and of their sights, and their bytes.
 void AddVisualMap(const MapDirectory& directory, const VisualMapData& visual_map,
                   nlohmann::ordered_json* json) {
   int64_t num_models = 0, num_bad = 0, num_sights = 0, num_bytes = 0;
@@ -242,16 +242,23 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
   return text;
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.map_path, {}));
+Status RunInspect(const InspectArguments& arguments, const CommandEnvironment& environment) {
+  const std::string& map_path = arguments.question.map_path;
+  if (arguments.question.is_asked() || !arguments.question.build_dir.empty()) {
+    if (arguments.svg_path.empty() && arguments.ambiguity_svg_path.empty())
+      return AnswerPlaceQuestion(arguments.question, environment);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--svg and --ambiguity-svg draw the whole map; leave them out, or --at, --image, "
+                     "--advice and --build-dir");
+  }
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(map_path, {}));
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(file));
-  CAIRN_ASSIGN_OR_RETURN(const auto tables, BytesPerTable(arguments.map_path));
-  auto json =
-      MapJson(file, rows, static_cast<int64_t>(std::filesystem::file_size(arguments.map_path)), tables);
+  CAIRN_ASSIGN_OR_RETURN(const auto tables, BytesPerTable(map_path));
+  auto json = MapJson(file, rows, static_cast<int64_t>(std::filesystem::file_size(map_path)), tables);
   json["bytes_per_block_kind"] = BytesPerBlockKind(file.directory());
   if (file.head().epoch != 0) json["epoch"] = file.head().epoch;
   if (file.seal().is_signed()) json["signed_with"] = HexOf(file.seal().public_key);
-  *environment.out << (arguments.json ? JsonText(json, 2) + "\n" : MapText(json, rows));
+  *environment.out << (arguments.question.json ? JsonText(json, 2) + "\n" : MapText(json, rows));
   if (!arguments.ambiguity_svg_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const std::string svg, AmbiguitySvg(rows));
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.ambiguity_svg_path, svg));
@@ -263,21 +270,43 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command InspectCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<InspectArguments>();
   return {
       .name = "inspect",
-      .summary = "Shows what is in a map: counts, bytes per table, options, a picture of the floor",
+      .summary = "Show what is in a map, or why a place is covered or not",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
-            app.add_flag("--json", arguments->json, "Print JSON");
-            app.add_option("--svg", arguments->svg_path, "Write a picture of the floor")
-                ->type_name("FILE.svg");
-            app.add_option("--ambiguity-svg", arguments->ambiguity_svg_path,
-                           "Write a picture of the places that look like others")
-                ->type_name("FILE.svg");
+          [arguments](ArgumentParser& parser) {
+            PlaceQuestion& question = arguments->question;
+            parser.Add("map", question.map_path, "Map").Required().Type("MAP");
+            const Argument at =
+                parser
+                    .Add("--at", question.place,
+                         "Why this place is covered or not, and what was dropped there: floor frame, metres, "
+                         "degrees counter-clockwise from +x")
+                    .Type("X,Y[,HEADING]");
+            const Argument image =
+                parser
+                    .Add("--image", question.image, "The same for a survey image, by its name in the capture")
+                    .Type("NAME")
+                    .Excludes(at);
+            parser
+                .AddFlag("--advice", question.advice, "What would make the map better, most important first")
+                .Excludes(at)
+                .Excludes(image);
+            parser
+                .Add("--build-dir", question.build_dir,
+                     "Build folder, for an --image that a stage rejected [MAP with .build for .cairn]")
+                .Type("FOLDER");
+            parser.AddFlag("--json", question.json, "Print JSON");
+            parser.Add("--svg", arguments->svg_path, "Write a picture of the floor").Type("FILE.svg");
+            parser
+                .Add("--ambiguity-svg", arguments->ambiguity_svg_path,
+                     "Write a picture of the places that look like others")
+                .Type("FILE.svg");
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunInspect(*arguments, environment); },
+      .former_names = {"explain"},
   };
 }
 

@@ -13,7 +13,7 @@
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct JoinArguments {
   std::vector<std::string> captures;  // "NAME=FOLDER"
   std::vector<std::string> queries;   // "NAME=FILE"
   std::string output;
@@ -26,7 +26,7 @@ Result<std::pair<std::string, std::string>> SplitAtEquals(const std::string& tex
   return std::pair(text.substr(0, equals), text.substr(equals + 1));
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunJoin(const JoinArguments& arguments, const CommandEnvironment& environment) {
   std::vector<CaptureSession> sessions;
   for (const std::string& text : arguments.captures) {
     CAIRN_ASSIGN_OR_RETURN(const auto session, SplitAtEquals(text, "NAME=FOLDER"));
@@ -56,24 +56,25 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 
 }  // namespace
 
-Command JoinCapturesCommand() {
-  const auto arguments = std::make_shared<Arguments>();
-  return {.name = "join-captures",
-          .summary = "Join several surveys in one frame into one capture, without copying images",
-          .add_arguments =
-              [arguments](CLI::App& app) {
-                app.add_option("captures", arguments->captures,
-                               "Session's name and capture folder, once per session")
-                    ->required()
-                    ->type_name("NAME=FOLDER");
-                app.add_option("--queries", arguments->queries,
-                               "Held-out images of a session [its capture's queries.txt]")
-                    ->type_name("NAME=FILE");
-                app.add_option("-o,--output", arguments->output, "Capture folder to write")
-                    ->required()
-                    ->type_name("FOLDER");
-              },
-          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+Command JoinCommand() {
+  const auto arguments = std::make_shared<JoinArguments>();
+  return {
+      .name = "join",
+      .summary = "Join surveys that share a frame into one capture, without copying images",
+      .add_arguments =
+          [arguments](ArgumentParser& parser) {
+            parser.Add("captures", arguments->captures, "Session's name and capture folder, once per session")
+                .Required()
+                .Type("NAME=FOLDER");
+            parser
+                .Add("--queries", arguments->queries,
+                     "Held-out images of a session [its capture's queries.txt]")
+                .Type("NAME=FILE");
+            parser.Add("-o,--output", arguments->output, "Capture folder to write").Required().Type("FOLDER");
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return RunJoin(*arguments, environment); },
+      .stage = "join_captures",
+      .former_names = {"join-captures"}};
 }
 
 }  // namespace cairn::pipeline

@@ -27,7 +27,7 @@
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct LocalizeArguments {
   std::string map_path;
   std::vector<std::string> images;
   std::string list_path;
@@ -55,7 +55,7 @@ struct Answer {
 // The camera to use for an image size: given on the command line, else the map's.
 class CameraChoice {
  public:
-  static Result<CameraChoice> Make(const Arguments& arguments, std::shared_ptr<const Map> map) {
+  static Result<CameraChoice> Make(const LocalizeArguments& arguments, std::shared_ptr<const Map> map) {
     CameraChoice choice;
     choice.map_ = std::move(map);
     if (!arguments.camera.empty()) {
@@ -90,8 +90,8 @@ class CameraChoice {
   std::map<CameraId, Camera> cameras_;
 };
 
-// What only another estimator or a sequence reads is refused.
-Status CheckWhatIsRead(const Arguments& arguments) {
+// Refuses options that only another estimator or a sequence reads.
+Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   if (!arguments.camera.empty() && !arguments.cameras_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--camera is the camera of all images, --cameras has one for each size; leave one out");
@@ -112,7 +112,7 @@ Status CheckWhatIsRead(const Arguments& arguments) {
   return Ok();
 }
 
-Status CheckEstimator(const Arguments& arguments) {
+Status CheckEstimator(const LocalizeArguments& arguments) {
   if (arguments.estimator != "pnp" && arguments.is_sequence) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--sequence follows a camera by --estimator pnp; leave one of them out");
@@ -125,9 +125,9 @@ Status CheckEstimator(const Arguments& arguments) {
   return Ok();
 }
 
-// By the visual map, and where asked for by PnP too.
+// By the visual map and, with --estimator both, by PnP too.
 Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>& map, const VisualMap& visual,
-                     const CameraChoice& cameras, const Arguments& arguments) {
+                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
   Answer answer{.image = image};
   const auto locate = [&]() -> Result<VisualPose> {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
@@ -177,7 +177,7 @@ Answer TrackImage(const std::string& image, const CameraChoice& cameras, RegionT
   return answer;
 }
 
-// That an image could not be tried.
+// The answer for an image that could not be tried.
 nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
   return {
       {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
@@ -226,7 +226,7 @@ nlohmann::ordered_json AnswerJson(const Answer& answer, const std::string& estim
 // Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
 class ImageNames {
  public:
-  static Result<ImageNames> Make(const Arguments& arguments) {
+  static Result<ImageNames> Make(const LocalizeArguments& arguments) {
     ImageNames names;
     names.names_ = arguments.images;
     if (!arguments.list_path.empty()) {
@@ -265,7 +265,7 @@ class ImageNames {
   size_t position_ = 0;
 };
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
   CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
@@ -324,32 +324,31 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command LocalizeCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<LocalizeArguments>();
   return {
       .name = "localize",
-      .summary = "Says where images were taken, as JSON lines",
+      .summary = "Say where images were taken, as JSON lines",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
-            app.add_option("images", arguments->images, "Image files; '-' reads names from stdin")
-                ->type_name("IMAGE");
-            app.add_option("--list", arguments->list_path, "File with an image's name per line")
-                ->type_name("FILE");
-            app.add_option("-o,--output", arguments->output_path,
-                           "Write the poses found in COLMAP's images.txt form too")
-                ->type_name("poses.txt");
-            app.add_option("--camera", arguments->camera, "Camera of the images [the map's one of that size]")
-                ->type_name("MODEL,W,H,P...");
-            app.add_option("--cameras", arguments->cameras_path, "cameras.txt; chosen by image size")
-                ->type_name("FILE");
-            app.add_flag("--sequence", arguments->is_sequence,
-                         "The images are frames in order: follow the camera from one to the next");
-            app.add_option(
-                   "--estimator", arguments->estimator,
-                   "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
-                   "how landmarks look from where (the map needs a visual map); both: and how far "
-                   "they disagree [pnp]")
-                ->check(CLI::IsMember({"pnp", "visual-map", "both"}));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->map_path, "Map").Required().Type("MAP");
+            parser.Add("images", arguments->images, "Image files; '-' reads names from stdin").Type("IMAGE");
+            parser.Add("--list", arguments->list_path, "File with an image's name per line").Type("FILE");
+            parser
+                .Add("-o,--output", arguments->output_path,
+                     "Write the poses found in COLMAP's images.txt form too")
+                .Type("poses.txt");
+            parser.Add("--camera", arguments->camera, "Camera of the images [the map's camera of that size]")
+                .Type("MODEL,W,H,P...");
+            parser.Add("--cameras", arguments->cameras_path, "cameras.txt; chosen by image size")
+                .Type("FILE");
+            parser.AddFlag("--sequence", arguments->is_sequence,
+                           "The images are frames in order: follow the camera from one to the next");
+            parser
+                .Add("--estimator", arguments->estimator,
+                     "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
+                     "how landmarks look from each place (the map needs a visual map); both: and how far "
+                     "they disagree [pnp]")
+                .OneOf({"pnp", "visual-map", "both"});
             OptionTable options = DescribeOptions(&arguments->options);
             const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
             options.insert(options.end(), of_tracker.begin(), of_tracker.end());
@@ -357,9 +356,13 @@ Command LocalizeCommand() {
                                                  DescribeOptions(&arguments->estimate_options)}) {
               options.insert(options.end(), of_visual.begin(), of_visual.end());
             }
-            arguments->option_arguments.Add(app, options);
+            arguments->option_arguments.Add(
+                parser, options,
+                {"max_num_features", "max_image_side_px", "min_num_inliers", "max_sigma_m", "max_sigma_deg",
+                 "max_distance_from_survey_m", "exclude_look_alikes"});
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunLocalize(*arguments, environment); },
   };
 }
 

@@ -22,11 +22,10 @@ using nlohmann::ordered_json;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kMaxDrawnSolutions = 6;
 
-struct Arguments {
+struct LocateScanArguments {
   std::string views;
   std::string scans;
-  bool has_scan = false;  // otherwise all
-  std::string scan;
+  std::optional<std::string> scan;  // otherwise all
   std::string svg;
   ScanSegmentsOptions segment_options;
   InterpretationTreeOptions search_options{.max_null_ratio = 0.25, .one_segment_per_wall = false};
@@ -71,17 +70,17 @@ decompose_views::ViewsOverlay Overlay(const ScanView& scan, const Interpretation
   return overlay;
 }
 
-// The first of the scans to locate, and the one after the last.
-// Errors: InvalidArgument for a --scan that is not the number of one.
-Result<std::pair<int, int>> ChosenScans(const Arguments& arguments, int num_scans) {
-  if (!arguments.has_scan) return std::pair(0, num_scans);
+// The first of the scans to locate, and the one after the last.  Errors: InvalidArgument for a --scan that is
+// not the number of a scan.
+Result<std::pair<int, int>> ChosenScans(const LocateScanArguments& arguments, int num_scans) {
+  if (!arguments.scan) return std::pair(0, num_scans);
   int scan = 0;
-  if (ParseNumber(arguments.scan, &scan) && scan >= 0 && scan < num_scans) return std::pair(scan, scan + 1);
+  if (ParseNumber(*arguments.scan, &scan) && scan >= 0 && scan < num_scans) return std::pair(scan, scan + 1);
   return MakeError(ErrorCode::kInvalidArgument, "{}: --scan '{}': it has {} scan(s), numbered 0 to {}",
-                   arguments.scans, arguments.scan, num_scans, num_scans - 1);
+                   arguments.scans, *arguments.scan, num_scans, num_scans - 1);
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunLocateScan(const LocateScanArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Views> opened, OpenViews(arguments.views));
   const Views& views = *opened;
@@ -130,33 +129,32 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command LocateScanCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<LocateScanArguments>();
   Command command;
-  command.name = "locate-scan";
+  command.name = "locate";
+  command.former_names = {"locate-scan"};
   command.summary = "Find where a laser scan was taken in a floor plan";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("scans", arguments->scans,
-                   "Carmen log, or lines x0,y0,x1,y1 of the walls seen (robot frame, metres)")
-        ->required()
-        ->type_name("FILE");
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        .Required()
+        .Type("FILE");
+    parser
+        .Add("scans", arguments->scans,
+             "Carmen log, or lines x0,y0,x1,y1 of the walls seen (robot frame, metres)")
+        .Required()
+        .Type("FILE");
     // As text, for one error that says how many scans there are.
-    app.add_option_function<std::string>(
-           "--scan",
-           [arguments](const std::string& scan) {
-             arguments->has_scan = true;
-             arguments->scan = scan;
-           },
-           "number of the only scan to locate, from 0")
-        ->type_name("INT");
-    app.add_option("--svg", arguments->svg, "also draw the first scan over the plan")->type_name("FILE.svg");
+    parser.Add("--scan", arguments->scan, "number of the only scan to locate, from 0").Type("INT");
+    parser.Add("--svg", arguments->svg, "also draw the first scan over the plan").Type("FILE.svg");
     OptionTable table = DescribeOptions(&arguments->segment_options);
     for (Option& option : DescribeOptions(&arguments->search_options)) table.push_back(std::move(option));
-    arguments->option_arguments.Add(app, std::move(table));
+    arguments->option_arguments.Add(parser, std::move(table),
+                                    {"max_range_m", "sigma_range_m", "max_null_ratio", "max_missing_ratio",
+                                     "sigma_wall_m", "sigma_wall_deg", "first_only"});
   };
-  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
+  command.run = [arguments](const CommandEnvironment& environment) {
+    return RunLocateScan(*arguments, environment);
+  };
   return command;
 }
 

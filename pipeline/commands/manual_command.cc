@@ -7,8 +7,10 @@
 
 #include "core/files/file.h"
 #include "core/line/program_version.h"
-#include "pipeline/program/common_arguments.h"
+#include "pipeline/build/recipe.h"
+#include "pipeline/build/stage_options.h"
 #include "pipeline/program/manual.h"
+#include "pipeline/program/program_parser.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -21,10 +23,11 @@ Status WriteManual(const std::string& folder) {
   CommonArguments arguments;
   const std::vector<Command> commands = AllCommands();
   const std::unique_ptr<CLI::App> program = MakeParser(commands, &arguments);
-  for (const CLI::App* command : program->get_subcommands(nullptr)) {
-    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(pages + "/cairn-" + command->get_name() + ".1",
-                                              CommandPage(*program, *command, ProgramVersion())));
+  for (const CalledCommand& command : CalledCommands(*program)) {
+    CAIRN_RETURN_IF_ERROR(
+        WriteFileAtomically(pages + "/" + PageName(command) + ".1", CommandPage(command, ProgramVersion())));
   }
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/recipe.md", RecipeReference(AllStageOptions())));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/cairn.bash", BashCompletion(*program)));
   return WriteFileAtomically(pages + "/cairn.1", ProgramPage(*program, ProgramVersion()));
 }
@@ -35,12 +38,12 @@ Command ManualCommand() {
   auto folder = std::make_shared<std::string>();
   return {
       .name = "manual",
-      .summary = "Writes this program's manual pages and its completion for bash into a folder",
+      .summary = "Write manual pages, completion for bash and the reference of recipes",
       .add_arguments =
-          [folder](CLI::App& app) {
-            app.add_option("-o,--output", *folder, "Folder: man1/*.1 and cairn.bash")
-                ->required()
-                ->type_name("FOLDER");
+          [folder](ArgumentParser& parser) {
+            parser.Add("-o,--output", *folder, "Folder to write: man1/*.1, cairn.bash, recipe.md")
+                .Required()
+                .Type("FOLDER");
           },
       .run = [folder](const CommandEnvironment&) { return WriteManual(*folder); },
   };

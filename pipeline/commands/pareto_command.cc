@@ -31,12 +31,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// By default each map has half the bytes of the one before, until one is not possible.
+// By default each map has half the bytes of the one before, until a map is not possible.
 constexpr int kMaxNumHalvings = 12;
 // Then sizes between the last one possible and the first one that was not.
 constexpr int kNumBetween = 2;
 
-struct Arguments {
+struct ParetoArguments {
   std::string recipe;
   std::string output;
   std::string build_dir;
@@ -96,7 +96,8 @@ Result<int> ExitCode(const std::vector<std::string>& words, const std::string& s
   return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : static_cast<int>(ErrorCode::kFailed);
 }
 
-Status CompileMap(const Arguments& arguments, const Places& places, const CommandEnvironment& environment) {
+Status CompileMap(const ParetoArguments& arguments, const Places& places,
+                  const CommandEnvironment& environment) {
   std::vector<std::string> words = {places.program,
                                     "compile",
                                     arguments.recipe,
@@ -122,7 +123,7 @@ Status CompileMap(const Arguments& arguments, const Places& places, const Comman
                    arguments.recipe);
 }
 
-// The point of a map that is there.
+// The point of an existing map.
 Result<ParetoPoint> ReadPoint(const Places& places, int64_t size) {
   const std::string path = places.Pareto(size, ".json");
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
@@ -182,7 +183,7 @@ int64_t Rounded(double size) {
   return static_cast<int64_t>(std::floor(size / unit) * unit);
 }
 
-// Halves of the map of all classes, as far as there are any; then what lies between.
+// Halves the map of all classes again and again while a map is possible; then sizes between.
 Status AddHalves(int64_t num_bytes, const std::function<Result<bool>(int64_t)>& add) {
   auto possible = static_cast<double>(num_bytes);
   for (int i = 0; i < kMaxNumHalvings; ++i) {
@@ -202,7 +203,7 @@ Status AddHalves(int64_t num_bytes, const std::function<Result<bool>(int64_t)>& 
   return Ok();
 }
 
-Status Run(Arguments arguments, const CommandEnvironment& environment) {
+Status RunPareto(ParetoArguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   CAIRN_ASSIGN_OR_RETURN(const std::vector<int64_t> asked,
                          !arguments.sizes ? std::vector<int64_t>() : ParseSizes(*arguments.sizes));
@@ -249,35 +250,38 @@ Status Run(Arguments arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command ParetoCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ParetoArguments>();
   return {
       .name = "pareto",
-      .summary =
-          "Compiles a recipe in several sizes and shows what a smaller map costs: a table, a CSV file, a "
-          "picture",
+      .summary = "Compile a recipe in several sizes and show what a smaller map costs",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("recipe", arguments->recipe,
-                           "Recipe of the map, or the folder of a capture; it needs held-out images")
-                ->required()
-                ->type_name("RECIPE.toml|FOLDER");
-            app.add_option(
-                   "-o,--output", arguments->output,
-                   "Map to compile; NAME.pareto.csv and NAME.pareto.svg are written beside it [by the "
-                   "name of the recipe or the folder, in the current folder]")
-                ->type_name("NAME.cairn");
-            app.add_option("--build-dir", arguments->build_dir,
-                           "Folder for the stages' files [NAME.build beside the map]")
-                ->type_name("DIR");
-            app.add_option("--sizes", arguments->sizes,
-                           "Sizes to try, bytes [halves of the map of all classes, as far as there are any]")
-                ->type_name("BYTES,...");
-            app.add_option(
-                   "--peer", arguments->peer,
-                   "Another program's map to show in the picture: NAME,BYTES,LOCALIZED_RATIO,MEDIAN_ERROR_M")
-                ->type_name("PEER");
+          [arguments](ArgumentParser& parser) {
+            parser
+                .Add("recipe", arguments->recipe,
+                     "Recipe of the map, or the folder of a capture; it needs held-out images")
+                .Required()
+                .Type("RECIPE.toml|FOLDER");
+            parser
+                .Add("-o,--output", arguments->output,
+                     "Map to compile; NAME.pareto.csv and NAME.pareto.svg are written beside it [by the "
+                     "name of the recipe or the folder, in the current folder]")
+                .Type("NAME.cairn");
+            parser
+                .Add("--build-dir", arguments->build_dir,
+                     "Folder for the stages' files [NAME.build beside the map]")
+                .Type("FOLDER");
+            parser
+                .Add("--sizes", arguments->sizes,
+                     "Sizes to try, bytes [the map of all classes, halved while a map is possible]")
+                .Type("BYTES,...");
+            parser
+                .Add(
+                    "--peer", arguments->peer,
+                    "Another program's map to show in the picture: NAME,BYTES,LOCALIZED_RATIO,MEDIAN_ERROR_M")
+                .Type("PEER");
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunPareto(*arguments, environment); },
   };
 }
 

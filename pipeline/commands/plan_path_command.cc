@@ -21,7 +21,7 @@ using Vec2 = Eigen::Vector2d;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-ordered_json Json(const std::vector<Vec2>& points) {
+ordered_json PathJson(const std::vector<Vec2>& points) {
   ordered_json list = ordered_json::array();
   for (const Vec2& point : points) list.push_back({point.x(), point.y()});
   return list;
@@ -62,7 +62,7 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   decompose_views::ViewsOverlay overlay;
   if (arguments.kind == "search") {
     CAIRN_ASSIGN_OR_RETURN(SearchPath search, FindSearchPath(space, from, arguments.options));
-    line["places"] = Json(search.places);
+    line["places"] = PathJson(search.places);
     line["seen_area_m2"] = search.seen_area_m2;
     line["reachable_area_m2"] = search.reachable_area_m2;
     overlay.captions = {fmt::format("{} places to look around from", search.places.size())};
@@ -75,7 +75,7 @@ Status RunPath(const PathArguments& arguments, const CommandEnvironment& environ
   }
   line["length_m"] = path.length_m;
   line["links"] = path.num_links();
-  line["points"] = Json(path.points);
+  line["points"] = PathJson(path.points);
   *environment.out << JsonText(line) << "\n";
   environment.report->out = {{"links", path.num_links()}};
   if (arguments.svg.empty()) return Ok();
@@ -92,7 +92,7 @@ struct ApartArguments {
   OptionArguments option_arguments;
 };
 
-// Errors: InvalidArgument for a heading that is no angle; places are checked with the plan.
+// Errors: InvalidArgument for a heading out of range; places are checked with the plan.
 Result<PlanarPose> ParsePose(const std::string& option, const std::vector<double>& values) {
   if (!(std::abs(values[2]) <= 360)) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -153,11 +153,11 @@ Status RunApart(const ApartArguments& arguments, const CommandEnvironment& envir
   if (plan.kind > 0) {
     line["is_best"] = plan.is_best;
     line["length_m"] = plan.path_length_m;
-    line["path_a"] = Json(plan.path_a);
-    line["path_b"] = Json(plan.path_b);
+    line["path_a"] = PathJson(plan.path_a);
+    line["path_b"] = PathJson(plan.path_b);
     line["feature_at"] = plan.feature_is_at_a ? "a" : "b";
-    line["feature_a"] = Json({plan.feature_start_a, plan.feature_end_a});
-    line["feature_b"] = Json({plan.feature_start_b, plan.feature_end_b});
+    line["feature_a"] = PathJson({plan.feature_start_a, plan.feature_end_a});
+    line["feature_b"] = PathJson({plan.feature_start_b, plan.feature_end_b});
     line["distance_m"] = plan.distance_m;
   }
   *environment.out << JsonText(line) << "\n";
@@ -165,7 +165,7 @@ Status RunApart(const ApartArguments& arguments, const CommandEnvironment& envir
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.svg, Drawn(views, a, b, plan)));
   if (plan.outcome != DisambiguationOutcome::kGaveUp) return Ok();
   return MakeError(ErrorCode::kFailed,
-                   "gave up: nothing that tells a from b is seen from the {} regions nearest to them, and "
+                   "gave up: nothing that distinguishes a from b is seen from the {} nearest regions, and "
                    "there are more; allow more with --max-num-regions",
                    plan.num_regions);
 }
@@ -175,24 +175,24 @@ Status RunApart(const ApartArguments& arguments, const CommandEnvironment& envir
 Command PlanPathCommand() {
   auto arguments = std::make_shared<PathArguments>();
   Command command;
-  command.name = "plan-path";
-  command.summary =
-      "Plan a path in a floor plan: a short one, one with few turns, or one that sees everything";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("--from", arguments->from, "start, metres")
-        ->required()
-        ->expected(2)
-        ->delimiter(',')
-        ->type_name("X,Y");
-    app.add_option("--to", arguments->to, "goal, metres")->expected(2)->delimiter(',')->type_name("X,Y");
-    app.add_option("--kind", arguments->kind, "short, min-link (few turns) or search (sees every point)")
-        ->check(CLI::IsMember({"short", "min-link", "search"}))
-        ->capture_default_str();
-    app.add_option("--svg", arguments->svg, "also draw it")->type_name("FILE.svg");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.name = "path";
+  command.former_names = {"plan-path"};
+  command.summary = "Plan a path: a short one, one with few turns, or one that sees everything";
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        .Required()
+        .Type("FILE");
+    parser.Add("--from", arguments->from, "start, metres")
+        .Required()
+        .Values(2)
+        .SeparatedByCommas()
+        .Type("X,Y");
+    parser.Add("--to", arguments->to, "goal, metres").Values(2).SeparatedByCommas().Type("X,Y");
+    parser.Add("--kind", arguments->kind, "short, min-link (few turns) or search (sees every point)")
+        .OneOf({"short", "min-link", "search"})
+        .ShowDefault();
+    parser.Add("--svg", arguments->svg, "also draw it").Type("FILE.svg");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) {
     return RunPath(*arguments, environment);
@@ -204,23 +204,19 @@ Command TellApartCommand() {
   auto arguments = std::make_shared<ApartArguments>();
   Command command;
   command.name = "tell-apart";
-  command.summary = "Plan where to go to tell which of two poses in a floor plan is the right one";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("--a", arguments->a, "a pose, metres and degrees")
-        ->required()
-        ->expected(3)
-        ->delimiter(',')
-        ->type_name("X,Y,DEG");
-    app.add_option("--b", arguments->b, "another")
-        ->required()
-        ->expected(3)
-        ->delimiter(',')
-        ->type_name("X,Y,DEG");
-    app.add_option("--svg", arguments->svg, "also draw it")->type_name("FILE.svg");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.summary = "Plan where to go to tell which of two poses is the right one";
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("views", arguments->views, "regions of the plan (views.db, or a map that has them)")
+        .Required()
+        .Type("FILE");
+    parser.Add("--a", arguments->a, "a pose, metres and degrees")
+        .Required()
+        .Values(3)
+        .SeparatedByCommas()
+        .Type("X,Y,DEG");
+    parser.Add("--b", arguments->b, "another").Required().Values(3).SeparatedByCommas().Type("X,Y,DEG");
+    parser.Add("--svg", arguments->svg, "also draw it").Type("FILE.svg");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) {
     return RunApart(*arguments, environment);

@@ -11,6 +11,7 @@
 
 #include "core/files/file.h"
 #include "core/files/output_path.h"
+#include "core/line/json_report.h"
 #include "core/map/map_file.h"
 #include "core/world/feature_class.h"
 #include "pipeline/explain/block_bytes.h"
@@ -26,11 +27,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kCheckWords = "what cairn check-map --details wrote";
+constexpr const char* kCheckWords = "what cairn check --details wrote";
 constexpr const char* kBuildWords = "the report that cairn compile wrote";
 constexpr const char* kDriveWords = "what cairn drive -o wrote";
 
-struct Arguments {
+struct ReportArguments {
   std::string map_path;
   std::string output_path;
   std::string build_report_path;
@@ -42,19 +43,11 @@ struct Arguments {
   bool print = false;
 };
 
-Result<Json> ReadJson(const std::string& path, const char* what) {
-  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object())
-    return MakeError(ErrorCode::kCorrupt, "{}: is no JSON object; expected {}", path, what);
-  return json;
-}
-
 Error NotWhatWasExpected(const std::string& path, const char* what) {
   return MakeError(ErrorCode::kCorrupt, "{}: its keys or their types are not those of {}", path, what);
 }
 
-// A map that every byte was checked of, as `cairn verify` does: what a report says must be what was made.
+// Opens a map and checks every byte, as `cairn verify` does: a report must describe the map that was made.
 Result<MapFile> OpenWholeMap(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {}));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(path));
@@ -70,7 +63,7 @@ std::vector<std::pair<std::string, int64_t>> BytesByKind(const MapFile& file, in
 }
 
 // The given file, or the one beside the map if it is there.
-std::string Beside(const Arguments& arguments, const std::string& given, const char* extension) {
+std::string Beside(const ReportArguments& arguments, const std::string& given, const char* extension) {
   if (!given.empty()) return given;
   const fs::path path = fs::path(arguments.map_path).replace_extension(extension);
   std::error_code error;
@@ -94,23 +87,23 @@ Result<std::vector<ParetoPoint>> ReadPareto(const std::string& path) {
   return ParseParetoCsv(csv, path);
 }
 
-// The given one, or that of the map's compilation if it is still that of this map.
-Result<std::optional<Json>> ReadCheck(const Arguments& arguments, const std::string& build_dir,
+// The given check, or that in the build folder if it is still a check of this map.
+Result<std::optional<Json>> ReadCheck(const ReportArguments& arguments, const std::string& build_dir,
                                       const MapRows& rows) {
   std::error_code error;
   const bool is_given = !arguments.check_path.empty();
   const std::string path = is_given ? arguments.check_path : build_dir + "/check.json";
   if (!is_given && (build_dir.empty() || !fs::exists(path, error))) return std::optional<Json>();
-  CAIRN_ASSIGN_OR_RETURN(std::optional<Json> check, ReadJson(path, kCheckWords));
+  CAIRN_ASSIGN_OR_RETURN(std::optional<Json> check, ReadJsonReport(path, kCheckWords));
   if (!check->contains("images")) {
     if (!is_given) return std::optional<Json>();
-    return MakeError(ErrorCode::kNoData,
-                     "{}: has no held-out images; cairn check-map takes them with --queries", path);
+    return MakeError(ErrorCode::kNoData, "{}: has no held-out images; cairn check takes them with --queries",
+                     path);
   }
   if (!IsCheckReport(*check)) return NotWhatWasExpected(path, kCheckWords);
   if (IsCheckOf(*check, rows)) return check;
   if (is_given) {
-    // Other images of the same map may be asked for.
+    // A check of the same map with other images is allowed.
     spdlog::warn("{}: its figures are not those of the self-test in {}", path, arguments.map_path);
     return check;
   }
@@ -122,15 +115,16 @@ Result<std::optional<Json>> ReadCheck(const Arguments& arguments, const std::str
 std::string FloorPicture(const std::string& folder) { return folder + "/floor.svg"; }
 std::string AmbiguityPicture(const std::string& folder) { return folder + "/ambiguity.svg"; }
 
-// The page and the pictures can be written, and none is a file that is read, given or found.
-Status CheckPageAndPictures(const Arguments& arguments, const std::vector<std::string>& inputs) {
+// Checks that the page and the pictures can be written, and that none of them is an input file, given
+// or found.
+Status CheckPageAndPictures(const ReportArguments& arguments, const std::vector<std::string>& inputs) {
   CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(arguments.output_path));
   CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.output_path, inputs));
   if (arguments.svg_dir.empty()) return Ok();
   for (const std::string& picture : {FloorPicture(arguments.svg_dir), AmbiguityPicture(arguments.svg_dir)}) {
     if (IsSameFile(picture, arguments.output_path))
-      return MakeError(ErrorCode::kInvalidArgument, "{}: is the page and a picture; choose another name",
-                       picture);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: is the name of the page and of a picture; choose another name", picture);
     CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(picture, inputs));
   }
   return Ok();
@@ -145,11 +139,11 @@ Status WritePictures(const std::string& folder, const MapRows& rows) {
   return ambiguity.ok() ? WriteFileAtomically(AmbiguityPicture(folder), *ambiguity) : Ok();
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunReport(const ReportArguments& arguments, const CommandEnvironment& environment) {
   if (arguments.print && !(arguments.drive_path.empty() && arguments.compare_path.empty())) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "--print has no room for --drive and --compare, which live by being clicked; leave one out");
+        "--print does not show --drive and --compare, which need the page's scripts; leave one out");
   }
   const std::string build_dir = Beside(arguments, arguments.build_dir, ".build");
   const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
@@ -168,14 +162,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(inputs.pareto, ReadPareto(pareto_path));
   std::optional<Json> build, drive;
   if (!build_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(build, ReadJson(build_path, kBuildWords));
+    CAIRN_ASSIGN_OR_RETURN(build, ReadJsonReport(build_path, kBuildWords));
     if (!IsBuildReport(*build)) return NotWhatWasExpected(build_path, kBuildWords);
     inputs.build_report = &*build;
   }
   CAIRN_ASSIGN_OR_RETURN(const std::optional<Json> check, ReadCheck(arguments, build_dir, rows));
   if (check) inputs.check = &*check;
   if (!arguments.drive_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(drive, ReadJson(arguments.drive_path, kDriveWords));
+    CAIRN_ASSIGN_OR_RETURN(drive, ReadJsonReport(arguments.drive_path, kDriveWords));
     if (!IsDrive(*drive)) return NotWhatWasExpected(arguments.drive_path, kDriveWords);
     inputs.drive = &*drive;
   }
@@ -203,43 +197,42 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command ReportCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReportArguments>();
   return {
       .name = "report",
-      .summary =
-          "Writes a page that shows what a map covers, how well, where a robot will be unsure, and what to "
-          "survey next",
+      .summary = "Write a page that shows what a map covers, how well, and what to survey next",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
-            app.add_option("-o,--output", arguments->output_path, "Page to write; it needs no network")
-                ->required()
-                ->type_name("FILE.html");
-            app.add_option(
-                   "--build-report", arguments->build_report_path,
-                   "Seconds and memory of the stages [NAME.report.json beside the map, if it is there]")
-                ->type_name("FILE.json");
-            app.add_option(
-                   "--build-dir", arguments->build_dir,
-                   "Build folder, for reprojection errors [NAME.build beside the map, if it is there]")
-                ->type_name("DIR");
-            app.add_option("--check", arguments->check_path,
-                           "What cairn check-map --details wrote: held-out images on the floor, with their "
-                           "errors or why they were not localized [check.json in the build folder, if it is "
-                           "of this map]")
-                ->type_name("FILE.json");
-            app.add_option("--drive", arguments->drive_path,
-                           "What cairn drive -o wrote: replayed on the floor")
-                ->type_name("RUN.json");
-            app.add_option("--compare", arguments->compare_path,
-                           "Another map of the place, in the same frame: what changed from it to MAP")
-                ->type_name("OLD");
-            app.add_flag("--print", arguments->print,
-                         "Write a page for paper: pictures and tables, no scripts");
-            app.add_option("--svg", arguments->svg_dir, "Write the pictures there too, as SVG")
-                ->type_name("DIR");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->map_path, "Map").Required().Type("MAP");
+            parser.Add("-o,--output", arguments->output_path, "Page to write; it needs no network")
+                .Required()
+                .Type("FILE.html");
+            parser
+                .Add("--build-report", arguments->build_report_path,
+                     "Seconds and memory of the stages [NAME.report.json beside the map, if it is there]")
+                .Type("FILE.json");
+            parser
+                .Add("--build-dir", arguments->build_dir,
+                     "Build folder, for reprojection errors [NAME.build beside the map, if it is there]")
+                .Type("FOLDER");
+            parser
+                .Add("--check", arguments->check_path,
+                     "What cairn check --details wrote: held-out images on the floor, with their "
+                     "errors or why they were not localized [check.json in the build folder, if it is "
+                     "of this map]")
+                .Type("FILE.json");
+            parser.Add("--drive", arguments->drive_path, "What cairn drive -o wrote: replayed on the floor")
+                .Type("RUN.json");
+            parser
+                .Add("--compare", arguments->compare_path,
+                     "Another map of the place, in the same frame: what changed from it to MAP")
+                .Type("OLD");
+            parser.AddFlag("--print", arguments->print,
+                           "Write a page for paper: pictures and tables, no scripts");
+            parser.Add("--svg", arguments->svg_dir, "Write the pictures there too, as SVG").Type("FOLDER");
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run =
+          [arguments](const CommandEnvironment& environment) { return RunReport(*arguments, environment); },
   };
 }
 

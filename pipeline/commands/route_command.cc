@@ -13,7 +13,7 @@
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct RouteArguments {
   std::string map_path;
   std::string from;
   std::string to;
@@ -22,7 +22,7 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunRoute(const RouteArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.from));
@@ -48,22 +48,19 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command RouteCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RouteArguments>();
   return {
       .name = "route",
-      .summary =
-          "Lists the images on the way from one survey image to another, over those that the map keeps",
+      .summary = "List the images on the route from one survey image to another",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map")->required()->type_name("MAP");
-            app.add_option("from", arguments->from, "Survey image to start at")
-                ->required()
-                ->type_name("IMAGE");
-            app.add_option("to", arguments->to, "Survey image to go to")->required()->type_name("IMAGE");
-            app.add_flag("--json", arguments->json, "Print JSON");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->map_path, "Map").Required().Type("MAP");
+            parser.Add("from", arguments->from, "Survey image to start at").Required().Type("IMAGE");
+            parser.Add("to", arguments->to, "Survey image to go to").Required().Type("IMAGE");
+            parser.AddFlag("--json", arguments->json, "Print JSON");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .run = [arguments](const CommandEnvironment& environment) { return RunRoute(*arguments, environment); },
   };
 }
 

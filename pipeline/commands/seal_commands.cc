@@ -9,18 +9,17 @@
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
 #include "core/seal/map_seal.h"
-#include "pipeline/commands/epoch_argument.h"
 
 namespace cairn::pipeline {
 namespace {
 
-struct Arguments {
+struct SealArguments {
   std::string input_path;
   std::string key_path;
   std::string output_path;
   std::string previous_path;
   std::string name;
-  uint64_t epoch = 0;  // 0: not given; of verify, the least
+  uint64_t epoch = 0;  // 0: not given; for verify, the smallest allowed
 };
 
 // " of epoch 3", where it was counted.
@@ -29,7 +28,7 @@ std::string EpochText(const MapHead& head) {
 }
 
 // Every byte by the file's hash, the signature, then every block and every row.
-Status Verify(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Verify(const SealArguments& arguments, const CommandEnvironment& environment) {
   MapFileOptions options;
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
@@ -38,15 +37,16 @@ Status Verify(const Arguments& arguments, const CommandEnvironment& environment)
   CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), arguments.input_path, arguments.name, arguments.epoch));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(arguments.input_path));
   CAIRN_RETURN_IF_ERROR(ReadMapRows(file));
-  *environment.out << fmt::format("{}: whole{}, {}\n", arguments.input_path, EpochText(file.head()),
-                                  file.seal().is_signed()
-                                      ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),
-                                                    options.public_key ? "" : ", which nobody asked for")
-                                      : "not signed");
+  *environment.out << fmt::format(
+      "{}: whole{}, {}\n", arguments.input_path, EpochText(file.head()),
+      file.seal().is_signed()
+          ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),
+                        options.public_key ? "" : ", which was not checked against a given key")
+          : "not signed");
   return Ok();
 }
 
-Status Keygen(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Keygen(const SealArguments& arguments, const CommandEnvironment& environment) {
   const KeyPair keys = MakeKeyPair();
   CAIRN_RETURN_IF_ERROR(WriteKeyPair(keys, arguments.output_path));
   *environment.out << fmt::format("{}: keep it secret; {}.pub: for robots ({})\n", arguments.output_path,
@@ -54,7 +54,7 @@ Status Keygen(const Arguments& arguments, const CommandEnvironment& environment)
   return Ok();
 }
 
-Status Sign(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Sign(const SealArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const SecretKey key, ReadSecretKey(arguments.key_path));
   std::string name;
   {
@@ -76,88 +76,89 @@ Status Sign(const Arguments& arguments, const CommandEnvironment& environment) {
   return Ok();
 }
 
-Status Migrate(const Arguments& arguments, const CommandEnvironment& environment) {
+Status Migrate(const SealArguments& arguments, const CommandEnvironment& environment) {
   Result<MapRows> read = ReadMapRowsVersion1(arguments.input_path);
   if (!read.ok() && read.error().code == ErrorCode::kTooNew) read = ReadMapRows(arguments.input_path);
-  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, std::move(read));
-  CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));
+  if (!read.ok()) return read.error();
+  CAIRN_RETURN_IF_ERROR(WriteMapRows(*read, arguments.output_path));
   *environment.out << fmt::format("{}: map '{}' as version {}.{}, not signed\n", arguments.output_path,
-                                  rows.name, kMapVersionMajor, kMapVersionMinor);
+                                  read->name, kMapVersionMajor, kMapVersionMinor);
   return Ok();
 }
 
 }  // namespace
 
 Command VerifyCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SealArguments>();
   return {
       .name = "verify",
-      .summary = "Checks every byte of a map, and its signature",
+      .summary = "Check every byte of a map, and its signature",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->input_path, "Map")->required()->type_name("MAP");
-            app.add_option("--public-key", arguments->key_path, "Key whose signature the map must have")
-                ->type_name("KEY.pub");
-            app.add_option("--name", arguments->name, "What the map must be called")->type_name("NAME");
-            AddEpochArgument(app, "--min-epoch", &arguments->epoch, 0, "Least epoch that the map may have");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->input_path, "Map").Required().Type("MAP");
+            parser.Add("--public-key", arguments->key_path, "Key whose signature the map must have")
+                .Type("KEY.pub");
+            parser.Add("--name", arguments->name, "Name that the map must have").Type("NAME");
+            parser.Add("--min-epoch", arguments->epoch, "Smallest epoch that the map may have")
+                .Type("N")
+                .WholeNumber(0);
           },
       .run = [arguments](const CommandEnvironment& environment) { return Verify(*arguments, environment); },
   };
 }
 
 Command KeygenCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SealArguments>();
   return {
       .name = "keygen",
-      .summary = "Makes a pair of keys for signing maps",
+      .summary = "Make a pair of keys for signing maps",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("key", arguments->output_path, "Secret key to write; KEY.pub is the public one")
-                ->required()
-                ->type_name("KEY");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("key", arguments->output_path, "Secret key to write; KEY.pub is the public one")
+                .Required()
+                .Type("KEY");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Keygen(*arguments, environment); },
   };
 }
 
 Command SignCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SealArguments>();
   return {
       .name = "sign",
-      .summary = "Writes a signed copy of a map",
+      .summary = "Write a signed copy of a map",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->input_path, "Map")->required()->type_name("MAP");
-            app.add_option("--key", arguments->key_path, "Secret key from keygen")
-                ->required()
-                ->type_name("KEY");
-            app.add_option("-o,--output", arguments->output_path, "Signed map to write")
-                ->required()
-                ->type_name("SIGNED");
-            CLI::Option* const epoch = AddEpochArgument(app, "--epoch", &arguments->epoch, 1,
-                                                        "Epoch of the map [that of the map, or 1]");
-            app.add_option("--after", arguments->previous_path,
-                           "Map that this one follows, signed with the same key: the epoch after its one")
-                ->excludes(epoch)
-                ->type_name("PREVIOUS");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->input_path, "Map").Required().Type("MAP");
+            parser.Add("--key", arguments->key_path, "Secret key from keygen").Required().Type("KEY");
+            parser.Add("-o,--output", arguments->output_path, "Signed map to write")
+                .Required()
+                .Type("SIGNED");
+            const Argument epoch =
+                parser.Add("--epoch", arguments->epoch, "Epoch of the map [that of the map, or 1]")
+                    .Type("N")
+                    .WholeNumber(1);
+            parser
+                .Add("--after", arguments->previous_path,
+                     "Map that this one follows, signed with the same key: its epoch plus 1 is used")
+                .Excludes(epoch)
+                .Type("PREVIOUS");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Sign(*arguments, environment); },
   };
 }
 
 Command MigrateCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SealArguments>();
   return {
       .name = "migrate",
-      .summary = "Writes a map of an earlier format in today's",
+      .summary = "Convert a map of an earlier format to the current one",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->input_path, "Map of format 1.0 to today's")
-                ->required()
-                ->type_name("OLD");
-            app.add_option("-o,--output", arguments->output_path, "Map to write")
-                ->required()
-                ->type_name("NEW");
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->input_path, "Map of format 1.0 to the current one")
+                .Required()
+                .Type("OLD");
+            parser.Add("-o,--output", arguments->output_path, "Map to write").Required().Type("NEW");
           },
       .run = [arguments](const CommandEnvironment& environment) { return Migrate(*arguments, environment); },
   };

@@ -16,17 +16,19 @@
 namespace cairn::pipeline {
 namespace {
 
-// A place that could as well be one other has this entropy; more is a place that looks like several.
+// Entropy of a place that looks the same as one other place; a larger entropy means several look-alikes.
 constexpr double kAmbiguousEntropy = std::numbers::ln2;
-// A map is smaller, or larger, if it has so many times the bytes; it localizes more if by this part.
+// A map counts as smaller if this map has at least this many times its bytes, and as localizing more if by at
+// least this part of the images.
 constexpr double kOtherSizeFactor = 1.5;
 constexpr double kMoreLocalized = 0.01;
-// Errors that one turn, scale and shift reduces to this part are those of a frame; fewer images cannot tell.
+// Errors that one rotation, scale and shift reduces to this part come from different frames; fewer images
+// than kMinAligned cannot show it.
 constexpr double kAlignedErrors = 0.7;
 constexpr size_t kMinAligned = 10;
 constexpr double kLeastFromWallM = 0.2;
 constexpr int kMaxNames = 6;
-// Part of the poses that lie within 10 cm and 5 degrees where there is nothing to mend.
+// Part of the poses within 10 cm and 5 degrees that is good enough.
 constexpr double kManyWithin = 0.8;
 
 std::vector<std::vector<StationIdx>> Neighbours(const MapRows& rows) {
@@ -139,23 +141,19 @@ Advice AboutUncovered(const MapRows& rows, const StationLosses& losses, std::vec
   } else if (num_seldom >= std::max(1, rows.k - num_visible) && num_seldom >= num_alike) {
     advice.text = fmt::format(
         "{} {} not covered: only {} features are in view, k = {} are needed, but {} more were seen from too "
-        "few "
-        "places. Take images around there.",
+        "few places. Take images around there.",
         where, verb, num_visible, rows.k, num_seldom);
     advice.images_to_take = ViewsBetween(rows, stations, neighbours);
   } else if (num_alike > num_seldom) {
     advice.text = fmt::format(
         "{} {} not covered: only {} features are in view, k = {} are needed, and {} look like others "
-        "elsewhere. "
-        "More images will not help; something unlike the rest on the walls there would.",
+        "elsewhere. More images will not help; something distinctive on the walls there would.",
         where, verb, num_visible, rows.k, num_alike);
   } else {
     advice.text = fmt::format(
         "{} {} not covered: only {} features are in view, k = {} are needed, and hardly more were found in "
-        "the "
-        "images (blank walls, darkness, blur). A smaller k, a camera that sees more, or something with "
-        "texture "
-        "there would help.",
+        "the images (blank walls, darkness, blur). A smaller k, a camera that sees more, or something with "
+        "texture there would help.",
         where, verb, num_visible, rows.k);
   }
   advice.stations = std::move(stations);
@@ -207,11 +205,11 @@ void AddAmbiguousRegions(const MapRows& rows, const std::vector<StationIdx>& abo
   for (const RegionEntropy* entry : ambiguous) {
     const std::vector<StationIdx>& stations = rows.regions[entry->region].stations;
     advice->push_back(
-        {.text = fmt::format(
-             "Region {} ({}) looks like other places: {:.2f} nats, as {:.1f} places alike. A robot that "
-             "starts there has to move before it knows where it is; something unlike the rest on "
-             "its walls would help.",
-             entry->region, WhereText(rows, stations), entry->entropy, std::exp(entry->entropy)),
+        {.text =
+             fmt::format("Region {} ({}) looks like other places: {:.2f} nats, as {:.1f} places alike. A "
+                         "robot that starts there has to move before it knows where it is; something "
+                         "distinctive on its walls would help.",
+                         entry->region, WhereText(rows, stations), entry->entropy, std::exp(entry->entropy)),
          .stations = stations,
          .region = entry->region});
   }
@@ -249,14 +247,13 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
     advice->push_back(
         {.text = fmt::format(
              "Of the {:.1f} % of held-out images that are localized, only {:.0f} % lie within 10 cm and 5 "
-             "degrees of where they were taken. Landmarks that are far away, few images around, or poses of "
-             "the survey that are off do this; [group_classes] refine_poses = \"always\" mends poses.",
+             "degrees of where they were taken. Causes are landmarks far away, few images around, or inexact "
+             "poses of the survey; [group_classes] refine_poses = \"always\" improves poses.",
              100 * localized->second, 100 * within->second / localized->second)});
   }
   if (rows.self_test.empty()) {
-    advice->push_back({.text =
-                           "No images were held out: queries = \"queries.txt\" in the capture tells how well "
-                           "the map localizes."});
+    advice->push_back({.text = "No images were held out: queries = \"queries.txt\" in the capture shows how "
+                               "well the map localizes."});
   }
 }
 
@@ -270,7 +267,7 @@ std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& a
   std::vector<Advice> advice;
   const StationLosses losses(rows);
   const auto neighbours = Neighbours(rows);
-  // Stations that lie together and for one reason are one piece of advice.
+  // Neighbouring stations with the same reason are one piece of advice.
   std::map<int, std::vector<StationIdx>> uncovered;
   for (size_t i = 0; i < rows.stations.size(); ++i) {
     const auto station = static_cast<StationIdx>(i);
@@ -319,9 +316,9 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
         BytesText(bytes), 100 * localized->second);
   };
   if (better != nullptr) {
-    advice->push_back({.text = "More can be had: " + text(*better)});
+    advice->push_back({.text = "A map that localizes more is possible: " + text(*better)});
   } else if (smaller != nullptr) {
-    advice->push_back({.text = "Smaller will do: " + text(*smaller)});
+    advice->push_back({.text = "A smaller map is enough: " + text(*smaller)});
   }
 }
 
@@ -355,7 +352,7 @@ void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>
       "{} held-out image{} failed where most are localized ({}{}). Survey images taken there, looking the "
       "same way, would help.",
       num_elsewhere, num_elsewhere == 1 ? "" : "s", names, num_elsewhere > kMaxNames ? ", ..." : "");
-  // What is about the map as a whole stays last.
+  // Advice about the map as a whole stays last.
   const auto place = std::find_if(advice->begin(), advice->end(),
                                   [](const Advice& entry) { return entry.stations.empty(); });
   advice->insert(place, std::move(elsewhere));
@@ -371,7 +368,7 @@ void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>
     middle += complex(image.taken) / num;
     found_middle += complex(image.found) / num;
   }
-  // The turn and scale that bring `taken` to `found` with the least squares, about the middles.
+  // The rotation and scale that take `taken` to `found` with the least squares, about their centres.
   Complex covariance = 0;
   double spread = 0, squares = 0;
   for (const PlacedImage& image : images) {
@@ -380,13 +377,13 @@ void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>
     spread += std::norm(taken);
     squares += (image.found - image.taken).squaredNorm();
   }
-  // Of images at one place neither can be told.
+  // Images at one place determine neither of them.
   if (spread < 100 * squares || spread <= 0) return;
   const Complex turned = covariance / spread;
   double squares_left = 0;
   for (const PlacedImage& image : images)
     squares_left += std::norm(turned * (complex(image.taken) - middle) + found_middle - complex(image.found));
-  // Four numbers of the 2 n went into the fit.
+  // The fit used up four of the 2 n numbers.
   const double before = std::sqrt(squares / num), after = std::sqrt(squares_left / (num - 2));
   if (after > kAlignedErrors * before) return;
   advice->push_back(

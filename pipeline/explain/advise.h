@@ -34,7 +34,7 @@ inline constexpr double kPoorLocalizedRatio = 0.8;
 // Needs what the compilation found out (MapFindings): without it, says so.
 std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& about = {});
 
-// What the same place's maps of other sizes say: whether a smaller one would do, whether a larger one
+// Adds advice from maps of other sizes of the same place: whether a smaller one is enough, or a larger one
 // localizes more.  `num_bytes` is the map's.
 void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPoint>& sizes,
               std::vector<Advice>* advice);
@@ -45,8 +45,8 @@ struct FailedImage {
   std::optional<StationIdx> station;
   Advice::View view;
 };
-// Images to take where held-out images failed: in the advice about their places they come first, those of no
-// such advice have one of their own.
+// Adds images to take where held-out images failed: first in the advice about their places, or in advice
+// of their own where there is none.
 void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>* advice);
 
 // Where held-out images were taken, and where the map puts them, floor frame, metres.
@@ -54,7 +54,7 @@ struct PlacedImage {
   Eigen::Vector2d taken = Eigen::Vector2d::Zero();
   Eigen::Vector2d found = Eigen::Vector2d::Zero();
 };
-// Whether their errors are those of a frame: one turn, scale and shift that takes most of them away.
+// Adds advice if one rotation, scale and shift removes most of their errors: then the frames differ.
 void AddMisalignment(const std::vector<PlacedImage>& images, std::vector<Advice>* advice);
 
 // A numbered line per advice, with the places of images to take under it.

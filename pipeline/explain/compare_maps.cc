@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
@@ -218,7 +218,7 @@ MapComparison CompareMaps(const MapRows& a, const MapRows& b, const CompareMapsO
   }
   comparison.num_landmarks_shared = static_cast<int64_t>(moves.size());
   if (!moves.empty()) {
-    comparison.median_move_m = Median(moves);
+    comparison.median_move_m = UpperMedian(moves);
     comparison.max_move_m = *std::max_element(moves.begin(), moves.end());
   }
   comparison.station_in_b = MatchStations(a, b, options);

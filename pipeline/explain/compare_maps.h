@@ -13,12 +13,12 @@ namespace cairn::pipeline {
 // What changed between two maps of one place, A and B, whose world frames are the same.
 
 struct CompareMapsOptions {
-  // Farther apart, two landmarks are not the same scene feature, m.
+  // Landmarks farther apart than this are not the same scene feature, m.
   double max_landmark_distance_m = 0.05;
-  // Nor when their descriptors differ by more than this angle, degrees: the same feature seen again differs
-  // by 15 to 30, another one by 50 to 90.
+  // Nor are landmarks whose descriptors differ by more than this angle, degrees: the same feature seen again
+  // differs by 15 to 30, another one by 50 to 90.
   double max_descriptor_angle_deg = 40;
-  // Farther apart, two stations are not the same, m; and their headings differ by less than this, degrees.
+  // Stations farther apart than this, m, or with a larger difference of headings, degrees, are not the same.
   double max_station_distance_m = 0.1;
   double max_heading_difference_deg = 10;
   // Regions that share less than this part of the stations that either has are not the same.
@@ -45,7 +45,7 @@ struct MapComparison {
     int num_shared_landmarks = 0;
     bool same = false;  // the same stations and the same landmarks
   };
-  // All regions of both: those of B ascending, then those of A that have none in B.
+  // All regions of both: those of B ascending, then those of A without one in B.
   std::vector<RegionChange> regions;
 
   std::vector<std::string> images_only_in_a, images_only_in_b;  // names, ascending
@@ -54,7 +54,7 @@ struct MapComparison {
 // O(n log n) for landmarks that are not closer together than the distance.
 MapComparison CompareMaps(const MapRows& a, const MapRows& b, const CompareMapsOptions& options = {});
 
-// Regions of B that are not the same in A, and those of A that have none in B.
+// The number of regions of B that are not the same in A, and of those of A without one in B.
 int NumChangedRegions(const MapComparison& comparison);
 
 // For people; at most `max_num_lines` stations and regions each.  `bytes`: of the files.

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
 #include "pipeline/explain/station_losses.h"
@@ -17,7 +17,7 @@
 namespace cairn::pipeline {
 namespace {
 
-// Closer together, stations are the headings of one place.
+// Stations closer together than this are headings of one place.
 constexpr double kSamePlaceM = 0.01;
 constexpr size_t kMaxImageNames = 12;
 constexpr size_t kMaxLookAlikes = 5;
@@ -33,7 +33,7 @@ double Spacing(const MapRows& rows) {
     }
     if (nearest < std::numeric_limits<double>::max()) distances.push_back(nearest);
   }
-  return distances.empty() ? 1 : Median(std::move(distances));
+  return distances.empty() ? 1 : UpperMedian(std::move(distances));
 }
 
 std::vector<RegionIdx> RegionsOf(const MapRows& rows, StationIdx station) {
@@ -54,7 +54,7 @@ std::vector<int32_t> ImagesAt(const MapRows& rows, StationIdx station) {
   return images;
 }
 
-// Its landmarks that the images taken at the station see.
+// The number of its landmarks that the images taken at the station see.
 int NumSeenOf(const MapRows& rows, const MapRegion& region, const std::vector<int32_t>& images) {
   std::set<LandmarkIdx> seen;
   for (const int32_t image : images) {

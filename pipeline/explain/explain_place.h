@@ -12,7 +12,7 @@
 
 namespace cairn::pipeline {
 
-// A place that somebody asks about: floor frame, metres; heading counter-clockwise from +x.
+// A place in a question: floor frame, metres; heading counter-clockwise from +x.
 struct AskedPlace {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   std::optional<double> heading_deg;

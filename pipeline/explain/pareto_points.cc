@@ -15,7 +15,7 @@ constexpr std::string_view kHead =
     "ratio,"
     "within_10cm_5deg_ratio,precision_ratio,median_error_m,median_error_deg";
 
-std::string Cell(const std::optional<double>& value, double unit, int digits) {
+std::string NumberCell(const std::optional<double>& value, double unit, int digits) {
   return value ? fmt::format("{:.{}f}", *value / unit, digits) : "-";
 }
 
@@ -42,8 +42,8 @@ Result<std::vector<ParetoPoint>> ParseParetoCsv(const std::string& csv, const st
   std::vector<ParetoPoint> points;
   const std::vector<std::string_view> lines = SplitLines(csv);
   if (lines.empty() || lines[0] != kHead)
-    return MakeError(ErrorCode::kCorrupt, "{}: does not begin as the tables of cairn pareto do: '{}'", path,
-                     kHead);
+    return MakeError(ErrorCode::kCorrupt, "{}: does not begin with the head of a table of cairn pareto: '{}'",
+                     path, kHead);
   for (size_t i = 1; i < lines.size(); ++i) {
     const std::vector<std::string> fields = SplitFields(lines[i], ',');
     ParetoPoint point;
@@ -62,7 +62,8 @@ Result<std::vector<ParetoPoint>> ParseParetoCsv(const std::string& csv, const st
         !read_if_any(fields[11], &point.median_error_deg) || point.num_bytes < 1 ||
         !IsRatio(point.localized_ratio) || !IsRatio(point.within_10cm_5deg_ratio) ||
         !IsRatio(point.precision_ratio)) {
-      return MakeError(ErrorCode::kCorrupt, "{}: line {} is none of cairn pareto's", path, i + 1);
+      return MakeError(ErrorCode::kCorrupt, "{}: line {} is not of the form that cairn pareto writes", path,
+                       i + 1);
     }
     points.push_back(point);
   }
@@ -79,7 +80,7 @@ std::string ParetoText(const std::vector<ParetoPoint>& points) {
         point.max_bytes > 0 ? std::to_string(point.max_bytes) : "-", point.num_bytes, point.num_landmarks,
         point.descriptor_bits, point.min_common_landmarks, point.num_stations_below_k,
         100 * point.localized_ratio, 100 * point.within_10cm_5deg_ratio, 100 * point.precision_ratio,
-        Cell(point.median_error_m, 0.01, 2), Cell(point.median_error_deg, 1, 2));
+        NumberCell(point.median_error_m, 0.01, 2), NumberCell(point.median_error_deg, 1, 2));
   }
   return text;
 }

@@ -11,7 +11,7 @@ namespace cairn::pipeline {
 
 // A map of one survey at one size, and how it fared.
 struct ParetoPoint {
-  int64_t max_bytes = 0;  // asked; 0: every class
+  int64_t max_bytes = 0;  // required; 0: every class
   int64_t num_bytes = 0;  // of the sealed map
   int64_t num_landmarks = 0;
   int descriptor_bits = 0;

@@ -8,7 +8,7 @@
 
 namespace cairn::pipeline {
 
-// What of the scene at every station became of it, from the map's own counts (core/blocks/map_findings.h).
+// What became of the scene features at every station, from the map's own counts (core/blocks/map_findings.h).
 class StationLosses {
  public:
   explicit StationLosses(const MapRows& rows);
@@ -23,7 +23,7 @@ class StationLosses {
   int NumAlike(StationIdx station) const;
   // That a robot there can expect to see: features of the world, kept or not.
   int NumVisible(StationIdx station) const;
-  // Why it is covered by no region; nothing where one covers it, or where the map does not know.
+  // Why it is covered by no region; nothing where a region covers it, or where the map does not store it.
   std::optional<DropReason> WhyUncovered(StationIdx station) const;
 
  private:

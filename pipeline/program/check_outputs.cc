@@ -14,8 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // What commands call the files and folders that they write.
-constexpr std::array kOutputs = {"--output",  "--svg",     "--ambiguity-svg", "--picture",
-                                 "--depfile", "--details", "--report",        "--stamp"};
+constexpr std::array kOutputs = {"--output",  "--svg",    "--ambiguity-svg", "--depfile",
+                                 "--details", "--report", "--stamp"};
 
 bool HasAnyName(const CLI::Option& option, const auto& names) {
   return std::any_of(names.begin(), names.end(), [&](const auto& name) { return option.check_name(name); });
@@ -68,10 +68,10 @@ Status CheckOutput(const Output& written, const std::string& input) {
 
 }  // namespace
 
-Status CheckOutputs(const CLI::App& subcommand, const std::vector<std::string>& may_be_output) {
+Status CheckOutputs(const CLI::App& command, const std::vector<std::string>& may_be_output) {
   std::vector<std::string> inputs;
   std::vector<Output> outputs;
-  for (const CLI::Option* option : subcommand.get_options()) {
+  for (const CLI::Option* option : command.get_options()) {
     const std::vector<std::string> paths = PathsOf(*option);
     if (HasAnyName(*option, kOutputs)) {
       for (const std::string& path : paths) outputs.push_back({path, option->check_name("--output")});

@@ -9,10 +9,10 @@
 
 namespace cairn::pipeline {
 
-// Refuses to write what a subcommand, parsed, would write over one of its other arguments: the same file
-// under whichever name, a list or an image of a capture, a folder that is replaced with an input inside.
-// `may_be_output`: names of arguments that are no such inputs (Command::may_be_output).
+// Refuses outputs of a parsed command that would overwrite one of its other arguments: the same file under
+// any name, a list or an image of a capture, or a folder that is replaced and has an input inside.
+// `may_be_output`: names of arguments that are not such inputs (Command::may_be_output).
 // Errors: InvalidArgument.
-Status CheckOutputs(const CLI::App& subcommand, const std::vector<std::string>& may_be_output);
+Status CheckOutputs(const CLI::App& command, const std::vector<std::string>& may_be_output);
 
 }  // namespace cairn::pipeline

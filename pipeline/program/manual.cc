@@ -53,9 +53,9 @@ std::string Entry(const CLI::Option& option) {
 }
 
 // "cairn localize MAP [IMAGE...] [OPTIONS]".
-std::string Synopsis(const CLI::App& command) {
-  std::string synopsis = ".B cairn " + Escaped(command.get_name()) + "\n";
-  for (const CLI::Option* option : command.get_options()) {
+std::string Synopsis(const CalledCommand& command) {
+  std::string synopsis = ".B cairn " + Escaped(command.words) + "\n";
+  for (const CLI::Option* option : command.arguments->get_options()) {
     if (!option->get_positional()) continue;
     std::string name = "\\fI" + Escaped(option->get_type_name()) + "\\fR";
     if (option->get_items_expected_max() > 1) name += "...";
@@ -75,9 +75,9 @@ std::string ProgramPage(const CLI::App& program, const std::string& version) {
       "Every command has a page of its own, \\fBcairn\\-COMMAND\\fR(1), and says the same with "
       "\\fB\\-\\-help\\fR.\n";
   page += ".SH COMMANDS\n";
-  for (const CLI::App* command : program.get_subcommands(nullptr))
-    page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", Escaped(command->get_name()),
-                        Escaped(command->get_description()));
+  for (const CalledCommand& command : CalledCommands(program))
+    page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", Escaped(command.words),
+                        Escaped(command.arguments->get_description()));
   page += ".SH EXIT STATUS\n.TP\n0\ndone\n";
   for (int code = static_cast<int>(ErrorCode::kFailed); code <= static_cast<int>(ErrorCode::kOtherMap);
        ++code)
@@ -85,14 +85,20 @@ std::string ProgramPage(const CLI::App& program, const std::string& version) {
   return page;
 }
 
-std::string CommandPage(const CLI::App& program, const CLI::App& command, const std::string& version) {
-  const std::string name = program.get_name() + "-" + command.get_name();
+std::string PageName(const CalledCommand& command) {
+  std::string name = "cairn-" + command.words;
+  std::replace(name.begin(), name.end(), ' ', '-');
+  return name;
+}
+
+std::string CommandPage(const CalledCommand& command, const std::string& version) {
+  const std::string name = PageName(command);
   std::string page = Header(name, version);
-  page += fmt::format(".SH NAME\n{} \\- {}\n", Escaped(name), Escaped(command.get_description()));
+  page += fmt::format(".SH NAME\n{} \\- {}\n", Escaped(name), Escaped(command.arguments->get_description()));
   page += ".SH SYNOPSIS\n" + Synopsis(command);
   std::vector<std::string> groups;  // in the order of --help
   std::map<std::string, std::string> entries;
-  for (const CLI::Option* option : command.get_options()) {
+  for (const CLI::Option* option : command.arguments->get_options()) {
     const std::string group = option->get_positional() ? "Arguments" : option->get_group();
     if (group.empty()) continue;  // hidden
     if (entries[group].empty()) groups.push_back(group);
@@ -109,15 +115,21 @@ std::string CommandPage(const CLI::App& program, const CLI::App& command, const 
 }
 
 std::string BashCompletion(const CLI::App& program) {
-  std::string commands, cases;
+  std::string commands, families, cases;
   for (const CLI::App* command : program.get_subcommands(nullptr)) {
     commands += (commands.empty() ? "" : " ") + command->get_name();
+    std::string words;
+    for (const CLI::App* subcommand : command->get_subcommands(nullptr))
+      words += (words.empty() ? "" : " ") + subcommand->get_name();
+    if (!words.empty()) families += fmt::format("    {}) words=\"{}\" ;;\n", command->get_name(), words);
+  }
+  for (const CalledCommand& command : CalledCommands(program)) {
     std::string options;
-    for (const CLI::Option* option : command->get_options()) {
+    for (const CLI::Option* option : command.arguments->get_options()) {
       for (const std::string& name : option->get_snames()) options += " -" + name;
       for (const std::string& name : option->get_lnames()) options += " --" + name;
     }
-    cases += fmt::format("    {}) words=\"{}\" ;;\n", command->get_name(),
+    cases += fmt::format("    \"{} \"*) words=\"{}\" ;;\n", command.words,
                          options.substr(options.empty() ? 0 : 1));
   }
   return fmt::format(R"(# Completion for cairn, written by `cairn manual`.
@@ -125,17 +137,22 @@ _cairn() {{
   local words=
   COMPREPLY=()
   if ((COMP_CWORD == 1)); then
-    COMPREPLY=($(compgen -W "{} --help --version" -- "$2"))
+    COMPREPLY=($(compgen -W "{} --help --help-all --version" -- "$2"))
     return
   fi
-  [[ $2 == -* ]] || return
-  case ${{COMP_WORDS[1]}} in
-{}  esac
+  if ((COMP_CWORD == 2)); then
+    case ${{COMP_WORDS[1]}} in
+{}    esac
+  fi
+  if [[ $words == "" && $2 == -* ]]; then
+    case "${{COMP_WORDS[1]}} ${{COMP_WORDS[2]}} " in
+{}    esac
+  fi
   COMPREPLY=($(compgen -W "$words" -- "$2"))
 }}
 complete -o default -F _cairn cairn
 )",
-                     commands, cases);
+                     commands, families, cases);
 }
 
 }  // namespace cairn::pipeline

@@ -6,10 +6,10 @@
 
 namespace cairn::pipeline {
 
-// Writes to `target` what it is given as Printable shows it (core/base/printable.h): the one way of results
-// and messages to a terminal, so that no name in a map, a capture or a recipe can command it.  What commands
-// the terminal on purpose, the progress bar and colours, goes past it.  A character may come in parts;
-// flushing ends it.
+// Writes text to `target` as Printable shows it (core/base/printable.h).  All results and messages go to the
+// terminal through it, so that no name in a map, a capture or a recipe can control the terminal.  The
+// progress bar and colours, which control it on purpose, do not go through this stream.  A character may come
+// in parts; flushing ends it.
 class PrintableStream : public std::ostream {
  public:
   explicit PrintableStream(std::ostream& target) : std::ostream(nullptr), buffer_(target.rdbuf()) {

@@ -11,6 +11,7 @@
 #include <optional>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -25,8 +26,8 @@
 #include "core/options/options.h"
 #include "pipeline/build/build_step.h"
 #include "pipeline/program/check_outputs.h"
-#include "pipeline/program/common_arguments.h"
 #include "pipeline/program/printable_stream.h"
+#include "pipeline/program/program_parser.h"
 #include "pipeline/program/progress.h"
 #include "pipeline/program/stop_signal.h"
 
@@ -78,7 +79,7 @@ Error OutOfMemory(const CommandEnvironment& environment) {
       environment.memory_mib, NumThreads(environment.num_threads));
 }
 
-// Whether it says that there is no memory, be it for a thread.
+// Whether it reports a lack of memory, also for a new thread.
 bool IsOutOfMemory(const std::exception& exception) {
   if (dynamic_cast<const std::bad_alloc*>(&exception) != nullptr) return true;
   if (const auto* of_opencv = dynamic_cast<const cv::Exception*>(&exception))
@@ -102,26 +103,27 @@ Status RunCaught(const Command& command, const CommandEnvironment& environment) 
   }
 }
 
-int Report(const std::string& command, const CommonArguments& arguments, const Error& error,
+int Report(const ChosenCommand& chosen, const CommonArguments& arguments, const Error& error,
            std::ostream& err) {
-  err << "cairn " << command << ": " << error.message << std::endl;
+  err << "cairn " << chosen.words << ": " << error.message << std::endl;
   if (!arguments.stamp.empty()) {
     const std::string folder = std::filesystem::absolute(arguments.stamp).parent_path().string();
-    if (const Status status = WriteErrorFile(folder, command, error); !status.ok())
+    if (const Status status = WriteErrorFile(folder, chosen.command->name, error); !status.ok())
       spdlog::warn("{}", status.error().message);
   }
   return static_cast<int>(error.code);
 }
 
 // "match_features": what a stage's folder, its table in a recipe and its part of a report are called.
-std::string StageName(std::string command) {
-  std::replace(command.begin(), command.end(), '-', '_');
-  return command;
+std::string StageName(const Command& command) {
+  std::string name = command.stage.empty() ? command.name : command.stage;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
 }
 
 // Runs the command; what it printed and reported goes to the files that were asked for.
-Status RunCommand(const Command& command, const CommonArguments& arguments, CommandEnvironment environment,
-                  std::ostream& out, std::ostream& err) {
+Status RunCommand(const ChosenCommand& chosen, const CommonArguments& arguments,
+                  CommandEnvironment environment, std::ostream& out, std::ostream& err) {
   const auto begin = std::chrono::steady_clock::now();
   std::optional<BuildStep> step;
   if (!arguments.stamp.empty()) {
@@ -130,18 +132,18 @@ Status RunCommand(const Command& command, const CommonArguments& arguments, Comm
   }
   const std::string report_file =
       arguments.report_file.empty() && step ? step->ReportPath() : arguments.report_file;
-  // What it would still have written is left as a kill leaves it.
-  const StopDeadline deadline([&] { std::_Exit(Report(command.name, arguments, kStopped, err)); });
+  // Outputs in progress are left as after a kill.
+  const StopDeadline deadline([&] { std::_Exit(Report(chosen, arguments, kStopped, err)); });
   StageReport report;
   std::ostringstream printed;
   environment.report = &report;
   environment.out = report_file.empty() ? &out : &printed;
-  Status status = RunCaught(command, environment);
+  Status status = RunCaught(*chosen.command, environment);
   if (!report_file.empty()) {
     out << printed.str();
     if (!status.ok()) return status;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    const nlohmann::ordered_json run = StageRunJson({.stage = StageName(command.name),
+    const nlohmann::ordered_json run = StageRunJson({.stage = StageName(*chosen.command),
                                                      .seconds = seconds.count(),
                                                      .num_threads = environment.num_threads,
                                                      .memory_mib = environment.memory_mib,
@@ -160,21 +162,45 @@ std::string NearestText(const std::string& word, const std::vector<std::string>&
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 
-// What is wrong with a word that no command and no option takes; empty where there is none.
-std::string UnknownWordText(const CLI::App& app, const std::vector<Command>& commands,
-                            const std::vector<std::string>& words) {
-  if (app.get_subcommands().empty()) {
-    if (words.empty() || words[0].starts_with('-')) return "";
-    std::vector<std::string> names;
-    for (const Command& command : commands) names.push_back(command.name);
-    return fmt::format("no command '{}'{}", words[0], NearestText(words[0], names));
+void AddNames(const std::vector<Command>& commands, const std::string& before,
+              std::vector<std::pair<std::string, std::string>>* names) {
+  for (const Command& command : commands) {
+    const std::string words = before + command.name;
+    names->emplace_back(command.name, words);
+    for (const std::string& name : command.former_names) names->emplace_back(name, words);
+    AddNames(command.subcommands, words + " ", names);
   }
-  const CLI::App& subcommand = *app.get_subcommands().front();
-  for (const std::string& word : subcommand.remaining()) {
+}
+
+// The command whose name, whatever words stand before it, is nearest to the word.
+std::string NearestCommandText(const std::string& word, const std::vector<Command>& commands) {
+  std::vector<std::pair<std::string, std::string>> names;  // and how it is called
+  AddNames(commands, "", &names);
+  std::vector<std::string> candidates;
+  for (const auto& [name, called] : names) candidates.push_back(name);
+  const std::string nearest = NearestWord(word, candidates);
+  const auto found =
+      std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.first == nearest; });
+  return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", found->second);
+}
+
+// What is wrong with a word that no command and no option takes; empty where there is none.
+std::string UnknownWordText(const ChosenCommand& chosen, const std::vector<Command>& commands,
+                            const std::vector<std::string>& words) {
+  if (chosen.command == nullptr) {
+    const auto num_words =
+        chosen.words.empty() ? 0 : std::count(chosen.words.begin(), chosen.words.end(), ' ') + 1;
+    if (std::cmp_less_equal(words.size(), num_words)) return "give a command";
+    if (words[num_words].starts_with('-')) return "";
+    const std::string& word = words[num_words];
+    return fmt::format("no command '{}'{}", chosen.words.empty() ? word : chosen.words + " " + word,
+                       NearestCommandText(word, commands));
+  }
+  for (const std::string& word : chosen.arguments->remaining()) {
     if (word == "--" || !word.starts_with('-')) continue;
     const std::string option = word.substr(0, word.find('='));
     std::vector<std::string> names;
-    for (const CLI::Option* known : subcommand.get_options()) {
+    for (const CLI::Option* known : chosen.arguments->get_options()) {
       for (const std::string& name : known->get_lnames()) names.push_back("--" + name);
     }
     return fmt::format("no option '{}'{}", option, NearestText(option, names));
@@ -185,9 +211,9 @@ std::string UnknownWordText(const CLI::App& app, const std::vector<Command>& com
 // Usage errors as one line that says where help is.
 int ReportUsage(const CLI::App& app, const std::vector<Command>& commands,
                 const std::vector<std::string>& words, const CLI::ParseError& error, std::ostream& err) {
-  std::string name = "cairn";
-  for (const CLI::App* subcommand : app.get_subcommands()) name += " " + subcommand->get_name();
-  const std::string unknown = UnknownWordText(app, commands, words);
+  const ChosenCommand chosen = FindChosen(app, commands);
+  const std::string name = chosen.words.empty() ? "cairn" : "cairn " + chosen.words;
+  const std::string unknown = UnknownWordText(chosen, commands, words);
   err << name << ": " << (unknown.empty() ? error.what() : unknown) << "; see " << name << " --help"
       << std::endl;
   return kUsageExitCode;
@@ -210,31 +236,29 @@ int RunProgram(const std::vector<Command>& commands, int argc, const char* const
     return ReportUsage(app, commands, std::vector<std::string>(argv + 1, argv + argc), error, err);
   }
 
-  const std::string name = app.get_subcommands().front()->get_name();
+  const ChosenCommand chosen = FindChosen(app, commands);
   const auto style = ParseProgressStyle(arguments.progress, isatty(STDERR_FILENO) != 0);
-  if (!style.ok()) return Report(name, arguments, style.error(), err);
+  if (!style.ok()) return Report(chosen, arguments, style.error(), err);
   ConfigureLog(arguments.log_level, *style);
   CatchStopSignals();
   const std::unique_ptr<Progress> progress = MakeTerminalProgress(*style);
   const CommandEnvironment environment = {
       .num_threads = arguments.num_threads,
       .seed = arguments.seed,
-      .seed_given = app.get_subcommands().front()->count("--seed") > 0,
+      .seed_given = chosen.arguments->count("--seed") > 0,
       .progress_style = arguments.progress,
       .log_level = arguments.log_level,
       .memory_mib = arguments.memory_mib > 0 ? arguments.memory_mib : DefaultMemoryMib(),
       .memory_given = arguments.memory_mib > 0,
       .progress = progress.get()};
-  const auto command =
-      std::find_if(commands.begin(), commands.end(), [&](const Command& c) { return c.name == name; });
-  Status status = CheckOutputs(*app.get_subcommands().front(), command->may_be_output);
-  if (status.ok()) status = RunCommand(*command, arguments, environment, out, err);
+  Status status = CheckOutputs(*chosen.arguments, chosen.command->may_be_output);
+  if (status.ok()) status = RunCommand(chosen, arguments, environment, out, err);
   out.flush();
   if (status.ok() && !out)
     status = MakeError(ErrorCode::kIo,
-                       "all is done, and files that were asked for are written; but standard output cannot "
-                       "be written: is it full?");
-  if (!status.ok()) return Report(name, arguments, status.error(), err);
+                       "the command is done and its files are written, but standard output cannot be "
+                       "written: is the disk full?");
+  if (!status.ok()) return Report(chosen, arguments, status.error(), err);
   return 0;
 }
 

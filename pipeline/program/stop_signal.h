@@ -12,9 +12,8 @@ namespace cairn::pipeline {
 void CatchStopSignals();
 bool StopRequested();
 
-// Sees to it that a command which does not look at Progress::Cancelled often enough still ends within a
-// second: calls `end`, which must not return, 0.7 s after a stop was requested, unless the object is gone by
-// then.
+// Makes a command that checks Progress::Cancelled too rarely still end within a second: calls `end`, which
+// must not return, 0.7 s after a stop was requested, unless the object is destroyed before.
 class StopDeadline {
  public:
   explicit StopDeadline(std::function<void()> end);

@@ -14,28 +14,8 @@
 namespace cairn::pipeline {
 namespace {
 
-// Every eighth of viridis.
-constexpr std::array<std::array<int, 3>, 9> kViridis = {{{68, 1, 84},
-                                                         {71, 45, 123},
-                                                         {59, 82, 139},
-                                                         {44, 114, 142},
-                                                         {33, 145, 140},
-                                                         {40, 174, 128},
-                                                         {94, 201, 98},
-                                                         {173, 220, 48},
-                                                         {253, 231, 37}}};
-constexpr char kLookAlikeColour[] = "#D55E00";
-
-// `value` in [0, 1].
-std::string Colour(double value) {
-  const double scaled = std::clamp(value, 0.0, 1.0) * (kViridis.size() - 1);
-  const auto below = std::min(static_cast<size_t>(scaled), kViridis.size() - 2);
-  const double share = scaled - static_cast<double>(below);
-  std::array<int, 3> rgb;
-  for (int i = 0; i < 3; ++i)
-    rgb[i] = static_cast<int>(std::lround((1 - share) * kViridis[below][i] + share * kViridis[below + 1][i]));
-  return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
-}
+// Stops of the legend.
+constexpr int kNumStops = 8;
 
 class Picture {
  public:
@@ -53,14 +33,14 @@ class Picture {
     const double height = view_.PictureHeightPx();
     size_t num_pairs = 0;
     for (const MapAppearanceNode& node : rows_.appearance) num_pairs += node.look_alikes.size();
-    std::string svg = BeginSvg(FloorView::kWidthPx, height, FloorView::kFontPx);
+    std::string svg = BeginSvg(FloorView::kPictureWidthPx, height, FloorView::kFontPx);
     svg += fmt::format(
         "<text x=\"24\" y=\"34\" font-size=\"20\" font-weight=\"bold\">{}: where the robot can tell where it "
         "is</text>\n<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{} places, {} pairs look alike</text>\n",
-        EscapeXml(rows_.name), FloorView::kWidthPx - 24, rows_.appearance.size(), num_pairs);
+        EscapeXml(rows_.name), FloorView::kPictureWidthPx - 24, rows_.appearance.size(), num_pairs);
     svg += DrawPairs();
     for (const MapAppearanceNode& node : rows_.appearance) svg += DrawNode(node);
-    svg += DrawScaleBar(view_, height - 36);
+    svg += ScaleBar(24, height - 36, view_.px_per_m, 0.2 * FloorView::kPictureWidthPx);
     return svg + DrawLegend(height - 32) + "</svg>\n";
   }
 
@@ -94,7 +74,7 @@ class Picture {
         svg += fmt::format(
             "<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"{}\" stroke-opacity=\"0.35\" "
             "stroke-width=\"{:.1f}\"/>\n",
-            from.x(), from.y(), to.x(), to.y(), kLookAlikeColour, 0.5 + 2.5 * other.score);
+            from.x(), from.y(), to.x(), to.y(), kSvgVermilion, 0.5 + 2.5 * other.score);
       }
     }
     return svg;
@@ -102,7 +82,7 @@ class Picture {
 
   std::string DrawNode(const MapAppearanceNode& node) const {
     std::string svg;
-    const std::string colour = Colour(most_ > 0 ? *node.entropy / most_ : 0);
+    const std::string colour = SvgViridis(most_ > 0 ? *node.entropy / most_ : 0);
     for (const int32_t image : node.images) {
       svg +=
           fmt::format("<polygon points=\"{}\" fill=\"{}\"><title>{}: {:.2f} nat</title></polygon>\n",
@@ -115,9 +95,9 @@ class Picture {
   std::string DrawLegend(double y) const {
     constexpr double kLeft = 420, kBar = 240;
     std::string svg = "<defs><linearGradient id=\"entropy\">";
-    for (size_t i = 0; i < kViridis.size(); ++i) {
-      const double share = static_cast<double>(i) / (kViridis.size() - 1);
-      svg += fmt::format("<stop offset=\"{:.3f}\" stop-color=\"{}\"/>", share, Colour(share));
+    for (int i = 0; i <= kNumStops; ++i) {
+      const double share = static_cast<double>(i) / kNumStops;
+      svg += fmt::format("<stop offset=\"{:.3f}\" stop-color=\"{}\"/>", share, SvgViridis(share));
     }
     svg += fmt::format(
         "</linearGradient></defs>\n<text x=\"{0:.0f}\" y=\"{1:.0f}\" text-anchor=\"end\">entropy "
@@ -128,7 +108,7 @@ class Picture {
     return svg + fmt::format(
                      "<path d=\"M{0:.0f} {1:.0f}h40\" stroke=\"{2}\" stroke-opacity=\"0.6\" "
                      "stroke-width=\"2\"/>\n<text x=\"{3:.0f}\" y=\"{4:.0f}\">look alike</text>\n",
-                     kLeft + kBar + 120, y, kLookAlikeColour, kLeft + kBar + 168, y + 5);
+                     kLeft + kBar + 120, y, kSvgVermilion, kLeft + kBar + 168, y + 5);
   }
 
   const MapRows& rows_;
@@ -141,11 +121,10 @@ class Picture {
 
 Result<std::string> AmbiguitySvg(const MapRows& rows) {
   if (rows.appearance.empty() || !rows.appearance.front().entropy) {
-    return MakeError(
-        ErrorCode::kNotFound,
-        "map '{}' does not tell how ambiguous its places are; compile it again, or give link-appearance the "
-        "vocabulary",
-        rows.name);
+    return MakeError(ErrorCode::kNotFound,
+                     "map '{}' does not store how ambiguous its places are; compile it again, or give "
+                     "link-appearance the vocabulary",
+                     rows.name);
   }
   return Picture(rows).Draw();
 }

@@ -44,7 +44,7 @@ std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
   return hull;
 }
 
-// Half of the least distance between stations' places, within what can be seen.
+// Half of the smallest distance between stations' places, limited to visible sizes.
 double MarkerSizePx(const MapRows& rows, const FloorView& view) {
   std::vector<Eigen::Vector2d> places;
   for (const MapStation& station : rows.stations) places.push_back(station.position);
@@ -137,20 +137,21 @@ std::string FloorSvg(const MapRows& rows) {
   const FloorView view = MakeFloorView(rows, landmarks);
   const double size = MarkerSizePx(rows, view);
   const double height = view.PictureHeightPx();
-  std::string svg = BeginSvg(FloorView::kWidthPx, height, FloorView::kFontPx);
+  std::string svg = BeginSvg(FloorView::kPictureWidthPx, height, FloorView::kFontPx);
   std::set<std::pair<double, double>> places;
   for (const MapStation& station : rows.stations) places.emplace(station.position.x(), station.position.y());
   svg += fmt::format(
       "<text x=\"24\" y=\"34\" font-size=\"20\" font-weight=\"bold\">{}</text>\n"
       "<text x=\"{:.0f}\" y=\"34\" text-anchor=\"end\">{}; {} landmarks; {} stations at {} "
       "places</text>\n",
-      EscapeXml(rows.name), FloorView::kWidthPx - 24, NumRegionsText(rows.regions.size(), rows.lower_bound),
-      rows.landmarks.size(), rows.stations.size(), places.size());
+      EscapeXml(rows.name), FloorView::kPictureWidthPx - 24,
+      NumRegionsText(rows.regions.size(), rows.lower_bound), rows.landmarks.size(), rows.stations.size(),
+      places.size());
 
   svg += fmt::format(
       "<clipPath id=\"floor\"><rect x=\"0\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n"
       "<g fill=\"#888888\" fill-opacity=\"0.55\" clip-path=\"url(#floor)\">\n",
-      FloorView::kTitlePx, FloorView::kWidthPx, view.HeightPx());
+      FloorView::kTitlePx, FloorView::kPictureWidthPx, view.HeightPx());
   for (const Eigen::Vector2d& landmark : landmarks) {
     const Eigen::Vector2d pixel = view.Pixel(landmark);
     svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\"/>\n", pixel.x(), pixel.y());
@@ -163,7 +164,7 @@ std::string FloorSvg(const MapRows& rows) {
   }
   for (size_t i = 0; i < rows.stations.size(); ++i)
     svg += DrawStation(rows.stations[i], first_region[i], view, size);
-  svg += DrawScaleBar(view, height - 36);
+  svg += ScaleBar(24, height - 36, view.px_per_m, 0.2 * FloorView::kPictureWidthPx);
   svg += DrawLegend(rows, height - 32);
   return svg + "</svg>\n";
 }

@@ -260,7 +260,8 @@ Json HeldOutJson(const Json& check, const MapRows& rows) {
 
 Eigen::Vector2d PlaceOf(const Json& floor) { return {floor[0].get<double>(), floor[1].get<double>()}; }
 
-// What a check's images say: where they failed, and how those err that were localized right.
+// Adds advice from a check's images: where they failed, and the errors of those that were
+// localized correctly.
 void AddCheckAdvice(const Json& check, const MapRows& rows, std::vector<Advice>* advice) {
   std::vector<FailedImage> failed;
   std::vector<PlacedImage> placed;
@@ -279,8 +280,8 @@ void AddCheckAdvice(const Json& check, const MapRows& rows, std::vector<Advice>*
   if (rows.frame.unit == "metre") AddMisalignment(placed, advice);
 }
 
-// The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees, median
-// error.
+// The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees,
+// median error.
 Json ParetoJson(std::vector<ParetoPoint> points) {
   std::sort(points.begin(), points.end(),
             [](const ParetoPoint& a, const ParetoPoint& b) { return a.num_bytes < b.num_bytes; });

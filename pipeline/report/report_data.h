@@ -14,8 +14,8 @@
 namespace cairn::pipeline {
 
 // Everything that the page of a report shows, as one JSON object; floor.js and the other scripts draw it.
-// Lists are by column and numbers rounded (places to 1 cm), so that a map of 100,000 landmarks makes a few
-// megabytes.
+// Lists are by column and numbers rounded (places to 1 cm), so that a map of 100,000 landmarks gives a
+// few megabytes.
 struct ReportInputs {
   const MapRows* rows = nullptr;
   int64_t num_bytes = 0;                                     // of the file

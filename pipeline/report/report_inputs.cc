@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Beyond it nothing is drawn, metres: no map reaches so far.
+// Nothing is drawn beyond this, metres: no map reaches that far.
 constexpr double kMaxPlace = 1e7;
 
 bool IsText(const Json& object, const char* key) { return !object.contains(key) || object[key].is_string(); }
@@ -40,7 +40,7 @@ bool IsPose(const Json& object, const char* key) {
          IsNumber(pose, "y_m") && IsNumber(pose, "heading_deg");
 }
 
-// The list of that name, if there is one, holds objects that are right.
+// Whether the list of that name, if there is one, holds only valid objects.
 template <typename IsRight>
 bool AreAll(const Json& object, const char* key, const IsRight& is_right) {
   if (!object.contains(key)) return true;

@@ -6,7 +6,7 @@
 
 namespace cairn::pipeline {
 
-// Whether they have what a page shows of them, of the right types, and numbers that can be.
+// Whether they have what a page shows of them, with the right types and possible numbers.
 bool IsBuildReport(const nlohmann::ordered_json& build);
 bool IsCheckReport(const nlohmann::ordered_json& check);
 // Whether a check was of this map: of as many landmarks and regions; of a sealed map, with its figures.

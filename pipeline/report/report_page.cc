@@ -46,7 +46,7 @@ std::string Replaced(std::string text, std::string_view from, std::string_view t
 // Inside of a script element nothing may look like its end; in JSON and in strings of scripts `<\/` is `</`.
 std::string InScript(std::string text) { return Replaced(std::move(text), "</", "<\\/"); }
 
-// A `<` only occurs in strings there, and can be written as its number.
+// A `<` only occurs in strings there, and can be written as its character code.
 std::string JsonInPage(const nlohmann::ordered_json& data) {
   return Replaced(data.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace), "<",
                   "\\u003c");
@@ -116,10 +116,9 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
   };
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>"
-      "body {{ font: 12px \"DejaVu Sans\", sans-serif; margin: 1cm; }} svg {{ max-width: 100%; height: auto; "
-      "}} "
-      "h2 {{ break-after: avoid; }} pre {{ white-space: pre-wrap; }} figure {{ margin: 0; break-inside: "
-      "avoid; }}"
+      "body {{ font: 12px \"DejaVu Sans\", sans-serif; margin: 1cm; }} "
+      "svg {{ max-width: 100%; height: auto; }} h2 {{ break-after: avoid; }} "
+      "pre {{ white-space: pre-wrap; }} figure {{ margin: 0; break-inside: avoid; }}"
       "</style></head><body>\n<h1>{0}</h1>\n",
       EscapeXml(rows.name));
   html += fmt::format("<p>{} bytes, {} landmarks, {} regions, {} stations; made by {}.</p>\n",

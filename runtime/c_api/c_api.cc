@@ -62,7 +62,7 @@ Error Misuse(fmt::format_string<Args...> format, Args&&... args) {
   return MakeError(ErrorCode::kInvalidArgument, format, std::forward<Args>(args)...);
 }
 
-// That a struct is there, and as long as the first release's, `least`: later ones only grow.
+// Checks that a struct is given and at least as long as the first release's, `least`: later ones only grow.
 template <typename Struct>
 Status CheckStruct(const Struct* value, const char* name, size_t least = sizeof(Struct)) {
   if (value == nullptr) return Misuse("{} is NULL", name);
@@ -72,14 +72,14 @@ Status CheckStruct(const Struct* value, const char* name, size_t least = sizeof(
   return Ok();
 }
 
-// As much of a result as the caller has room for; its size field stays.
+// Copies as much of a result as the caller has room for; its size field stays.
 template <typename Struct>
 void Return(Struct result, Struct* to) {
   result.size = to->size;
   std::memcpy(to, &result, std::min(to->size, sizeof(Struct)));
 }
 
-// Cut where a character of UTF-8 begins.
+// Cuts a text where a UTF-8 character begins.
 template <size_t kNumBytes>
 void CopyText(const std::string& text, char (&to)[kNumBytes]) {
   size_t length = std::min(text.size(), kNumBytes - 1);
@@ -90,13 +90,14 @@ void CopyText(const std::string& text, char (&to)[kNumBytes]) {
   to[length] = 0;
 }
 
-// What a map that is opened, or one that an update brings, is asked to be.
+// What the caller requires of a map that is opened or that an update brings.
 struct GivenOptions {
   MapOptions map;
   UpdateOptions update;
 };
 
-// The caller's options; NULL: the defaults.  Of callers built with an earlier release, what that had.
+// The caller's options; NULL: the defaults.  Callers built with an earlier release give the fields
+// that it had.
 Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
   GivenOptions given;
   if (options == nullptr) return given;
@@ -123,13 +124,13 @@ Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
 
 Result<std::shared_ptr<const Map>> FindMap(const cairn_map* handle) {
   if (auto map = Maps().Find(handle)) return map;
-  return Misuse("map is {}", handle == nullptr ? "NULL" : "no open map: it was closed, or never opened");
+  return Misuse("map is {}", handle == nullptr ? "NULL" : "not an open map: it was closed, or never opened");
 }
 
 Result<std::shared_ptr<OpenLocalizer>> FindLocalizer(const cairn_localizer* handle) {
   if (auto localizer = Localizers().Find(handle)) return localizer;
   return Misuse("localizer is {}",
-                handle == nullptr ? "NULL" : "no localizer: it was destroyed, or never created");
+                handle == nullptr ? "NULL" : "not a localizer: it was destroyed, or never created");
 }
 
 // Holds a localizer for one thread.
@@ -153,7 +154,7 @@ class Use {
   std::shared_ptr<OpenLocalizer> localizer_;
 };
 
-// Longer, no row of an image lies behind another: a sum that overflowed.
+// A longer stride is an overflowed sum, not a distance between rows.
 constexpr size_t kMaxStrideBytes = size_t{1} << 31;
 
 // The caller's pixels, not copied.
@@ -368,7 +369,7 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
                        const cairn_prior* prior, cairn_fix* fix) {
   return Call("cairn_localize", [&]() -> Status {
     CAIRN_RETURN_IF_ERROR(CheckStruct(fix, "fix"));
-    Return(FixOf({}), fix);  // who looks at it after an error must not find the fix before
+    Return(FixOf({}), fix);  // after an error the caller must not find the previous fix
     CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));

@@ -34,7 +34,7 @@ extern "C" {
 enum {
   CAIRN_OK = 0,
   CAIRN_FAILED = 1,           /* anything that has no code of its own */
-  CAIRN_INVALID_ARGUMENT = 2, /* a call that cannot be meant: null, a closed handle, a wrong size */
+  CAIRN_INVALID_ARGUMENT = 2, /* a call with an invalid argument: null, a closed handle, a wrong size */
   CAIRN_NOT_FOUND = 3,        /* a file, a camera or a part of a map that does not exist */
   CAIRN_CORRUPT = 4,          /* a map that is damaged */
   CAIRN_UNSUPPORTED = 5,      /* a camera model or a version that this library does not know */
@@ -54,8 +54,8 @@ enum {
   CAIRN_READ_ONLY = 19,
   CAIRN_DISK_FULL = 20,
   CAIRN_LOST = 21,
-  CAIRN_NOT_NEWER = 22, /* a signed map of an epoch that is not after what this robot has or asks for */
-  CAIRN_OTHER_MAP = 23  /* a signed map of another name: another site's */
+  CAIRN_NOT_NEWER = 22, /* a signed map of an epoch not later than this robot's, or below the requested one */
+  CAIRN_OTHER_MAP = 23  /* a signed map of another name: the map of another site */
 };
 
 /* Why an image has no fix: a result, not an error.  Append-only. */
@@ -72,7 +72,7 @@ enum {
   CAIRN_AMBIGUOUS = 9 /* another place explains the image nearly as well */
 };
 
-/* Handles.  They are numbers in disguise, not addresses: one that was closed is never taken for another. */
+/* Handles.  They are numbers, not addresses: a closed one is never mistaken for another. */
 typedef struct cairn_map cairn_map;
 typedef struct cairn_localizer cairn_localizer;
 
@@ -81,9 +81,9 @@ typedef struct cairn_localizer cairn_localizer;
 
 typedef struct cairn_map_options {
   size_t size;
-  int64_t memory_budget_bytes; /* what is loaded of the map and kept, at most; 0: the default, 256 MiB */
+  int64_t memory_budget_bytes; /* limit for loaded parts of the map that are kept; 0: the default, 256 MiB */
   const uint8_t* public_key;   /* 32 bytes: maps that this key has not signed are refused; NULL: any map */
-  /* To be trusted only with a key: without one, anybody can write a map that says so. */
+  /* Only to be trusted with a key: without one, anybody can write a map that says so. */
   const char* name;    /* maps of another name are refused (CAIRN_OTHER_MAP); NULL or "": any name */
   uint64_t min_epoch;  /* maps of an earlier epoch are refused (CAIRN_NOT_NEWER); 0: any */
   int32_t allow_older; /* 1: cairn_map_update takes an earlier or the same epoch, too; never another map */
@@ -92,14 +92,14 @@ typedef struct cairn_map_options {
 #define CAIRN_MAP_OPTIONS_INIT \
   { sizeof(cairn_map_options), 0, NULL, NULL, 0, 0, 0 }
 
-/* What a map says of itself. */
+/* What a map says about itself. */
 typedef struct cairn_map_description {
   size_t size;
   int64_t num_landmarks;
   int64_t num_images; /* of the survey */
   int64_t num_regions;
   int32_t has_visual_map; /* 1: cairn_localize_on_floor works */
-  int32_t is_metric;      /* 0: nothing gave the survey its scale, "metres" are of arbitrary length */
+  int32_t is_metric;      /* 0: nothing gave the survey its scale, and "metres" have an arbitrary length */
   char name[128];         /* as the recipe calls it, cut to fit, always with a NUL */
   uint64_t epoch;         /* counts the signed releases of a map of this name; 0: never counted */
 } cairn_map_description;
@@ -121,8 +121,8 @@ typedef struct cairn_camera {
     sizeof(cairn_camera), 0, 0, 0, 0, { 0 } \
   }
 
-/* 8-bit grey pixels: `height` rows of `width` bytes, `stride` bytes from one row's begin to the next.  Only
- * read, and only during the call. */
+/* 8-bit grey pixels: `height` rows of `width` bytes, `stride` bytes from the start of one row to the next.
+ * Only read, and only during the call. */
 typedef struct cairn_image {
   size_t size;
   const uint8_t* pixels;
@@ -154,7 +154,7 @@ typedef struct cairn_fix {
   double center_m[3]; /* where the camera stands, world frame */
   /* 6 x 6: rotation (rad), translation (m), of the left perturbation of cam_from_world. */
   double covariance[36];
-  int32_t region; /* with most inliers; -1: of none */
+  int32_t region; /* the one with most inliers; -1: none */
   int32_t num_features, num_matches, num_inliers;
   char
       message[CAIRN_MESSAGE_BYTES]; /* why there is no fix: found and needed; cut to fit, always with a NUL */
@@ -164,7 +164,7 @@ typedef struct cairn_fix {
     sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, { 0 } \
   }
 
-/* A place on the floor, by how landmarks look from where (maps with a visual map). */
+/* A place on the floor, from how landmarks look from different places (maps with a visual map). */
 typedef struct cairn_floor_fix {
   size_t size;
   int32_t has_fix;
@@ -182,11 +182,11 @@ typedef struct cairn_floor_fix {
 
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
-/* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES; "unknown" for a number that is
- * none. */
+/* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES; "unknown" for any other
+ * number. */
 CAIRN_API const char* cairn_error_name(int32_t code);
 CAIRN_API const char* cairn_reason_name(int32_t reason);
-/* Of the last call of this thread that failed: names what was found and what to do.  Never NULL; valid until
+/* The message of this thread's last failed call: says what was found and what to do.  Never NULL; valid until
  * this thread's next call of the library. */
 CAIRN_API const char* cairn_last_error(void);
 
@@ -197,7 +197,7 @@ CAIRN_API int32_t cairn_map_describe(const cairn_map* map, cairn_map_description
 /* The survey's camera of this image size.  CAIRN_NOT_FOUND when none or more than one has it. */
 CAIRN_API int32_t cairn_map_camera_for_size(const cairn_map* map, int32_t width, int32_t height,
                                             cairn_camera* camera);
-/* Localizers of the map stay usable.  NULL is fine; a handle that is closed already is
+/* Localizers of the map stay usable.  NULL is allowed; a handle that is already closed gives
  * CAIRN_INVALID_ARGUMENT. */
 CAIRN_API int32_t cairn_map_close(cairn_map* map);
 
@@ -206,8 +206,8 @@ CAIRN_API int32_t cairn_localizer_create(const cairn_map* map, cairn_localizer**
 CAIRN_API int32_t cairn_localizer_set_option(cairn_localizer* localizer, const char* name, const char* value);
 CAIRN_API int32_t cairn_localizer_destroy(cairn_localizer* localizer);
 
-/* `camera` NULL: the survey's of the image's size; `prior` may be NULL.  An image without a fix is no error:
- * see fix->has_fix.  After an error *fix says that there is none. */
+/* `camera` NULL: the survey's camera of the image's size; `prior` may be NULL.  An image without a fix is no
+ * error: see fix->has_fix.  After an error *fix has no fix. */
 CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image,
                                  const cairn_camera* camera, const cairn_prior* prior, cairn_fix* fix);
 /* The same by the visual map, on the floor.  CAIRN_NOT_FOUND where the map has none; the first call loads it.
@@ -215,17 +215,17 @@ CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* 
 CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
                                           const cairn_camera* camera, cairn_floor_fix* fix);
 
-/* Maps sent as what changed (`cairn delta`).  Brings the file at `map_path` to the map that the delta leads
- * to: at any instant it is the whole old or the whole new one, and the old one stays beside it, for
- * cairn_map_roll_back.  Who has the map open keeps the old one; open it again.  `options`, which may be NULL:
- * delta and new map must be signed with the public key; name, min_epoch, allow_older.  *was_updated (may be
- * NULL): 0 where the map is the new one already.  CAIRN_INVALID_ARGUMENT: the delta leads from another map;
- * CAIRN_NOT_NEWER, CAIRN_OTHER_MAP: a key is required, or the map in place is signed, and the new map does
- * not follow it; CAIRN_BUSY: another update is at work in the folder. */
+/* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
+ * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one
+ * stays beside it, for cairn_map_roll_back.  A map that is open stays the old one; open it again.  `options`,
+ * which may be NULL: delta and new map must be signed with the public key; name, min_epoch, allow_older.
+ * *was_updated (may be NULL): 0 where the map already is the new one.  CAIRN_INVALID_ARGUMENT: the delta
+ * leads from another map; CAIRN_NOT_NEWER, CAIRN_OTHER_MAP: a key is required, or the map in place is signed,
+ * and the new map does not follow it; CAIRN_BUSY: another update is running in the folder. */
 CAIRN_API int32_t cairn_map_update(const char* map_path, const char* delta_path,
                                    const cairn_map_options* options, int32_t* was_updated);
-/* Exchanges the map and the one before the last update; a second time exchanges them back.  min_epoch holds
- * here too; allow_older does not matter. */
+/* Exchanges the map and the one before the last update; a second call exchanges them back.  min_epoch holds
+ * here too; allow_older is ignored. */
 CAIRN_API int32_t cairn_map_roll_back(const char* map_path, const cairn_map_options* options);
 
 #ifdef __cplusplus

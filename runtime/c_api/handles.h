@@ -7,11 +7,11 @@
 
 namespace cairn {
 
-// Handles that a foreign language holds: `Handle` is an opaque C type, never defined.  A handle is a number
-// that is given out once, not an address: what was closed is found to be closed, however often memory is used
-// again, and nothing of what a caller passes is ever followed.  Kinds are told apart by their residue, so
-// that one passed for another is found too. May be used from all threads; an object lives until the last Find
-// that returned it is done with it.
+// Handles that another language holds: `Handle` is an opaque C type, never defined.  A handle is a number
+// that is given out once, not an address: a closed handle is recognised as closed, even when its memory is
+// used again, and no pointer from a caller is ever followed.  Kinds differ in their residue modulo kNumKinds,
+// so that a handle of another kind is recognised too.  May be used from all threads; an object lives until
+// the last user that got it from Find releases it.
 template <typename Handle, typename Object, uint64_t kKind, uint64_t kNumKinds>
 class Handles {
  public:
@@ -21,7 +21,7 @@ class Handles {
     objects_.emplace(next_, std::move(object));
     return reinterpret_cast<Handle*>(static_cast<uintptr_t>(next_));
   }
-  // Null where the handle is none of these, or was removed.
+  // Null where the handle is not one of these, or was removed.
   std::shared_ptr<Object> Find(const Handle* handle) const {
     const std::lock_guard lock(mutex_);
     const auto found = objects_.find(Number(handle));

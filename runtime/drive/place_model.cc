@@ -7,11 +7,13 @@
 namespace cairn {
 
 OptionTable DescribeOptions(PlaceModelOptions* options) {
-  return {{.name = "score_exponent",
-           .value = &options->score_exponent,
-           .help = "probabilities go with scores to this power; more: the best-looking place counts for more",
-           .min = 1e-3,
-           .max = 100}};
+  return {
+      {.name = "score_exponent",
+       .value = &options->score_exponent,
+       .help =
+           "probabilities are proportional to scores to this power; a larger one favours the best place more",
+       .min = 1e-3,
+       .max = 100}};
 }
 
 Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& options) {
@@ -73,7 +75,7 @@ PlaceScores PlaceModel::OfNodes(const std::vector<double>& scores) const {
     places.probabilities[node] += probabilities[image];
     sum += probabilities[image];
   }
-  for (double& p : places.probabilities) p /= sum;
+  for (double& p : places.probabilities) p /= sum;  // [Mariottini11 eq. 6] h = p(X | Z), of nodes
   return places;
 }
 
@@ -104,6 +106,7 @@ Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
 }
 
 std::vector<double> PlaceModel::Expected(NodeIdx node) const {
+  // [Mariottini11 eq. 6] h' = p(X | Z of the node's own images), the mean where it has several
   const std::vector<int32_t>& images = appearance_->node_images[node];
   std::vector<double> mean(num_nodes(), 0.0);
   for (const int32_t image : images) {

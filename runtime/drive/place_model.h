@@ -13,26 +13,26 @@
 namespace cairn {
 
 struct PlaceModelOptions {
-  // Of ProbabilitiesOfScores.  REQUIRES: > 0
+  // Exponent of ProbabilitiesOfScores.  REQUIRES: > 0
   double score_exponent = kScoreExponent;
 };
 OptionTable DescribeOptions(PlaceModelOptions* options);
 
-// What an image says about where it was taken, before anything is matched: of the nodes of the appearance
-// graph.
+// What an image says about where it was taken, before anything is matched, as scores of the nodes of the
+// appearance graph.
 struct PlaceScores {
-  std::vector<double> scores;  // per node: the best of its images', in [0, 1]; zeros: nothing is shared
+  std::vector<double> scores;  // per node: the best of its images' scores, in [0, 1]; all 0: no shared words
   std::vector<double>
-      probabilities;  // p(X = node | image) [Mariottini11 §IV]: sums to 1, all alike for zeros
+      probabilities;  // p(X = node | image) [Mariottini11 §IV]: sums to 1; all equal where all scores are 0
 };
 
-// A survey image of a map as geometry sees it: the landmarks that it shows, where they are and as they look.
-// Errors: as Map::Landmarks.
+// What geometric verification reads of a survey image: the landmarks in it, with their directions and
+// descriptors.  Errors: as Map::Landmarks.
 Result<PlaceView> ViewOfImage(const Map& map, int32_t image);
 
 // Scores images against the places of a map by its visual words [Mariottini11 §IV].  Holds the whole
-// vocabulary and its inverted files: unlike a Localizer it looks at all of the map for every image.
-// Immutable, shareable between threads.
+// vocabulary and its inverted files: unlike a Localizer it uses the whole map for every image.  Immutable,
+// shareable between threads.
 class PlaceModel {
  public:
   // Errors: NotFound (a map without appearance graph or without words: says how to get one), InvalidArgument
@@ -42,21 +42,21 @@ class PlaceModel {
   int num_nodes() const { return static_cast<int>(appearance_->is_kept.size()); }
   const AppearanceMap& appearance() const { return *appearance_; }
 
-  // Of an image's descriptors (n x 128); none: nothing is known.  Touches shared words only.
+  // Scores an image by its descriptors (n x 128); without any, nothing is known.  Reads shared words only.
   PlaceScores Look(const DescriptorMatrix& descriptors) const;
   // A closer look, for a robot that stands still because it is lost: the images that score best by their
-  // words are verified (core/vocabulary/rerank_places.h), and those that are get the score of that instead,
-  // the others none.  Where none is, the same as Look.  Costs one matching of descriptors for each of them.
-  // `map`: the one that the model is of, best with all landmarks. Errors: InvalidArgument (an option), and as
-  // Map::Landmarks.  No exception leaves it.
+  // words are verified (core/vocabulary/rerank_places.h), and the verified ones get that score instead, the
+  // others 0.  Where none is verified, the same as Look.  Costs one matching of descriptors for each of them.
+  // `map`: the map that the model was made from, best with all landmarks.  Errors: InvalidArgument (an
+  // option), and as Map::Landmarks.  No exception leaves it.
   Result<PlaceScores> LookCloser(const Map& map, const Query& query, const RerankOptions& options = {}) const;
-  // h' = p(X | Z of a node) [Mariottini11 eq. 7]: what a robot at the node expects to get, the mean over its
-  // images.
+  // h' = p(X | Z of a node) [Mariottini11 eq. 6]: what a robot at the node expects to get, the mean over
+  // its images.
   std::vector<double> Expected(NodeIdx node) const;
 
  private:
   PlaceModel() = default;
-  std::vector<double> ImageScores(const BagOfWords& bag) const;  // images of no node: 0
+  std::vector<double> ImageScores(const BagOfWords& bag) const;  // 0 for images of no node
   PlaceScores OfNodes(const std::vector<double>& image_scores) const;
 
   std::shared_ptr<const AppearanceMap> appearance_;

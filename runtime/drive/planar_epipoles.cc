@@ -14,11 +14,11 @@
 namespace cairn {
 namespace {
 
-// Errors beyond so many standard deviations are outliers'.
+// Errors beyond this many standard deviations are outliers.
 constexpr double kMaxSigmas = 3;
 // Factors of the assumed focal length that samples try, in units of its standard deviation.
 constexpr std::array<double, 5> kFocalSteps = {0, -0.8, 0.8, -1.6, 1.6};
-// Rays further off the axis are no image points.
+// Rays further off the axis are not image points.
 constexpr double kMaxTangent = 1000;
 constexpr int kNumRefined = 3;
 constexpr int kNumRefinements = 12;
@@ -45,6 +45,7 @@ class Constraint {
     const double current_side = kappa_ * pair.current.x() * cos_psi_ + sin_psi_;
     const double target_side = kappa_ * pair.target.x() * cos_delta_ + sin_delta_;
     const double along_xc = kappa_ * yt * cos_psi_, along_xt = kappa_ * yc * cos_delta_;
+    // [Mariottini11 §V-A] the epipoles from matches alone: by planar motion, not by a fundamental matrix
     return {
         yt * current_side - yc * target_side,
         along_xc * along_xc + along_xt * along_xt + current_side * current_side + target_side * target_side};
@@ -84,7 +85,7 @@ class Estimator {
     return limit * limit;
   }
 
-  // Truncated sum of squares, and how far the focal length is from the assumed one.
+  // Truncated sum of squares, plus the deviation of the focal length from the assumed one.
   double Cost(const Motion& motion) const {
     const Constraint constraint(motion);
     const double limit = MaxSquaredError();
@@ -129,7 +130,7 @@ class Estimator {
   double FocalWeight() const { return 1 / (options_.focal_error_ratio * options_.focal_error_ratio); }
   double FocalOffset(const Motion& motion) const { return motion[2] - std::log(options_.focal_ratio); }
 
-  // Normal equations of one step: over the inliers, and what is known of the focal length.
+  // Normal equations of one step: over the inliers, with the prior of the focal length.
   struct Normal {
     Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -177,7 +178,7 @@ class Estimator {
     return motions;
   }
 
-  // Damped Gauss-Newton over the inliers, chosen anew at each step.
+  // Damped Gauss-Newton over the inliers, chosen again at each step.
   Motion Refined(Motion motion) const {
     double damping = 1e-3, cost = Cost(motion);
     for (int step = 0; step < kNumRefinements; ++step) {
@@ -251,13 +252,13 @@ OptionTable DescribeOptions(PlanarEpipolesOptions* o) {
   return {
       {"noise_px", &o->noise_px, "standard deviation of a matched pixel", 0.01, 10},
       {"focal_ratio", &o->focal_ratio, "assumed focal length over the true one, as far as is known", 0.2, 5},
-      {"focal_error_ratio", &o->focal_error_ratio, "standard deviation of that", 0.001, 0.5},
-      {"min_num_inliers", &o->min_num_inliers, "least matches that agree on one motion", 4},
+      {"focal_error_ratio", &o->focal_error_ratio, "standard deviation of that ratio", 0.001, 0.5},
+      {"min_num_inliers", &o->min_num_inliers, "fewest matches that agree on one motion", 4},
       {"min_inlier_ratio", &o->min_inlier_ratio, "least share of the matches that agree on one motion", 0, 1},
       {"min_spread_px", &o->min_spread_px, "least standard deviation of these matches in each image, pixels",
        0, 10000},
       {"num_samples", &o->num_samples, "pairs of matches that are tried", 1, 100000},
-      {"seed", &o->seed, "of these samples"},
+      {"seed", &o->seed, "seed of these samples"},
   };
 }
 

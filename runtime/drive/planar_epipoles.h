@@ -29,10 +29,10 @@ namespace cairn {
 //
 // This is the epipolar constraint of an essential matrix with two unknowns instead of five.  A camera whose
 // focal length is f times an unknown 1 / kappa has kappa X_c, kappa X_t instead: a third unknown, known
-// beforehand to some percent.  Matches fix it where they can, otherwise what is known beforehand decides: the
-// epipoles come right with a wrong focal length.  Without a baseline psi alone is arbitrary, the turn is not.
-// Points of one vertical wall and nothing else (no floor, no ceiling) agree with two motions, as every plane
-// does with an essential matrix; either is returned.  Points at the camera's height tell nothing.
+// beforehand to some percent.  Matches determine it where they can, otherwise the prior does: the epipoles
+// are right even with a wrong focal length.  Without a baseline only psi is arbitrary, the turn is not.
+// Points of a single vertical wall (no floor, no ceiling) agree with two motions, as a plane does with two
+// essential matrices; either is returned.  Points at the camera's height carry no information.
 struct PlanarEpipolesOptions {
   // Standard deviation of a matched pixel.  REQUIRES: in [0.01, 10]
   double noise_px = 1;
@@ -40,10 +40,11 @@ struct PlanarEpipolesOptions {
   double focal_ratio = 1;
   // Standard deviation of that.  REQUIRES: in [0.001, 0.5]
   double focal_error_ratio = 0.12;
-  // Least matches that agree, and their least share of all.  REQUIRES: >= 4, in [0, 1]
+  // Minimum number of matches that agree, and minimum share of all.  REQUIRES: >= 4, in [0, 1]
   int min_num_inliers = 12;
   double min_inlier_ratio = 0.3;
-  // Least standard deviation of the inliers in the images: in one spot they tell nothing.  REQUIRES: >= 0
+  // Least standard deviation of the inliers in the images: in one spot they carry no
+  // information.  REQUIRES: >= 0
   double min_spread_px = 8;
   // Pairs of matches that are tried.  REQUIRES: in [1, 100000]
   int num_samples = 100;
@@ -61,8 +62,8 @@ struct PlanarEpipoles {
   double turn_rad = 0;              // heading minus the target's, [-pi, pi]
   double focal_ratio = 1;           // kappa: assumed / true focal length
   double focal_error_ratio = 0;     // standard deviation of it
-  // rho over the median distance of the inliers from the target: >= 0, no metres are known.  Tells how far
-  // it is where the scene's size is about known, and "there" where it is 0.
+  // rho over the median distance of the inliers from the target: >= 0; metres are not known.  Gives the
+  // distance where the scene's size is roughly known; 0 means that the target is reached.
   double distance_ratio = 0;
   std::vector<char> is_inlier;  // per match
   int num_inliers = 0;

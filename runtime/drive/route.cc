@@ -10,7 +10,9 @@ namespace {
 
 double LinkWeight(const AppearanceMap& appearance, const RouteOptions& options, NodeIdx node,
                   const AppearanceGraph::Neighbour& neighbour) {
+  // [Mariottini11 §V] the planner to compare with: the inverse of the number of matches
   if (options.weight == "matches") return 1.0 / neighbour.num_inliers;
+  // [Mariottini11 eq. 2] w_ij = (H_i + H_j) / 2
   if (options.weight == "entropy") return (appearance.entropy[node] + appearance.entropy[neighbour.node]) / 2;
   return 1;
 }
@@ -22,8 +24,8 @@ struct Ways {
   std::vector<NodeIdx> next;
 };
 
-// Dijkstra from the goal; a way's inner nodes are kept ones.  Links may cost nothing: of ways that cost the
-// same the one of fewest links is taken, so that none leads in a circle.
+// [Mariottini11 §V] Dijkstra, from the goal for all starts at once; a way's inner nodes are kept ones.  Links
+// may cost nothing: of ways that cost the same the one of fewest links is taken, so that none is a circle.
 Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& options) {
   const size_t num_nodes = appearance.is_kept.size();
   Ways ways{std::vector<double>(num_nodes, std::numeric_limits<double>::infinity()),
@@ -40,6 +42,7 @@ Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& o
     open.pop();
     const bool is_old = std::tie(cost, num_links) > std::tie(ways.cost[node], ways.num_links[node]);
     if (is_old || (node != goal && !appearance.is_kept[node])) continue;
+    // [Booij06 §IV-A] all original links among kept nodes count, not those of a tree alone
     for (const AppearanceGraph::Neighbour& neighbour : appearance.graph.Neighbours(node)) {
       const NodeIdx other = neighbour.node;
       const auto through = std::tuple(cost + LinkWeight(appearance, options, node, neighbour), num_links + 1);
@@ -58,7 +61,8 @@ Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& o
 OptionTable DescribeOptions(RouteOptions* options) {
   return {{.name = "weight",
            .value = &options->weight,
-           .help = "what is least on the way: links, 1 / matches of links, or the entropy of places",
+           .help = "what the way minimises: the number of links, the sum of 1 / matches of links, or the "
+                   "entropy of places",
            .choices = {"links", "matches", "entropy"}}};
 }
 
@@ -68,10 +72,9 @@ Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appe
   RouteOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (options.weight == "entropy" && appearance.entropy.empty()) {
-    return MakeError(
-        ErrorCode::kNotFound,
-        "route: the map does not tell how ambiguous its places are; compile it again, or plan by links "
-        "or matches");
+    return MakeError(ErrorCode::kNotFound,
+                     "route: the map does not say how ambiguous its places are; compile it again, or plan by "
+                     "links or matches");
   }
   const Ways ways = WaysTo(appearance, goal, options);
   std::vector<std::optional<NodePath>> paths;

@@ -12,9 +12,9 @@
 namespace cairn {
 
 struct RouteOptions {
-  // What the links of a way add up: "links": 1 each; "matches": 1 / verified inliers, over which the planner
-  // that [Mariottini11 §V] compares with runs; "entropy": the mean of the entropies at both ends (eq. 2), so
-  // that the way leads where the robot can tell where it is.
+  // The cost of a link, summed over a way: "links": 1 each; "matches": 1 / verified inliers, as in the
+  // planner that [Mariottini11 §V] compares with; "entropy": the mean of the entropies at both ends
+  // [Mariottini11 eq. 2], so that the way leads through places that the robot can recognise.
   std::string weight = "links";
 };
 OptionTable DescribeOptions(RouteOptions* options);
@@ -27,10 +27,10 @@ struct NodePath {
 };
 
 // From each start the way of least cost to the goal over kept nodes (its ends may be others) [Booij06 §IV:
-// paths over the connected dominating set; Mariottini11 §V: Dijkstra], of equal ones the one of fewest links,
-// of these the one through the smallest nodes; nothing where there is none.  O(links log links).  REQUIRES:
-// nodes of the graph.  Errors: InvalidArgument (no such weight), NotFound (weight "entropy" in a map without
-// entropies).
+// paths over the connected dominating set; Mariottini11 §V: Dijkstra].  Among equal costs the way with the
+// fewest links, then the one through the smallest nodes; nothing where there is no way.  O(links log links).
+// REQUIRES: nodes of the graph.  Errors: InvalidArgument (no such weight), NotFound (weight "entropy" in a
+// map without entropies).
 Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
                                                        const std::vector<NodeIdx>& starts, NodeIdx goal,
                                                        const RouteOptions& options);
@@ -44,8 +44,8 @@ struct Route {
 };
 
 // FindPaths for two images.  Errors: the same; InvalidArgument (no such image), NotFound (the map has no
-// appearance graph; one of the images is not in it; no path leads from one to the other), Corrupt (a damaged
-// block).
+// appearance graph; one of the images is not in it; no path leads from one to the other), Corrupt (a
+// damaged block).
 Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOptions& options = {});
 
 // The index of a survey image by its name.  O(images).  Errors: NotFound (no such image), Corrupt.

@@ -10,25 +10,25 @@
 namespace cairn {
 namespace {
 
-// A retreat makes up at least so much of the scene's distance a second at speed_gain 1: there the distance to
-// the target does not tell how far to go.
+// A retreat covers at least this part of the scene's distance per second at speed_gain 1: during a retreat
+// the distance to the target does not say how far to go.
 constexpr double kRetreatRatio = 0.15;
-// Directions up to so much of max_heading_deg are approached without a retreat.
+// Directions up to this part of max_heading_deg are approached without a retreat.
 constexpr double kApproachable = 0.8;
-// Towards the height of the target a robot goes up to this part of a retreat before it.
+// On the way to the height of the target a robot ends this part of a retreat behind it.
 constexpr double kHeightOfTarget = 0.1;
-// Away from what stopped it: as far, over the scene's distance.
+// Distance that the robot goes away from what stopped it, over the scene's distance.
 constexpr double kAwayRatio = 0.2;
-// Patience wears out from where it first comes as near as so many tolerances.
+// Commands are counted against the patience once the robot has come within this many tolerances.
 constexpr double kNearRatio = 5;
-// However long it takes, tolerances are doubled no more often.
+// Tolerances are doubled at most this often.
 constexpr int kMostDoublings = 3;
-// Weight of what own commands taught, after each further command; squared ratio that the first guess weighs.
+// Weight of what earlier commands taught, per further command; weight of the first guess, as a squared ratio.
 constexpr double kForget = 0.9;
 constexpr double kGuessWeight = 2e-4;
 
-// What one image tells of the focal length counts as this part of what independent noise would tell, and all
-// images together leave this standard deviation.
+// The information of one image about the focal length counts as this part of what it would be with
+// independent noise, and all images together leave this standard deviation.
 constexpr double kFocalShare = 0.2;
 constexpr double kLeastFocalError = 0.02;
 
@@ -42,25 +42,25 @@ OptionTable DescribeOptions(ServoOptions* o) {
       {"max_speed_m_s", &o->max_speed_m_s, "greatest speed, m/s", 1e-3, 10},
       {"max_turn_deg_s", &o->max_turn_deg_s, "greatest turn rate, degrees/s", 0.1, 720},
       {"step_s", &o->step_s, "time for which a command holds, seconds", 1e-3, 10},
-      {"speed_gain", &o->speed_gain, "part of the way left that is made in a second", 1e-3, 10},
-      {"turn_gain", &o->turn_gain, "part of the turn wanted that is made in a second", 1e-3, 10},
+      {"speed_gain", &o->speed_gain, "part of the remaining way that is covered in a second", 1e-3, 10},
+      {"turn_gain", &o->turn_gain, "part of the wanted turn that is made in a second", 1e-3, 10},
       {"approach_gain", &o->approach_gain, "heading over the direction to the target while it approaches",
        1.5, 10},
-      {"max_heading_deg", &o->max_heading_deg, "greatest turn from the target's heading on purpose, degrees",
+      {"max_heading_deg", &o->max_heading_deg, "greatest deliberate turn from the target's heading, degrees",
        5, 60},
       {"max_heading_error_deg", &o->max_heading_error_deg,
        "turns on the spot when the heading is off by more, degrees", 1, 90},
       {"arrive_heading_deg", &o->arrive_heading_deg,
-       "arrived: turn from the target's heading, degrees, at most", 1e-3, 45},
+       "arrived: largest turn from the target's heading, degrees", 1e-3, 45},
       {"arrive_distance_ratio", &o->arrive_distance_ratio,
-       "arrived: distance from the target over that of the scene, at most", 1e-4, 1},
+       "arrived: largest distance from the target over that of the scene", 1e-4, 1},
       {"patience_commands", &o->patience_commands,
-       "tolerances of arrival double after each so many commands near the target", 1},
+       "tolerances of arrival double every time this many commands were given near the target", 1},
       {"max_retreat_ratio", &o->max_retreat_ratio,
        "a retreat ends at this distance behind the target, over that of the scene", 1e-3, 10},
       {"min_num_matches_to_turn", &o->min_num_matches_to_turn,
        "with fewer matches the robot looks along the target's heading, the fewer the straighter", 4},
-      {"scene_distance_m", &o->scene_distance_m, "how far the scene is as long as nothing is known, metres",
+      {"scene_distance_m", &o->scene_distance_m, "distance of the scene before anything is known, metres",
        0.01, 1000},
   };
 }
@@ -80,6 +80,7 @@ const char* ServoStateName(ServoState state) {
 }
 
 PolarRates RatesOf(double rho_m, double psi_rad, double speed_m_s, double turn_rad_s) {
+  // [Mariottini11 §V-A] by its reference: the unicycle in polar coordinates (servo.h)
   const double swing = speed_m_s / rho_m * std::sin(psi_rad);
   return {-speed_m_s * std::cos(psi_rad), swing - turn_rad_s, swing};
 }
@@ -98,7 +99,7 @@ Result<Servo> Servo::Create(const Camera& assumed_camera, const ServoOptions& op
   return Servo(assumed_camera, options);
 }
 
-// Information filter: what the image adds is the estimate's information less what was known before.
+// Information filter: the image adds the estimate's information less the prior's.
 void Servo::LearnFocal(const PlanarEpipoles& epipoles) {
   PlanarEpipolesOptions& known = options_.epipoles;
   const double before = 1 / (known.focal_error_ratio * known.focal_error_ratio);
@@ -177,9 +178,10 @@ double Servo::WantedHeading(const PlanarPose& pose, int num_inliers) const {
   if (leg_ == Leg::kToHeightOfTarget) return -leg_side_ * limit;
   const double tolerance = options_.arrive_distance_ratio * Patience();
   if (std::abs(behind) <= tolerance) return 0;
-  // The direction to the target, less what its uncertainty is near the target.
+  // The direction to the target, less its uncertainty near the target.
   const double offset = Sign(left) * std::max(0.0, std::abs(left) - 0.5 * tolerance);
   const double delta = std::atan2(-offset, std::max(std::abs(behind), 3 * tolerance));
+  // [Mariottini11 §V-A] both epipoles to zero and then along the axis, in one: by the heading (servo.h)
   return Limited(Sign(behind) * options_.approach_gain * delta, limit);
 }
 

@@ -8,6 +8,7 @@
 namespace cairn {
 namespace {
 
+// [Mariottini11 fn 5] X_1: "nodes in the graph connected with X_0 up to distance 2", itself among them.
 std::vector<NodeIdx> WithinReach(const AppearanceGraph& graph, NodeIdx start, int num_links) {
   std::set<NodeIdx> reached = {start};
   std::vector<NodeIdx> front = {start};
@@ -27,6 +28,7 @@ std::vector<NodeIdx> WithinReach(const AppearanceGraph& graph, NodeIdx start, in
 std::vector<NodeIdx> Candidates(const AppearanceGraph& graph, const std::vector<double>& scores,
                                 const StartHypothesesOptions& options) {
   const std::vector<NodeIdx> order = BestFirst(scores);
+  // [Mariottini11 fn 4] a percentage of the maximum: of the scores, before they become probabilities
   const double min_score = options.min_score_ratio * scores[order[0]];
   std::vector<char> is_taken(scores.size(), 0);
   std::vector<NodeIdx> candidates;
@@ -39,7 +41,7 @@ std::vector<NodeIdx> Candidates(const AppearanceGraph& graph, const std::vector<
   return candidates;
 }
 
-// Its values at some bins, made to sum to 1.
+// The values at some bins, scaled to sum to 1.
 std::vector<double> Restrict(const std::vector<double>& probabilities, const std::vector<NodeIdx>& bins) {
   std::vector<double> part;
   double sum = 0;
@@ -59,7 +61,7 @@ OptionTable DescribeOptions(StartHypothesesOptions* options) {
        .max = 1},
       {.name = "max_num_hypotheses",
        .value = &options->max_num_hypotheses,
-       .help = "most starts that are kept in mind",
+       .help = "most starts that are considered",
        .min = 1},
       {.name = "reach_links",
        .value = &options->reach_links,
@@ -67,16 +69,16 @@ OptionTable DescribeOptions(StartHypothesesOptions* options) {
        .min = 1},
       {.name = "compared_nodes",
        .value = &options->compared_nodes,
-       .help = "over which places what an image says is compared with what is expected",
+       .help = "places over which an image's distribution is compared with the expected one",
        .choices = {"all", "reachable"}},
       {.name = "uniform_ratio",
        .value = &options->uniform_ratio,
-       .help = "part of a uniform distribution that is mixed into those compared",
+       .help = "part of a uniform distribution that is mixed into both compared distributions",
        .min = 1e-9,
        .max = 1},
       {.name = "switch_margin",
        .value = &options->switch_margin,
-       .help = "posterior by which another start must lead before the robot turns back for it",
+       .help = "margin of posterior by which another start must lead before the robot turns back for it",
        .min = 0,
        .max = 1},
       {.name = "switching",
@@ -96,7 +98,8 @@ OptionTable DescribeOptions(StartHypothesesOptions* options) {
        .choices = {"total", "mean"}},
       {.name = "min_reachable_ratio",
        .value = &options->min_reachable_ratio,
-       .help = "least part of what an image says that lies within reach; less: carried away; 0: never",
+       .help = "smallest probability of the places within reach, by an image; with less the robot was "
+               "carried away; 0: not checked",
        .min = 0,
        .max = 1},
   };
@@ -115,10 +118,9 @@ Result<StartHypotheses> StartHypotheses::Make(const PlaceModel& model, const Pla
                      first.scores.size(), model.num_nodes());
   }
   if (*std::max_element(first.scores.begin(), first.scores.end()) <= 0) {
-    return MakeError(
-        ErrorCode::kNoData,
-        "start: the first image shares no visual word with the map; turn the camera to where there is "
-        "something to see");
+    return MakeError(ErrorCode::kNoData,
+                     "start: the first image shares no visual word with the map; turn the camera to "
+                     "something with more texture");
   }
   StartHypotheses result(model, goal, options);
   const std::vector<NodeIdx> candidates = Candidates(model.appearance().graph, first.scores, options);
@@ -139,10 +141,12 @@ Result<StartHypotheses> StartHypotheses::Make(const PlaceModel& model, const Pla
     if (options.first_choice == "score") return -hypothesis.score;
     return options.way_cost == "mean" ? hypothesis.path.MeanCost() : hypothesis.path.cost;
   };
+  // [Mariottini11 §V] of the ways from all candidates the one of least entropy is followed
   const auto least =
       std::min_element(result.hypotheses_.begin(), result.hypotheses_.end(),
                        [&](const StartHypothesis& a, const StartHypothesis& b) { return cost(a) < cost(b); });
   result.followed_ = static_cast<int>(least - result.hypotheses_.begin());
+  // [Mariottini11 eq. 3] the prior p(X_0 | Z_0) is uniform over the candidates
   for (StartHypothesis& hypothesis : result.hypotheses_)
     hypothesis.posterior = 1.0 / static_cast<double>(result.hypotheses_.size());
   result.Restart();
@@ -166,8 +170,10 @@ double StartHypotheses::Likelihood(const std::vector<double>& seen, NodeIdx node
                                    const std::vector<NodeIdx>& bins) {
   auto found = expected_.find(node);
   if (found == expected_.end()) found = expected_.emplace(node, model_->Expected(node)).first;
+  // [Mariottini11 eq. 6] J between what is seen, h, and what is expected at the node, h'
   const double divergence = JeffreyDivergence(
       seen, bins.empty() ? found->second : Restrict(found->second, bins), options_.uniform_ratio);
+  // [Mariottini11 eq. 8] p(Z | X) = exp(-J^2 / 2) / sqrt(2 pi)
   return std::exp(-divergence * divergence / 2) / std::sqrt(2 * std::numbers::pi);
 }
 
@@ -175,6 +181,7 @@ StartHypotheses::Belief StartHypotheses::Predict(const Belief& belief) {
   Belief predicted;
   for (const auto& [node, probability] : belief) {
     const std::vector<NodeIdx>& reach = Reach(node);
+    // [Mariottini11 eq. 4] sum over X_0 of p(X_1 | X_0), uniform over the nodes within reach
     for (const NodeIdx next : reach) predicted[next] += probability / static_cast<double>(reach.size());
   }
   return predicted;
@@ -186,6 +193,7 @@ HypothesisVerdict StartHypotheses::Observe(const PlaceScores& image) {
     belief = Predict(belief);
     for (const auto& [node, probability] : belief) reachable.insert(node);
   }
+  // [Mariottini11 eq. 7] the sum's domain, which the source leaves open
   std::vector<NodeIdx> bins;  // none: all
   if (options_.compared_nodes == "reachable") bins.assign(reachable.begin(), reachable.end());
   const std::vector<double> seen = bins.empty() ? image.probabilities : Restrict(image.probabilities, bins);
@@ -196,11 +204,13 @@ HypothesisVerdict StartHypotheses::Observe(const PlaceScores& image) {
     reachable_ratio += image.probabilities[node];
   }
   for (Belief& belief : beliefs_) {
+    // [Mariottini11 eq. 5] times p(Z_1 | X_1): image by image as they come, not recursively from the last
     for (auto& [node, probability] : belief) probability *= likelihood[node];
   }
   Normalise();
   ++num_images_;
   if (reachable_ratio < options_.min_reachable_ratio) return HypothesisVerdict::kLost;
+  // [Mariottini11 §VI] the posterior's peak; the source has no switch_margin
   int best = followed_;
   for (int i = 0; i < static_cast<int>(hypotheses_.size()); ++i) {
     if (hypotheses_[i].posterior > hypotheses_[best].posterior) best = i;
@@ -235,6 +245,7 @@ void StartHypotheses::Normalise() {
     sum += of_hypothesis;
   }
   for (size_t i = 0; i < beliefs_.size(); ++i) {
+    // [Mariottini11 eq. 3] p(X_0 | Z_0:T), up to the factor that the sum over the starts gives
     hypotheses_[i].posterior = sums[i] / sum;
     for (auto& [node, probability] : beliefs_[i]) probability /= sum;
   }

@@ -13,34 +13,35 @@
 namespace cairn {
 
 struct StartHypothesesOptions {
-  // Nodes that score at least this part of the best score may be the start [Mariottini11, On line 1: a
+  // Nodes that score at least this part of the best score may be the start [Mariottini11 fn 4: a
   // percentage of the maximum, not given].  REQUIRES: in (0, 1]
   double min_score_ratio = 0.7;
-  // Most starts, those that score most; the source has no limit.  REQUIRES: >= 1
+  // Most starts that are considered, the best-scoring ones; the source has no limit.  REQUIRES: >= 1
   int max_num_hypotheses = 10;
-  // Links that a robot may have passed between two images [Mariottini11 §VI: 2].  Of candidates so near to
+  // Links that a robot may have passed between two images [Mariottini11 fn 5: 2].  Of candidates so near to
   // each other only the best one is a hypothesis: they are one place.  REQUIRES: >= 1
   int reach_links = 2;
-  // Over which bins images are compared (eq. 7; the source leaves it open): "all" nodes, or those "reachable"
-  // within reach_links by some hypothesis.
+  // Over which bins images are compared [Mariottini11 eq. 7: leaves it open]: "all" nodes, or those
+  // "reachable" within reach_links by some hypothesis.
   std::string compared_nodes = "reachable";
-  // Of JeffreyDivergence, so that an empty bin is no proof.  REQUIRES: in (0, 1]
+  // For JeffreyDivergence, so that an empty bin proves nothing.  REQUIRES: in (0, 1]
   double uniform_ratio = 0.02;
-  // Posterior by which another start must lead before the robot turns back for it.  REQUIRES: in [0, 1]
+  // Margin of posterior by which another start must lead before the robot turns back for
+  // it.  REQUIRES: in [0, 1]
   double switch_margin = 0.1;
-  // Whether it turns back at all; without, the first choice is followed to its end.
+  // Whether it turns back at all; if not, the first choice is followed to its end.
   bool switching = true;
   // What it then does: "retrace" to the start over the images it came by, and follow that hypothesis's way
   // [Mariottini11]; or "replan" from where it would be by now, which the source rejects.
   std::string on_switch = "retrace";
-  // Which start is followed first: that of the least "entropy" of its way [Mariottini11], or of the best
-  // "score".
+  // Which start is followed first: that of the least "entropy" of its way [Mariottini11], or of the
+  // best "score".
   std::string first_choice = "entropy";
   // Ways are compared by their "total" cost [Mariottini11], or by the "mean" of their links, which does not
   // penalise long ones.
   std::string way_cost = "total";
-  // Least part of what an image says that must lie within reach of some hypothesis; less: the robot was
-  // carried away. 0: never.  REQUIRES: in [0, 1]
+  // Smallest probability, by an image, of the places within reach of some hypothesis; with less, the robot
+  // was carried away.  0: not checked.  REQUIRES: in [0, 1]
   double min_reachable_ratio = 0.1;
   RouteOptions route{.weight = "entropy"};
 };
@@ -58,15 +59,15 @@ struct StartHypothesis {
 enum class HypothesisVerdict {
   kFollow,  // go on
   kSwitch,  // another start is followed from now on
-  kLost,    // no hypothesis explains the image: look anew
+  kLost,    // no hypothesis explains the image: localize again
 };
 
 // Which of several places a lost robot started at, found out while it is under way to a goal [Mariottini11
 // §VI]. Image by image, over nodes of the appearance graph:
-//   p(X_0 | Z_0:T) ~ p(X_0 | Z_0) sum_{X_1} p(Z_1 | X_1) p(X_1 | X_0) ...        (eq. 3-5)
+//   p(X_0 | Z_0:T) ~ p(X_0 | Z_0) sum_{X_1} p(Z_1 | X_1) p(X_1 | X_0) ...        [Mariottini11 eq. 3-5]
 // summed forward instead of backward, which gives the same; p(X_0 | Z_0) is uniform over the candidates, p(X'
 // | X) over the nodes within reach, X itself among them.
-//   p(Z | X) = exp(-J^2 / 2) / sqrt(2 pi),  J = D(h || h') + D(h' || h)          (eq. 6-8)
+//   p(Z | X) = exp(-J^2 / 2) / sqrt(2 pi),  J = D(h || h') + D(h' || h)          [Mariottini11 eq. 6-8]
 // of what the image says, h, and what an image at X would, h'.
 class StartHypotheses {
  public:
@@ -78,16 +79,16 @@ class StartHypotheses {
 
   // An image at the next node of the way.
   HypothesisVerdict Observe(const PlaceScores& image);
-  // What the next image of the followed way shows is not there: the robot did not start so.  Follows the
-  // likeliest other start; false where there is none.
+  // The robot does not see what the next image of the followed way shows, so it did not start there.  Follows
+  // the likeliest other start; false where there is none.
   bool Refute();
-  // The robot is back where it started: what it has found out about starts is kept.
+  // The robot is back at its start: what it has learnt about starts is kept.
   void Restart();
 
   const std::vector<StartHypothesis>& hypotheses() const { return hypotheses_; }  // best score first
   int followed() const { return followed_; }                                      // index of the one
   int num_images() const { return num_images_; }  // T: since the first one, or the last Restart()
-  // Where the robot most likely is by now, should it have started there.
+  // Where the robot most likely is by now if it started there.
   NodeIdx Whereabouts(int hypothesis) const;
   // From there to the goal; nothing where no way leads.
   std::optional<NodePath> Replan(int hypothesis) const;
@@ -97,7 +98,7 @@ class StartHypotheses {
       : model_(&model), goal_(goal), options_(options) {}
   using Belief = std::map<NodeIdx, double>;  // sums to the hypothesis's posterior
   const std::vector<NodeIdx>& Reach(NodeIdx node);
-  // `seen`: what an image says of `bins`; no bins: of all nodes.
+  // `seen`: an image's probabilities of `bins`; without bins, of all nodes.
   double Likelihood(const std::vector<double>& seen, NodeIdx node, const std::vector<NodeIdx>& bins);
   Belief Predict(const Belief& belief);
   void Normalise();

@@ -50,12 +50,14 @@ std::vector<std::pair<double, FaceIdx>> CandidateRegions::Find() const {
   std::vector<std::pair<double, FaceIdx>> found;
   for (FaceIdx face = 0; face < views.num_faces(); ++face) {
     const ViewIndex& values = views.index[face];
+    // [Simsarian96 §2.3] the second index function: significantly less total length than observed
     if (values.wall_length_m <
         (1 - options_.max_null_ratio) * observed_m_ - num * options_.length_tolerance_m) {
       continue;
     }
     bool fits = true;
     if (options_.one_segment_per_wall) {
+      // [Simsarian96 §2.3] the first: N_v edges, within a range where segments may be missing or of no wall
       fits = values.num_labels >= least && values.num_labels <= most;
       const ViewSearchIndex::LengthCounts& walls = index_.WallsByLength(face);
       for (size_t i = 0; i < longer.size() && fits; ++i) fits = walls[i] + max_nulls_ >= longer[i];
@@ -65,6 +67,7 @@ std::vector<std::pair<double, FaceIdx>> CandidateRegions::Find() const {
         fits = std::abs(std::abs(expected[m]) - std::abs(spectrum_[m])) <= others + (m + 1) * blur_ + 1e-3;
     }
     if (!fits) continue;
+    // [Simsarian96 §3] the visible perimeter: it ranks candidates, where the source filters by it
     const double ratio =
         std::log(std::max(1e-3, static_cast<double>(values.visible_length_m)) / std::max(1e-3, observed_m_));
     found.emplace_back(std::abs(ratio), face);
@@ -72,7 +75,7 @@ std::vector<std::pair<double, FaceIdx>> CandidateRegions::Find() const {
   return found;
 }
 
-// Segments of no wall, and walls without a segment, at most.
+// Largest number of segments without a wall and walls without a segment.
 double CandidateRegions::NumOthers(FaceIdx face) const {
   return 2.0 * max_nulls_ +
          std::max(0.0, index_.views().index[face].num_labels - static_cast<double>(segments_.size()));
@@ -94,6 +97,7 @@ FaceSet CandidateRegions::Seeing(const FaceSet& candidates, const PairingTable& 
                                  LabelIdx label) const {
   const Pairing& pairing = table.Of(segment, label);
   const double reach = table.PlaceTolerance(segment) + options_.position_tolerance_m;
+  // [Simsarian96 §2.3] regions whose label sets do not contain the edge are removed
   FaceSet left = Intersection(candidates, index_.FacesOf(label));
   KeepIf(&left, [&](FaceIdx face) {
     return Touches(index_.BoxOf(face), pairing, reach) && HasDirections(face, pairing.heading);

@@ -16,13 +16,13 @@ class CandidateRegions {
                    const InterpretationTreeOptions& options);
 
   // Regions that see enough walls: number (a) and length (b) of all, number by length, and the spread of
-  // their directions.  Each with how far the length visible in it is from that observed (logarithm of the
-  // ratio), by region.
+  // their directions.  Each with the difference between the length visible in it and the observed one
+  // (logarithm of the ratio), by region.
   std::vector<std::pair<double, FaceIdx>> Find() const;
 
-  // Those of `candidates` that see a label and can hold the robot if a segment is its: some of the pairing's
-  // places lie in the region's box, and with its heading the directions of all segments are those of the
-  // region's labels.
+  // Those of `candidates` that see a label and can contain the robot if a segment belongs to the label: some
+  // of the pairing's places lie in the region's box, and with its heading the directions of all segments are
+  // those of the region's labels.
   FaceSet Seeing(const FaceSet& candidates, const PairingTable& table, int segment, LabelIdx label) const;
   // Those that see both labels and come within `reach` of a place, with the heading of a pose.
   FaceSet SeeingBoth(const FaceSet& candidates, LabelIdx a, LabelIdx b, const PlanarPose& pose,

@@ -16,7 +16,7 @@ using Vec2 = Eigen::Vector2d;
 constexpr int kMaxSteps = 8;
 constexpr double kSmallestStep = 1e-7;  // metres and radians
 
-// What is seen of a wall ends where the wall does or before: an end beyond it pulls the pose back.
+// The visible part of a wall ends where the wall does or before: an end beyond it pulls the pose back.
 void AddEndsBeyondWalls(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
                         const Interpretation& found, Eigen::Matrix3d* information,
                         Eigen::Vector3d* gradient) {
@@ -85,7 +85,7 @@ void FitPose(const FloorPlan& plan, const std::vector<ScanSegment>& segments,
       information += offset_weight * row * row.transpose();
       gradient += offset_weight * row * offset;
     }
-    // A direction that nothing fixes is left to the middle of where the segments may lie.
+    // Along a direction that nothing fixes, the pose goes to the middle of where the segments may lie.
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information.topLeftCorner<2, 2>().eval());
     found.determined = solver.eigenvalues()[0] > 1e-3 * solver.eigenvalues()[1];
     if (!found.determined) {

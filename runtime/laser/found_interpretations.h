@@ -22,8 +22,8 @@ class FoundInterpretations {
   bool IsSeen(const Interpretation& found, int segment) const;
 
   // Keeps labels (one per segment; -1: none) whose walls are seen from the pose that follows from them; those
-  // that do not fit it are taken out, the worst first, while enough are left.  Of two at one pose the one
-  // with more matched length stays.  Whether there is a solution more.
+  // that do not fit it are removed, the worst first, while enough are left.  Of two at one pose the one with
+  // more matched length stays.  Returns whether a solution was added.
   bool Add(const std::vector<LabelIdx>& labels);
 
   // Whether a solution has both pairings.

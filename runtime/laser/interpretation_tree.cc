@@ -36,6 +36,7 @@ class TreeSearch {
     const int num_segments = static_cast<int>(segments.size());
     order_.resize(num_segments);
     std::iota(order_.begin(), order_.end(), 0);
+    // [Simsarian96 §3] the source orders edges by heuristics of works it cites; here segments, longest first
     std::stable_sort(order_.begin(), order_.end(),
                      [&](int a, int b) { return segments[a].Length() > segments[b].Length(); });
     max_nulls_ = MaxNumNulls(segments.size(), options);
@@ -47,6 +48,7 @@ class TreeSearch {
     if (options_.search == "vir") {
       SearchCandidates();
     } else {
+      // [Simsarian96 §2.3] the standard search branches over all edges of the map
       std::vector<LabelIdx> all(plan_.num_labels());
       std::iota(all.begin(), all.end(), 0);
       Search(nullptr, all);
@@ -100,6 +102,7 @@ class TreeSearch {
     FaceSet candidates = all;
     if (all_walls) candidates = SearchInOrder(all);
     if (candidates.empty() || done_) return;
+    // [Simsarian96 §2.3] the VIR search branches over the union of the candidates' label sets
     std::vector<LabelIdx> labels;
     for (LabelIdx label = 0; label < plan_.num_labels(); ++label) {
       if (Intersects(candidates, index_.FacesOf(label))) labels.push_back(label);
@@ -113,8 +116,8 @@ class TreeSearch {
     return largest;
   }
 
-  // Where every visible wall has a segment, only labels in the order in which a candidate sees them; returns
-  // the candidates whose order cannot tell.
+  // Where every visible wall has a segment, tries only labels in the order in which a candidate sees them;
+  // returns the candidates whose order is not usable.
   FaceSet SearchInOrder(const FaceSet& candidates) {
     const std::vector<int> order = SegmentsInOrder(segments_);
     const double tolerance =
@@ -174,6 +177,8 @@ class TreeSearch {
       Finish(labels_);
       return;
     }
+    // [Simsarian96 §2.3] a level of the tree for each observed segment, a branch for each edge: in this form
+    // only without fix_pose_early
     const int segment = order_[depth];
     for (const LabelIdx label : labels) {
       if (options_.one_segment_per_wall && used_[label]) continue;
@@ -185,6 +190,7 @@ class TreeSearch {
       if (candidates == nullptr) {
         Descend(depth + 1, num_nulls, nullptr, labels);
       } else {
+        // [Simsarian96 §2.3] candidates without the edge are out below it, and the union shrinks
         const FaceSet left = regions_.Seeing(*candidates, table_, segment, label);
         std::vector<LabelIdx> beside;
         for (const LabelIdx other : labels) {
@@ -328,8 +334,8 @@ class TreeSearch {
     return best != kNull && found_.IsSeen(found, segment) ? best : kNull;
   }
 
-  // Walls of one direction: where along them most segments have a wall, each gets the one that lies there.
-  // Walls that cross a little fix the pose nevertheless.
+  // Walls of one direction: at the place along them where most segments have a wall, each gets the wall that
+  // lies there.  Walls that are not quite parallel still fix the pose.
   void PairParallels(int num_nulls, const std::vector<PlaceStretch>& stretches, int least,
                      const FaceSet* candidates) {
     const std::vector<SupportedPlaces> places = BestSupported(PlacesWithSupport(stretches, least));
@@ -360,6 +366,7 @@ class TreeSearch {
   }
 
   void Finish(const std::vector<LabelIdx>& labels) {
+    // [Simsarian96 §2.3] "The search continues until a complete interpretation is found", or all are
     if (found_.Add(labels) && options_.first_only) done_ = true;
   }
 

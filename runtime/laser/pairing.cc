@@ -15,6 +15,7 @@ Pairing MakePairing(const FloorPlan& plan, const ScanSegment& segment, LabelIdx 
                     double length_tolerance_m) {
   Pairing pairing;
   const Vec2 start = LabelStart(plan, label), along = LabelEnd(plan, label) - start;
+  // [Simsarian96 §2.3] a segment is a portion of its edge
   const double spare = along.norm() - segment.Length();
   pairing.possible = spare >= -length_tolerance_m;
   pairing.heading = std::atan2(along.y(), along.x()) - segment.Angle();
@@ -99,6 +100,7 @@ double PairingTable::LoosePlaceTolerance(int a, int b) const {
 
 bool PairingTable::Agree(int a, LabelIdx label_a, int b, LabelIdx label_b) const {
   const Pairing &pa = Of(a, label_a), &pb = Of(b, label_b);
+  // [Simsarian96 §2.3: after Gaston and Lozano-Perez] two pairings that geometry excludes prune the branch
   if (std::abs(WrapAngle(pa.heading - pb.heading)) > AngleTolerance(a, b)) return false;
   const double place = std::hypot(place_tolerance_[a], place_tolerance_[b]) + options_.position_tolerance_m;
   return LineToLine(pa, pb) <= place;

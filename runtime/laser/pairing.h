@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-// What one pairing of a segment with a label says about the pose [Simsarian96 §2.3]: its heading, radians,
+// What a pairing of one segment with a label says about the pose [Simsarian96 §2.3]: its heading, radians,
 // and a line of places, metres, as the segment may be any portion of the wall.
 struct Pairing {
   bool possible = false;
@@ -28,11 +28,11 @@ double LineToLine(const Pairing& a, const Pairing& b);
 // Whether a pairing's line of places comes within `reach` of a box.
 bool Touches(const Eigen::AlignedBox2f& box, const Pairing& pairing, double reach);
 
-// Most null matches that an interpretation of so many segments may have.
+// Most null matches that an interpretation of this many segments may have.
 int MaxNumNulls(size_t num_segments, const InterpretationTreeOptions& options);
 
 // All pairings of segments with labels, and how far two that are both true may differ: by what the options
-// allow and by what the fits do.
+// and the fits allow.
 class PairingTable {
  public:
   // All arguments outlive this.  O(segments * labels)
@@ -46,15 +46,16 @@ class PairingTable {
   // Direction of a label, of length 1.
   const Eigen::Vector2d& Along(LabelIdx label) const { return along_[label]; }
 
-  // What the fit of one segment allows its heading, radians.
+  // Tolerance of heading from the fit of one segment, radians.
   double AngleTolerance(int segment) const { return angle_tolerance_[segment]; }
-  // What it allows its places, metres.
+  // Tolerance of places from the fit of one segment, metres.
   double PlaceTolerance(int segment) const { return place_tolerance_[segment]; }
-  // What two segments' pairings are allowed; the second also where walls stand only about where the plan
-  // says.
+  // Tolerances between the pairings of two segments; the second includes how far walls may stand from where
+  // the plan says.
   double AngleTolerance(int a, int b) const;
   double LoosePlaceTolerance(int a, int b) const;
-  // What a fit and a wall that stands only about there allow the ends of a pairing's places, along the wall.
+  // Tolerance of the ends of a pairing's places along the wall, from the fit and from how far the wall may
+  // stand from the plan.
   double EndTolerance(int segment) const { return end_tolerance_[segment]; }
   // Whether two pairings can both be true.
   bool Agree(int a, LabelIdx label_a, int b, LabelIdx label_b) const;

@@ -111,7 +111,7 @@ std::vector<SupportedPlaces> PlacesWithSupport(const std::vector<PlaceStretch>& 
   for (size_t i = 0; i < events.size(); ++i) {
     num += events[i].change;
     const bool at_a_point = i + 1 < events.size() && events[i + 1].at == events[i].at;
-    // A point counts where all begin that begin there and none has ended yet.
+    // A point counts after all stretches that begin there and before any that ends there.
     if (i + 1 == events.size() || (at_a_point && !(events[i].change > 0 && events[i + 1].change < 0)))
       continue;
     if (num >= least) places.push_back({events[i].at, events[i + 1].at, num});

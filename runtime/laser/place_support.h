@@ -14,13 +14,13 @@ struct PlaceStretch {
   LabelIdx label = 0;
 };
 
-// Places along a first pairing's line where so many other segments may have a pairing.
+// Places along a first pairing's line where a number of other segments may have a pairing.
 struct SupportedPlaces {
   double low = 0, high = 0;
   int num_segments = 0;
 };
 
-// Bound on what a first pairing can lead to: a pairing leaves the robot on a line of places, and each further
+// Bounds what a first pairing can lead to: a pairing leaves the robot on a line of places, and each further
 // one on a stretch of that line.  No interpretation pairs more segments than have stretches over one place,
 // so where these are too few, no branch below the first pairing needs to be tried.
 //
@@ -32,13 +32,13 @@ std::vector<PlaceStretch> StretchesAlong(const PairingTable& table, int segment,
                                          const std::function<bool(LabelIdx)>& may_be);
 
 // Places with stretches of at least `least` different segments, ascending, divided where the number changes;
-// none where `least` is 0 and there is no stretch.  `stretches`: by segment.  O(n log n)
+// empty where `least` is 0 and there is no stretch.  `stretches`: by segment.  O(n log n)
 std::vector<SupportedPlaces> PlacesWithSupport(const std::vector<PlaceStretch>& stretches, int least);
 
 // Those of ascending places that touch none with more support.
 std::vector<SupportedPlaces> BestSupported(const std::vector<SupportedPlaces>& places);
 
-// Of each segment the stretch over a place whose middle is nearest to it; by segment as `stretches`.
+// For each segment, of its stretches over a place the one whose middle is nearest; by segment as `stretches`.
 std::vector<PlaceStretch> StretchesOver(const std::vector<PlaceStretch>& stretches, double place);
 
 }  // namespace cairn

@@ -59,7 +59,7 @@ class OrderSearch {
     if (place + 1 == order_.size()) {
       if (OnlySeenAgain(first, passed + 1)) found_.push_back(*labels);
     } else {
-      // Windows of walls seen elsewhere too may be passed over.
+      // Windows of walls that are also seen elsewhere may be skipped.
       for (size_t next = passed + 1; next < walls_.size(); ++next) {
         Extend(place + 1, first, next, labels);
         if (!walls_[(first + next) % walls_.size()].seen_again) break;

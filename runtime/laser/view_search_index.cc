@@ -14,7 +14,7 @@ int64_t FaceSet::Count() const {
 namespace {
 
 // Calls visit(word of a, word of b) for the blocks of both, until it returns true; whether it did.  A short
-// set leaps through a long one.
+// set skips through a long one.
 template <typename Visit>
 bool ForCommonBlocks(const FaceSet& a, const FaceSet& b, const Visit& visit) {
   const auto leap = [](const std::vector<FaceSet::Word>& words, size_t at, int32_t block) {
@@ -102,6 +102,7 @@ ViewSearchIndex::ViewSearchIndex(const Views& views) : views_(views) {
       for (size_t i = 0; i < kLengths.size() && length >= kLengths[i]; ++i) ++walls_by_length_[face][i];
     }
     for (int m = 0; m < kNumHarmonics; ++m) spectra_[face][m] = std::complex<float>(sums[m]);
+    // [Simsarian96 §2.3] with each edge, the union of the label sets that include it
     for (const LabelIdx label : labels) {
       uint64_t* row = together_.data() + label * words_per_label_;
       for (size_t i = 0; i < words_per_label_; ++i) row[i] |= bits[i];

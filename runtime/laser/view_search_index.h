@@ -31,9 +31,9 @@ struct FaceSet {
 FaceSet Intersection(const FaceSet& a, const FaceSet& b);
 bool Intersects(const FaceSet& a, const FaceSet& b);
 
-// What a search asks of a plan's regions: for each label the regions that see it and the labels that some
-// region sees beside it, and for each region how many of its walls are how long and how their directions are
-// spread.
+// What a search reads of a plan's regions: for each label the regions that see it and the labels that some
+// region sees together with it, and for each region the numbers of its walls by length and the spread of
+// their directions.
 class ViewSearchIndex {
  public:
   // Lengths that walls are counted by, metres.
@@ -57,7 +57,7 @@ class ViewSearchIndex {
   const Eigen::AlignedBox2f& BoxOf(FaceIdx face) const { return boxes_[face]; }
   // Those of a set's blocks of 64 regions that reach into a box.
   FaceSet BlocksNear(const Eigen::AlignedBox2f& box, const FaceSet& set) const;
-  // How many of a region's walls are at least so long.
+  // How many of a region's walls are at least as long as each of kLengths.
   const LengthCounts& WallsByLength(FaceIdx face) const { return walls_by_length_[face]; }
 
  private:

@@ -18,7 +18,7 @@ enum class NoFix {
   kTooFewMatches,   // few landmarks recognised
   kNoPose,          // the matches agree on no pose
   kTooFewInliers,   // too few of them do
-  kPoorSpread,      // they crowd in one place of the image
+  kPoorSpread,      // they lie close together in the image
   kUncertain,       // they leave the pose too uncertain
   kFarFromSurvey,   // they put the camera where nobody surveyed
   kAmbiguous,       // another pose is nearly as good
@@ -27,27 +27,27 @@ enum class NoFix {
 const char* NoFixName(NoFix reason);
 
 struct AcceptOptions {
-  // Least features of the image.  REQUIRES: >= 4
+  // Minimum number of features of the image.  REQUIRES: >= 4
   int min_num_features = 30;
-  // Least matches to try for a pose.  REQUIRES: >= 4
+  // Minimum number of matches for which a pose is tried.  REQUIRES: >= 4
   int min_num_matches = 7;
-  // Least matches, found without knowing the pose, that agree with it.  REQUIRES: >= 4
+  // Minimum number of matches, found without knowing the pose, that agree with it.  REQUIRES: >= 4
   int min_num_unguided_inliers = 6;
-  // Log10 of the number of poses that would have as many inliers if all matches were random
-  // (Log10ChancePoses), at most.
+  // Largest log10 of the number of poses that would have as many inliers if all matches were
+  // random (Log10ChancePoses).
   double max_log10_chance = -4;
-  // Least inliers in all.  REQUIRES: >= 5
+  // Minimum number of inliers in all.  REQUIRES: >= 5
   int min_num_inliers = 7;
   // Least part of the inliers found without knowing the pose that refinement must keep (by number): where
   // points crowd in the image, many lie within the wide limit of a wrong pose and few within the refined
   // one's.  REQUIRES: in [0, 1]
   double min_kept_ratio = 0.5;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
-  // min_num_cells. REQUIRES: >= 1
+  // min_num_cells.  REQUIRES: >= 1
   int spread_grid = 6;
   int min_num_cells = 4;
   // Largest standard deviation of the camera's place, m, and of its rotation, degrees, in the worst
-  // direction. REQUIRES: > 0
+  // direction.  REQUIRES: > 0
   double max_sigma_m = 0.5;
   double max_sigma_deg = 5;
   // Largest distance from the nearest survey image, m; 0: any.  REQUIRES: >= 0
@@ -69,8 +69,8 @@ OptionTable DescribeOptions(AcceptOptions* options);
 double ChanceOfInlier(const std::vector<PoseMeasurement>& measurements, const Pose& cam_from_world,
                       double max_error_px, const Camera& camera);
 
-// Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches at
-// random:
+// Expected number, as log10, of poses with at least `num_inliers` inliers among `num_matches` matches
+// at random:
 //   C(n, 3) C(n - 3, m - 3) p^(m - 3)
 // [Moisan & Stival, "A probabilistic criterion to detect rigid point matches", 2004: number of false alarms]
 double Log10ChancePoses(int num_matches, int num_inliers, double chance_of_inlier);

@@ -83,7 +83,7 @@ std::array<int, kSampleSize> DrawSample(int num_measurements, Random& random) {
   return sample;
 }
 
-// Samples needed to draw one of inliers only with the wanted confidence.
+// Number of samples needed so that, with the wanted confidence, one has inliers only.
 int NumIterations(size_t num_inliers, size_t num_measurements, const EstimateOptions& options) {
   const double ratio = static_cast<double>(num_inliers) / static_cast<double>(num_measurements);
   const double good = std::pow(ratio, kSampleSize);

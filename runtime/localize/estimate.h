@@ -30,7 +30,7 @@ struct PoseEstimate {
 
 // Pose from correspondences of which many are wrong: RANSAC over three points (P3P, OpenCV), truncated
 // squared errors as score, each best pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler,
-// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result. Nothing when no pose has at
+// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result.  Nothing when no pose has at
 // least 4 inliers.
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,

@@ -44,8 +44,8 @@ Localization Failure(NoFix reason, std::string message) {
   return localization;
 }
 
-// The one of two answers to believe.  Of two fixes the one with more inliers, unless they are at different
-// places and nearly as good; of two failures the one that came farther is the more telling.
+// The better of two answers.  Of two fixes the one with more inliers, unless they are at different places and
+// nearly equally good; of two failures the one that came farther says more.
 Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
   if (!first.has_fix() && !second.has_fix()) {
     const bool is_better =
@@ -114,18 +114,18 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
   table.push_back(
       {.name = "exclude_look_alikes",
        .value = &options->exclude_look_alikes,
-       .help = "withhold a fix as long as a place that looks alike explains the image nearly as well"});
+       .help = "withhold a fix while a place that looks alike explains the image nearly as well"});
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});
   table.push_back(
       {.name = "sure_num_unguided_inliers",
        .value = &options->sure_num_unguided_inliers,
-       .help = "a fix with at least so many unguided inliers is taken without trying more landmarks",
+       .help = "a fix with at least this many unguided inliers is taken without trying more landmarks",
        .min = 0});
   table.push_back({.name = "fall_back_max_num_landmarks",
                    .value = &options->fall_back_max_num_landmarks,
-                   .help = "but not in maps of more landmarks than this",
+                   .help = "largest map, in landmarks, in which all are tried",
                    .min = 0});
   AddCondition({"fall_back_to_all", {"true"}}, {"fall_back_max_num_landmarks"}, &table);
   return table;
@@ -133,7 +133,7 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
 
 Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
     : map_(std::move(map)), options_(options) {
-  // What the survey's poses were off by does not average out over landmarks.
+  // The errors of the survey's poses do not average out over landmarks.
   options_.refine.systematic_sigma_m =
       std::hypot(options.refine.systematic_sigma_m, map_->head().stated_pose_sigma_m);
   options_.refine.systematic_sigma_deg =
@@ -323,13 +323,11 @@ Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) 
       Log10ChancePoses(localization.num_matches, localization.num_unguided_inliers, chance_of_inlier);
   if (localization.num_unguided_inliers < accept.min_num_unguided_inliers ||
       log10_chance > accept.max_log10_chance) {
-    return fail(
-        NoFix::kTooFewInliers,
-        fmt::format(
-            "{} of {} matches agree on a pose, as 10^{:.1f} poses would by chance; at least {} and at "
-            "most 10^{:g} are needed",
-            estimate->inliers.size(), matches.size(), log10_chance, accept.min_num_unguided_inliers,
-            accept.max_log10_chance));
+    return fail(NoFix::kTooFewInliers,
+                fmt::format("{} of {} matches agree on a pose, as they would by chance on 10^{:.1f} poses; "
+                            "at least {} matches and at most 10^{:g} poses are needed",
+                            estimate->inliers.size(), matches.size(), log10_chance,
+                            accept.min_num_unguided_inliers, accept.max_log10_chance));
   }
   if (accept.max_second_pose_ratio > 0 && IsAmbiguous(measurements, *estimate)) {
     return fail(NoFix::kAmbiguous, fmt::format("another pose has at least {:.0f} % as many inliers",
@@ -371,7 +369,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     return fail(
         NoFix::kTooFewInliers,
         fmt::format(
-            "of {} matches that agree on a pose {} are left after refinement, at least {:.0f} % are needed",
+            "of {} matches that agree on a pose {} are left after refinement; at least {:.0f} % are needed",
             localization.num_unguided_inliers, localization.num_inliers, 100 * min_kept_ratio));
   }
   CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));

@@ -31,8 +31,9 @@ struct LocalizerOptions {
   // Landmarks to match first: of the candidates' regions, or of the candidate images themselves; "auto":
   // regions, unless the map keeps landmarks that no region has.
   std::string first_landmarks = "auto";
-  // A fix with at least so many inliers, found without the pose, is taken at once; with fewer, the other sets
-  // of landmarks are tried too, and the fix with most inliers counts: look-alikes give few.  REQUIRES: >= 0
+  // A fix with at least this many inliers found without the pose is taken at once; with fewer, the other sets
+  // of landmarks are tried too, and the fix with the most inliers counts: look-alikes give
+  // few.  REQUIRES: >= 0
   int sure_num_unguided_inliers = 20;
   // Where the map knows that the place of a fix looks like others that lie elsewhere [Mariottini11 §V], try
   // these too, unless a prior excludes them: the fix is withheld as long as one of them explains the image
@@ -54,8 +55,8 @@ struct Localization {
   std::string message;  // why there is no fix: found and needed
   bool has_fix() const { return reason == NoFix::kNone; }
 
-  // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given is
-  // applied).
+  // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given
+  // is applied).
   Pose cam_from_world;
   // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
   // (Exp(rotation), translation) * cam_from_world.
@@ -70,28 +71,29 @@ struct Localization {
   std::vector<ImageId> candidates;  // survey images, most alike first
 };
 
-// Says where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
+// Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {
  public:
   explicit Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options = {});
 
-  // From 8-bit grey pixels of the camera's size.  Same image, same result.
-  // Errors: InvalidArgument (not 8-bit grey; a camera that is none or of another size); Corrupt, Io (a part
-  // of the map that is needed is damaged or cannot be read).  An image that cannot be localized is no error:
-  // see Localization::reason.  No exception leaves it.
+  // From 8-bit grey pixels of the camera's size.  Same image, same result.  Errors: InvalidArgument (not
+  // 8-bit grey; a camera that is invalid or of another size); Corrupt, Io (a part of the map that is needed
+  // is damaged or cannot be read).  An image that cannot be localized is no error: see Localization::reason.
+  // No exception leaves it.
   Result<Localization> Localize(const cv::Mat& grey, const Camera& camera,
                                 const std::optional<PosePrior>& prior = std::nullopt);
 
-  // The same from features that are there already (rows of descriptors belong to keypoints).
+  // The same from features that were already extracted (rows of descriptors belong to keypoints).
   Result<Localization> LocalizeFeatures(Features features, const Camera& camera,
                                         const std::optional<PosePrior>& prior = std::nullopt);
 
-  // The pieces of it, for who knows more than an image (RegionTracker).
-  // Features of an image and what is known of them.  Errors: as Localize.
+  // The steps of Localize, for callers that know more than one image (RegionTracker).  The features of an
+  // image, with their rays and packed descriptors.  Errors: as Localize.
   Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
   Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
   Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
-  // Among these landmarks (ascending) alone, and those of look-alikes that the prior does not exclude.
+  // Localizes among these landmarks (ascending) only, and those of look-alikes that the prior does
+  // not exclude.
   Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::vector<LandmarkIdx> landmarks,
                                      const std::optional<PosePrior>& prior) const;
 
@@ -99,7 +101,7 @@ class Localizer {
 
  private:
   struct Attempt;
-  // What every fix passes on its way out: no look-alike questions it, and it is in the given frame.
+  // The last step of every fix: look-alikes are excluded, and the pose is put into the given frame.
   Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
                               Localization localization) const;
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
@@ -108,7 +110,7 @@ class Localizer {
   Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
                               std::vector<Correspondence> matches, const Pose& cam_from_world,
                               Localization localization) const;
-  // `best` if it has a fix that no look-alike of its place questions.
+  // `best`, unless a look-alike of its place explains the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
                                          Localization best) const;
   bool IsAmbiguous(const std::vector<PoseMeasurement>& measurements, const PoseEstimate& first) const;

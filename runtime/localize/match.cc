@@ -62,7 +62,7 @@ bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double dep
   return ratio <= max_ratio && ratio * max_ratio >= 1;
 }
 
-// How far from its projection a landmark, at `point` in the camera's frame, may show, px.
+// How far from its projection a landmark, at `point` in the camera's frame, may appear, px.
 double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, const Pose& cam_from_world,
                     double focal_px, const MatchOptions& options) {
   if (point.z() <= 0) return options.guided_radius_px;  // beyond 90 degrees no keypoint has a ray
@@ -97,11 +97,11 @@ OptionTable DescribeOptions(MatchOptions* o) {
        .min = 0.1},
       {.name = "guided_radius_sigmas",
        .value = &o->guided_radius_sigmas,
-       .help = "and this many standard deviations of its own position, projected",
+       .help = "plus this many standard deviations of its own position, projected",
        .min = 0},
       {.name = "guided_max_angle_rad",
        .value = &o->guided_max_angle_rad,
-       .help = "largest descriptor angle there, radians",
+       .help = "guided matching: largest descriptor angle of a match, radians",
        .min = 1e-3},
       {.name = "guided_max_scale_ratio",
        .value = &o->guided_max_scale_ratio,

@@ -15,13 +15,13 @@ struct MatchOptions {
   // Largest angle between the descriptors of a match, radians.  REQUIRES: > 0
   double max_angle_rad = 0.8;
 
-  // Guided by a first pose: a landmark is looked for within this distance of its projection, px (REQUIRES: >
-  // 0), and this many standard deviations of its own position, projected (REQUIRES: >= 0): they add as
-  // squares.  A radius that cuts off errors that the landmarks' covariances announce would make the pose's
-  // covariance too small.
+  // Guided by a first pose: a landmark is looked for within guided_radius_px of its projection and
+  // guided_radius_sigmas standard deviations of its own position, projected; the two add as squares.  A
+  // radius smaller than the errors that the landmarks' covariances predict would make the pose's covariance
+  // too small.  REQUIRES: guided_radius_px > 0, guided_radius_sigmas >= 0
   double guided_radius_px = 10;
   double guided_radius_sigmas = 3;
-  // Largest descriptor angle there, radians.  REQUIRES: > 0
+  // Largest descriptor angle of a guided match, radians.  REQUIRES: > 0
   double guided_max_angle_rad = 0.7;
   // Largest ratio of the keypoint's scale to the one that the landmark's size predicts, or of its inverse.
   // REQUIRES: >= 1

@@ -17,13 +17,13 @@ namespace cairn {
 struct MeasurementOptions {
   // Standard deviation of a small keypoint's position, px.  REQUIRES: > 0
   double keypoint_sigma_px = 0.5;
-  // Growth of that standard deviation with the keypoint's scale (sigma, px): they add as squares.  REQUIRES:
-  // >= 0
+  // Growth of that standard deviation with the keypoint's scale (sigma, px): they add as squares.
+  // REQUIRES: >= 0
   double keypoint_sigma_per_scale = 0.2;
 };
 OptionTable DescribeOptions(MeasurementOptions* options);
 
-// A keypoint of the query as a ray: any camera model is gone from here on, up to first order.
+// A keypoint of the query as a ray: the rest of localization needs no camera model, to first order.
 struct QueryRay {
   Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // x/z, y/z
   Eigen::Matrix2d pixel_from_ray =

@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn {
@@ -89,8 +89,8 @@ NormalEquations BuildNormalEquations(const std::vector<PoseMeasurement>& measure
   return equations;
 }
 
-// The cost at another pose with the same weights of the measurements; infinite when a point went behind the
-// camera.
+// The cost at another pose with the same weights of the measurements; infinite when a point went behind
+// the camera.
 double CostAt(const std::vector<PoseMeasurement>& measurements, const NormalEquations& equations,
               const Pose& pose, double scale) {
   double cost = 0;
@@ -151,21 +151,21 @@ std::vector<double> WhitenedSquares(const std::vector<PoseMeasurement>& measurem
   return squares;
 }
 
-// Noise variance from the median of squared residuals, most of which belong to inliers; the 6 parameters took
-// their part.
+// Noise variance from the median of squared residuals, most of which belong to inliers, corrected for the 6
+// fitted parameters.
 double VarianceFromMedian(const std::vector<double>& squares) {
   constexpr double kMedianChiSquare = 1.3863;  // of 2 degrees of freedom: 2 ln 2
   const double num_residuals = 2.0 * static_cast<double>(squares.size());
   return std::max(1e-6,
-                  Median(squares) / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
+                  UpperMedian(squares) / kMedianChiSquare * num_residuals / std::max(1.0, num_residuals - 6));
 }
 
 // Sum of squared residuals of n two-dimensional inliers, as a variance whose inverse has the right mean for
 // the normalised error squared: E[F(6, d)] = d / (d - 2).
 double VarianceFromSum(double sum, int num_inliers) { return sum / std::max(1, 2 * num_inliers - 6 - 2); }
 
-// 2 / E[r^2 | r^2 < limit] for a chi-square of 2 degrees of freedom: what cutting the tail hides of the
-// variance.  By Stein's identity the estimate from the inliers alone is worse by the same factor.
+// 2 / E[r^2 | r^2 < limit] for a chi-square of 2 degrees of freedom: the part of the variance that cutting
+// the tail hides.  By Stein's identity the estimate from the inliers alone is worse by the same factor.
 double TruncationFactor(double limit) {
   const double tail = std::exp(-0.5 * limit);
   return (1 - tail) / (1 - (1 + 0.5 * limit) * tail);
@@ -244,7 +244,7 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
   if (!pose) return std::nullopt;
   RefinedPose refined;
   std::vector<double> squares = WhitenedSquares(measurements, *pose);
-  // The loss's scale is in units of the noise, which shows only now.
+  // The loss's scale is in units of the noise, which is known only now.
   refined.noise_variance = VarianceFromMedian(squares);
   pose = LevenbergMarquardt(measurements, *pose, options.robust_scale * std::sqrt(refined.noise_variance),
                             options.max_num_refine_iterations);

@@ -15,17 +15,17 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 struct RefineOptions {
-  // Whitened residual (standard deviations) from which a measurement loses weight (Cauchy's loss).  REQUIRES:
-  // > 0
+  // Whitened residual (standard deviations) from which a measurement loses weight (Cauchy's loss).
+  // REQUIRES: > 0
   double robust_scale = 2.5;
   // Most Levenberg-Marquardt steps.  REQUIRES: >= 1
   int max_num_refine_iterations = 20;
   // Squared whitened residual, over the estimated noise, up to which a measurement is an inlier: chi-square
   // of 2 degrees of freedom at 99 %.  REQUIRES: > 0
   double inlier_chi_square = 9.21;
-  // Factor on the reported covariance: neighbouring keypoints and landmarks err together, which the normal
-  // matrix does not know.  Measured on the demo, where it brings the normalised error squared from 10.7 to
-  // its 6 degrees of freedom.  REQUIRES: > 0
+  // Factor on the reported covariance: errors of neighbouring keypoints and landmarks are correlated, which
+  // the normal matrix ignores.  Measured on the demo, where it brings the normalised error squared from 10.7
+  // to its 6 degrees of freedom.  REQUIRES: > 0
   double covariance_scale = 1.8;
   // Errors that more landmarks do not average out (survey poses, intrinsics): added to the covariance of the
   // camera's place, m, and of its rotation, degrees, as standard deviations per axis.  REQUIRES: >= 0
@@ -42,8 +42,8 @@ Vector6d PerturbationBetween(const Pose& from, const Pose& to);
 
 // Minimises the robust sum over measurements of rho(r' S^-1 r): r = reprojection error in px, S = keypoint's
 // variance + landmark's covariance projected into the image, rho = Cauchy's loss.  Levenberg-Marquardt on 6
-// parameters. Nothing when fewer than 3 points lie in front of the camera or the normal equations are
-// singular.
+// parameters.  Nothing when fewer than 3 points lie in front of the camera or the normal equations
+// are singular.
 std::optional<Pose> RefinePose(const std::vector<PoseMeasurement>& measurements, const Pose& initial,
                                const RefineOptions& options);
 
@@ -52,10 +52,10 @@ struct RefinedPose {
   Pose cam_from_world;
   // Order: rotation (rad), translation (m); of the left perturbation.  Inverse of the normal matrix, scaled
   // by the noise that the inliers show (unbiased for the normalised error squared: the residuals' sum is
-  // divided by their degrees of freedom minus 2, as the mean of an F distribution asks), and by what leaving
-  // out outliers costs and hides.
+  // divided by their degrees of freedom minus 2, as the mean of an F distribution requires), and corrected
+  // for the outliers left out.
   Matrix6d covariance = Matrix6d::Identity();
-  double noise_variance = 1;  // of whitened residuals; 1: keypoints and landmarks are as good as they claim
+  double noise_variance = 1;  // of whitened residuals; 1: keypoints and landmarks are as accurate as stated
   std::vector<int> inliers;   // indices of measurements, ascending
 };
 

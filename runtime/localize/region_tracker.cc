@@ -21,11 +21,11 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .min = 1e-6},
       {.name = "max_prior_sigma_m",
        .value = &o->max_prior_sigma_m,
-       .help = "a prediction less certain than this is none, m",
+       .help = "predictions less certain than this are not used, m",
        .min = 1e-6},
       {.name = "max_num_sigmas",
        .value = &o->max_num_sigmas,
-       .help = "a tracked fix lies within so many standard deviations of the prediction",
+       .help = "a tracked fix lies within this many standard deviations of the prediction",
        .min = 1e-6},
       {.name = "max_num_neighbour_regions",
        .value = &o->max_num_neighbour_regions,
@@ -76,6 +76,7 @@ Result<Localization> RegionTracker::TrackQuery(const Query& query) {
   const bool has_features =
       static_cast<int>(query.features.keypoints.size()) >= localizer_.options().accept.min_num_features;
   const std::optional<PosePrior> prior = Prediction();
+  // [Sala06 §III] inside a region its features are tracked; here those of its neighbours too
   if (has_features && prior) {
     CAIRN_ASSIGN_OR_RETURN(auto expected, ExpectedLandmarks(*prior, query.camera));
     CAIRN_ASSIGN_OR_RETURN(Localization found,
@@ -85,6 +86,7 @@ Result<Localization> RegionTracker::TrackQuery(const Query& query) {
       return found;
     }
   }
+  // [Sala06 §III] a region whose features are not all visible was left: the visible ones vote
   if (has_features) {
     CAIRN_ASSIGN_OR_RETURN(auto voted, VotedLandmarks(query));
     if (!voted.empty()) {
@@ -119,7 +121,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
     std::sort(landmarks.begin(), landmarks.end());
     landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
   }
-  // In view: within the camera's half diagonal of the optical axis, give or take what is uncertain.
+  // In view: within the camera's half diagonal of the optical axis, plus the uncertainty.
   const Pose cam_from_world = map_->head().camera_from_given * prior.cam_from_world;
   const std::optional<Eigen::Vector3d> corner = BearingFromImage(camera, {0, 0});
   if (!corner) return landmarks;
@@ -150,6 +152,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::VotedLandmarks(const Query& quer
   CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(*map_, visible));
   std::vector<RegionIdx> regions;
   for (const RegionVotes& vote : votes) {
+    // [Sala06 §III] regions with "at least k votes" are candidates, those with most first
     if (vote.num_votes < options_.min_num_votes) break;
     if (static_cast<int>(regions.size()) == options_.max_num_voted_regions) break;
     regions.push_back(vote.region);

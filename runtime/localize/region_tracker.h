@@ -10,13 +10,13 @@ namespace cairn {
 
 // How a stream of frames is followed, beyond the localizer's own options.
 struct RegionTrackerOptions {
-  // Standard deviation of what the motion from one frame to the next differs from the motion before, m and
-  // degrees; every frame without a fix adds as much.  REQUIRES: > 0
+  // Standard deviation of the change of motion from one frame to the next, m and degrees; every frame without
+  // a fix adds as much.  REQUIRES: > 0
   double step_sigma_m = 0.15;
   double step_sigma_deg = 8;
-  // A prediction less certain than this is none: the robot is lost.  REQUIRES: > 0
+  // A prediction less certain than this is not used: the robot is lost.  REQUIRES: > 0
   double max_prior_sigma_m = 0.6;
-  // A tracked fix lies within so many standard deviations of the prediction.  REQUIRES: > 0
+  // A tracked fix lies within this many standard deviations of the prediction.  REQUIRES: > 0
   double max_num_sigmas = 4;
   // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
   // REQUIRES: >= 0
@@ -28,12 +28,12 @@ struct RegionTrackerOptions {
 };
 OptionTable DescribeOptions(RegionTrackerOptions* options);
 
-// Says where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
+// Finds where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
 // landmarks of its region and of the regions around that the motion so far (constant velocity, less certain
 // with every frame) predicts to be in view; a fix far from the prediction does not count.  When that fails,
-// the landmarks that are visible at all vote for the regions they belong to, and those of the regions with
-// most votes are matched; at last the frame is localized as if it were the first.  The latter two know
-// nothing of the frames before: a kidnapped robot is found again.  One per camera; the map is shared.
+// all visible landmarks vote for the regions that they belong to, and those of the regions with the most
+// votes are matched; last, the frame is localized as if it were the first.  The latter two do not use earlier
+// frames: a kidnapped robot is found again.  One per camera; the map is shared.
 class RegionTracker {
  public:
   explicit RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options = {},
@@ -49,9 +49,9 @@ class RegionTracker {
 
  private:
   Result<Localization> TrackQuery(const Query& query);
-  // Of its own and the neighbouring regions, ascending, those in view of the prediction.
+  // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
   Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
-  // Of the regions that the visible landmarks vote for, ascending.
+  // Landmarks of the regions that the visible landmarks vote for, ascending.
   Result<std::vector<LandmarkIdx>> VotedLandmarks(const Query& query) const;
   bool Agrees(const Localization& found, const PosePrior& prior) const;
   void Update(const Localization& found);

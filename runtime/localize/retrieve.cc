@@ -28,7 +28,7 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
        .min = 1},
       {.name = "min_score_ratio",
        .value = &o->min_score_ratio,
-       .help = "least score of a candidate, as part of the best one's",
+       .help = "lowest score of a candidate, as part of the best one's",
        .min = 0,
        .max = 1},
       {.name = "max_word_angle_rad",
@@ -38,7 +38,8 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
        .min = 1e-3},
       {.name = "max_word_ratio",
        .value = &o->max_word_ratio,
-       .help = "and largest ratio of that angle to the one of the second nearest landmark",
+       .help =
+           "without a vocabulary: largest ratio of that angle to the angle to the second nearest landmark",
        .min = 1e-3,
        .max = 1},
       {.name = "max_num_regions",
@@ -47,11 +48,11 @@ OptionTable DescribeOptions(RetrieveOptions* o) {
        .min = 1},
       {.name = "prior_distance_m",
        .value = &o->prior_distance_m,
-       .help = "survey images this near to a prior are candidates, m",
+       .help = "with a prior: largest distance of a candidate image from it, m",
        .min = 0},
       {.name = "prior_angle_deg",
        .value = &o->prior_angle_deg,
-       .help = "and those that look this nearly the same way, degrees",
+       .help = "with a prior: largest angle between a candidate image and it, degrees",
        .min = 0,
        .max = 180},
   };
@@ -143,6 +144,7 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
     if (next == ordinal) continue;
     ordinal = next;
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+    // [Sala06 §III] a vote for each region that it belongs to
     for (const auto& [region, of_region] : block->regions) counts[region] += NumShared(of_region, ascending);
   }
   std::vector<RegionVotes> votes;

@@ -12,8 +12,8 @@ namespace cairn {
 struct RetrieveOptions {
   // Most candidate images.  REQUIRES: >= 1
   int max_num_candidates = 20;
-  // Candidates score at least this part of the best one's score [Mariottini11: a percentage of the maximum,
-  // not given]. REQUIRES: in [0, 1]
+  // Candidates score at least this part of the best one's score [Mariottini11 fn 4: a percentage of the
+  // maximum, not given]. REQUIRES: in [0, 1]
   double min_score_ratio = 0.3;
   // Without a vocabulary: largest angle between a descriptor and the landmark that is its word, radians.
   // REQUIRES: > 0
@@ -44,7 +44,7 @@ struct Candidate {
 
 // All of these: errors as Map::Landmarks, a damaged block.
 
-// Survey images most like the query [Mariottini11, On line 1], best first: by the vocabulary's words, or, in
+// Survey images most like the query [Mariottini11 §IV], best first: by the vocabulary's words, or, in
 // a map without one, by the landmarks nearest to the query's descriptors, each a word of its own.
 Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& query,
                                                const RetrieveOptions& options);
@@ -60,8 +60,8 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
 Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);
 
-// How many of these landmarks (each once) every region has [Sala06 §III: the visible features vote], most
-// first, ties to the smaller index; regions without any are left out.
+// For every region the number of these landmarks (each once) that it has [Sala06 §III: the visible features
+// vote], most first, ties to the smaller index; regions without any are left out.
 struct RegionVotes {
   RegionIdx region = -1;
   int num_votes = 0;
@@ -71,8 +71,8 @@ Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vect
 // The region that has most of these landmarks, the smaller index on a tie; -1 for none.
 Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
 
-// Distance from a place (in the map's own frame) to the nearest survey camera, metres; infinite without
-// images.
+// Distance from a place (in the map's own frame) to the nearest survey camera, metres; infinite
+// without images.
 Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center);
 
 }  // namespace cairn

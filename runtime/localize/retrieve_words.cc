@@ -17,7 +17,7 @@ std::vector<Candidate> BestImages(const std::vector<double>& dots, double query_
   std::vector<Candidate> scored;
   for (size_t image = 0; image < dots.size(); ++image) {
     if (dots[image] <= 0) continue;
-    // As float: the last bits of a sum in another order do not decide.
+    // As float, so that the last bits of a sum in another order do not decide.
     const auto score = static_cast<float>(std::min(1.0, dots[image] / (query_norm * document_norm(image))));
     scored.push_back({static_cast<int32_t>(image), score});
   }
@@ -27,12 +27,13 @@ std::vector<Candidate> BestImages(const std::vector<double>& dots, double query_
                       return std::pair(-a.score, a.image) < std::pair(-b.score, b.image);
                     });
   scored.resize(num_kept);
+  // [Mariottini11 fn 4] candidates exceed "a percentage of the maximum value"
   while (!scored.empty() && scored.back().score < options.min_score_ratio * scored.front().score)
     scored.pop_back();
   return scored;
 }
 
-// How many images are documents, and which where these are not all.
+// How many images are documents, and which ones where not all are.
 struct Documents {
   double count = 0;
   std::shared_ptr<const AppearanceMap> kept;  // null: all images are
@@ -74,6 +75,7 @@ Result<std::vector<Candidate>> RetrieveByVocabulary(const Map& map, const Descri
     }
     const std::vector<Posting>& postings = block->postings[word - block->first];
     if (postings.empty()) continue;
+    // [Mariottini11 §IV] the query vector's entry, a word's count times its inverse document frequency
     const double idf = std::log(documents.count / static_cast<double>(postings.size()));
     const double query_weight = static_cast<double>(end - begin) * idf;
     squared_norm += query_weight * query_weight;
@@ -96,7 +98,7 @@ Result<std::vector<Candidate>> RetrieveByLandmarks(const Map& map, const Query& 
       ++counts[word.idx];
   }
   CAIRN_ASSIGN_OR_RETURN(const Documents documents, DocumentsOf(map));
-  // The plus keeps a landmark that every image sees from saying nothing: a map may have one image.
+  // With the plus, a landmark that every image sees still counts: a map may have one image.
   std::vector<double> idf(counts.size());
   double squared_norm = 0;
   for (size_t i = 0; i < idf.size(); ++i) {

@@ -8,20 +8,20 @@
 
 namespace cairn {
 
-// What was loaded of a map, within a budget of bytes: the least recently used goes first.  What somebody
-// still holds stays alive until he lets go.  May be used by several threads at once.
+// The loaded parts of a map, within a budget of bytes: the least recently used is dropped first.  A block
+// that somebody still holds stays alive until it is released.  May be used by several threads at once.
 class BlockCache {
  public:
   explicit BlockCache(int64_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
-  // Null when it is not there.
+  // Null when it is not loaded.
   std::shared_ptr<const void> Find(int64_t key);
-  // Returns what is kept under this key: another thread may have been faster.
+  // Returns the block kept under this key: another thread may have inserted one first.
   std::shared_ptr<const void> Insert(int64_t key, std::shared_ptr<const void> block, int64_t num_bytes);
 
   int64_t num_bytes() const;
   int64_t num_blocks() const;
-  // Blocks inserted since the beginning.
+  // Number of blocks inserted so far.
   int64_t num_loads() const;
 
  private:

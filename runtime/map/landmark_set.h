@@ -8,14 +8,14 @@
 
 namespace cairn {
 
-// Some landmarks of a map, taken out of its blocks: what a query works on.
+// Some landmarks of a map, copied from its blocks for a query.
 struct LandmarkSet {
   std::vector<LandmarkIdx> idx;        // ascending
   std::vector<MapLandmark> landmarks;  // of each
   DescriptorMatrix descriptors;        // row i: idx[i]
-  PackedDescriptors packed;            // the same, for matching; empty where nobody matches the set
+  PackedDescriptors packed;            // the same, for matching; empty where the set is not matched
 
-  // REQUIRES: it is one of them
+  // REQUIRES: the landmark is in the set
   const MapLandmark& Find(LandmarkIdx landmark) const { return landmarks[Position(landmark)]; }
   size_t Position(LandmarkIdx landmark) const;
 };

@@ -17,27 +17,27 @@
 
 namespace cairn {
 
-// The appearance graph of a map's images, for who wants to go from one to another (runtime/drive/route.h).
+// The appearance graph of a map's images, for finding ways from one to another (runtime/drive/route.h).
 struct AppearanceMap {
   AppearanceGraph graph;                          // links with a kept node at one end
   std::vector<std::vector<int32_t>> node_images;  // per node, indices of images, ascending
   std::vector<char> is_kept;                      // per node
-  std::vector<NodeIdx> node_of_image;             // per image of the map; -1: of none
+  std::vector<NodeIdx> node_of_image;             // per image of the map; -1: in no node
   int num_kept_images = 0;
-  // Where the map tells how well places are told apart (else empty): per node.
+  // How well each node's place can be told from others; empty where the map does not say.
   std::vector<double> entropy;                                         // nats
   std::vector<std::vector<MapAppearanceNode::LookAlike>> look_alikes;  // both ways, ascending by node
 };
 
 struct MapOptions {
-  // What is loaded of a map and kept for later queries, at most.  What a query works on at the moment comes
-  // on top of it.
+  // Largest size of the loaded parts of a map that are kept for later queries.  The parts that a query is
+  // using come on top.
   int64_t memory_budget_bytes = int64_t{256} << 20;
   // Maps without a signature of this key are refused.
   std::optional<PublicKey> public_key;
-  // What the map must be called (empty: anything), and the least epoch that it may have (0: any): of this
-  // site, and not older than what the robot knew before.  Only with a key can they be trusted: without one,
-  // anybody can write a map that says so.
+  // Required name of the map (empty: any) and its smallest epoch (0: any): a map of this site, not older than
+  // the robot's last one.  They can be trusted only with a key: without one, anybody can write a map that
+  // says so.
   std::string name = {};
   uint64_t min_epoch = 0;
 };
@@ -48,7 +48,7 @@ struct MapOptions {
 class Map {
  public:
   // Opens a map file read-only; it must not change while the map is open.  Errors: as MapFile::Open
-  // (core/map/map_file.h); OtherMap, NotNewer (not what the options ask for).
+  // (core/map/map_file.h); OtherMap, NotNewer (not the map that the options require).
   static Result<std::shared_ptr<const Map>> Open(const std::string& path, const MapOptions& options = {});
   // A map that was never a file: its numbers are not rounded.  Errors: InvalidArgument (CheckMapRows).
   static Result<std::shared_ptr<const Map>> FromRows(MapRows rows);
@@ -61,8 +61,8 @@ class Map {
   // Without words, every landmark is its own: they are few enough to be searched one by one.
   bool has_words() const { return directory_.Count(BlockKind::kVocabularyTree) > 0; }
 
-  // The camera of the survey with this image size.
-  // Errors: NotFound when no camera or more than one has it; lists the sizes there are.
+  // The camera of the survey with this image size.  Errors: NotFound when no camera or more than one has it;
+  // lists the available sizes.
   Result<Camera> CameraForSize(int width, int height) const;
 
   // Blocks by their ordinals, from the cache or the file.  REQUIRES: ordinal < directory().NumBlocks(kind)
@@ -76,20 +76,20 @@ class Map {
   Result<std::shared_ptr<const Vocabulary>> VocabularyTree() const;  // its inverted files: Words
   Result<std::shared_ptr<const std::vector<float>>> DocumentNorms() const;
 
-  // The appearance graph as a whole; nothing in it where the map has none.  Kept like a block.
-  // Errors: Corrupt, also where an image is of two nodes.
+  // The whole appearance graph; empty where the map has none.  Kept like a block.  Errors: Corrupt, also
+  // where an image is of two nodes.
   Result<std::shared_ptr<const AppearanceMap>> Appearance() const;
 
   // Whether there is a floor plan.
   bool has_views() const { return directory_.Count(BlockKind::kViewRegions) > 0; }
-  // The floor plan and its view-invariant regions as a whole, floor frame.  Kept like a block.
-  // Errors: NotFound where the map has none; Corrupt.
+  // The whole floor plan and its view-invariant regions, floor frame.  Kept like a block.  Errors: NotFound
+  // where the map has none; Corrupt.
   Result<std::shared_ptr<const Views>> FloorViews() const;
 
   // Whether there is a visual map (runtime/visual_map/visual_map.h).
   bool has_visual_map() const { return directory_.NumBlocks(BlockKind::kLandmarkModels) > 0; }
-  // The models of all landmarks; their images are in range.  Not kept: who loads them makes more of them.
-  // Errors: NotFound where the map has none; Corrupt.
+  // The models of all landmarks; their images are in range.  Not kept in the cache: the caller turns them
+  // into a VisualMap.  Errors: NotFound where the map has none; Corrupt.
   Result<VisualMapData> LandmarkModels() const;
 
   // An image by its index.
@@ -99,7 +99,7 @@ class Map {
   // All landmarks, packed.  Kept like a block.
   Result<std::shared_ptr<const LandmarkSet>> AllLandmarks() const;
 
-  // What is kept at the moment.
+  // The blocks that are kept at the moment.
   const BlockCache& cache() const { return cache_; }
 
  private:

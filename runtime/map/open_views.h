@@ -8,8 +8,8 @@
 
 namespace cairn {
 
-// The view-invariant regions of a floor plan, from a map that has them or from views.db: which of the two a
-// file is, its contents say.  Errors: those of Map::Open and Map::FloorViews, or of ReadViews.
+// The view-invariant regions of a floor plan, from a map that has them or from views.db; the file's contents
+// say which of the two it is.  Errors: those of Map::Open and Map::FloorViews, or of ReadViews.
 Result<std::shared_ptr<const Views>> OpenViews(const std::string& path);
 
 }  // namespace cairn

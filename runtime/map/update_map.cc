@@ -26,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Holds the folder of a map against other updates and rollbacks there, until it goes.
-// Errors: Busy, NotFound, Io.
+// Locks the folder of a map against other updates and rollbacks, for as long as the object lives.  Errors:
+// Busy, NotFound, Io.
 Result<FileLock> LockFolderOf(const std::string& map_path) {
   FileLock lock(open(FolderOf(map_path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (lock.descriptor() < 0) {
@@ -35,18 +35,18 @@ Result<FileLock> LockFolderOf(const std::string& map_path) {
                      std::strerror(errno));
   }
   if (lock.Try(FileLock::Kind::kExclusive) == FileLock::Claim::kHeld) return lock;
-  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is at work in its folder; try again",
+  return MakeError(ErrorCode::kBusy, "{}: another update or rollback is running in its folder; try again",
                    map_path);
 }
 
-// The file itself where the path is a link to it: that is what others read.
+// The file itself where the path is a link to it: others read that file.
 std::string FileOf(const std::string& map_path) {
   std::error_code error;
   const fs::path file = fs::canonical(map_path, error);
   return error ? map_path : file.string();
 }
 
-// What updates that were killed have left beside a map.  REQUIRES: LockFolderOf(map_path)
+// Removes what killed updates have left beside a map.  REQUIRES: LockFolderOf(map_path)
 void RemoveStale(const std::string& map_path) {
   std::error_code error;
   const fs::path map(map_path);
@@ -72,8 +72,8 @@ Status CheckMayFollow(const MapFile& next, const std::string& next_name, const s
   return CheckFollows(next.head(), next_name, old->head(), old_path, options.allow_older);
 }
 
-// The file that is to be `path`: a map made by a delta from the one at `old_path`, written and opened as a
-// robot would; what robots would refuse must not take the place of what they can open.
+// Writes the file that will become `path`: a map made by a delta from the one at `old_path`.  It is opened as
+// a robot would: a map that robots would refuse must not replace one that they can open.
 Result<Replacement> WriteMap(const std::string& bytes, const std::string& path, const std::string& old_path,
                              const std::string& delta_path, const UpdateOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(Replacement file, Replacement::Begin(path));
@@ -92,8 +92,8 @@ int Exchange(const std::string& path1, const std::string& path2) {
   return renameat2(AT_FDCWD, path1.c_str(), AT_FDCWD, path2.c_str(), RENAME_EXCHANGE);
 }
 
-// The map in place kept as the previous one, until it is known whether another takes its place: then Confirm
-// drops what was the previous one before, else that comes back.
+// Keeps the map in place as the previous one until it is known whether a new one replaces it.  If so, Confirm
+// drops the older previous map; else the destructor restores that one.
 class KeptMap {
  public:
   KeptMap(const std::string& map_path, int folder)
@@ -116,13 +116,13 @@ class KeptMap {
     struct stat before = {};
     const bool is_there = lstat(previous_.c_str(), &before) == 0;
     if (is_there && !S_ISREG(before.st_mode) && !S_ISLNK(before.st_mode))
-      return MakeError(ErrorCode::kIo, "{}: is no file, and the map before cannot be kept there; remove it",
+      return MakeError(ErrorCode::kIo, "{}: is not a file, so the old map cannot be kept there; remove it",
                        previous_);
     CAIRN_ASSIGN_OR_RETURN(const std::string second, SecondName());
     if (is_there && Exchange(second, previous_) == 0) {
       aside_ = second;
     } else {
-      // There is nothing to keep, or the file system cannot exchange: the older one steps aside first.
+      // There is nothing to keep, or the file system cannot exchange: the older one is moved aside first.
       if (is_there) {
         const std::string aside = RandomTemporaryPath(previous_);
         if (rename(previous_.c_str(), aside.c_str()) != 0) return CannotKeep(second, errno);
@@ -140,12 +140,12 @@ class KeptMap {
   }
 
   void Confirm() {
-    if (!aside_.empty()) unlink(aside_.c_str());  // else it only takes room, and the next update removes it
+    if (!aside_.empty()) unlink(aside_.c_str());  // else it only takes space, and the next update removes it
     is_kept_ = false;
   }
 
  private:
-  // A second name for the map's file, or, where there can be none, a copy.
+  // A second name (link) for the map's file, or a copy where links are not possible.
   Result<std::string> SecondName() {
     const std::string second = RandomTemporaryPath(previous_);
     if (link(map_path_.c_str(), second.c_str()) == 0) return second;
@@ -165,7 +165,7 @@ class KeptMap {
 
   Error CannotKeep(const std::string& second, int error) const {
     unlink(second.c_str());
-    return WriteError(previous_, "the map before cannot be kept there", error);
+    return WriteError(previous_, "the old map cannot be kept there", error);
   }
 
   std::string map_path_, previous_;
@@ -233,15 +233,16 @@ Status RollBackMap(const std::string& given_path, const UpdateOptions& options) 
       if (errno != ENOENT) return WriteError(previous, "cannot be opened", errno);
       return MakeError(
           ErrorCode::kNotFound,
-          "{}: no such file; there is a previous map only where `cairn apply --in-place` made one", previous);
+          "{}: no such file; there is a previous map only where `cairn update apply --in-place` made one",
+          previous);
     }
-    // A link would take the map's place.
+    // A link would replace the map.
     if (!S_ISREG(status.st_mode))
-      return MakeError(ErrorCode::kIo, "{}: is no regular file; no update has put it there", previous);
+      return MakeError(ErrorCode::kIo, "{}: is not a regular file; no update has put it there", previous);
     CAIRN_ASSIGN_OR_RETURN(const MapFile before, MapFile::Open(previous, {.public_key = options.public_key}));
     CAIRN_RETURN_IF_ERROR(CheckFileHash(previous));
     CAIRN_RETURN_IF_ERROR(CheckAskedFor(before.head(), previous, options.name, options.min_epoch));
-    // The map in place may be what is wrong: one that cannot be opened is no reason to stay with it.
+    // The map in place may be the damaged one: that it cannot be opened is no reason to keep it.
     const Result<MapFile> map = MapFile::Open(map_path, {.public_key = options.public_key});
     if (map.ok() && (map->seal().is_signed() || before.seal().is_signed())) {
       CAIRN_RETURN_IF_ERROR(

@@ -13,7 +13,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// A stretch of wall in the robot's frame that one of two views has and the other has not.
+// A stretch of wall in the robot's frame that only one of two views has.
 struct Feature {
   Vec2 start, end;
   double distance = 0;
@@ -29,11 +29,12 @@ class Planner {
   Result<DisambiguationPlan> Run() {
     DisambiguationPlan plan;
     plan.num_regions = 1;
+    // [Simsarian96 §4.2] case 1: the views differ; move closer to the telling feature
     if (const auto feature = Telling(Vec2::Zero())) {
       Fill(1, {Vec2::Zero(), Towards(*feature)}, *feature, &plan);
       return plan;
     }
-    // One and the same pose.
+    // Both are the same pose.
     if (a_.position == b_.position && WrapAngle(a_.heading_rad - b_.heading_rad) == 0) return plan;
     for (const PlanarPose* pose : {&a_, &b_}) {
       if (space_.IsFree(pose->position, pose->position, options_.radius_m)) continue;
@@ -50,7 +51,7 @@ class Planner {
  private:
   struct Step {
     double length;
-    bool is_around_b;  // the region's pose: the walk around a, or that around b
+    bool is_around_b;  // whether the region belongs to the search around b, or to that around a
     FaceIdx face;
     Vec2 place;  // in the robot's first frame
     int before;  // step
@@ -65,13 +66,13 @@ class Planner {
     return seen;
   }
 
-  // Nearer, or as near and first by place: by nothing that depends on which pose is a.
+  // Nearer, or equally near and first by place: independent of which pose is called a.
   static bool IsBefore(double distance, const Vec2& start, const Feature& other) {
     return std::make_tuple(distance, start.x(), start.y()) <
            std::make_tuple(other.distance, other.start.x(), other.start.y());
   }
 
-  // The longest part of a stretch of which the other view has nothing, if it is long enough and near enough.
+  // The longest part of a stretch that the other view lacks, if it is long enough and near enough.
   void Compare(const std::vector<std::pair<Vec2, Vec2>>& view,
                const std::vector<std::pair<Vec2, Vec2>>& other, const Vec2& moved, bool is_at_a,
                std::optional<Feature>* best) const {
@@ -121,7 +122,7 @@ class Planner {
     return space_.IsFree(pose.FloorFromRobot(from), end, options_.radius_m) && space_.FaceAt(end) >= 0;
   }
 
-  // Straight to one metre before the feature, or as far as nothing stands in the way in either case.
+  // Straight to one metre before the feature, or as far as the way is free at both poses.
   Vec2 Towards(const Feature& feature) const {
     const Vec2 target = 0.5 * (feature.start + feature.end);
     double share = std::max(0.0, 1 - 1 / std::max(1e-9, target.norm()));
@@ -142,6 +143,7 @@ class Planner {
       queue.push(static_cast<int>(steps_.size()) - 1);
     }
     double best_cost = std::numeric_limits<double>::infinity();
+    // [Simsarian96 §4.2] best-first in parallel from both poses, to the cheapest pair, not the first
     while (!queue.empty()) {
       const int at = queue.top();
       queue.pop();
@@ -156,9 +158,11 @@ class Planner {
         }
         ++plan->num_regions;
         const auto feature = Telling(step.place);
+        // [Simsarian96 §4.2] the length of the path, plus a measure of the cost of telling the two apart
         const double cost = feature ? step.length + options_.cost_of_distance * feature->distance : best_cost;
         if (cost < best_cost) {
           best_cost = cost;
+          // [Simsarian96 §4.2] case 2: a border of the region is crossed; case 3: it is left
           Fill(step.depth == 1 ? 2 : 3, PathTo(at), *feature, plan);
         }
       }
@@ -182,7 +186,7 @@ class Planner {
     }
   }
 
-  // Without the detours over the middles of regions where nothing stands in the way.
+  // Without detours over the middles of regions where the straight way is free.
   std::vector<Vec2> PathTo(int at) const {
     std::vector<Vec2> places;
     for (int i = at; i >= 0; i = steps_[i].before) places.push_back(steps_[i].place);
@@ -221,28 +225,28 @@ OptionTable DescribeOptions(DisambiguateOptions* o) {
   return {
       {.name = "min_feature_m",
        .value = &o->min_feature_m,
-       .help = "a stretch of wall of which so much is seen from one place only tells places apart, metres",
+       .help = "length of wall, seen from one of the places only, that tells them apart, metres",
        .min = 0.01,
        .max = 100},
       {.name = "same_wall_m",
        .value = &o->same_wall_m,
-       .help = "walls this close look the same, metres",
+       .help = "walls closer than this look the same, metres",
        .min = 1e-6,
        .max = 10},
       {.name = "same_wall_deg",
        .value = &o->same_wall_deg,
-       .help = "walls this parallel look the same, degrees",
+       .help = "walls whose directions differ by less than this look the same, degrees",
        .min = 1e-6,
        .max = 45},
       {.name = "view_range_m",
        .value = &o->max_range_m,
-       .help = "what lies farther away is not seen, metres",
+       .help = "range of the laser, metres",
        .min = 0.1,
        .max = 1e4},
       {.name = "radius_m", .value = &o->radius_m, .help = "radius of the robot, metres", .min = 0, .max = 10},
       {.name = "cost_of_distance",
        .value = &o->cost_of_distance,
-       .help = "metres of path that are worth one metre of distance to what tells places apart",
+       .help = "metres of path that count as much as one metre of distance to what tells the places apart",
        .min = 0,
        .max = 1e3},
       {.name = "max_num_regions",

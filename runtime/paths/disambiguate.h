@@ -10,17 +10,18 @@
 namespace cairn {
 
 struct DisambiguateOptions {
-  // A stretch of wall tells two places apart if at least so much of it is seen from one only, metres.
-  // REQUIRES: > 0
+  // A stretch of wall tells two places apart if at least this length of it is seen from only one of them,
+  // metres.  REQUIRES: > 0
   double min_feature_m = 0.3;
-  // Walls this close to each other, and this parallel, look the same.  REQUIRES: > 0
+  // Walls closer to each other than this, m, and with directions closer than this, degrees, look the
+  // same.  REQUIRES: > 0
   double same_wall_m = 0.15;
   double same_wall_deg = 5;
-  // What the robot does not see, metres.  REQUIRES: > 0
+  // Distance beyond which the robot sees nothing, metres.  REQUIRES: > 0
   double max_range_m = 20;
   // Radius of the robot, metres.  REQUIRES: >= 0
   double radius_m = 0.2;
-  // Metres of path that are worth one metre more of distance to the telling feature.  REQUIRES: >= 0
+  // Metres of path that count as much as one metre of distance to the distinguishing feature.  REQUIRES: >= 0
   double cost_of_distance = 0.1;
   // Most regions to look from before giving up, those around a and around b together.  REQUIRES: >= 1
   int max_num_regions = 40000;
@@ -29,37 +30,38 @@ OptionTable DescribeOptions(DisambiguateOptions* options);
 
 enum class DisambiguationOutcome {
   kFound = 0,
-  kAlike = 1,  // of all regions that the robot can get to from either pose, nothing tells them apart
-  kGaveUp = 2  // max_num_regions were looked from, and others were left: there may be something
+  kAlike = 1,  // no region that the robot can reach from either pose tells them apart
+  kGaveUp = 2  // max_num_regions were tried, and others were left, which may tell them apart
 };
 
-// What tells whether a robot is at one of two places that its scan fits.
+// How a robot finds out at which of two places it is that both fit its scan.
 struct DisambiguationPlan {
   DisambiguationOutcome outcome = DisambiguationOutcome::kAlike;
   // 1: the views differ already, 2: after crossing a border of the region, 3: farther on; 0: nothing was
-  // found.  What follows is of a plan that was found.
+  // found.  The fields below describe a plan that was found.
   int kind = 0;
-  // Whether none costs less; false: max_num_regions were looked from before that was known.
+  // Whether no plan costs less; false: max_num_regions were tried before that was known.
   bool is_best = true;
-  // The motion, if the robot is at a, and if it is at b: the same in the robot's frame, free of walls in
-  // both.
+  // The motion, if the robot is at a, and if it is at b: the same in the robot's frame, free of
+  // walls in both.
   std::vector<Eigen::Vector2d> path_a, path_b;
-  // The telling stretch of wall, as it lies if the robot is at a, and at b; it is there in one of the cases
-  // only.
+  // The distinguishing stretch of wall, in its place if the robot is at a, and if at b; it exists in only one
+  // of the cases.
   bool feature_is_at_a = false;
-  Eigen::Vector2d feature_start_a, feature_end_a, feature_start_b, feature_end_b;
+  Eigen::Vector2d feature_start_a = Eigen::Vector2d::Zero(), feature_end_a = feature_start_a,
+                  feature_start_b = feature_start_a, feature_end_b = feature_start_a;
   double path_length_m = 0;
   double distance_m = 0;  // of the feature from the end of the path
-  int num_regions = 0;    // looked from, in any case
+  int num_regions = 0;    // regions that were tried, also where nothing was found
 };
 
-// Plans, before the robot moves, how to tell two poses apart that a scan fits [Simsarian96 §4].  Best-first
+// Plans, before the robot moves, how to tell two poses apart that a scan fits [Simsarian96 §4.2].  Best-first
 // over the adjacency graph around a and that around b at once, each motion carried along at the other pose:
-// from each region's middle the two predicted views are compared, and the path that costs least, with what
-// the distance to the telling feature costs, wins.  In case 1 the path leads towards the feature, as far as
-// both poses allow.  Which of the two is called a does not matter.
-// Errors: InvalidArgument (options; a pose outside of the domain, or without a heading), NoData (views that
-// do not differ, and the robot does not fit at a pose: it cannot move).
+// from each region's middle the two predicted views are compared, and the path of least cost, including the
+// distance to the distinguishing feature, wins.  In case 1 the path leads towards the feature, as far as both
+// poses allow.  The result does not depend on which of the two is called a.  Errors: InvalidArgument
+// (options; a pose outside of the domain, or without a heading), NoData (the views do not differ, and the
+// robot cannot move because it does not fit at a pose).
 Result<DisambiguationPlan> PlanDisambiguation(const PlanSpace& space, const PlanarPose& a,
                                               const PlanarPose& b, const DisambiguateOptions& options);
 

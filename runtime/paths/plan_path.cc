@@ -54,8 +54,8 @@ struct Spot {
   double area = 0;  // of all regions that it stands for
 };
 
-// All regions if there are no more than `most`; otherwise the largest of each cell of a grid with about as
-// many cells, standing for all with their middles in the cell.
+// All regions if there are at most `most`; otherwise the largest region of each cell of a grid with about as
+// many cells, standing for all regions with their middles in the cell.
 std::vector<Spot> SpreadSpots(const Views& views, int most) {
   const Vec2 low = views.plan.Metres(views.plan.low);
   double domain = 0;
@@ -175,6 +175,7 @@ std::vector<int> ChooseLookingPlaces(const PlanSpace& space, const PlanRoadmap& 
     }
   };
   look_from(0);
+  // [Simsarian96 §4.3] A path to every region is more than is needed: places that together see enough.
   while (result->seen_area_m2 < seen_ratio * result->reachable_area_m2 - 1e-9) {
     size_t best = 0;
     double most = 0;
@@ -253,6 +254,7 @@ Result<PlanPath> FindPath(const PlanSpace& space, const Vec2& from, const Vec2& 
   CAIRN_RETURN_IF_ERROR(CheckStands(space, from, options.radius_m));
   CAIRN_RETURN_IF_ERROR(CheckStands(space, to, options.radius_m));
   if (from == to) return PlanPath{{from}, 0};
+  // [Simsarian96 §4.1] a low-cost path: over the visibility graph of the walls, not over the regions
   const PlanRoadmap roadmap(space, options.radius_m, {from, to});
   const std::vector<int> way = roadmap.ShortestWay(0, 1);
   if (way.empty()) return NoWay(from, to, options.radius_m);
@@ -273,7 +275,8 @@ Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Vec2& from, c
   std::vector<int> before(roadmap.num_nodes(), -1), order{kFrom};
   std::vector<bool> reached(roadmap.num_nodes(), false);
   reached[kFrom] = true;
-  // Nodes of one level are tried in the order of their distance to the goal.
+  // [Simsarian96 §4.1] The fewest links: breadth first over nodes, not over weak visibility regions.  Nodes
+  // of one level are tried in the order of their distance to the goal.
   for (size_t level = 0; level < order.size();) {
     const size_t end = order.size();
     for (size_t i = level; i < end; ++i) {

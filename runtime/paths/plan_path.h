@@ -30,7 +30,7 @@ struct PlanPath {
 // none does.  A point robot (radius 0) may touch walls and walk along them; it never passes a joint.  Places
 // count as the nearest points of the plan's grid there.
 
-// The shortest path [Simsarian96 §4 plans over the adjacency graph of regions; there ways go from border to
+// The shortest path [Simsarian96 §4.1: over the adjacency graph of regions; there ways go from border to
 // border, which finds no shortest one, and none where a border's middle is too near to a wall].  Exact for a
 // point; plan_roadmap.h says how near to it for a disc.  From a place to itself: this one point, no links.
 // Errors: InvalidArgument (options, a place outside of the domain), NoData (no way for this radius, a place
@@ -38,9 +38,9 @@ struct PlanPath {
 Result<PlanPath> FindPath(const PlanSpace& space, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                           const PlanPathOptions& options);
 
-// A path with few straight links: breadth first over what is seen from start, from there, and so on, turns
-// being made in the middles of regions and around the corners of walls.  No path that turns there only has
-// fewer links; one that turns elsewhere may.  Errors: as FindPath.
+// A path with few straight links: breadth first over the places seen from the start, then from those, and so
+// on, with turns in the middles of regions and around the corners of walls.  No path with turns at such
+// places only has fewer links; a path with turns elsewhere may.  Errors: as FindPath.
 Result<PlanPath> FindMinimumLinkPath(const PlanSpace& space, const Eigen::Vector2d& from,
                                      const Eigen::Vector2d& to, const PlanPathOptions& options);
 
@@ -50,9 +50,9 @@ struct SearchPath {
   double seen_area_m2 = 0, reachable_area_m2 = 0;
 };
 // A path from which every point is seen: looking places chosen greedily by the area that they add, visited in
-// the order of a tour that 2-opt has shortened.  A region counts as seen with its middle and its corners; in
-// plans of more than max_num_places regions the largest of each cell stands for the others there.
-// Errors: as FindPath.
+// the order of a tour that 2-opt has shortened.  A region counts as seen when its middle and its corners are;
+// in plans of more than max_num_places regions the largest of each cell stands for the others there.  Errors:
+// as FindPath.
 Result<SearchPath> FindSearchPath(const PlanSpace& space, const Eigen::Vector2d& from,
                                   const PlanPathOptions& options);
 

@@ -15,7 +15,8 @@ using Vec2 = Eigen::Vector2d;
 constexpr double kPi = std::numbers::pi;
 // Greatest angle between neighbours of the points around a corner.
 constexpr double kTurnStep = kPi / 8;
-// So much farther from walls than the radius, metres: what is computed to be free then is when checked again.
+// Extra distance from walls beyond the radius, metres, so that links that are computed as free stay free when
+// checked again.
 constexpr double kRounding = 1e-9;
 
 Vec2 Direction(double angle) { return {std::cos(angle), std::sin(angle)}; }
@@ -58,7 +59,7 @@ void PlanRoadmap::AddCorners() {
 }
 
 // Whether a straight link through a point of a corner's polygon leaves the polygon on one side: a shortest
-// way has no others, and most are others.
+// way has only such links, and most links are not.
 bool PlanRoadmap::FollowsRim(const Node& node, const Vec2& direction) const {
   const double before = Cross(direction, node.rim_before - node.place);
   const double after = Cross(direction, node.rim_after - node.place);

@@ -12,17 +12,18 @@ namespace cairn {
 // Nodes of a plan joined by free straight links: places that are asked for, and points around the corners of
 // walls where a robot of one radius turns.  It is the visibility graph of the walls grown by the robot
 // [Lozano-Perez & Wesley, CACM 1979]: if there is a way at all, there is one over these nodes, and the
-// shortest is among them. All kinds of paths are planned over it, so that they agree whether there is a way.
+// shortest is among them.  All kinds of paths are planned over it, so that they agree on whether there
+// is a way.
 //
 // A point robot (radius 0) turns at the corners themselves.  It may touch walls and walk along them, but
 // passes no joint: a link that ends at a corner ends on one side of the walls there.  Exact.
 //
 // A disc turns about a corner on a circle; the polygon around it here has a point every 22.5 degrees.  A way
-// that is found is free; a passage less than 2 % wider than the robot may be missed, and a path be
-// longer by as much of its turns.
+// that is found is free; a passage less than 2 % wider than the robot may be missed, and a path may be longer
+// by 2 % of its turns.
 class PlanRoadmap {
  public:
-  // The places are nodes 0, 1, ...; one where the robot does not fit (radius 0: on a wall) is joined to none.
+  // The places are nodes 0, 1, ...; a place where the robot does not fit (radius 0: on a wall) has no links.
   // `space` outlives this.
   PlanRoadmap(const PlanSpace& space, double radius_m, const std::vector<Eigen::Vector2d>& places);
 

@@ -100,6 +100,7 @@ class StraightWay {
 
 }  // namespace
 
+// [Simsarian96 §4.1] The region adjacency graph, with the middles of common borders.
 void PlanSpace::ListNeighbours() {
   for (const ViewLink& link : views_.links) {
     ++neighbour_offsets_[link.a + 1];
@@ -180,8 +181,7 @@ double PlanSpace::CellMargin() const { return std::max(1e-3, views_.plan.grid_m)
 std::optional<GridPoint> PlanSpace::OnGrid(const Vec2& place) const {
   const FloorPlan& plan = views_.plan;
   const Vec2 point = plan.Grid(place).array().round();
-  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > static_cast<double>(kMaxGridCoordinate))
-    return std::nullopt;
+  if (!(point.array().abs() <= static_cast<double>(kMaxGridCoordinate)).all()) return std::nullopt;
   const GridPoint on_grid{static_cast<int64_t>(point.x()), static_cast<int64_t>(point.y())};
   if (on_grid.x < plan.low.x || on_grid.y < plan.low.y || on_grid.x > plan.high.x || on_grid.y > plan.high.y)
     return std::nullopt;

@@ -10,8 +10,8 @@
 
 namespace cairn {
 
-// A path without the points that it can go straight past, where `is_free(from, to)` says so; of each point
-// the last that it reaches.
+// A path without the points that it can skip, where `is_free(from, to)` says so; from each point it goes to
+// the last point that it can reach.
 template <typename Point, typename IsFree>
 std::vector<Point> Tightened(const std::vector<Point>& points, const IsFree& is_free) {
   std::vector<Point> tight{points[0]};
@@ -35,7 +35,7 @@ struct WallCorner {
 enum PassingSide : unsigned { kLeftSide = 1, kRightSide = 2, kEitherSide = 3 };
 
 // How a point may move straight from one place to another: sets of PassingSide at its arrival, by the side on
-// which it leaves.  Where no wall lies along the way the sides are one.
+// which it leaves.  Where no wall lies along the way there is no difference between the sides.
 struct Passage {
   unsigned from_left = 0, from_right = 0;
 
@@ -49,8 +49,8 @@ struct Passage {
 
 // The free space of a plan, to move and to look in: its box without the pieces of its walls.
 //
-// What touches and what crosses is decided on the plan's grid, in integers: a place counts as the grid's
-// nearest point, and pieces that meet share a vertex.  So no gap opens at a joint, whatever its angle.
+// Whether something touches or crosses is decided on the plan's grid, in integers: a place counts as the
+// grid's nearest point, and pieces that meet share a vertex.  So no gap opens at a joint, whatever its angle.
 class PlanSpace {
  public:
   // `views` outlives this.
@@ -65,14 +65,14 @@ class PlanSpace {
   FaceIdx FaceAt(const Eigen::Vector2d& place) const { return locator_.Find(place); }
   // Errors: InvalidArgument where a place lies in no region.
   Status CheckInside(const Eigen::Vector2d& place) const;
-  // What is visible from a place in the domain; nothing outside of it.
+  // The stretches visible from a place in the domain; empty outside of it.
   std::vector<VisibleStretch> ViewFrom(const Eigen::Vector2d& place) const;
   // Whether a disc may move straight from a to b: its middle stays in the plan's box, and no wall comes
   // nearer to it than `radius_m`; radius 0: nothing of a wall, its ends included, is touched.
   bool IsFree(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double radius_m) const;
   // How a point may move, or look, straight from a to b where it may touch walls, but not cross them: it
   // moves along a wall on one of its sides, and past an end or a joint on a side where no wall leaves it.
-  // From a or b itself on a wall nothing is asked.
+  // Walls on which a or b itself lies are not checked there.
   Passage PassageBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const;
   // Distance to the nearest wall.  O(walls).
   double Clearance(const Eigen::Vector2d& place) const;
@@ -95,7 +95,7 @@ class PlanSpace {
   void ListNeighbours();
   void ListPieces();
   void ListCorners();
-  // How far rounding may move a place, and more: pieces are listed in all cells that they come as near to.
+  // More than rounding can move a place: pieces are listed in all cells that they come this near to.
   double CellMargin() const;
   // The nearest point of the grid; none outside of the plan's box.
   std::optional<GridPoint> OnGrid(const Eigen::Vector2d& place) const;

@@ -46,13 +46,12 @@ cv::Mat PixelsOf(const py::array& image) {
                                       image.ndim() == 3 ? "; make one channel of its colours first" : ""));
   if (image.shape(0) == 0 || image.shape(1) == 0 || image.shape(0) > 65536 || image.shape(1) > 65536)
     throw py::value_error(fmt::format("image has shape {}; both must be in 1 .. 65536", ShapeText(image)));
-  // A row's pixels lie one after the other, rows themselves in order: OpenCV reads no others without a copy.
+  // Pixels of a row must be contiguous and rows in order: OpenCV reads other layouts only after a copy.
   if ((image.strides(1) != 1 && image.shape(1) > 1) ||
       (image.strides(0) < image.shape(1) && image.shape(0) > 1))
     throw py::value_error(
         fmt::format("image of shape {} has strides ({}, {}) bytes: not row by row (a transposed, mirrored or "
-                    "thinned view, or "
-                    "order 'F'); numpy.ascontiguousarray(image) makes a copy that is",
+                    "strided view, or order 'F'); numpy.ascontiguousarray(image) makes such a copy",
                     ShapeText(image), image.strides(0), image.strides(1)));
   const auto stride = static_cast<size_t>(image.shape(0) > 1 ? image.strides(0) : image.shape(1));
   return cv::Mat(static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1)), CV_8UC1,

@@ -33,7 +33,7 @@ inline void ThrowIfError(const Status& status) {
   if (!status.ok()) throw PythonError(status.error());
 }
 
-// Makes cairn.Error, and PythonErrors into it.
+// Makes the exception cairn.Error, and lets PythonErrors become it.
 void BindErrors(pybind11::module_& module);
 
 // The pixels of an array of uint8, height x width, not copied; rows may have gaps.  Throws a TypeError for
@@ -43,11 +43,11 @@ cv::Mat PixelsOf(const pybind11::array& image);
 // Sets an option from a keyword argument.  Throws cairn.Error for an unknown name or a value out of range.
 void SetFromPython(const OptionTable& table, const std::string& name, const pybind11::handle& value);
 
-// Throws a ValueError for what is no rotation or no number.
+// Throws a ValueError for an invalid rotation or number.
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg);
 
-// Of a fix, as arrays of their own; None without one.
+// Of a fix, as new arrays; None without a fix.
 pybind11::object RotationOf(const Localization& found);
 pybind11::object VectorOf(const Localization& found, const Eigen::Vector3d& vector);
 pybind11::object MatrixOf(const Localization& found);

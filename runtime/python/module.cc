@@ -56,7 +56,7 @@ PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::op
   return {ValueOrThrow(Map::Open(name, options)), name};
 }
 
-// A localizer of a thread; its use from two at once is found out.
+// A localizer of one thread; its use from two threads at once is detected.
 class PyLocalizer {
  public:
   PyLocalizer(const PyMap& map, const py::kwargs& given) : map_(map.map) {
@@ -90,8 +90,8 @@ class PyLocalizer {
 
 namespace pybind11::detail {
 
-// Hands out objects only after __init__: pybind11 itself gives those of CLASS.__new__(CLASS) memory that
-// nobody has filled.
+// Hands out objects only after __init__: pybind11 itself gives objects of CLASS.__new__(CLASS)
+// uninitialised memory.
 template <typename T>
 struct ConstructedCaster : type_caster_base<T> {
   bool load(handle source, bool convert) {

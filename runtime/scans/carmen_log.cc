@@ -35,7 +35,7 @@ Result<std::vector<RangeScan>> ParseCarmenLog(const std::string& text, const std
     std::vector<double> values(num_beams + 7);
     for (size_t i = 0; i < values.size(); ++i) {
       if (!ParseNumber(words[i + 2], &values[i]) || !std::isfinite(values[i])) {
-        return Corrupt(what, "line {}: \"{}\" is no finite number", number, words[i + 2]);
+        return Corrupt(what, "line {}: \"{}\" is not a finite number", number, words[i + 2]);
       }
     }
     scan.ranges_m.assign(values.begin(), values.begin() + num_beams);

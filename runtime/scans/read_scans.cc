@@ -1,8 +1,10 @@
 #include "runtime/scans/read_scans.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
@@ -20,12 +22,10 @@ Result<ScanView> ParseSegments(const std::string& text, const std::string& what,
     ++number;
     const std::string_view trimmed = Trim(line);
     if (trimmed.empty() || trimmed[0] == '#') continue;
-    const std::vector<std::string> fields = SplitFields(trimmed, ',');
-    std::vector<double> values(fields.size());
-    bool ok = fields.size() == 4 || fields.size() == 6;
-    for (size_t i = 0; i < fields.size() && ok; ++i)
-      ok = ParseNumber(fields[i], &values[i]) && std::abs(values[i]) <= kMaxRangeM;
-    if (!ok) {
+    const std::vector<double> values = ParseNumbers(trimmed).value_or(std::vector<double>());
+    const bool is_near =
+        std::all_of(values.begin(), values.end(), [](double v) { return std::abs(v) <= kMaxRangeM; });
+    if ((values.size() != 4 && values.size() != 6) || !is_near) {
       return Corrupt(what,
                      "line {}: {:?} is not x0,y0,x1,y1 or x0,y0,x1,y1,sigma_angle_deg,sigma_offset_m (finite "
                      "numbers up to {:g})",

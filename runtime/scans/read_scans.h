@@ -18,7 +18,7 @@ struct ScanView {
 
 // Reads scans: a Carmen log (a line begins with FLASER), whose scans are divided into segments, or the
 // segments of one scan as lines x0,y0,x1,y1[,sigma_angle_deg,sigma_offset_m] in the robot's frame, metres.
-// Errors: those of ReadCarmenLog; Corrupt (a line that is no segment), NoData (nothing in the file).
+// Errors: those of ReadCarmenLog; Corrupt (a line that is not a segment), NoData (nothing in the file).
 Result<std::vector<ScanView>> ReadScans(const std::string& path, const ScanSegmentsOptions& options);
 Result<std::vector<ScanView>> ParseScans(const std::string& text, const std::string& what,
                                          const ScanSegmentsOptions& options);

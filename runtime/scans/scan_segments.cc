@@ -165,7 +165,7 @@ std::vector<ScanSegment> FindScanSegments(const RangeScan& scan, const ScanSegme
     for (const Points& points : stretches) {
       if (static_cast<int>(points.size()) < std::max(2, options.min_num_points)) continue;
       const ScanSegment segment = FitSegment(points, options.sigma_range_m);
-      // A line through the robot itself is none that it sees.
+      // The robot cannot see a line through itself.
       if (segment.Length() < std::max(1e-6, options.min_length_m) || Cross(segment.start, segment.end) <= 0)
         continue;
       segments.push_back(segment);

@@ -43,7 +43,7 @@ struct ScanSegmentsOptions {
 OptionTable DescribeOptions(ScanSegmentsOptions* options);
 
 // Straight stretches of a scan by split-and-merge, each fitted by total least squares, in the order of the
-// beams.  A scan in which nothing is straight has none.  Deterministic.  O(n log n) for n beams.
+// beams.  Empty for a scan without straight stretches.  Deterministic.  O(n log n) for n beams.
 std::vector<ScanSegment> FindScanSegments(const RangeScan& scan, const ScanSegmentsOptions& options);
 
 // The line through points that were seen counter-clockwise, with a standard deviation for each.

@@ -17,12 +17,12 @@ struct FloorFix {
 // REQUIRES: localization.has_fix()
 FloorFix FloorFixOf(const Localization& localization, const Pose& floor_from_world);
 
-// How far two estimates that share nothing but the keypoints lie apart: a check of one by the other.
+// The distance between two estimates that share only the keypoints: a check of one by the other.
 struct Disagreement {
   double distance_m = 0;
   double angle_deg = 0;
-  // Mahalanobis distance in (x, y, heading) under the sum of both covariances: beyond 4 they contradict each
-  // other.
+  // Mahalanobis distance in (x, y, heading) under the sum of both covariances: beyond 4 they contradict
+  // each other.
   double mahalanobis = 0;
 };
 Disagreement Compare(const FloorFix& fix, const VisualPose& pose);

@@ -24,8 +24,8 @@ constexpr int kNumRefined = 3;
 constexpr double kReachSpacings = 1.5;
 // Points per three standard deviations around the maximum that share out its probability.
 constexpr int kSpreadSteps = 7;
-// A survey is unsure of its own images when their landmarks' shared errors are larger than this part of its
-// spacing.
+// A survey localizes its own images badly when their landmarks' shared errors are larger than this part of
+// its spacing.
 constexpr double kUnsureSpacings = 0.25;
 // How much of the uniform distribution a posterior with a flag gets.
 constexpr double kFlaggedUniform = 0.5;
@@ -40,6 +40,7 @@ class Estimator {
         num_places_(static_cast<int32_t>(map.places().size())),
         search_(map, seen, options, log_prior_) {
     for (int32_t place = 0; place < num_places_; ++place) {
+      // [Sala06 §VI-C] p(x) is uniform over the places, here beside "elsewhere"
       const double share = prior.empty() ? 1.0 / num_places_ : prior[place];
       log_prior_.push_back(std::log((1 - options.elsewhere_ratio) * share));
     }
@@ -102,7 +103,8 @@ class Estimator {
   }
 
   // The most likely maxima, each refined from the best point around it; their masses are those of the search,
-  // or what Laplace makes of the maximum itself where that is more: points lie too far apart for sharp ones.
+  // or Laplace's approximation of the maximum itself where that is larger: points lie too far apart for
+  // sharp maxima.
   std::vector<DensityMaximum> RefineMaxima() {
     const std::vector<VisualHypothesis>& hypotheses = search_.hypotheses();
     std::vector<size_t> order(hypotheses.size() - search_.first_point());
@@ -138,7 +140,7 @@ class Estimator {
             .log_mass = refined.log_mass};
   }
 
-  // With the models that extend to where it ends: again where that is nearer to another place.
+  // Uses the models that extend to where it ends: repeats where that is nearer to another place.
   std::optional<DensityMaximum> RefineFromNearest(const VisualHypothesis& start) const {
     auto refined = RefinePose(map_, search_, start);
     if (!refined) return refined;
@@ -152,8 +154,9 @@ class Estimator {
     return (at - refined.position).norm() <= kReachSpacings * map_.spacing_m();
   }
 
-  // The maximum with what landmarks' errors share.
+  // The best maximum, with the shared part of landmarks' errors.
   std::optional<DensityMaximum> Best(std::vector<DensityMaximum> maxima) const {
+    // [Sala06 §VI-C] The estimate is the maximum of p(x | z): here refined between the places.
     const auto best = std::max_element(
         maxima.begin(), maxima.end(),
         [](const DensityMaximum& a, const DensityMaximum& b) { return a.log_density < b.log_density; });
@@ -176,8 +179,8 @@ class Estimator {
     return nearest;
   }
 
-  // What the points around the maximum have of the posterior is shared out anew among the places, as the
-  // normal distribution of the refined pose says: the points are too far apart to do so.
+  // Distributes the posterior of the points around the maximum again among the places, by the normal
+  // distribution of the refined pose: the points themselves are too far apart.
   void SpreadAround(const DensityMaximum& refined, VisualPose* pose) const {
     const int32_t heading = refined.start.heading;
     double mass = 0;
@@ -219,7 +222,7 @@ class Estimator {
     std::vector<int> agreeing = refined.agreeing;
     std::sort(agreeing.begin(), agreeing.end());
     pose->num_agreeing = static_cast<int>(std::unique(agreeing.begin(), agreeing.end()) - agreeing.begin());
-    // What lies farther off than the refinement goes widens the covariance.
+    // The posterior outside the range of the refinement widens the covariance.
     pose->covariance = refined.covariance;
     pose->mean.setZero();
     double sum = 0;
@@ -247,7 +250,7 @@ class Estimator {
     return Entropy(shares);
   }
 
-  // Of a camera that may be anywhere in the survey.
+  // The covariance of a camera that may be anywhere in the survey.
   Eigen::Matrix3d SurveyCovariance() const {
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& place : map_.places()) mean += place / num_places_;
@@ -347,7 +350,7 @@ Status CheckInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   for (const SeenLandmark& match : seen) {
     if (match.landmark < 0 || match.landmark >= map.num_landmarks() || !match.seen.allFinite()) {
-      return MakeError(ErrorCode::kInvalidArgument, "visual map: a match of landmark {} of {} makes no sense",
+      return MakeError(ErrorCode::kInvalidArgument, "visual map: a match of landmark {} of {} is not valid",
                        match.landmark, map.num_landmarks());
     }
   }
@@ -385,7 +388,9 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
 
 double PosteriorDivergence(const VisualPose& p, const VisualPose& q, double uniform_weight) {
   const auto count = static_cast<double>(p.at_place.size() + 1);
+  // [Sala06 §VI-C] "we mixed a uniform distribution with a small weight with each distribution"
   const auto mixed = [&](double share) { return (1 - uniform_weight) * share + uniform_weight / count; };
+  // [Sala06 §VI-C] D = sum over x of p(x) log(p(x) / q(x)), in nats
   const auto part = [&](double of_p, double of_q) {
     return mixed(of_p) > 0 ? mixed(of_p) * std::log(mixed(of_p) / mixed(of_q)) : 0.0;
   };

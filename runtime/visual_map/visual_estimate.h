@@ -13,47 +13,47 @@ namespace cairn {
 // p(x | z) over the places and headings of a visual map [Sala06 §VI-C].
 //   p(z | x) = product over the matched landmarks of (1 - o) N(z; model(x), S) + o U
 // with U uniform over the image and the scales, and U alone where the landmark's model does not extend to x.
-// S is the model's from cross-validation plus the keypoint's own.  The camera may be turned between the
-// headings of the survey, tilted a little, and held higher or lower: that moves all landmarks together, and
-// for every place the turn and height that fit best are found and their width counted (Laplace).  Differs
-// from the source, whose test poses have the survey's headings.  "Elsewhere", where every match is an
-// outlier, is one more possibility, so that matches that agree by chance are no fix.
+// S is the model's covariance from cross-validation plus the keypoint's own.  The camera may be turned
+// between the headings of the survey, tilted a little, and held higher or lower: that moves all landmarks
+// together, so for every place the best-fitting turn and height are found and integrated over (Laplace).
+// Differs from the source, whose test poses have the survey's headings.  "Elsewhere", where every match is an
+// outlier, is one more possibility, so that matches that agree by chance give no fix.
 struct VisualEstimateOptions {
-  // Standard deviation of a query's keypoint beside what the model itself is off by, px.  REQUIRES: > 0
+  // Standard deviation of a query's keypoint in addition to the model's own error, px.  REQUIRES: > 0
   double visual_sigma_px = 0.5;
-  // The same of its scale, octaves.  REQUIRES: > 0
+  // The same for its scale, octaves.  REQUIRES: > 0
   double visual_sigma_octaves = 0.15;
-  // Share of wrong matches, o; of landmarks whose model predicts badly it is halfway to 1.  REQUIRES: in
-  // (0, 1)
+  // Share of wrong matches, o; for landmarks whose model predicts badly, the mean of this and
+  // 1.  REQUIRES: in (0, 1)
   double outlier_ratio = 0.3;
-  // Standard deviation of the camera's pitch and roll beside what the survey's cameras have, degrees.
-  // REQUIRES: > 0
+  // Standard deviation of the camera's pitch and roll in addition to that of the survey's cameras,
+  // degrees.  REQUIRES: > 0
   double tilt_sigma_deg = 2;
-  // Standard deviation of its height beside what the survey's cameras have, m.  REQUIRES: > 0
+  // Standard deviation of its height in addition to that of the survey's cameras, m.  REQUIRES: > 0
   double height_sigma_m = 0.05;
   // Headings farther than half way to the next of the survey count up to this much, degrees; where the survey
-  // does not tell how far a turn moves the image, this is all.  REQUIRES: >= 0
+  // does not say how far a turn moves the image, only up to this.  REQUIRES: >= 0
   double heading_margin_deg = 5;
-  // Places and headings that are looked at between the places of the survey, and into how many parts a side.
-  // REQUIRES: >= 1
+  // Number of places and headings that are refined between the places of the survey, and number of parts per
+  // side.  REQUIRES: >= 1
   int num_refined_places = 12;
   int num_subdivisions = 5;
-  // What does not average out over landmarks beside what the survey itself shows (VisualErrors),
-  // per axis, m and degrees.  REQUIRES: >= 0
+  // Errors that do not average out over landmarks, in addition to those that the survey itself shows
+  // (VisualErrors), per axis, m and degrees.  REQUIRES: >= 0
   double shared_sigma_m = 0.002;
   double shared_sigma_deg = 0.05;
   // Prior probability that the camera is at none of these places.  REQUIRES: in (0, 1)
   double elsewhere_ratio = 0.5;
-  // Flags: least matches that agree with the pose, and which part of those whose models extend to it; least
-  // standard deviation of their positions in the image, as part of its diagonal; farthest from a place of the
-  // survey, in its spacings.  REQUIRES: >= 0
+  // Flags: minimum number of matches that agree with the pose, and minimum share of those whose models extend
+  // to it; smallest standard deviation of their positions in the image, as part of its diagonal; largest
+  // distance from a place of the survey, in its spacings.  REQUIRES: >= 0
   int min_num_agreeing = 4;
   double min_agreeing_ratio = 0.3;
   double min_spread_ratio = 0.07;
   double max_distance_spacings = 0.75;
-  // Least matches that agree where the survey is unsure of its own images, which landmarks' shared errors
-  // above a quarter of its spacing say: as many as an image needs for these to be learnt from it.
-  // REQUIRES: >= 0
+  // Minimum number of matches that agree where the survey localizes its own images badly (landmarks' shared
+  // errors are above a quarter of its spacing): as many as an image needs for these errors to be learnt from
+  // it.  REQUIRES: >= 0
   int min_num_agreeing_unsure = 8;
 };
 OptionTable DescribeOptions(VisualEstimateOptions* options);
@@ -80,8 +80,9 @@ struct VisualPose {
   // The maximum of p(x | z), refined between the survey's places.
   Eigen::Vector2d position = Eigen::Vector2d::Zero();  // floor frame, metres
   double heading_deg = 0;                              // [0, 360)
-  double higher_m = 0;                                 // than the survey's cameras were on the mean
-  // x m, y m, heading rad: of the maximum, widened by what lies elsewhere (with a flag: by the whole survey).
+  double higher_m = 0;                                 // than the survey's cameras on average
+  // x m, y m, heading rad: of the maximum, widened by the posterior elsewhere (with a flag: by the
+  // whole survey).
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   // Of the whole posterior.
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -92,22 +93,22 @@ struct VisualPose {
   std::vector<std::vector<double>> turn_rad;    // per place and heading: the camera's best turn from it
 };
 
-// Landmarks in a small spot of the image, s across, hardly tell how far a camera has turned around them: by
-// an angle a, s^2 sin(a) / f px of perspective give it away, and models are off by as much.  So what
-// landmarks' errors share (VisualErrors) holds for images with landmarks all over, of this spread, and grows
-// with its square where they lie closer.
+// Landmarks in a small spot of the image, s across, hardly show how far a camera has turned around them: a
+// turn by an angle a changes perspective by s^2 sin(a) / f px, and the models' errors are as large.  So the
+// shared errors (VisualErrors) hold for images with landmarks everywhere, of this spread, and grow with its
+// square where landmarks lie closer.
 inline constexpr double kFullSpreadRatio = 0.2;
 double SharedGrowth(double spread_ratio);
 
-// `prior`: probability per place of the map (sums to 1), empty: uniform.  Same input, same result.
-// O(matches * places).  Errors: InvalidArgument (a prior of another length or that is none, a landmark that
-// is not there, a number that is not finite, a bad option).
+// `prior`: probability per place of the map (sums to 1), empty: uniform.  Same input, same result.  O(matches
+// * places).  Errors: InvalidArgument (an invalid prior or one of another length, a landmark that does not
+// exist, a number that is not finite, a bad option).
 Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                                       const VisualEstimateOptions& options = {},
                                       const std::vector<double>& prior = {});
 
 // Kullback-Leibler divergence of p from q, nats, after mixing `uniform_weight` of the uniform distribution
-// into both [Sala06 §VI-C]; of two posteriors over the same places, elsewhere included.
+// into both [Sala06 §VI-C]; of two posteriors over the same places, with "elsewhere".
 double PosteriorDivergence(const VisualPose& p, const VisualPose& q, double uniform_weight);
 
 }  // namespace cairn

@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kNumBins = 72;
 constexpr double kBinRad = 2 * std::numbers::pi / kNumBins;
-// A place or heading is told to within its cell, so that a step adds a cell's variance (a twelfth of its
-// side's square) where it does not end in the middle of another.
+// A place or heading is known to within its cell, so a step adds a cell's variance (a twelfth of its side's
+// square) where it does not end in the middle of another cell.
 constexpr double kCellVariance = 1.0 / 12;
 // Cells farther off than this many standard deviations get nothing.
 constexpr double kReachSigmas = 3;
@@ -62,10 +62,12 @@ OptionTable DescribeOptions(VisualFilterOptions* o) {
       {"odometry_way_ratio", &o->odometry_way_ratio, "odometry's standard deviation, as part of the way", 0},
       {"odometry_turn_ratio", &o->odometry_turn_ratio, "odometry's standard deviation, as part of the turn",
        0},
-      {"odometry_sigma_m", &o->odometry_sigma_m, "and besides at every step, metres", 0},
-      {"odometry_sigma_deg", &o->odometry_sigma_deg, "and besides at every step, degrees", 0},
+      {"odometry_sigma_m", &o->odometry_sigma_m,
+       "odometry's standard deviation at every step in addition, metres", 0},
+      {"odometry_sigma_deg", &o->odometry_sigma_deg,
+       "odometry's standard deviation at every step in addition, degrees", 0},
       {"kidnapped_ratio", &o->kidnapped_ratio,
-       "probability that the robot was carried away since the image before", 0, 1}};
+       "probability that the robot was carried away since the last image", 0, 1}};
 }
 
 VisualFilter::VisualFilter(std::shared_ptr<const VisualMap> map, const VisualFilterOptions& options,
@@ -84,7 +86,8 @@ std::vector<double> VisualFilter::AtPlaces() const {
 
 Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
   if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
-    return MakeError(ErrorCode::kInvalidArgument, "visual map: the odometry's way or turn is no number");
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "visual map: the odometry's way or turn is not a finite number");
   const std::vector<Eigen::Vector2d>& places = map_->places();
   const double cell_variance = kCellVariance * map_->spacing_m() * map_->spacing_m();
   const double variance = std::pow(options_.odometry_way_ratio * way_m.norm(), 2) +
@@ -111,9 +114,10 @@ Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
         reached.emplace_back(to, variance > 0 ? std::exp(-0.5 * squared / variance) : 1);
         sum += reached.back().second;
       }
-      for (const auto& [to, weight] : reached) {  // who leaves the survey is lost to the belief
+      for (const auto& [to, weight] : reached) {  // probability that leaves the survey is lost
         for (size_t i = 0; i < turn.weights.size(); ++i) {
           const int to_bin = ((bin + turn.first + static_cast<int>(i)) % kNumBins + kNumBins) % kNumBins;
+          // [Sala06 §VI-C] the Markov chain's step: the belief moves as the odometry says, and widens
           moved[to][to_bin] += share * weight / sum * turn.weights[i];
         }
       }
@@ -134,7 +138,7 @@ Result<VisualPose> VisualFilter::See(const std::vector<SeenLandmark>& seen) {
   Normalise(&belief_);
   const std::vector<double> prior = AtPlaces();
   CAIRN_ASSIGN_OR_RETURN(VisualPose pose, EstimateVisualPose(*map_, seen, estimate_options_, prior));
-  // The image's likelihood per place and heading; "elsewhere" says nothing about either.
+  // [Sala06 §VI-C] p(z | x) per place and heading; "elsewhere" carries no information about either.
   for (size_t place = 0; place < belief_.size(); ++place) {
     std::vector<double> likelihood(kNumBins, pose.elsewhere);
     for (size_t heading = 0; heading < map_->headings_deg().size() && prior[place] > 0; ++heading) {

@@ -8,21 +8,21 @@
 
 namespace cairn {
 
-// p(x | z) over time: a Markov filter over the survey's places and headings [Sala06 §VII names it: a Markov
-// chain with the robot's motion model], for views that alone do not tell.
+// p(x | z) over time: a Markov filter over the survey's places and headings [Sala06 §VI-C: names "a Markov
+// chain and a model of the robot's motion"], for views that alone do not determine the place.
 struct VisualFilterOptions {
-  // What the odometry is off by: part of the way, part of the turn, and at every step besides, m and degrees.
-  // REQUIRES: >= 0
+  // Standard deviation of the odometry: part of the way, part of the turn, and an addition at every step, m
+  // and degrees.  REQUIRES: >= 0
   double odometry_way_ratio = 0.1;
   double odometry_turn_ratio = 0.05;
   double odometry_sigma_m = 0.02;
   double odometry_sigma_deg = 1;
-  // Probability that the robot was carried away since the image before.  REQUIRES: in [0, 1]
+  // Probability that the robot was carried away since the last image.  REQUIRES: in [0, 1]
   double kidnapped_ratio = 0.01;
 };
 OptionTable DescribeOptions(VisualFilterOptions* options);
 
-// Where the robot probably is: starts knowing nothing.  One per robot; not for concurrent calls.
+// Where the robot probably is, at first anywhere.  One per robot; not for concurrent calls.
 class VisualFilter {
  public:
   explicit VisualFilter(std::shared_ptr<const VisualMap> map, const VisualFilterOptions& options = {},
@@ -31,9 +31,9 @@ class VisualFilter {
   // The robot drove: ahead and to the left (m, in its frame at the start), and turned left (rad).
   // Errors: InvalidArgument for a number that is not finite.
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
-  // It sees landmarks.  The result is that of this image with the belief before as its prior; its at_place,
-  // mean and entropy are those of the belief after, and where the image has a flag, position and covariance
-  // of the place too.  Errors: as EstimateVisualPose.
+  // It sees landmarks.  The result is that of this image with the previous belief as its prior.  Its
+  // at_place, mean and entropy are those of the new belief; where the image has a flag, position and
+  // covariance are too.  Errors: as EstimateVisualPose.
   Result<VisualPose> See(const std::vector<SeenLandmark>& seen);
 
   // Probability per place of the map; sums to 1.

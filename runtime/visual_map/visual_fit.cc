@@ -14,14 +14,15 @@ namespace cairn {
 namespace {
 
 constexpr double kVoteBinRad = 2 * std::numbers::pi / 180;
-// The first step believes errors of this many standard deviations more.
+// The first step assumes errors larger by this factor.
 constexpr double kFirstStepScale = 3;
-// A turn that no item asks for is not wider than this.
+// Largest width of a turn that no item determines.
 constexpr double kWidestTurnRad = 1;
 
 }  // namespace
 
 ItemScore ScoreItem(const FitItem& item, const Eigen::Vector3d& error) {
+  // [Sala06 §VI-C] one landmark's factor of p(z | x), (1 - o) N(z; model(x), S) + o U, over o U
   const double log_odds = item.log_odds - 0.5 * (error.array().square() / item.variance.array()).sum();
   if (log_odds > 30) return {log_odds, 1};
   const double odds = std::exp(log_odds);

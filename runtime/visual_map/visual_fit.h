@@ -8,8 +8,8 @@
 
 namespace cairn {
 
-// How a camera at a place is held against the survey's: turned to the left, up, and clockwise, radians, and
-// held higher, metres.
+// The attitude of a camera at a place relative to the survey's: turned to the left, up, and clockwise,
+// radians, and held higher, metres.
 struct Turn {
   double left = 0, up = 0, clockwise = 0;
   double higher_m = 0;
@@ -23,7 +23,7 @@ struct FitItem {
   double rise = 0;  // d predicted.y / d height of the camera, px / m
   // ln of the odds that it is right, before its error: ((1 - o) / o) * N(0) / U.
   double log_odds = 0;
-  int match = -1;  // whose it is
+  int match = -1;  // index of its match
 };
 
 struct TurnFitOptions {
@@ -40,7 +40,7 @@ struct ItemScore {
 };
 ItemScore ScoreItem(const FitItem& item, const Eigen::Vector3d& error);
 
-// What is predicted for a camera that is held higher.
+// The prediction for a camera that is held higher.
 Eigen::Vector3d LiftedPrediction(const FitItem& item, double higher_m);
 
 // The error of an item seen by a camera that is held higher and turned, and d error / d (left, up, clockwise,
@@ -51,15 +51,15 @@ bool ItemError(const FitItem& item, const Eigen::Matrix3d& turn, double higher_m
 // d (as seen after the turn) / d predicted; the scale's own change is left out.
 Eigen::Matrix3d TurnGradient(const Eigen::Vector3d& predicted, const Eigen::Matrix3d& turn, double focal_px);
 
-// The turn to the left that most items ask for, by votes in bins of 2 degrees.  Nothing to find: 0.
+// The turn to the left that most items vote for, in bins of 2 degrees; 0 without votes.
 double VoteForLeft(const std::vector<FitItem>& items, const TurnFitOptions& options);
 
-// ln of the prior density of turns and heights without its exponents: headings are uniform over the circle,
+// ln of the normalisation of the prior density of turns and heights: headings are uniform over the circle,
 // tilt and height normal.
 double LogTurnPrior(const TurnFitOptions& options);
 
 // Improves a turn by `num_steps` of iteratively reweighted least squares, and returns ln of the integral over
-// turns and heights of prior times the product of the items' ratios, by Laplace.
+// turns and heights of the prior times the product of the items' ratios, by Laplace's method.
 double FitTurn(const std::vector<FitItem>& items, const TurnFitOptions& options, int num_steps, Turn* turn);
 
 }  // namespace cairn

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "core/base/deciles.h"
 #include "core/base/no_throw.h"
+#include "core/base/quantiles.h"
 #include "core/camera/camera_turn.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/floor_pose.h"
@@ -16,7 +16,7 @@
 namespace cairn {
 namespace {
 
-// Stations nearer than this are at one place.
+// Stations closer together than this are at one place.
 constexpr double kSamePlaceM = 0.01;
 constexpr double kGuessedFocal = 1.2;  // of the longer side
 
@@ -44,7 +44,7 @@ double MedianSpacing(const std::vector<Eigen::Vector2d>& places) {
     }
     nearest.push_back(least);
   }
-  return nearest.size() < 2 ? 1 : Median(nearest);
+  return nearest.size() < 2 ? 1 : UpperMedian(nearest);
 }
 
 double Deviation(const std::vector<double>& values) {
@@ -155,8 +155,8 @@ Status VisualMap::AddModels(const VisualMapData& data) {
       }
       auto interpolation = LandmarkModel::Make(sights, stored.shape);
       if (!interpolation) {
-        return MakeError(ErrorCode::kCorrupt, "the {} sights of landmark {} make no model", sights.size(),
-                         landmark);
+        return MakeError(ErrorCode::kCorrupt, "the {} sights of landmark {} do not determine a model",
+                         sights.size(), landmark);
       }
       models_of_landmark_[landmark].push_back(static_cast<int32_t>(models_.size()));
       models_.push_back({static_cast<LandmarkIdx>(landmark),

@@ -14,9 +14,10 @@
 
 namespace cairn {
 
-// Localization without 3-D points and without a calibration [Sala06 §VI-C, after Sim & Dudek]: the visual map
-// has, for every landmark and heading, a model of where in the image and how large it shows from where.  It
-// is opt-in ([emit_map] visual_map = true); runtime/visual_map/visual_estimate.h finds the pose.
+// Localization without 3-D points and without a calibration [Sala06 §VI-C: after Sim & Dudek]: the visual map
+// has, for every landmark and heading, a model of its place and size in the image as a function of the
+// camera's place.  It is opt-in ([emit_map] visual_map = true); runtime/visual_map/visual_estimate.h finds
+// the pose.
 
 struct VisualMapOptions {
   // A model counts at the survey's places that see the landmark, and at those within this distance of one, in
@@ -29,7 +30,7 @@ struct VisualMapOptions {
 };
 OptionTable DescribeOptions(VisualMapOptions* options);
 
-// A keypoint that shows a landmark, as the estimator takes it: no camera.
+// A keypoint that shows a landmark, in the estimator's form: without a camera.
 struct SeenLandmark {
   LandmarkIdx landmark = 0;
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();  // x px, y px, log2 of the scale in px
@@ -39,17 +40,17 @@ struct SeenLandmark {
 struct VisualSurvey {
   std::vector<Eigen::Vector2d> places;  // the pose lattice, each place once; floor frame, metres
   std::vector<Eigen::Vector2d> images;  // where each image of the map was taken
-  std::vector<double> heights_m;        // and how high; empty: all as high as each other
+  std::vector<double> heights_m;        // and how high; empty: all at the same height
   int width_px = 0, height_px = 0;      // of the images
 };
 
-// Stations nearer than a centimetre are one place.
+// Stations closer together than a centimetre are one place.
 std::vector<Eigen::Vector2d> DistinctPlaces(const std::vector<Eigen::Vector2d>& stations);
 
 // The visual map of a map, ready to use: immutable, shareable.
 class VisualMap {
  public:
-  // What a model says at a place of the survey.
+  // A model's prediction at a place of the survey.
   struct AtPlace {
     int32_t place = 0;
     Eigen::Vector3d seen;                  // from the image's middle
@@ -80,20 +81,21 @@ class VisualMap {
   // Median distance from a place to the next.
   double spacing_m() const { return spacing_m_; }
   const std::vector<double>& headings_deg() const { return headings_deg_; }
-  // px; where the survey does not tell how far a turn moves the image, a guess: 1.2 max(width, height).
+  // px; where the survey does not say how far a turn moves the image, a guess: 1.2 max(width, height).
   double focal_px() const { return focal_px_; }
   bool has_learnt_focal() const { return has_learnt_focal_; }
   const VisualErrors& errors() const { return errors_; }
   // Standard deviation of the survey's cameras' heights, m.
   double height_sigma_m() const { return height_sigma_m_; }
-  // Size of the images that it is for.
+  // Size of the images that it can localize.
   int image_width_px() const { return survey_.width_px; }
   int image_height_px() const { return survey_.height_px; }
   Eigen::Vector2d middle_px() const { return {0.5 * survey_.width_px, 0.5 * survey_.height_px}; }
-  // Of what a model says at a place: that of left-out sights, grown with the distance from its sights.
+  // Variance of a model's prediction at a place: that of left-out sights, growing with the distance from
+  // its sights.
   Eigen::Vector3d Variance(const Model& model, const Eigen::Vector2d& position) const;
   const std::vector<Model>& models() const { return models_; }
-  // Of a landmark: indices in models().
+  // Models of a landmark: indices in models().
   const std::vector<int32_t>& ModelsOf(LandmarkIdx landmark) const { return models_of_landmark_[landmark]; }
   int64_t num_landmarks() const { return static_cast<int64_t>(models_of_landmark_.size()); }
 

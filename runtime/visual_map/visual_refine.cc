@@ -13,8 +13,8 @@ namespace cairn {
 namespace {
 
 constexpr int kNumPoseSteps = 12;
-// The first steps believe larger errors: by this much, halved from step to step.
-constexpr double kFirstStepScale = 8;
+// The first steps assume larger errors: by this factor, halved from step to step.
+constexpr double kFirstRefineScale = 8;
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
@@ -38,7 +38,7 @@ class Refiner {
         .start = start, .position = map_.places()[start.place] + start.offset, .turn = start.turn};
     for (int step = 0; step < kNumPoseSteps; ++step) {
       const NormalEquations equations =
-          Linearise(std::max(1.0, std::ldexp(kFirstStepScale, -step)), &refined);
+          Linearise(std::max(1.0, std::ldexp(kFirstRefineScale, -step)), &refined);
       const Vector6d change = -equations.normal.ldlt().solve(equations.gradient);
       if (!change.allFinite()) return std::nullopt;
       Step(change, &refined);
@@ -47,7 +47,7 @@ class Refiner {
     const Matrix6d inverse = normal.inverse();
     if (!inverse.allFinite()) return std::nullopt;
     refined.covariance = inverse.topLeftCorner<3, 3>();
-    // A place of the survey stands for the square of its spacing.
+    // A place of the survey stands for an area of the square of its spacing.
     refined.log_mass = search_.LogMassWithoutMatches(start.place) - 2 * std::log(map_.spacing_m()) +
                        LogTurnPrior(search_.fit()) + refined.log_density +
                        3 * std::log(2 * std::numbers::pi) - 0.5 * std::log(normal.determinant());
@@ -55,7 +55,7 @@ class Refiner {
   }
 
  private:
-  // Also counts what agrees.  `scale`: by how much larger errors are believed.
+  // Also counts agreeing matches.  `scale`: factor on the assumed errors.
   NormalEquations Linearise(double scale, DensityMaximum* refined) const {
     const TurnFitOptions& fit = search_.fit();
     const Turn& turn = refined->turn;
@@ -97,7 +97,7 @@ class Refiner {
 
   const VisualMap& map_;
   const VisualSearch& search_;
-  Vector6d weights_;  // what is known before
+  Vector6d weights_;  // of the prior
   Vector6d least_;    // keeps the system solvable
 };
 

@@ -11,12 +11,12 @@ namespace cairn {
 
 // A maximum of p(x | z) between the survey's places.
 struct DensityMaximum {
-  VisualHypothesis start;  // what it was found from
+  VisualHypothesis start;  // the point that it was found from
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Turn turn;
   double log_density = 0;  // there, unnormalised: ln p(z | x) p(turn)
-  // ln of its integral over places, turns and heights by Laplace, in the measure of VisualHypothesis's
-  // log_mass.
+  // ln of its integral over places, turns and heights by Laplace, in the measure of
+  // VisualHypothesis's log_mass.
   double log_mass = 0;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // x m, y m, heading rad
   std::vector<int> agreeing;                             // matches

@@ -119,6 +119,7 @@ double VisualSearch::LogMassWithoutMatches(int32_t place) const {
 }
 
 void VisualSearch::Fit(double log_share, VisualHypothesis* hypothesis) const {
+  // [Sala06 §VI-C] p(x | z) ~ p(z | x) p(x), as logarithms
   hypothesis->log_mass = LogMassWithoutMatches(hypothesis->place) + log_share +
                          FitTurn(items_, fit_, kNumTurnSteps, &hypothesis->turn);
 }

@@ -26,8 +26,8 @@ struct VisualTerm {
   const VisualMap::AtPlace* at;
 };
 
-// How well every place and heading of a visual map explains an image, and points around the best ones: what
-// p(x | z) of runtime/visual_map/visual_estimate.h is made of.
+// How well every place and heading of a visual map explains an image, and points around the best ones: the
+// parts of p(x | z) of runtime/visual_map/visual_estimate.h.
 class VisualSearch {
  public:
   // Keeps references.  `log_prior`: per place of the map.
@@ -36,7 +36,8 @@ class VisualSearch {
 
   // O(matches * places * headings).
   void Run();
-  // Adds a point with what the hypotheses of its heading up to `reach_m` around it lack of its mass together.
+  // Adds a point with the mass that the hypotheses of its heading within `reach_m` lack compared
+  // with its own.
   void AddMissingMass(VisualHypothesis point, double reach_m);
 
   // Places and headings, then, from first_point() on, points around the best of them, which these replace.
@@ -50,12 +51,12 @@ class VisualSearch {
   // `offset`: from the term's place, metres; `spread_m`: the item stands for points this far around, standard
   // deviation per axis.
   FitItem MakeItem(const VisualTerm& term, const Eigen::Vector2d& offset, double spread_m) const;
-  // Of what the term's model says at a position.
+  // From the prediction of the term's model at a position.
   FitItem MakeItem(const VisualTerm& term, const LandmarkModel::Prediction& prediction,
                    const Eigen::Vector2d& position) const;
 
  private:
-  // `variance`: of the model and for the points that the item stands for.
+  // `variance`: of the model plus that of the points that the item stands for.
   FitItem MakeItem(const VisualTerm& term, const Eigen::Vector3d& predicted, const Eigen::Vector3d& variance,
                    double rise) const;
   double LogOdds(const VisualMap::Model& model, const Eigen::Vector3d& variance) const;
@@ -74,7 +75,7 @@ class VisualSearch {
   std::vector<std::vector<VisualTerm>> terms_;  // per heading and place
   std::vector<VisualHypothesis> hypotheses_;
   size_t first_point_ = 0;
-  std::vector<FitItem> items_;  // of the one that is looked at
+  std::vector<FitItem> items_;  // of the hypothesis being fitted
 };
 
 }  // namespace cairn

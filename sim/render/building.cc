@@ -40,8 +40,8 @@ class BuildingMaker {
   }
 
  private:
-  // The texture's first column is at the face's left and its first row at the top, seen from outside of the
-  // box.
+  // The texture's first column is at the face's left and its first row at the top, seen from outside
+  // of the box.
   Surface FaceSurface(const Box& box, int face, int texture) const {
     Surface surface;
     surface.texture = texture;
@@ -163,7 +163,7 @@ class BuildingMaker {
     building_.num_repeated_panels = num_repeated;
   }
 
-  // Panels of the second twin take the textures of the first, but for the ones that are to differ.
+  // Panels of the second twin take the textures of the first, except those that are to differ.
   void PairTwins() {
     const Twins& twins = *building_.layout.twins;
     const Rect& rect = twins.rect;
@@ -199,7 +199,7 @@ class BuildingMaker {
     }
   }
 
-  // The floor or the ceiling of the second twin: that of the first.
+  // Copies the floor or the ceiling of the first twin to the second.
   void CopyTwin(cv::Mat picture, double texel_m) const {
     const Twins& twins = *building_.layout.twins;
     const auto column = [&](double x) { return std::clamp(static_cast<int>(x / texel_m), 0, picture.cols); };

@@ -14,7 +14,7 @@
 
 namespace cairn::sim {
 
-// How a plane that is perpendicular to an axis carries its texture: texel = offset + scale * coordinate, for
+// How the texture lies on a plane that is perpendicular to an axis: texel = offset + scale * coordinate, for
 // two axes.
 struct Surface {
   int texture = -1;  // index into Building::textures; -1 is never seen
@@ -38,7 +38,7 @@ struct RayHit {
 };
 
 // A synthetic building: geometry, textures, and an index for ray casting.  World frame: z up, floor at z = 0,
-// metres. Immutable after MakeBuilding and shareable between threads.
+// metres.  Immutable after MakeBuilding and shareable between threads.
 struct Building {
   Layout layout;
   double height_m = 0;
@@ -62,8 +62,8 @@ struct Building {
 };
 
 // Builds and paints it.  The same options and seed give the same building for any number of threads.
-// Cost: about 10 million texels a second and thread.  Errors: InvalidArgument, as CheckSimulateOptions and
-// MakeLayout.
+// Cost: about 10 million texels a second and thread.  Errors: InvalidArgument, as CheckSimulateOptions
+// and MakeLayout.
 Result<Building> MakeBuilding(const SimulateOptions& options, uint64_t seed, int num_threads = 0);
 
 // The first surface along a ray (world frame; `direction` need not have length 1).  Nothing for a ray that

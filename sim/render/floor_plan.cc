@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Corners are written in tenths of a millimetre; edges nearer than that are one.
+// Corners are written in tenths of a millimetre; edges closer than that are treated as one.
 constexpr double kGridM = 1e-4;
 
 double Snapped(double value) { return std::round(value / kGridM) * kGridM; }

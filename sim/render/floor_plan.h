@@ -21,11 +21,13 @@ struct PlanPolygon {
 // crossings of their edges.  One polygon per connected part, by its lowest, then leftmost corner.
 std::vector<PlanPolygon> FreeSpace(const Rect& bounds, const std::vector<Rect>& obstacles);
 
-// The floor plan as a GeoJSON FeatureCollection, metres in the capture's world frame.  Property "kind" of a
-// feature:
-//   free_space   where the floor is free (Polygon, or MultiPolygon where it has several parts); always the
-//   first wall         a straight wall with its openings, a MultiPolygon of its pieces furniture, pillar with
-//   "height_m" room, corridor      with "name"
+// The floor plan as a GeoJSON FeatureCollection, metres in the capture's world frame.  Property "kind" of
+// a feature:
+//   free_space           where the floor is free; always the first feature.  A Polygon, or a MultiPolygon
+//                        where the free floor has several parts
+//   wall                 a straight wall with its openings, a MultiPolygon of its pieces
+//   furniture, pillar    with "height_m"
+//   room, corridor       with "name"
 Status WriteFloorPlan(const Layout& layout, const std::vector<Rect>& obstacles, const std::string& path);
 
 }  // namespace cairn::sim

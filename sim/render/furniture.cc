@@ -11,14 +11,14 @@ namespace {
 constexpr int kMaxAttemptsPerRoom = 200;
 // Kept free in front of a door, metres.
 constexpr double kDoorApproachM = 0.8;
-// Between pieces that do not touch, metres.
+// Gap between pieces that do not touch, metres.
 constexpr double kGapM = 0.05;
 // Edge of a cell of the raster on which connectedness is tested, metres.
 constexpr double kCellM = 0.05;
 constexpr double kPillarEdgeM = 0.35;
 
-// Whether the cells of a room that keep `clearance` from its walls and obstacles are one 4-connected part and
-// hold a cell in front of each door.
+// Whether the cells of a room that keep `clearance` from its walls and obstacles are one 4-connected part
+// with a cell in front of each door.
 bool StaysConnected(const Rect& room, const std::vector<Rect>& obstacles, const std::vector<Rect>& approaches,
                     double clearance) {
   const Rect inner = room.Grown(-clearance);

@@ -10,11 +10,11 @@
 namespace cairn::sim {
 namespace {
 
-// Least width and depth of a room, metres, and greatest share of the average by which walls between rooms
-// shift.
+// Least width and depth of a room, metres, and greatest share of the average by which walls between
+// rooms shift.
 constexpr double kMinRoomM = 2.0;
 constexpr double kWallShift = 0.15;
-// Depth of building per corridor, metres: beyond it there is another one.
+// Depth of building per corridor, metres: a deeper building has another corridor.
 constexpr double kDepthPerCorridorM = 11;
 // Least wall beside a door, metres.
 constexpr double kDoorMarginM = 0.25;
@@ -65,11 +65,10 @@ class LayoutMaker {
     const double strip =
         (d - num_corridors * (corridor + 2 * t) - (num_corridors - 1) * t) / (2 * num_corridors);
     if (strip < kMinRoomM) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "a building of depth_m = {:g} with corridor_width_m = {:g} leaves {:.2f} m for rooms on either "
-          "side, {:g} m are needed; make it deeper or the corridor narrower",
-          d, corridor, strip, kMinRoomM);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "a building of depth_m = {:g} with corridor_width_m = {:g} leaves {:.2f} m for rooms "
+                       "on either side, but {:g} m are needed; make it deeper or the corridor narrower",
+                       d, corridor, strip, kMinRoomM);
     }
     std::vector<std::pair<double, double>> intervals = {{0, w}};
     if (num_corridors > 1) {
@@ -106,11 +105,10 @@ class LayoutMaker {
     double total_width = 0;
     for (const Block& block : blocks_) total_width += block.rect.width();
     if (options_.num_rooms < num_blocks) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "option num_rooms = {}: this building has {} stretches of rooms along its corridors, each "
-          "needs at least one room; ask for {} rooms or a smaller depth_m",
-          options_.num_rooms, num_blocks, num_blocks);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "option num_rooms = {}: this building has {} stretches of rooms along its corridors, "
+                       "and each needs at least one room; ask for {} rooms or a smaller depth_m",
+                       options_.num_rooms, num_blocks, num_blocks);
     }
     std::vector<std::pair<double, int>> remainders;
     int left = options_.num_rooms;

@@ -7,7 +7,7 @@
 
 namespace cairn::sim {
 
-// What is built, how it is surveyed, and what the camera adds.  The defaults are the demo: about 130 stations
+// The building, its survey, and the effects of the camera.  The defaults are the demo: about 130 stations
 // with four headings each in four furnished rooms along a corridor, and 93 held-out queries.
 struct SimulateOptions {
   // --- The building: a box of width_m (x) by depth_m (y) inside its outer walls, floor at z = 0.
@@ -30,21 +30,21 @@ struct SimulateOptions {
   // Share of a room's floor that furniture covers, as far as it fits without cutting the room in two.
   // REQUIRES: in [0, 0.6]
   double furniture_ratio = 0.12;
-  // Pillars per room, standing free where there is place.  REQUIRES: in [0, 10]
+  // Pillars per room, free-standing where there is space.  REQUIRES: in [0, 10]
   double pillars_per_room = 0.5;
 
   // Two wings that look alike, a spine and a goal room instead of rooms along corridors: perceptual aliasing
   // of whole places (twin_wings.h).
   bool twin_wings = false;
   // The wings lead on to a second corridor, to which the goal room opens as well: ways that look alike, and
-  // one that does not.  Counts with twin_wings only.
+  // one that does not.  Used with twin_wings only.
   bool back_corridor = false;
 
   // --- Its surfaces
   // Walls are covered with panels of at most this width, each with a texture.  REQUIRES: in [0.5, 10]
   double panel_width_m = 1.6;
-  // Share of wall panels that take their texture from a small shared set: perceptual aliasing.  REQUIRES: in
-  // [0, 1]
+  // Share of wall panels that take their texture from a small shared set: perceptual aliasing.
+  // REQUIRES: in [0, 1]
   double repetition_ratio = 0.15;
   // Size of that set.  REQUIRES: in [1, 100]
   int num_shared_textures = 3;
@@ -55,7 +55,7 @@ struct SimulateOptions {
   double texel_m = 0.003;
 
   // --- The camera.  PINHOLE: an ideal one.  OPENCV_FISHEYE: a fisheye lens with some distortion.
-  // EQUIRECTANGULAR: panoramas for the survey (one a station, num_headings does not count), pinhole queries.
+  // EQUIRECTANGULAR: panoramas for the survey (one per station; num_headings is not used), pinhole queries.
   std::string camera_model = "PINHOLE";
   // REQUIRES: in [32, 8192]
   int image_width_px = 640;
@@ -80,19 +80,19 @@ struct SimulateOptions {
   std::vector<double> survey_area_m;
   // Path length between two images of a driven survey.  REQUIRES: in [0.01, 5]
   double step_m = 0.15;
-  // Another run through the same building: other places in another order, other noise; a second survey of it,
-  // or a drive to localize along.  REQUIRES: >= 0
+  // Number of the run through the same building; each has other places in another order, and other noise.
+  // For a second survey of it, or a drive to localize along.  REQUIRES: >= 0
   int run = 0;
   // Least distance of the camera from walls and furniture.  REQUIRES: in [0.05, 2]
   double clearance_m = 0.3;
-  // Standard deviation of what images.txt says against where the camera was: per axis of position and of
-  // rotation. REQUIRES: in [0, 1] and [0, 45]
+  // Standard deviation of the poses in images.txt from the true ones: per axis of position and of rotation.
+  // REQUIRES: in [0, 1] and [0, 45]
   double pose_noise_m = 0;
   double pose_noise_deg = 0;
   // Standard deviation of the grey noise of survey images, of 255.  REQUIRES: in [0, 50]
   double image_noise = 1.0;
-  // Brightness of all images before noise, as part of full light: the less, the more noise and rounding to
-  // grey values count.  REQUIRES: in [0.01, 1]
+  // Brightness of all images before noise, as part of full light: with less light, noise and rounding to grey
+  // values matter more.  REQUIRES: in [0.01, 1]
   double light_ratio = 1;
   // Of all image files.  REQUIRES: in [1, 100]
   int jpeg_quality = 95;
@@ -100,7 +100,7 @@ struct SimulateOptions {
   // --- The queries: free poses off the lattice, held out
   // REQUIRES: in [0, 1000000]
   int num_queries = 93;
-  // Whereto queries of a lattice survey look: "any" way, or "surveyed": along one of its headings.
+  // Where queries of a lattice survey look: in "any" direction, or "surveyed": along one of its headings.
   std::string query_headings = "any";
   // Standard deviations of pitch and roll, and of the height around camera_height_m.
   // REQUIRES: in [0, 30] and [0, 0.3]
@@ -118,7 +118,7 @@ struct SimulateOptions {
 };
 OptionTable DescribeOptions(SimulateOptions* options);
 
-// Ranges, and what one option says about another.  Errors: InvalidArgument.
+// Checks ranges and combinations of options.  Errors: InvalidArgument.
 Status CheckSimulateOptions(const SimulateOptions& options);
 
 }  // namespace cairn::sim

@@ -11,8 +11,8 @@
 namespace cairn::sim {
 
 // Procedural surfaces, 8-bit grey.  All have structure at many scales, as things in buildings do, so that
-// features found from one distance are found again from another; noise of one scale would not be.  Same size,
-// texel and random stream, same picture.
+// features found from one distance are found again from another; with noise of one scale they would not be.
+// Same size, texel and random stream, same picture.
 
 enum class Material { kPlaster, kBrick, kWood, kConcrete, kWallpaper };
 inline constexpr int kNumMaterials = 5;

@@ -9,12 +9,12 @@ namespace {
 
 // Pixels in which surfaces meet are the mean of this many rays squared.
 constexpr int kEdgeSamples = 3;
-// A pixel averages a surface over this many times its own width: a lens is never as sharp as its sensor's
-// grid.
+// A pixel averages a surface over this many times its own width: a lens is never as sharp as its
+// sensor's grid.
 constexpr float kLensWidthPx = 1.5f;
 // Stands for "no surface" beside the values of RayHit::face.
 constexpr int kNoFace = -3;
-// Walls are darker towards the floor: brightness there, of that below the ceiling.
+// Walls are darker towards the floor: brightness there, as part of that below the ceiling.
 constexpr double kBrightnessAtFloor = 0.8;
 
 // The surface that a ray meets, and its grey value averaged over the pixel's footprint; `step_x` and `step_y`
@@ -75,7 +75,8 @@ cv::Mat Renderer::RenderFloat(const Pose& cam_from_world) const {
   struct SteppedRay {
     Eigen::Vector3d ray, step_x, step_y;
   };
-  // To the next pixel in a direction; at the border, and beside pixels without a ray, from the one before.
+  // Step to the next pixel in a direction; at the border, and beside pixels without a ray, from the
+  // previous pixel.
   const auto step = [&](int x, int y, int dx, int dy) {
     const auto is_inside = [&](int px, int py) { return px >= 0 && py >= 0 && px < width && py < height; };
     Eigen::Vector3f change = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());

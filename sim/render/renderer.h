@@ -11,8 +11,8 @@
 
 namespace cairn::sim {
 
-// What a camera sees in a building.  Made once per camera (the ray of every pixel is worked out then), used
-// for any number of poses, from any number of threads at once:
+// Renders what a camera sees in a building.  Made once per camera (the ray of every pixel is computed then),
+// used for any number of poses, from any number of threads at once:
 //
 //   CAIRN_ASSIGN_OR_RETURN(const Building building, MakeBuilding(options, seed));
 //   const Renderer renderer(building, camera);
@@ -20,15 +20,15 @@ namespace cairn::sim {
 //
 // One ray per pixel through a grid of boxes; textures are averaged over the pixel's footprint, and pixels in
 // which two surfaces meet over kEdgeSamples^2 rays: no aliasing.  All camera models of core/camera/camera.h,
-// lens distortion included. Deterministic.  About 50 ms for 640 x 480 on one core.
+// lens distortion included.  Deterministic.  About 50 ms for 640 x 480 on one core.
 class Renderer {
  public:
   // `building` must outlive the renderer.  REQUIRES: CheckCamera(camera).ok()
   Renderer(const Building& building, const Camera& camera);
 
-  // The image, 8-bit grey.  Black where a pixel has no ray, and from outside of the free space.
+  // The image, 8-bit grey.  Black where a pixel has no ray, and for cameras outside of the free space.
   cv::Mat Render(const Pose& cam_from_world) const;
-  // The same before rounding, CV_32FC1 in [0, 255]: for adding exposures, noise, blur.
+  // The same before rounding, CV_32FC1 in [0, 255]: for adding exposure, noise and blur.
   cv::Mat RenderFloat(const Pose& cam_from_world) const;
 
   const Camera& camera() const { return camera_; }

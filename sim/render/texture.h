@@ -8,8 +8,8 @@
 namespace cairn::sim {
 
 // A grey picture with its chain of half-size levels, sampled without aliasing: at the level that fits the
-// pixel's footprint (trilinear), with several taps along the footprint where a surface is seen at a grazing
-// angle.
+// pixel's footprint (trilinear), with several taps along the footprint where a surface is seen at a
+// grazing angle.
 class Texture {
  public:
   Texture() = default;
@@ -23,7 +23,7 @@ class Texture {
 
   // Grey value in [0, 255] around `position` (texels; the first texel's centre is (0.5, 0.5)), averaged over
   // the parallelogram spanned by `step_x` and `step_y`: how far the position moves per pixel to the right and
-  // down. Beyond the border the outermost texels are repeated.
+  // down.  Beyond the border the outermost texels are repeated.
   float Sample(const Eigen::Vector2f& position, const Eigen::Vector2f& step_x,
                const Eigen::Vector2f& step_y) const;
 

@@ -6,7 +6,7 @@
 namespace cairn::sim {
 namespace {
 
-// Of the spine, on either side of a wing, that looks the same before both, metres.
+// Length of the spine on either side of a wing that looks the same at both wings, metres.
 constexpr double kMarginM = 0.9;
 // Least length of a wing and least width and depth of the goal room, metres.
 constexpr double kMinWingM = 2.5;
@@ -45,7 +45,7 @@ Result<Layout> MakeTwinLayout(const SimulateOptions& options) {
   layout.walls[1].joints = layout.walls[0].joints;
   if (!options.back_corridor) layout.walls[1].joints = {first, first + c, second, second + c};
 
-  // The solid parts between the wings: walls around what nobody enters.
+  // The solid parts between the wings: walls around closed space.
   double x = 0;
   const auto add_along_spines = [&](double low, double high, std::vector<std::pair<double, double>> doors) {
     layout.walls.push_back({{low, c, high, upper_y}, true, doors});

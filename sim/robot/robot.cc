@@ -14,7 +14,7 @@ namespace {
 
 // Turns on the spot, degrees from where it lost the target, in order.
 constexpr double kSearchDeg[] = {20, -20, 40, -40, 60, -60};
-// Commands to one image that something stops, before the robot gives up.
+// Number of blocked commands on the way to one image after which the robot gives up.
 constexpr int kMaxNumBlocked = 8;
 constexpr DescriptorMatcherOptions kMatcher{.max_ratio = 0.85, .max_angle_rad = 0.8};
 
@@ -33,21 +33,21 @@ OptionTable DescribeOptions(RobotOptions* o) {
   OptionTable table = {
       {.name = "servo",
        .value = &o->servo,
-       .help = "how the robot gets to an image: steered by it, or put there with noise",
+       .help = "how the robot gets to an image: steered by the image, or put there with noise",
        .choices = {"epipolar", "ideal"}},
       {"ideal_noise_m", &o->ideal_noise_m, "standard deviation of the ideal servo's place, per axis, metres",
        0, 1},
       {"ideal_noise_deg", &o->ideal_noise_deg, "standard deviation of the ideal servo's heading, degrees", 0,
        45},
-      {"ideal_reach_m", &o->ideal_reach_m, "the ideal servo gets to places no farther than this, metres",
+      {"ideal_reach_m", &o->ideal_reach_m, "the ideal servo reaches places no farther than this, metres",
        0.01, 1000},
       {"focal_ratio", &o->focal_ratio, "focal length that the servo assumes over the camera's", 0.5, 2},
       {"radius_m", &o->radius_m, "radius of the robot, metres", 0, 2},
       {"max_num_commands", &o->max_num_commands, "most commands to one image", 1},
       {"pass_distance_ratio", &o->pass_distance_ratio,
-       "distance at which images on the way are passed, over that of the scene", 1e-4, 1},
-      {"pass_heading_deg", &o->pass_heading_deg, "turn at which images on the way are passed, degrees", 1e-3,
-       45},
+       "distance at which images on the way count as reached, over that of the scene", 1e-4, 1},
+      {"pass_heading_deg", &o->pass_heading_deg, "turn at which images on the way count as reached, degrees",
+       1e-3, 45},
       {"image_noise", &o->image_noise, "standard deviation of grey noise, of 255", 0, 50},
   };
   const OptionTable sift = DescribeOptions(&o->sift);
@@ -132,7 +132,7 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
       alike.push_back({target.pose.position + Eigen::Vector2d(offset, 0), target.pose.heading_rad});
     }
   }
-  // It moves as the images' places do: by as much as from the last one's to this one's.
+  // It moves by the difference between the places of the last image and this one.
   Eigen::Vector2d expected = pose_.position;
   if (last_target_) expected += target.pose.position - last_target_->position;
   const PlanarPose& nearest =

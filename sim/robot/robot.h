@@ -20,13 +20,13 @@ namespace cairn::sim {
 
 struct RobotOptions {
   // How it gets to where an image was taken: "epipolar", by the servo (runtime/drive/servo.h); "ideal", put
-  // there with the noise below, or to the place of the other of twin wings that looks the same, where that is
-  // nearer: for statistics over many drives.
+  // there with the noise below, or at the same-looking place in the other twin wing, where that is nearer:
+  // for statistics over many drives.
   std::string servo = "epipolar";
   // Standard deviations of the ideal servo, per axis and of the heading.  REQUIRES: >= 0
   double ideal_noise_m = 0.05;
   double ideal_noise_deg = 2;
-  // The ideal servo gets to places that are no farther than this, metres.  REQUIRES: > 0
+  // The ideal servo reaches places that are no farther than this, metres.  REQUIRES: > 0
   double ideal_reach_m = 4;
   // The assumed focal length over the camera's.  REQUIRES: in [0.5, 2]
   double focal_ratio = 1;
@@ -34,24 +34,24 @@ struct RobotOptions {
   double radius_m = 0.15;
   // Most commands to one image.  REQUIRES: >= 1
   int max_num_commands = 120;
-  // Images on the way are passed at this distance, over that of the scene, and turn, degrees; the servo's own
-  // limits hold at the goal.  REQUIRES: > 0
+  // Images on the way count as reached at this distance, over that of the scene, and this turn, degrees; the
+  // servo's own limits hold at the goal.  REQUIRES: > 0
   double pass_distance_ratio = 0.04;
   double pass_heading_deg = 4;
-  // Of the image's grey values.  REQUIRES: in [0, 50]
+  // Standard deviation of the noise of the image's grey values.  REQUIRES: in [0, 50]
   double image_noise = 1;
   SiftOptions sift{.max_num_features = 800};
 };
 OptionTable DescribeOptions(RobotOptions* options);
 
-// What an image shows that can be found again, and where it was taken: known to the ideal servo alone.
+// The features of an image that can be found again, and its place, which only the ideal servo uses.
 struct ServoTarget {
   std::vector<Eigen::Vector2d> pixels;
   DescriptorMatrix descriptors;  // row i: pixel i
   PlanarPose pose;
 };
 
-// Of a survey image: the map's landmarks that it sees, projected by its pose.  Errors: as Map's.
+// The target of a survey image: the map's landmarks that it sees, projected by its pose.  Errors: as Map's.
 Result<ServoTarget> TargetOfImage(const Map& map, int32_t image);
 // The place of a survey image on the floor of the capture's frame.
 PlanarPose PlanarPoseOf(const Pose& cam_from_world);
@@ -64,7 +64,7 @@ struct RobotStep {
 
 struct RobotLeg {
   bool arrived = false;
-  bool seen = false;  // the target's matches agreed on a motion, if only once
+  bool seen = false;  // the target's matches agreed on a motion at least once
   std::string why;    // of the last command
   std::vector<RobotStep> steps;
 };
@@ -72,22 +72,23 @@ struct RobotLeg {
 // A robot with a camera in a synthetic building.  Deterministic by its seed.
 class Robot {
  public:
-  // `building` must outlive it.  Errors: InvalidArgument (options; a camera that is none).
+  // `building` must outlive it.  Errors: InvalidArgument (options; an invalid camera).
   static Result<Robot> Create(const Building& building, const Camera& camera, double camera_height_m,
                               const RobotOptions& options, const ServoOptions& servo_options, uint64_t seed);
 
   const PlanarPose& pose() const { return pose_; }
-  // Somewhere; it does not remember which image it came by.
+  // Puts it anywhere; it forgets its last image.
   void PutAt(const PlanarPose& pose) {
     pose_ = pose;
     last_target_.reset();
   }
 
-  // The features of what it sees.
+  // The features of its current image.
   Features Look();
   // Matches of such features with a target that agree on one motion over the floor; 0 where none do.
   int NumAgreeing(const Features& seen, const ServoTarget& target) const;
-  // Goes to where an image was taken.  A target without matches is looked for by turning on the spot.
+  // Goes to where an image was taken.  If there are no matches with the target, it searches by turning on
+  // the spot.
   RobotLeg GoTo(const ServoTarget& target, bool is_goal);
 
  private:
@@ -106,7 +107,7 @@ class Robot {
   uint64_t seed_;
   uint64_t num_draws_ = 0;  // images and noise so far
   PlanarPose pose_;
-  std::optional<PlanarPose> last_target_;  // where the image was taken that it was put at last
+  std::optional<PlanarPose> last_target_;  // place of the image that it was last put at
 };
 
 }  // namespace cairn::sim

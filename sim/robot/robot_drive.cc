@@ -82,7 +82,7 @@ class Driver {
     return MakeError(ErrorCode::kLost, "drive: not at the goal after {} images", num_legs_);
   }
 
-  // Where it stands is its start from now on.
+  // Its current place becomes its start.
   Status LookAnew(const char* kind) {
     robot_.PutAt(robot_.pose());
     const Features seen = robot_.Look();
@@ -92,8 +92,8 @@ class Driver {
     drive_.legs.push_back(leg);
     if (seen.keypoints.empty()) {
       return MakeError(ErrorCode::kNoData,
-                       "drive: an image without features at {:.2f}, {:.2f}; turn the "
-                       "camera to where there is something to see",
+                       "drive: an image without features at {:.2f}, {:.2f}; turn the camera to something "
+                       "with more texture",
                        robot_.pose().position.x(), robot_.pose().position.y());
     }
     PlaceScores scores = model_.Look(seen.descriptors);
@@ -105,8 +105,8 @@ class Driver {
     return TakeWay(hypotheses_->hypotheses()[hypotheses_->followed()].path, seen);
   }
 
-  // Scores become shares of the most matches, 0 for places whose images do not show what it sees, unless none
-  // does.
+  // Replaces scores by numbers of matches over the largest one, and by 0 for places whose images do not show
+  // what the robot sees; keeps the scores if no image does.
   Status KeepSeen(const Features& seen, PlaceScores* scores) {
     if (options_.min_start_inliers == 0) return Ok();
     std::vector<NodeIdx> order = BestFirst(scores->scores);
@@ -127,7 +127,7 @@ class Driver {
     return Ok();
   }
 
-  // Whether it shows what the image at `index` of the way does; the goal's after the last one.
+  // Whether the robot sees what the image at `index` of the way shows; past the last index: the goal's image.
   Result<bool> SeesNode(const Features& seen, size_t index) const {
     if (options_.min_start_inliers == 0) return false;
     CAIRN_ASSIGN_OR_RETURN(const ServoTarget target, index < way_.nodes().size()
@@ -150,9 +150,10 @@ class Driver {
     return LookAnew("relocalize");
   }
 
-  // An image of the way is not where the followed start has it: another one is tried, as long as there is
-  // any. An image that was seen and not reached is where it should be, and says nothing against the start; it
-  // is left out where the robot sees what the one after it shows, but no two in a row: it may be off its way.
+  // An image of the way is not where it should be if the followed start were right: another start is tried,
+  // as long as there is one.  An image that was seen but not reached is where it should be, so it is no
+  // evidence against the start; it is skipped where the robot sees what the next one shows, but never two in
+  // a row: the robot may be off its way.
   Status GiveUp(DriveLeg* leg) {
     if (leg->seen) {
       Note(leg);
@@ -170,11 +171,11 @@ class Driver {
     const std::string why = leg->why;
     Note(leg);
     if (!has_other) return Relocalize(why);
-    trail_.push_back({});  // of here, from where it goes back
+    trail_.push_back({});  // of this place, from which it goes back
     return Switch();
   }
 
-  // Back to the start over its own images, or on from where it would be by now.
+  // Goes back to the start over its own images, or on from where it would be by now.
   Status Switch() {
     ++drive_.num_switches;
     const int followed = hypotheses_->followed();
@@ -183,6 +184,7 @@ class Driver {
       if (!path) return Relocalize("no way from where the robot would be");
       return TakeWay(*path, robot_.Look());
     }
+    // [Mariottini11 §VI] "the images stored up to T to servo back to the initial image"
     for (size_t i = trail_.size() - 1; i-- > 0;) {
       const DriveLeg& leg = Go("retrace", trail_[i], -1, false);
       if (!leg.arrived) return Relocalize(leg.why);
@@ -192,8 +194,8 @@ class Driver {
     return TakeWay(hypotheses_->hypotheses()[followed].path, robot_.Look());
   }
 
-  // From its first image on, where what the second one shows is not to be seen from here; without the image
-  // that it could not reach before, where what comes after that is seen.
+  // Begins at the first image, unless what the second one shows is seen from here; skips the image that it
+  // could not reach before, where what comes after that is seen.
   Status TakeWay(const NodePath& path, const Features& seen) {
     std::vector<NodeIdx> nodes = path.nodes;
     if (nodes.size() > 1) nodes.pop_back();  // the goal's image itself comes last
@@ -246,9 +248,9 @@ class Driver {
   NodeIdx goal_node_ = -1;
   RobotDrive drive_;
   std::optional<StartHypotheses> hypotheses_;
-  std::vector<ServoTarget> trail_;  // its own images since the start, that first
+  std::vector<ServoTarget> trail_;  // its own images since the start, beginning with that one
   DriveWay way_;                    // without the goal, unless it is the start
-  NodeIdx unreached_ = -1;          // seen last and not reached
+  NodeIdx unreached_ = -1;          // seen last but not reached
   int num_legs_ = 0;
 };
 
@@ -258,13 +260,13 @@ OptionTable DescribeOptions(RobotDriveOptions* o) {
   OptionTable table = {
       {"max_num_legs", &o->max_num_legs, "most images that the robot goes to", 1},
       {"max_num_relocalizations", &o->max_num_relocalizations,
-       "how often it may look anew where it is, after it got lost", 0},
+       "how often it may localize itself again after it got lost", 0},
       {"min_start_inliers", &o->min_start_inliers,
-       "matches with a place's image that must agree on one motion for it to be held possible; 0: words "
-       "decide",
+       "matches with a place's image that must agree on one motion for the place to be a possible start; 0: "
+       "words decide",
        0},
-      {"max_num_start_checks", &o->max_num_start_checks, "places that are checked so, those that score best",
-       1},
+      {"max_num_start_checks", &o->max_num_start_checks,
+       "places that are checked in this way, those that score best", 1},
   };
   for (const OptionTable& part :
        {DescribeOptions(&o->robot), DescribeOptions(&o->servo), DescribeOptions(&o->hypotheses)}) {
@@ -282,8 +284,8 @@ Result<RobotDrive> DriveToImage(const Map& map, const PlaceModel& model, const B
   for (const PlanarPose& pose : {start, kidnapping ? kidnapping->pose : start}) {
     if (!(ClearanceM(building, pose.position.x(), pose.position.y()) > 0)) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "drive: no place to stand at {:g}, {:g}: in a wall, in "
-                       "furniture or outside of the building",
+                       "drive: no place to stand at {:g}, {:g}: in a wall, in furniture or outside of the "
+                       "building",
                        pose.position.x(), pose.position.y());
     }
   }

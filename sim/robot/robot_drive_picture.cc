@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/geometry/pose.h"
+#include "core/picture/floor_frame.h"
 #include "core/picture/svg.h"
 #include "sim/robot/robot_drive.h"
 
@@ -17,8 +18,11 @@ class Picture {
   Picture(const RobotDrive& drive, const Building& building, const std::vector<PlanarPose>& node_poses)
       : drive_(drive), building_(building), node_poses_(node_poses) {
     const Rect& bounds = building.layout.bounds;
-    px_per_m_ = (kWidthPx - 2 * kMarginPx) / bounds.width();
-    floor_px_ = bounds.depth() * px_per_m_;
+    frame_.low = {bounds.x0, bounds.y0};
+    frame_.high = {bounds.x1, bounds.y1};
+    frame_.px_per_m = (kWidthPx - 2 * kMarginPx) / bounds.width();
+    frame_.left_px = kMarginPx;
+    frame_.top_px = kTopPx;
     for (const DriveLeg& leg : drive.legs) {
       for (const DriveHypothesis& hypothesis : leg.hypotheses) {
         if (std::find(starts_.begin(), starts_.end(), hypothesis.start) == starts_.end())
@@ -28,9 +32,9 @@ class Picture {
   }
 
   std::string Draw() {
-    const double height = kTopPx + floor_px_ + kChartPx + kLegendPx + 40;
-    text_ = BeginSvg(kWidthPx, height, 14);
-    Write(
+    const double height = kTopPx + frame_.HeightPx() + kChartPx + kLegendPx + 40;
+    svg_.Begin(kWidthPx, height, 14);
+    svg_.Write(
         "<text x=\"{:.0f}\" y=\"34\" font-size=\"18\" font-weight=\"bold\">{}; {:.1f} m, turned back {} "
         "times, looked anew {} times</text>\n",
         kMarginPx, drive_.error ? "not at the goal" : "at the goal", drive_.way_m, drive_.num_switches,
@@ -38,19 +42,11 @@ class Picture {
     DrawFloor();
     DrawWay();
     DrawChart();
-    return text_ + "</svg>\n";
+    return svg_.End();
   }
 
  private:
-  template <typename... Args>
-  void Write(fmt::format_string<Args...> format, Args&&... args) {
-    text_ += fmt::format(format, std::forward<Args>(args)...);
-  }
-
-  Eigen::Vector2d Pixel(const Eigen::Vector2d& place) const {
-    const Rect& bounds = building_.layout.bounds;
-    return {kMarginPx + (place.x() - bounds.x0) * px_per_m_, kTopPx + (bounds.y1 - place.y()) * px_per_m_};
-  }
+  Eigen::Vector2d Pixel(const Eigen::Vector2d& place) const { return frame_.Pixel(place); }
 
   const char* Colour(NodeIdx start) const {
     const auto found = std::find(starts_.begin(), starts_.end(), start);
@@ -60,19 +56,19 @@ class Picture {
   void DrawArrow(const PlanarPose& pose, double size, const std::string& paint) {
     const Eigen::Vector2d p = Pixel(pose.position);
     const double c = std::cos(pose.heading_rad), s = -std::sin(pose.heading_rad);
-    Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}z\" {}/>\n", p.x() + size * c,
-          p.y() + size * s, p.x() - 0.4 * size * (c + s), p.y() - 0.4 * size * (s - c),
-          p.x() - 0.4 * size * (c - s), p.y() - 0.4 * size * (s + c), paint);
+    svg_.Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}z\" {}/>\n", p.x() + size * c,
+               p.y() + size * s, p.x() - 0.4 * size * (c + s), p.y() - 0.4 * size * (s - c),
+               p.x() - 0.4 * size * (c - s), p.y() - 0.4 * size * (s + c), paint);
   }
 
   void DrawFloor() {
-    Write("<g fill=\"#cccccc\">\n");
+    svg_.Write("<g fill=\"#cccccc\">\n");
     for (const Rect& rect : building_.obstacles) {
       const Eigen::Vector2d p = Pixel({rect.x0, rect.y1});
-      Write("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", p.x(), p.y(),
-            rect.width() * px_per_m_, rect.depth() * px_per_m_);
+      svg_.Write("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", p.x(), p.y(),
+                 rect.width() * frame_.px_per_m, rect.depth() * frame_.px_per_m);
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
     // The ways of the starts, later ones over earlier ones.
     for (const DriveLeg& leg : drive_.legs) {
       if (leg.kind != "start" && leg.kind != "relocalize") continue;
@@ -82,7 +78,7 @@ class Picture {
                     fmt::format("fill=\"none\" stroke=\"{}\"", Colour(hypothesis.start)));
         }
         const Eigen::Vector2d p = Pixel(hypothesis.start_pose.position);
-        Write(
+        svg_.Write(
             "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"13\" fill=\"none\" stroke=\"{}\" "
             "stroke-width=\"3\"/>\n",
             p.x(), p.y(), Colour(hypothesis.start));
@@ -99,36 +95,36 @@ class Picture {
       };
       for (const RobotStep& step : leg.steps) add(step.pose);
       add(leg.pose);
-      Write("<polyline points=\"{}\" fill=\"none\" stroke=\"#000000\" stroke-width=\"1.5\"{}/>\n", points,
-            leg.kind == "retrace" ? " stroke-dasharray=\"4 3\"" : "");
+      svg_.Write("<polyline points=\"{}\" fill=\"none\" stroke=\"#000000\" stroke-width=\"1.5\"{}/>\n",
+                 points, leg.kind == "retrace" ? " stroke-dasharray=\"4 3\"" : "");
     }
     DrawArrow(drive_.start, 12, "fill=\"#000000\"");
     DrawArrow(drive_.goal, 12, "fill=\"#D55E00\"");
-    const double y = kTopPx + floor_px_ + 26;
+    const double y = kTopPx + frame_.HeightPx() + 26;
     for (const auto& [line, text] :
          {std::pair(0, "black arrow: start, red: goal; line: the robot's way, dashed where it turns back"),
           std::pair(1,
                     "rings: starts held possible, with the images of their ways; below: posteriors after "
                     "each image")}) {
-      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", kMarginPx, y + 18 * line, text);
+      svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", kMarginPx, y + 18 * line, text);
     }
   }
 
   void DrawChart() {
-    const double top = kTopPx + floor_px_ + kLegendPx, bottom = top + kChartPx;
+    const double top = kTopPx + frame_.HeightPx() + kLegendPx, bottom = top + kChartPx;
     std::vector<const DriveLeg*> looked;
     for (const DriveLeg& leg : drive_.legs) {
       if (!leg.hypotheses.empty()) looked.push_back(&leg);
     }
     const double step = (kWidthPx - 2 * kMarginPx) / std::max<double>(1, looked.size());
-    Write("<path d=\"M{0:.0f} {1:.0f}v{2:.0f}h{3:.0f}\" fill=\"none\" stroke=\"#888888\"/>\n", kMarginPx, top,
-          kChartPx, kWidthPx - 2 * kMarginPx);
+    svg_.Write("<path d=\"M{0:.0f} {1:.0f}v{2:.0f}h{3:.0f}\" fill=\"none\" stroke=\"#888888\"/>\n", kMarginPx,
+               top, kChartPx, kWidthPx - 2 * kMarginPx);
     for (size_t i = 0; i < looked.size(); ++i) {
       double y = bottom;
       for (const DriveHypothesis& hypothesis : looked[i]->hypotheses) {
         const double part = hypothesis.posterior * kChartPx;
         y -= part;
-        Write(
+        svg_.Write(
             "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"><title>start "
             "{}: {:.3f}</title></rect>\n",
             kMarginPx + static_cast<double>(i) * step + 1, y, std::max(1.0, step - 2), part,
@@ -136,8 +132,8 @@ class Picture {
       }
       const std::string& verdict = looked[i]->verdict;
       if (!verdict.empty() && verdict != "follow") {
-        Write("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\">{}</text>\n",
-              kMarginPx + static_cast<double>(i) * step, bottom + 14, verdict);
+        svg_.Write("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\">{}</text>\n",
+                   kMarginPx + static_cast<double>(i) * step, bottom + 14, verdict);
       }
     }
   }
@@ -145,9 +141,9 @@ class Picture {
   const RobotDrive& drive_;
   const Building& building_;
   const std::vector<PlanarPose>& node_poses_;
-  double px_per_m_ = 1, floor_px_ = 0;
+  FloorFrame frame_;
   std::vector<NodeIdx> starts_;
-  std::string text_;
+  SvgWriter svg_;
 };
 
 }  // namespace

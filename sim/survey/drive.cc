@@ -14,14 +14,14 @@ namespace {
 
 // Edge of a cell of the raster on which ways are searched, metres.
 constexpr double kCellM = 0.1;
-// Places to visit in a room are at least so far from each other, metres.
+// Places to visit in a room are at least this far from each other, metres.
 constexpr double kVisitSpacingM = 1.5;
-// Cells nearer than this to something cost more, the nearer the more, metres.
+// Cells nearer than this to an obstacle cost more the nearer they are, metres.
 constexpr double kComfortM = 0.7;
 constexpr double kNearCost = 4;
 constexpr int kSmoothingSteps = 40;
-// Runs other than the first prefer some squares of this edge, metres: in the others ways cost up to so much
-// more.
+// Runs other than the first prefer some squares of this edge, metres; in the other squares ways cost up to
+// this factor more.
 constexpr double kPreferenceM = 0.8;
 constexpr double kPreferenceCost = 2;
 // Greatest turn between two images, rad: where the way turns faster, the camera turns on the spot.
@@ -79,7 +79,7 @@ class DrivePlanner {
 
   bool IsFree(int cell) const { return clearance_[cell] >= options_.clearance_m; }
 
-  // In every room the roomiest place, then further ones away from those chosen.
+  // Chooses in every room the place with the most space, then further ones away from those chosen.
   Status ChoosePlaces() {
     for (size_t r = 0; r < building_.layout.rooms.size(); ++r) {
       const Room& room = building_.layout.rooms[r];
@@ -205,7 +205,7 @@ class DrivePlanner {
   Random random_;
   int cols_ = 0, rows_ = 0;
   std::vector<double> clearance_;  // per cell
-  std::vector<double> way_cost_;   // per cell: of a metre there, beside the comfort of its clearance
+  std::vector<double> way_cost_;   // per cell: cost of a metre there, besides the cost of its clearance
   std::vector<PlaceToVisit> places_;
 };
 

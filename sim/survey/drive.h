@@ -15,10 +15,10 @@ struct DrivePose {
 };
 
 // A smooth round trip through all rooms and corridors: from the middle of one to the nearest one not yet
-// seen, along ways that keep away from walls, and back to the start; a pose every step_m of the way.  Every
-// pose keeps clearance_m. Run 0 visits the roomiest places and prefers the middle of ways; others, by `seed`,
-// random places along ways that they prefer at random.  Errors: NoData when a room cannot be entered with
-// that clearance.
+// visited, along ways that keep away from walls, and back to the start; a pose every step_m of the way.
+// Every pose keeps clearance_m.  Run 0 visits the places with the most space and prefers the middle of ways;
+// other runs visit random places, by `seed`, along ways with random preferences.  Errors: NoData when a room
+// cannot be entered with that clearance.
 Result<std::vector<DrivePose>> PlanDrive(const Building& building, const SimulateOptions& options,
                                          uint64_t seed);
 

@@ -15,7 +15,7 @@ class DriveWay {
   explicit DriveWay(std::vector<NodeIdx> nodes) : nodes_(std::move(nodes)) {}
 
   const std::vector<NodeIdx>& nodes() const { return nodes_; }
-  // Index of the node that it goes to; past the last one: the goal.
+  // Index of the node that it goes to next; past the last one: the goal.
   size_t next() const { return next_; }
   bool LeadsToGoal() const { return next_ >= nodes_.size(); }
 
@@ -25,7 +25,7 @@ class DriveWay {
     has_left_out_ = false;
   }
   void Arrive() { BeginAt(next_ + 1); }
-  // No two in a row: a robot that reaches neither may be off its way.
+  // Never two in a row: a robot that reaches neither may be off its way.
   bool MayLeaveOut() const { return !has_left_out_; }
   void LeaveOut() {
     ++next_;

@@ -12,15 +12,15 @@
 namespace cairn::sim {
 namespace {
 
-// Draws of a free place before it counts as impossible.
+// Number of random draws after which a free place counts as impossible.
 constexpr int kMaxDraws = 20000;
-// Queries lie between these distances from the nearest station, in units of the spacing (lattice) or metres
-// (driven).
+// Queries lie between these distances from the nearest station, in units of the spacing (lattice) or
+// metres (driven).
 constexpr double kLeastOffset = 0.1, kGreatestOffset = 0.75;
 constexpr double kGreatestDriveOffsetM = 0.3;
 // Queries of a driven survey look along the drive up to this angle.
 constexpr double kDriveHeadingDeg = 25;
-// Longest way of the image centre between two renderings of one exposure, pixels.
+// Largest motion of the image centre between two renderings of one exposure, pixels.
 constexpr double kBlurStepPx = 1;
 
 Pose RotatedInCamera(const Pose& cam_from_world, const Eigen::Vector3d& turn) {
@@ -138,7 +138,7 @@ Status AddQueries(const Building& building, const SimulateOptions& options, uint
       if (++draws > kMaxDraws) {
         return MakeError(
             ErrorCode::kNoData,
-            "no place for query {}: {} random places are all nearer than clearance_m = {:g} to something "
+            "no place for query {}: {} random places are all nearer than clearance_m = {:g} to an obstacle "
             "or outside of the surveyed area; use a smaller clearance or num_queries = 0",
             q, kMaxDraws, options.clearance_m);
       }
@@ -194,7 +194,7 @@ Camera MakePinhole(const SimulateOptions& options) {
   camera.model = CameraModel::kPinhole;
   camera.width = options.image_width_px;
   camera.height = options.image_height_px;
-  // Rounded to what cameras.txt can say in few digits: 90 degrees give 320, not 320.00000000000006.
+  // Rounded so that cameras.txt needs few digits: 90 degrees give 320, not 320.00000000000006.
   const double exact = 0.5 * camera.width / std::tan(0.5 * RadFromDeg(options.horizontal_fov_deg));
   const double focal = std::round(exact * 1e6) / 1e6;
   camera.params = {focal, focal, 0.5 * camera.width, 0.5 * camera.height};

@@ -14,11 +14,11 @@
 
 namespace cairn::sim {
 
-// An image to be taken: where the camera is, where it is said to be, and what the camera does to it.
+// An image to be taken: where the camera is, its stated pose, and what the camera does to the image.
 struct PlannedImage {
   std::string name;            // file name; sorts in order of capture
   Pose cam_from_world;         // true pose, in the middle of the exposure
-  Pose stated_cam_from_world;  // what images.txt says: with pose noise for survey images
+  Pose stated_cam_from_world;  // the pose in images.txt: with pose noise for survey images
   double noise = 0;            // standard deviation of grey noise, of 255
   double gain = 1, bias = 0;   // exposure: gain * grey + bias
   // The camera's turn during the exposure, camera frame: axis times angle, rad.
@@ -27,7 +27,7 @@ struct PlannedImage {
 
 struct Survey {
   Camera camera;                          // of the survey images
-  Camera query_camera;                    // the same but for panoramas
+  Camera query_camera;                    // the same, except for panoramas
   std::vector<PlannedImage> images;       // the survey
   std::vector<PlannedImage> queries;      // held out
   std::vector<Eigen::Vector2d> stations;  // where survey images are taken, metres
@@ -44,7 +44,7 @@ Camera MakeQueryCamera(const SimulateOptions& options);
 
 // Decides where images are taken.  Lattice stations are the places ((i + 1/2) spacing_m, (j + 1/2) spacing_m)
 // with enough clearance, row by row; each has num_headings images.  Queries lie off the lattice, inside the
-// surveyed area, and look anywhere; those of a driven survey look roughly along the drive. Errors:
+// surveyed area, and look anywhere; those of a driven survey look roughly along the drive.  Errors:
 // InvalidArgument for bad options, NoData where no station or query fits; both with a remedy.
 Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& options, uint64_t seed);
 

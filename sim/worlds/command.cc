@@ -29,11 +29,11 @@ Command SimulateWorldsCommand() {
   Command command;
   command.name = "simulate-worlds";
   command.summary = "Draw a random world seen from above, to try region algorithms on";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("-o,--output", arguments->output, "world to write: .json, or else a database")
-        ->required()
-        ->type_name("FILE");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("-o,--output", arguments->output, "world to write: .json, or else a database")
+        .Required()
+        .Type("FILE");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
   return command;

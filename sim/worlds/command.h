@@ -4,7 +4,7 @@
 
 namespace cairn::sim {
 
-// cairn simulate-worlds --setting 1..4 --seed S -o WORLD
+// cairn stage simulate-worlds --setting 1..4 --seed S -o WORLD
 Command SimulateWorldsCommand();
 
 }  // namespace cairn::sim

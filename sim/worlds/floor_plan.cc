@@ -49,7 +49,7 @@ Polygon DrawPerimeter(const SimulateWorldsOptions& options, Random* random) {
                  half_height = random->Normal(radius, 0.1 * radius);
     return Rectangle(Eigen::Vector2d::Zero(), half_width, half_height);
   }
-  // Sides: U(4, 4) w.p. 0.1, N(5, 0.5) w.p. 0.45, N(7, 2) w.p. 0.45
+  // [Sala06 §VI-A] sides: U(4, 4) w.p. 0.1, N(5, 0.5) w.p. 0.45, N(7, 2) w.p. 0.45
   const double which = random->Uniform();
   const int num_sides = which < 0.1    ? 4
                         : which < 0.55 ? RoundedNormal(5, 0.5, random)
@@ -59,7 +59,7 @@ Polygon DrawPerimeter(const SimulateWorldsOptions& options, Random* random) {
 }
 
 int DrawNumObstacles(const SimulateWorldsOptions& options, Random* random) {
-  // Irregular: U(5, 9) or N(8, 2); rectangular: U(6, 9) or N(10, 2), each w.p. 0.5
+  // [Sala06 §VI-A] irregular: U(5, 9) or N(8, 2); rectangular: U(6, 9) or N(10, 2), each w.p. 0.5
   const bool rectangular = IsRectangular(options.setting);
   const bool uniform = random->Uniform() < 0.5;
   const int num = uniform ? static_cast<int>(random->UniformInt(rectangular ? 6 : 5, 9))
@@ -139,6 +139,7 @@ void DrawFeatures(const SimulateWorldsOptions& options, Random* random, WorldPla
 
 WorldPlan DrawFloorPlan(const SimulateWorldsOptions& options, uint64_t seed) {
   Random random(MixSeed(seed, static_cast<uint64_t>(options.setting)));
+  // [Sala06 Table I] perimeter, obstacles, features
   WorldPlan plan;
   plan.perimeter = DrawPerimeter(options, &random);
   DrawObstacles(options, &random, &plan);

@@ -53,8 +53,8 @@ void MarkFreeSpace(const WallIndex& walls, Lattice* lattice) {
     size_t next = 0;
     for (int column = 0; column < lattice->num_columns; ++column) {
       while (next < crossings.size() && crossings[next] <= lattice->Position(column, row).x()) ++next;
-      // Inside of the perimeter and outside of the obstacles, which do not overlap: after an odd number of
-      // walls.
+      // Inside of the perimeter and outside of the obstacles, which do not overlap: after an odd number
+      // of walls.
       if (next % 2 == 1) lattice->At(column, row) = 0;
     }
   }
@@ -77,6 +77,7 @@ void MakeStations(const WallIndex& walls, Lattice* lattice, World* world) {
   const auto index = [&](int column, int row) {
     return static_cast<size_t>(row) * lattice->num_columns + column;
   };
+  // [Sala06 Def. 3.1] E: lattice points a spacing apart with no wall between
   for (int row = 0; row < lattice->num_rows; ++row) {
     for (int column = 0; column < lattice->num_columns; ++column) {
       for (int way = 0; way < 2 && lattice->At(column, row) == 0; ++way) {
@@ -169,6 +170,7 @@ std::vector<StationIdx> VisibilityArea(const SimulatedFeature& feature, const Wa
       const Eigen::Vector2d position = lattice.Position(column, row);
       const Eigen::Vector2d ray = position - feature.position;
       const double distance = ray.norm();
+      // [Sala06 §VI] within the visibility range and the angular extent, read as the full opening
       if (distance < feature.near_m || distance > feature.far_m) continue;
       if (ray.dot(feature.normal) < min_cosine * distance) continue;
       // The ray starts off its own wall.

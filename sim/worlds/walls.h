@@ -11,10 +11,10 @@
 
 namespace cairn::sim {
 
-// Whether a point lies inside of a polygon; points on its border may go either way.
+// Whether a point lies inside of a polygon; for points on its border either may be returned.
 bool Contains(const Polygon& polygon, const Eigen::Vector2d& point);
 
-// Walls in the cells of a grid, to ask for those near a place.
+// Walls in the cells of a grid, to find those near a place.
 class WallIndex {
  public:
   using Wall = std::pair<Eigen::Vector2d, Eigen::Vector2d>;

@@ -10,7 +10,7 @@
 namespace cairn::build_vocabulary {
 namespace {
 
-// Stream of the seed; the others grow the tree.
+// Stream of the seed; the other streams grow the tree.
 constexpr uint64_t kSampleStream = 0;
 
 // `count` of the numbers below `total`, drawn without repetition, ascending.
@@ -51,6 +51,7 @@ void FillInvertedFiles(const std::vector<ImageDescriptors>& images, double max_d
   for (size_t i = 0; i < images.size(); ++i) {
     vocabulary->document_ids.push_back(images[i].image_id);
     for (const WordIdx word : words[i]) {
+      // [Mariottini11 §IV] the word's inverted file: the images that have it, and how often
       std::vector<Posting>& postings = vocabulary->inverted_files[word];
       if (postings.empty() || postings.back().document != static_cast<int32_t>(i)) {
         postings.push_back({static_cast<int32_t>(i), 0});
@@ -101,9 +102,8 @@ OptionTable DescribeOptions(BuildVocabularyOptions* o) {
        .max = 1},
       {.name = "tree_from",
        .value = &o->tree_from,
-       .help = "vocabulary.db of an earlier compilation whose words are taken over; absolute or relative to "
-               "the recipe; "
-               "empty: words are learnt"},
+       .help = "vocabulary.db of an earlier compilation, whose words are used again; absolute or relative to "
+               "the recipe; empty: words are learnt"},
   };
   AddCondition({"depth", {"0"}}, {"descriptors_per_word"}, &table);
   AddCondition({"tree_from", {""}},

@@ -27,8 +27,8 @@ struct BuildVocabularyOptions {
   // Stop list [Mariottini11 §VII-A]: words that occur in more than this part of the images do not score (the
   // source gives no value; 1 = no stop list).  REQUIRES: in (0, 1]
   double max_document_ratio = 1;
-  // vocabulary.db of an earlier compilation whose tree is taken over, so that a place that did not change
-  // keeps its words and a delta of the maps its size (docs/updates.md); empty: a tree is grown.
+  // vocabulary.db of an earlier compilation, whose tree is used again, so that a place that did not change
+  // keeps its words and deltas between maps stay small (docs/updates.md); empty: a tree is grown.
   std::string tree_from;
 };
 OptionTable DescribeOptions(BuildVocabularyOptions* options);
@@ -39,11 +39,11 @@ struct ImageDescriptors {
   DescriptorMatrix descriptors;
 };
 
-// With a tree, its words are the words and none is grown; its documents do not matter.
-// Pure: no files, no clock; the same tree for any number of threads (all sums are of integers).  An image
-// without descriptors is a document without words.  If all descriptors are equal, the tree is one word; with
-// fewer distinct descriptors than branches, each is a word. Cost: training descriptors * depth * rounds *
-// branching dot products. Errors: InvalidArgument (an option; images not in ascending order), NoData (no
+// With a tree, its words are used and none is grown; its documents are ignored.  Pure: no files, no clock;
+// the same tree for any number of threads (all sums are of integers).  An image without descriptors is a
+// document without words.  If all descriptors are equal, the tree is one word; with fewer distinct
+// descriptors than branches, each is a word.  Cost: training descriptors * depth * rounds * branching dot
+// products.  Errors: InvalidArgument (an option; images not in ascending order), NoData (no
 // descriptors), Cancelled.
 Result<Vocabulary> BuildVocabulary(const std::vector<ImageDescriptors>& images,
                                    const BuildVocabularyOptions& options, uint64_t seed, int num_threads,

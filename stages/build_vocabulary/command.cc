@@ -14,7 +14,7 @@
 namespace cairn::build_vocabulary {
 namespace {
 
-// Bytes of memory for one of the input file.
+// Bytes of memory per byte of the input file.
 constexpr double kMemoryPerFileByte = 1.5;
 
 struct Arguments {
@@ -25,7 +25,7 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// `survey`: names of the images to read; none: all.
+// `survey`: names of the images to read; empty: all.
 Result<std::vector<ImageDescriptors>> ReadDescriptors(const std::string& path,
                                                       const std::optional<std::set<std::string>>& survey) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
@@ -74,14 +74,18 @@ Command BuildVocabularyCommand() {
   auto arguments = std::make_shared<Arguments>();
   return {
       .name = "build-vocabulary",
-      .summary = "Learns the visual words of a survey and which image shows which of them",
+      .summary = "Learn the visual words of a survey, and which image shows which (stage 6)",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("features", arguments->features_path, "features.db")->required();
-            app.add_option("--capture", arguments->capture_path,
-                           "Capture folder: only its survey images have words [all of features.db]");
-            app.add_option("-o,--output", arguments->output_path, "vocabulary.db to write")->required();
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("features", arguments->features_path, "features.db").Required().Type("features.db");
+            parser
+                .Add("--capture", arguments->capture_path,
+                     "Capture folder: only its survey images have words [all of features.db]")
+                .Type("CAPTURE");
+            parser.Add("-o,--output", arguments->output_path, "vocabulary.db to write")
+                .Required()
+                .Type("vocabulary.db");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
       .may_be_output = {"--tree-from"},

@@ -4,7 +4,7 @@
 
 namespace cairn::build_vocabulary {
 
-// cairn build-vocabulary features.db -o vocabulary.db
+// cairn stage build-vocabulary features.db -o vocabulary.db
 Command BuildVocabularyCommand();
 
 }  // namespace cairn::build_vocabulary

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/capture/image_file.h"
 #include "core/features/sift.h"
 
@@ -20,7 +21,7 @@ double MillisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// Localize, in two steps so that SIFT's time is known.
+// Localizes in two steps so that SIFT's time is known.
 Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
                                    const LocalizerOptions& options, HeldOutResult* result) {
   CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image.path));
@@ -98,7 +99,7 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
   f["nees_high"] = 6 + band;
 }
 
-// Of the regions that have enough images, the first that is below.
+// Reports the first region with enough images that is below its gate.
 Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& options) {
   for (const RegionSelfTest& row : report.regions) {
     if (row.region == kOutsideRegions || row.num_held_out < options.min_region_held_out) continue;
@@ -106,11 +107,11 @@ Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& opti
          {std::tuple("localized_ratio", row.LocalizedRatio(), options.min_region_localized_ratio),
           std::tuple("precision_ratio", row.PrecisionRatio(), options.min_region_precision_ratio)}) {
       if (found >= least) continue;
-      return MakeError(
-          ErrorCode::kGate,
-          "below the gate: {} of region {} is {:.3f} ({} of its {} held-out images are localized, "
-          "{} of them wrong), at least {:.3f} is asked",
-          name, row.region, found, row.num_localized, row.num_held_out, row.num_gross_errors, least);
+      return MakeError(ErrorCode::kGate,
+                       "below the gate: {} of region {} is {:.3f} ({} of its {} held-out images are "
+                       "localized, {} of them wrong), at least {:.3f} is required",
+                       name, row.region, found, row.num_localized, row.num_held_out, row.num_gross_errors,
+                       least);
     }
   }
   return Ok();
@@ -120,13 +121,6 @@ Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& opti
 
 bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options) {
   return result.error_m > options.gross_error_m || result.error_deg > options.gross_error_deg;
-}
-
-double Quantile(std::vector<double> values, double part) {
-  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
-  const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
 }
 
 OptionTable DescribeOptions(CheckMapOptions* o) {
@@ -141,27 +135,27 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
        .min = 1e-6},
       {.name = "min_localized_ratio",
        .value = &o->min_localized_ratio,
-       .help = "gate: least part of the held-out images localized",
+       .help = "gate: smallest part of the held-out images that must be localized",
        .min = 0,
        .max = 1},
       {.name = "min_precision_ratio",
        .value = &o->min_precision_ratio,
-       .help = "gate: least part of the fixes that are not wrong",
+       .help = "gate: smallest part of the fixes that must not be wrong",
        .min = 0,
        .max = 1},
       {.name = "min_region_localized_ratio",
        .value = &o->min_region_localized_ratio,
-       .help = "gate: least part of each region's held-out images localized",
+       .help = "gate: smallest part of each region's held-out images that must be localized",
        .min = 0,
        .max = 1},
       {.name = "min_region_precision_ratio",
        .value = &o->min_region_precision_ratio,
-       .help = "gate: least part of each region's fixes that are not wrong",
+       .help = "gate: smallest part of each region's fixes that must not be wrong",
        .min = 0,
        .max = 1},
       {.name = "min_region_held_out",
        .value = &o->min_region_held_out,
-       .help = "gate: regions with fewer held-out images than this are not asked",
+       .help = "gate: regions with fewer held-out images than this are not checked",
        .min = 1},
       {.name = "max_station_heading_deg",
        .value = &o->max_station_heading_deg,
@@ -180,11 +174,11 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
                    .help = "gate: where the map has a floor plan, its walls must fit the landmarks"});
   for (Option& option : DescribeOptions(&o->plan)) table.push_back(std::move(option));
   for (const auto& [name, value, help] :
-       {std::tuple("scan_x_m", &o->scan_x_m,
-                   "where scans are given: the laser stands this far ahead of the camera, m"),
-        std::tuple("scan_y_m", &o->scan_y_m, "where scans are given: and this far to its left, m"),
+       {std::tuple("scan_x_m", &o->scan_x_m, "with scans: distance of the laser ahead of the camera, m"),
+        std::tuple("scan_y_m", &o->scan_y_m,
+                   "with scans: distance of the laser to the left of the camera, m"),
         std::tuple("scan_heading_deg", &o->scan_heading_deg,
-                   "where scans are given: and heads so far to the left of the camera's, degrees")}) {
+                   "with scans: turn of the laser's heading to the left of the camera's, degrees")}) {
     table.push_back({.name = name, .value = value, .help = help, .min = -1000, .max = 1000});
   }
   const OptionTable localizer = DescribeOptions(&o->localizer);
@@ -249,8 +243,8 @@ Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
                 options.min_region_precision_ratio});
   if (report.images.empty() && most_asked > 0) {
     return MakeError(ErrorCode::kGate,
-                     "below the gate: a ratio of at least {:.3f} is asked, but there are no held-out images; "
-                     "list some in queries.txt, or ask nothing",
+                     "below the gate: a ratio of at least {:.3f} is required, but there are no held-out "
+                     "images; list some in queries.txt, or remove the gate",
                      most_asked);
   }
   const auto check = [&](const std::string& name, double least) -> Status {
@@ -258,8 +252,8 @@ Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
     const auto figure = report.figures.find(name);
     const double found = figure == report.figures.end() ? 0 : figure->second;
     if (found >= least) return Ok();
-    return MakeError(ErrorCode::kGate, "below the gate: {} is {:.3f}, at least {:.3f} is asked", name, found,
-                     least);
+    return MakeError(ErrorCode::kGate, "below the gate: {} is {:.3f}, at least {:.3f} is required", name,
+                     found, least);
   };
   CAIRN_RETURN_IF_ERROR(check("localized_ratio", options.min_localized_ratio));
   CAIRN_RETURN_IF_ERROR(check("precision_ratio", options.min_precision_ratio));

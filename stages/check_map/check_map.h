@@ -18,30 +18,30 @@
 
 namespace cairn::check_map {
 
-// Tries a map on images that it was not made from: how many are localized, how well, how sure the map is of
-// it, and whether images of another place are refused.  Before: emit_map.  The last stage: its figures are
-// sealed into the map.
+// Tries a map on images that it was not made from: how many are localized, how accurately, how certain the
+// map is, and whether images of another place are refused.  Before: emit_map.  The last stage: its figures
+// are sealed into the map.
 struct CheckMapOptions {
-  // A fix farther than this from the truth is a wrong one: it counts against precision.  REQUIRES: > 0
+  // A fix farther than this from the truth is wrong: it counts against precision.  REQUIRES: > 0
   double gross_error_m = 0.5;
   double gross_error_deg = 10;
-  // Gate: least part of the held-out images localized, and of the fixes that are not gross errors.  REQUIRES:
-  // in [0, 1]
+  // Gate: smallest part of the held-out images that must be localized, and of the fixes that must not be
+  // gross errors.  REQUIRES: in [0, 1]
   double min_localized_ratio = 0;
   double min_precision_ratio = 0;
   // Gate: the same within each region, over the held-out images at its stations; regions with fewer than
-  // min_region_held_out such images are not asked.  REQUIRES: in [0, 1]; >= 1
+  // min_region_held_out such images are not checked.  REQUIRES: in [0, 1]; >= 1
   double min_region_localized_ratio = 0;
   double min_region_precision_ratio = 0;
   int min_region_held_out = 5;
-  // An image stands at the nearest station of a heading within this of its own, if that is no farther than
-  // this many times the stations' spacing (region_figures.h).  REQUIRES: in [0, 180]; >= 0
+  // An image belongs to the nearest station whose heading is within this of its own, if that station is no
+  // farther than this many times the stations' spacing (region_figures.h).  REQUIRES: in [0, 180]; >= 0
   double max_station_heading_deg = 45;
   double max_station_distance_ratio = 1.5;
   // Gate: the map's floor plan must fit its landmarks (plan_fit.h).
   bool plan_must_fit = false;
   PlanFitOptions plan;
-  // A laser in the camera's floor frame: ahead, to the left (m), counter-clockwise (degrees).
+  // Pose of the laser in the camera's floor frame: ahead, to the left (m), counter-clockwise (degrees).
   double scan_x_m = 0;
   double scan_y_m = 0;
   double scan_heading_deg = 0;
@@ -49,7 +49,7 @@ struct CheckMapOptions {
 };
 OptionTable DescribeOptions(CheckMapOptions* options);
 
-// An image to localize.  Without a true pose it is of another place, and must be refused.
+// An image to localize.  An image without a true pose shows another place and must be refused.
 struct HeldOutImage {
   std::string name;
   std::string path;
@@ -60,11 +60,11 @@ struct HeldOutImage {
 struct HeldOutResult {
   std::string name;
   std::optional<Pose> true_cam_from_world;
-  std::optional<StationIdx> station;  // where it was taken: for FindStations (region_figures.h) to fill
+  std::optional<StationIdx> station;  // where it was taken: filled by FindStations (region_figures.h)
   std::string rejected;  // why the image could not be tried (unreadable, wrong size); empty otherwise
   Localization localization;
-  // Fixes of images with a true pose: distance of the camera centres, angle, normalised estimation error
-  // squared.
+  // Fixes of images with a true pose: distance of the camera centres, angle, normalised estimation
+  // error squared.
   double error_m = 0;
   double error_deg = 0;
   double nees = 0;
@@ -73,29 +73,26 @@ struct HeldOutResult {
   bool has_fix() const { return rejected.empty() && localization.has_fix(); }
 };
 
-// Of a fix of an image with a true pose.
+// REQUIRES: a fix of an image with a true pose
 bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options);
-
-// The least value that at least `part` of them do not exceed.  REQUIRES: not empty
-double Quantile(std::vector<double> values, double part);
 
 struct CheckMapReport {
   std::vector<HeldOutResult> images;  // in the given order
-  // Figures without times, by name: what the map's self-test stores.  Ratios are of the images tried; those
-  // that need a fix are left out where there is none.
+  // Figures without times, by name: those that the map's self-test stores.  Ratios are of the images tried;
+  // those that need a fix are left out where there is none.
   //   num_held_out, num_localized, localized_ratio, median_error_m, median_error_deg, p90_error_m,
   //   p90_error_deg, within_5cm_5deg_ratio, within_10cm_2deg_ratio, within_10cm_5deg_ratio, num_gross_errors,
-  //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees of
-  //   freedom)
-  // and of a map whose retrieval finds kept images alone, beside the same map's with all images
-  // (AddFullFigures):
+  //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees
+  //   of freedom)
+  // and of a map whose retrieval finds kept images alone, beside the same map's with all
+  // images (AddFullFigures):
   //   num_by_retrieval, all_images_num_by_retrieval: fixes from landmarks that retrieval led to, not from all
   //   landmarks of the map; all_images_num_localized, all_images_localized_ratio, all_images_precision_ratio
-  // and of a map with a floor plan what AddPlanFigures (plan_fit.h) and CompareWithPlan (plan_agreement.h)
-  // say.
+  // and of a map with a floor plan what AddPlanFigures (plan_fit.h) and CompareWithPlan
+  // (plan_agreement.h) say.
   std::map<std::string, double> figures;
   std::string plan_verdict;  // PlanVerdict; empty where there is no floor plan
-  // The same by region, of images with a true pose: for SummarizeRegions (region_figures.h) to fill.
+  // The same by region, of images with a true pose: filled by SummarizeRegions (region_figures.h).
   std::vector<RegionSelfTest> regions;
   // Means over the images tried.
   double mean_sift_ms = 0;
@@ -112,8 +109,8 @@ Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
 // Adds to a sparse map's figures what the same map would do with all images as documents.
 void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse);
 
-// Whether the figures pass the gate.  Errors: Gate, naming the figure, its region, what was found and what is
-// asked; also where something is asked and there was no image to find out.
+// Whether the figures pass the gate.  Errors: Gate, naming the figure, its region, the value found and the
+// value required; also where a value is required but there was no image to measure it.
 Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options);
 
 }  // namespace cairn::check_map

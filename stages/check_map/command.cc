@@ -115,7 +115,7 @@ Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& c
   return WriteMapRows(rows, path);
 }
 
-// Image fixes and landmarks against the floor plan, where the map has one.
+// Compares fixes and landmarks with the floor plan, where the map has one.
 Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandEnvironment& environment,
                  CheckMapReport* report) {
   if (rows.views.plan.walls.empty()) {
@@ -141,12 +141,13 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
                          environment.num_threads, *environment.progress, &report->figures);
 }
 
-// What is for held-out images or scans, and there are none, is refused.
+// Refuses arguments for held-out images or scans where there are none.
 Status CheckWhatIsRead(const Arguments& arguments) {
   if (arguments.queries_path.empty() && !arguments.capture_path.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--capture {}: is where the images of --queries are; give --queries, or leave it out",
-                     arguments.capture_path);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--capture {}: is used for the images of --queries only; give --queries, or leave it out",
+        arguments.capture_path);
   }
   if (arguments.queries_path.empty() && !arguments.scans_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -157,12 +158,12 @@ Status CheckWhatIsRead(const Arguments& arguments) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"min_localized_ratio", "min_precision_ratio", "min_region_localized_ratio",
          "min_region_precision_ratio", "min_region_held_out", "plan_must_fit"},
-        "is a gate for held-out images or for a map to seal; give --queries or -o, or leave it out"));
+        "is a gate for held-out images or for a map that is sealed; give --queries or -o, or leave it out"));
   }
   if (arguments.scans_path.empty()) {
-    CAIRN_RETURN_IF_ERROR(
-        arguments.option_arguments.RefuseGiven({"scan_x_m", "scan_y_m", "scan_heading_deg"},
-                                               "says where the laser of --scans stands; give --scans"));
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"scan_x_m", "scan_y_m", "scan_heading_deg"},
+        "is the pose of the laser of --scans; give --scans, or leave it out"));
   }
   return Ok();
 }
@@ -173,11 +174,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   for (const std::string& path : {arguments.output_path, arguments.details_path}) {
     if (!path.empty()) CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(path));
   }
-  cv::setNumThreads(1);  // images in parallel, each on one thread: times mean one core
+  cv::setNumThreads(1);  // images in parallel, each on one thread: times are for one core
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(arguments.map_path));
   if (rows.sealed && !arguments.output_path.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: is sealed already; -o is for a map from emit-map",
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is already sealed; -o is for a map from emit-map",
                      arguments.map_path);
   }
   CheckMapReport held_out;
@@ -211,7 +212,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                              .foreign = foreign ? &*foreign : nullptr,
                              .options = &arguments.options};
   *environment.out << (arguments.json ? ReportJson(report, true) : ReportText(report));
-  // Also where the gate refuses the map: then people want to see why.
+  // Also where the gate refuses the map, so that users can see why.
   if (!arguments.details_path.empty())
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.details_path, ReportJson(report, false)));
   ReportHeldOut(held_out, environment.report);
@@ -226,29 +227,42 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 Command CheckMapCommand() {
   auto arguments = std::make_shared<Arguments>();
   return {
-      .name = "check-map",
-      .summary = "Localizes held-out images in a map, prints how well, and seals the map",
+      .name = "check",
+      .summary = "Localize held-out images in a map, print the figures, and seal the map",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "map")->required();
-            app.add_option("--queries", arguments->queries_path,
-                           "held-out images with their poses (queries.txt)");
-            app.add_option("--capture", arguments->capture_path,
-                           "capture that has the images [the folder of queries.txt]");
-            app.add_option("--foreign", arguments->foreign_paths,
-                           "capture or folder of images of another place: none may be localized");
-            app.add_option("--scans", arguments->scans_path,
-                           "Carmen log: laser scan i was taken with held-out image i; located in the floor "
-                           "plan, it should say the same");
-            app.add_option("-o,--output", arguments->output_path,
-                           "sealed map to write, with the figures inside");
-            app.add_flag("--json", arguments->json, "print JSON, every image included");
-            app.add_option("--details", arguments->details_path,
-                           "file to write the same JSON to, without times, for cairn report --check")
-                ->type_name("FILE.json");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("map", arguments->map_path, "map").Required().Type("MAP");
+            parser.Add("--queries", arguments->queries_path, "held-out images with their poses (queries.txt)")
+                .Type("queries.txt");
+            parser
+                .Add("--capture", arguments->capture_path,
+                     "capture that has the images [the folder of queries.txt]")
+                .Type("CAPTURE");
+            parser
+                .Add("--foreign", arguments->foreign_paths,
+                     "capture or folder of images of another place: none may be localized")
+                .Type("FOLDER");
+            parser
+                .Add("--scans", arguments->scans_path,
+                     "Carmen log: laser scan i was taken with held-out image i; it is located in the floor "
+                     "plan and compared with the fix")
+                .Type("FILE");
+            parser.Add("-o,--output", arguments->output_path, "sealed map to write, with the figures inside")
+                .Type("MAP");
+            parser.AddFlag("--json", arguments->json, "print JSON, every image included");
+            parser
+                .Add("--details", arguments->details_path,
+                     "file to write the same JSON to, without times, for cairn report --check")
+                .Type("FILE.json");
+            arguments->option_arguments.Add(
+                parser, DescribeOptions(&arguments->options),
+                {"gross_error_m", "gross_error_deg", "min_localized_ratio", "min_precision_ratio",
+                 "min_region_localized_ratio", "min_region_precision_ratio", "plan_must_fit", "scan_x_m",
+                 "scan_y_m", "scan_heading_deg"});
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
+      .stage = "check_map",
+      .former_names = {"check-map"},
   };
 }
 

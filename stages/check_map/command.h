@@ -4,7 +4,7 @@
 
 namespace cairn::check_map {
 
-// cairn check-map MAP [--queries QUERIES.txt] [--capture DIR] [--foreign DIR]... [-o SEALED] [--json]
+// cairn check MAP [--queries QUERIES.txt] [--capture DIR] [--foreign DIR]... [-o SEALED] [--json]
 Command CheckMapCommand();
 
 }  // namespace cairn::check_map

@@ -10,7 +10,7 @@
 namespace cairn::check_map {
 namespace {
 
-// The camera's pose on the floor that a laser's pose means.
+// The camera's pose on the floor that follows from the laser's.
 FloorPose CameraOf(const PlanarPose& laser, const CheckMapOptions& options) {
   const double heading_rad = laser.heading_rad - RadFromDeg(options.scan_heading_deg);
   const Eigen::Vector2d to_laser(options.scan_x_m, options.scan_y_m);

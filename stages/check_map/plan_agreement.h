@@ -13,7 +13,7 @@
 namespace cairn::check_map {
 
 // How the fixes of images and the floor plan agree; `scans` is empty, or scans[i] was taken with images[i] by
-// a laser where options.scan_..._ says.  Adds to the figures
+// a laser at the pose in options.scan_x_m, scan_y_m and scan_heading_deg.  Adds to the figures
 //   plan_fixes_free_ratio: fixes that lie in a region of the plan
 // and with scans
 //   num_scan_fixes: scans that some pose in the plan explains

@@ -6,7 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/floor_pose.h"
 
 namespace cairn::check_map {
@@ -18,10 +18,11 @@ constexpr int kMaxNumLandmarks = 1500;
 constexpr int kMinNumLandmarks = 30;
 constexpr double kMaxNumCells = 4e6;
 constexpr double kCoarseScaleM = 0.5, kFineScaleM = 0.15;
-// A motion has to gain this much to count: landmarks are no perfect sample of the walls.
+// A motion has to gain this much to count: landmarks are an imperfect sample of the walls.
 constexpr double kMinGainRatio = 1.05;
 
-// Distances from the nearest wall, up to kMaxWallDistanceM, at the middles of cells, to a cell or so.
+// Distances from the nearest wall, up to kMaxWallDistanceM, at the middles of cells, accurate to
+// about a cell.
 class WallDistances {
  public:
   explicit WallDistances(const FloorPlan& plan) {
@@ -61,7 +62,7 @@ class WallDistances {
   cv::Mat distances_;  // in cells
 };
 
-// Of the landmarks, about their middle.
+// A motion of the landmarks about their middle.
 struct Motion {
   Vec2 shift = Vec2::Zero();
   double turn_rad = 0;
@@ -99,7 +100,7 @@ class Fitter {
     return score;
   }
 
-  // Tried all over, then refined.
+  // Tries motions over the whole range, then refines the best.
   Motion Best() const {
     const double step_m = kCoarseScaleM / 2;
     const double step_rad = std::clamp(step_m / std::max(1.0, radius_), RadFromDeg(0.1), RadFromDeg(1.0));
@@ -117,13 +118,13 @@ class Fitter {
       }
     }
     best = Refined(best, step_m, step_rad);
-    // Where the plan is about right, the way from there may lead higher.
+    // Where the plan is nearly right, refining from there may give a higher value.
     const Motion near = Refined({}, step_m, step_rad);
     return Score(near, kFineScaleM) >= Score(best, kFineScaleM) ? near : best;
   }
 
  private:
-  // Steps along the axes while they gain, then half as long ones.
+  // Takes steps along the axes while they gain, then halves them.
   Motion Refined(Motion motion, double step_m, double step_rad) const {
     double score = Score(motion, kFineScaleM);
     for (; step_m > 0.005; step_m /= 2, step_rad /= 2) {
@@ -149,13 +150,13 @@ class Fitter {
   const PlanFitOptions& options_;
 };
 
-// Floor places of landmarks near the cameras' height: every so many of them.
+// Floor places of landmarks near the cameras' height, evenly sampled.
 std::vector<Vec2> LandmarkPlaces(const MapRows& rows, double band_m) {
   std::vector<double> heights;
   for (const MapImage& image : rows.images)
     heights.push_back((rows.floor_from_world * image.cam_from_world.Center()).z());
   if (heights.empty()) return {};
-  const double middle = Median(std::move(heights));
+  const double middle = UpperMedian(std::move(heights));
   std::vector<Vec2> places;
   for (const MapLandmark& landmark : rows.landmarks) {
     const Eigen::Vector3d place = rows.floor_from_world * landmark.position;
@@ -185,26 +186,26 @@ OptionTable DescribeOptions(PlanFitOptions* o) {
        .min = 0.01},
       {.name = "plan_max_shift_m",
        .value = &o->plan_max_shift_m,
-       .help = "floor plan: how far it may be shifted for the best fit to be found, m",
+       .help = "floor plan: largest shift that is tried for the best fit, m",
        .min = 0.1,
        .max = 10},
       {.name = "plan_max_turn_deg",
        .value = &o->plan_max_turn_deg,
-       .help = "floor plan: how far it may be turned for the best fit to be found, degrees",
+       .help = "floor plan: largest turn that is tried for the best fit, degrees",
        .min = 0.1,
        .max = 45},
       {.name = "plan_tolerance_m",
        .value = &o->plan_tolerance_m,
-       .help = "floor plan: one that fits better shifted by more than this does not fit, m",
+       .help = "floor plan: it does not fit if it fits better shifted by more than this, m",
        .min = 0.01},
       {.name = "plan_tolerance_deg",
        .value = &o->plan_tolerance_deg,
-       .help = "floor plan: one that fits better turned by more than this does not fit, degrees",
+       .help = "floor plan: it does not fit if it fits better turned by more than this, degrees",
        .min = 0.05},
       {.name = "min_plan_on_walls_ratio",
        .value = &o->min_plan_on_walls_ratio,
-       .help = "floor plan: one that has a smaller part of the landmarks on its walls, however moved, does "
-               "not fit",
+       .help = "floor plan: it does not fit if a smaller part of the landmarks lies on its walls, however it "
+               "is moved",
        .min = 0,
        .max = 1},
   };
@@ -226,7 +227,7 @@ Result<PlanFit> FitPlan(const MapRows& rows, const PlanFitOptions& options) {
   if (places.size() < kMinNumLandmarks) {
     return MakeError(ErrorCode::kNoData,
                      "map '{}': {} landmarks within {} m of the cameras' height are too few to compare with "
-                     "the floor plan's walls, {} are needed",
+                     "the floor plan's walls; {} are needed",
                      rows.name, places.size(), options.plan_height_band_m, kMinNumLandmarks);
   }
   fit.num_landmarks = static_cast<int>(places.size());
@@ -238,7 +239,7 @@ Result<PlanFit> FitPlan(const MapRows& rows, const PlanFitOptions& options) {
   };
   const std::vector<double> distances = fitter.Distances({});
   fit.num_on_walls = num_on_walls(distances);
-  fit.median_wall_distance_m = Median(distances);
+  fit.median_wall_distance_m = UpperMedian(distances);
 
   Motion best = fitter.Best();
   if (fitter.Score(best, kFineScaleM) < kMinGainRatio * fitter.Score({}, kFineScaleM)) best = {};
@@ -272,8 +273,8 @@ std::string PlanVerdict(const PlanFit& fit) {
   if (fit.fits) return "fits: " + on_walls;
   if (fit.shift.norm() == 0 && fit.turn_deg == 0) return "does not fit, and no motion helps: " + on_walls;
   return fmt::format(
-      "does not fit: {}, and {:.0f} % were it turned by {:.2f} deg about ({:.2f}, {:.2f}), then shifted by "
-      "({:.2f}, {:.2f}) m",
+      "does not fit: {}, but {:.0f} % if it were turned by {:.2f} deg about ({:.2f}, {:.2f}), then shifted "
+      "by ({:.2f}, {:.2f}) m",
       on_walls, 100 * Ratio(fit.num_on_walls_moved, fit.num_landmarks), fit.turn_deg, fit.center.x(),
       fit.center.y(), fit.shift.x(), fit.shift.y());
 }

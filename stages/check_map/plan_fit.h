@@ -13,35 +13,36 @@ namespace cairn::check_map {
 
 // Where a map has both images and a floor plan, each checks the other: neither was made from the other.
 //
-// Landmarks near the cameras' height lie mostly on walls; the others, on furniture and people, do neither
-// harm nor good.  With d(p) the distance of landmark p from the nearest wall of the plan, the rigid motion M
-// on the floor that maximises
+// Landmarks near the cameras' height lie mostly on walls; others, on furniture and people, have no effect.
+// With d(p) the distance of landmark p from the nearest wall of the plan, the rigid motion M on the floor
+// that maximises
 //     sum over p of max(0, 1 - d(M p)^2 / s^2)
-// is the identity where the plan fits; elsewhere its inverse is what the plan lacks.
+// is the identity where the plan fits; otherwise its inverse is the correction of the plan.
 struct PlanFitOptions {
   // A landmark this close to a wall lies on it, metres.  REQUIRES: > 0
   double plan_wall_distance_m = 0.1;
-  // Landmarks this far above or below the cameras' median height are asked, metres.  REQUIRES: > 0
+  // Landmarks up to this far above or below the cameras' median height are used, metres.  REQUIRES: > 0
   double plan_height_band_m = 1;
-  // How far the plan may be off for the best motion to be found, metres and degrees.  REQUIRES: > 0
+  // Largest shift and turn of the plan that are tried, metres and degrees.  REQUIRES: > 0
   double plan_max_shift_m = 2;
   double plan_max_turn_deg = 10;
-  // A plan that fits better moved by more than this does not fit, metres and degrees.  REQUIRES: > 0
+  // A plan that fits better when moved by more than this does not fit, metres and degrees.  REQUIRES: > 0
   double plan_tolerance_m = 0.15;
   double plan_tolerance_deg = 1;
-  // Nor does one that has fewer of the landmarks on its walls however it is moved.  REQUIRES: in [0, 1]
+  // A plan with a smaller part of the landmarks on its walls, however it is moved, does not fit
+  // either.  REQUIRES: in [0, 1]
   double min_plan_on_walls_ratio = 0.3;
 };
 OptionTable DescribeOptions(PlanFitOptions* options);
 
 struct PlanFit {
-  int num_landmarks = 0;  // asked
+  int num_landmarks = 0;  // used
   int num_on_walls = 0;
   // Distances beyond kMaxWallDistanceM count as that.
   double median_wall_distance_m = 0;
   // With the plan moved as below.
   int num_on_walls_moved = 0;
-  // What would make the plan fit best: turned about `center`, counter-clockwise, then shifted.
+  // The motion that would make the plan fit best: a turn about `center`, counter-clockwise, then a shift.
   Eigen::Vector2d center = Eigen::Vector2d::Zero();  // floor frame, metres
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();   // metres
   double turn_deg = 0;
@@ -51,16 +52,16 @@ struct PlanFit {
 };
 inline constexpr double kMaxWallDistanceM = 0.5;
 
-// Compares landmarks and camera places of the survey with the walls of the map's plan.  Pure.
-// O(motions * landmarks), of which 1500 are asked at most.
-// Errors: InvalidArgument (an option), NoData (no plan; too few landmarks at the cameras' height).
+// Compares landmarks and camera places of the survey with the walls of the map's plan.  Pure.  O(motions *
+// landmarks), of which at most 1500 are used.  Errors: InvalidArgument (an option), NoData (no plan; too few
+// landmarks at the cameras' height).
 Result<PlanFit> FitPlan(const MapRows& rows, const PlanFitOptions& options);
 
 // As figures of the self-test: plan_num_landmarks, plan_on_walls_ratio, plan_median_wall_distance_m,
 // plan_on_walls_ratio_moved, plan_shift_m, plan_turn_deg, plan_images_free_ratio, plan_fits (0 or 1).
 void AddPlanFigures(const PlanFit& fit, std::map<std::string, double>* figures);
 
-// In words: that the plan fits, or how it does not and what would help.
+// In words: that the plan fits, or in what way it does not and which motion would help.
 std::string PlanVerdict(const PlanFit& fit);
 
 }  // namespace cairn::check_map

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/base/quantiles.h"
 #include "core/geometry/floor_pose.h"
 
 namespace cairn::check_map {

@@ -14,17 +14,17 @@ namespace cairn::check_map {
 double StationSpacingM(const std::vector<MapStation>& stations);
 
 // The station at which a camera stands: of those whose heading is within max_station_heading_deg of the
-// camera's (or that see all around) the nearest, then the one of nearest heading, then the first.  None where
-// it is farther away than max_station_distance_ratio times the spacing (of a single place: any distance).
-// `cam_from_world` is in the frame of the poses that the capture states.  O(n).
+// camera's (or that see all around) the nearest, then the one of nearest heading, then the first.  Nothing
+// where it is farther away than max_station_distance_ratio times the spacing (if all stations are at one
+// place: any distance).  `cam_from_world` is in the frame of the poses that the capture states.  O(n).
 std::optional<StationIdx> StationOf(const Pose& cam_from_world, double spacing_m, const MapRows& rows,
                                     const CheckMapOptions& options);
 
 // Fills in StationOf of every image with a true pose.
 void FindStations(const MapRows& rows, const CheckMapOptions& options, std::vector<HeldOutResult>* results);
 
-// How the images with a true pose fared, by the regions that have their station.  Ascending region; images at
-// no station of any region count in kOutsideRegions.
+// The results of the images with a true pose, by the regions that have their station.  Ascending region;
+// images at no station of any region count in kOutsideRegions.
 std::vector<RegionSelfTest> SummarizeRegions(const MapRows& rows, const std::vector<HeldOutResult>& results,
                                              const CheckMapOptions& options);
 

@@ -79,7 +79,7 @@ std::string Line(const std::string& name, const std::string& value) {
   return fmt::format("{:<22} {}\n", name, value);
 }
 
-// What the images and the floor plan say of each other.
+// How the images and the floor plan agree.
 std::string PlanText(const CheckMapReport& held_out) {
   const auto figure = [&](const char* name) { return Figure(held_out, name); };
   std::string text;

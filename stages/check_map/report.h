@@ -12,8 +12,8 @@
 
 namespace cairn::check_map {
 
-// What check-map prints: the figures of the held-out images and, if other places were tried, of the images
-// there.
+// What check-map prints: the figures of the held-out images and, if other places were tried, of the
+// images there.
 struct PrintedReport {
   const MapRows* rows = nullptr;
   int64_t map_bytes = 0;

@@ -8,13 +8,13 @@ namespace {
 
 constexpr size_t kMaxShown = 20;
 
-struct Arguments {
+struct CheckArguments {
   std::string world;
   std::string regions;
   int max_hole = -1;
 };
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunCheck(const CheckArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
   CAIRN_ASSIGN_OR_RETURN(const Decomposition decomposition, ReadDecomposition(arguments.regions));
   const RegionCheck check = CheckRegions(world, decomposition, arguments.max_hole);
@@ -37,18 +37,20 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command CheckRegionsCommand() {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CheckArguments>();
   Command command;
   command.name = "check-regions";
-  command.summary = "Check a decomposition against the definition of one, and say which property fails";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("world", arguments->world, "world: database or JSON")->required()->type_name("FILE");
-    app.add_option("regions", arguments->regions, "regions: database or JSON")->required()->type_name("FILE");
-    app.add_option("--max-hole", arguments->max_hole,
-                   "most connected uncovered stations that are allowed; -1: any")
-        ->type_name("INT");
+  command.summary = "Check a decomposition against its definition, and say which property fails";
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("world", arguments->world, "world: database or JSON").Required().Type("FILE");
+    parser.Add("regions", arguments->regions, "regions: database or JSON").Required().Type("FILE");
+    parser
+        .Add("--max-hole", arguments->max_hole, "most connected uncovered stations that are allowed; -1: any")
+        .Type("INT");
   };
-  command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
+  command.run = [arguments](const CommandEnvironment& environment) {
+    return RunCheck(*arguments, environment);
+  };
   return command;
 }
 

@@ -85,7 +85,7 @@ class Checker {
     return reached;
   }
 
-  // N_tau(v), by breadth-first search (3.6).
+  // [Sala06 Def. 3.6] N_tau(v), by breadth-first search.
   StationSet Neighbourhood(StationIdx center) const {
     StationSet stations = {center};
     size_t begin = 0;
@@ -107,11 +107,13 @@ class Checker {
 
   void CheckRegion(int idx) {
     const Region& region = decomposition_.regions[idx];
+    // [Sala06 Def. 3.4] any two stations of a region are joined by a path inside of it
     const size_t num_reached = ReachableFrom(region.stations[0], region.stations).size();
     if (num_reached < region.stations.size()) {
       Fail("region {} is not connected: {} of its {} stations cannot be reached from station {}", idx,
            region.stations.size() - num_reached, region.stations.size(), region.stations[0]);
     }
+    // [Sala06 Def. 3.8] |intersection of F_v over v in R| >= k
     if (static_cast<int>(region.features.size()) < decomposition_.k) {
       Fail("region {} has {} features, fewer than k = {}", idx, region.features.size(), decomposition_.k);
     }
@@ -126,7 +128,7 @@ class Checker {
     }
   }
 
-  // Which regions contain the neighbourhood of each coverable station (3.7).
+  // [Sala06 Def. 3.7] Which regions contain the neighbourhood of each coverable station.
   void CheckCoverage() {
     visited_.assign(world_.num_stations(), false);
     regions_of_.resize(world_.num_stations());
@@ -143,7 +145,7 @@ class Checker {
         Intersect(sets_[other], &common);
         Intersect(regions_with[other], &containing);
       }
-      if (static_cast<int>(common.size()) < decomposition_.k) continue;
+      if (static_cast<int>(common.size()) < decomposition_.k) continue;  // [Sala06 §V-A] not coverable
       ++check_.num_coverable;
       regions_of_[station] = containing;
       if (containing.empty()) uncovered_.push_back(station);
@@ -160,6 +162,7 @@ class Checker {
            listed ? "it is covered or not coverable" : "no region contains its neighbourhood",
            difference.size());
     }
+    // [Sala06 Def. 3.5] The regions' union is V: of coverable stations, and where rho lets none go.
     if (decomposition_.rho == 0 && !uncovered_.empty()) {
       Fail("{} coverable stations are uncovered although rho = 0; first: station {}", uncovered_.size(),
            uncovered_[0]);
@@ -170,6 +173,7 @@ class Checker {
     std::erase_if(*list, [&](int32_t value) { return !std::binary_search(with.begin(), with.end(), value); });
   }
 
+  // [Sala06 §V-D] No region can go without leaving a station uncovered.
   void CheckRedundancy() {
     std::vector<bool> needed(decomposition_.regions.size(), false);
     for (const std::vector<int>& regions : regions_of_) {

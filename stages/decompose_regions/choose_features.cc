@@ -15,7 +15,7 @@
 namespace cairn::decompose_regions {
 namespace {
 
-// The stations that a region still has: as it takes features, those that see all of them.
+// The stations that a region still has: those that see all features taken so far.
 class ShrinkingRegion {
  public:
   // `required`: the stations that it must hold, connected.
@@ -27,7 +27,8 @@ class ShrinkingRegion {
             static_cast<size_t>(std::ceil(min_kept_ratio * static_cast<double>(stations_.size())))),
         finder_(*finder) {}
 
-  // Shrinks to the stations that see a feature; false, and as before, where too little would be left.
+  // Shrinks to the stations that see a feature; returns false and changes nothing where too few
+  // would be left.
   bool Take(const std::vector<StationIdx>& area) {
     std::vector<StationIdx> seen;
     std::set_intersection(stations_.begin(), stations_.end(), area.begin(), area.end(),
@@ -70,7 +71,7 @@ class Chooser {
   // As many features as the region has, those that add most first.
   Result<std::vector<FeatureIdx>> Choose(size_t num_features, ShrinkingRegion* region) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Candidate> candidates, CandidatesOf(region->required()));
-    // What a candidate adds never grows: of outdated values the largest is looked at first.  Ties: the
+    // The gain of a candidate never grows: of outdated values the largest is updated first.  Ties: the
     // smaller feature.
     std::priority_queue<std::pair<double, int>> gains;
     for (int i = 0; i < std::ssize(candidates); ++i) gains.emplace(Gain(candidates[i]), -i);
@@ -164,14 +165,13 @@ OptionTable DescribeOptions(ChooseFeaturesOptions* o) {
   OptionTable table = {
       {.name = "feature_choice",
        .value = &o->feature_choice,
-       .help =
-           "features that a region keeps: pose (of those it could have, the ones that fix a camera's pose "
-           "best) or cover (those that the algorithm found)",
+       .help = "features that a region keeps: pose (the possible ones that determine a camera's pose best) "
+               "or cover (those that the algorithm found)",
        .choices = {"pose", "cover"}},
       {.name = "min_kept_ratio",
        .value = &o->min_kept_ratio,
        .help =
-           "feature choice: least part of its stations that a region keeps for the sake of better features",
+           "feature choice: smallest part of its stations that a region keeps when it takes better features",
        .min = 0,
        .max = 1},
       {.name = "keypoint_sigma_px",
@@ -191,12 +191,12 @@ OptionTable DescribeOptions(ChooseFeaturesOptions* o) {
        .max = 10},
       {.name = "rough_sigma_m",
        .value = &o->rough_sigma_m,
-       .help = "feature choice: what a camera knows of its place without landmarks, m",
+       .help = "feature choice: standard deviation of a camera's place without landmarks, m",
        .min = 1e-3,
        .max = 1e6},
       {.name = "rough_sigma_deg",
        .value = &o->rough_sigma_deg,
-       .help = "feature choice: what it knows of its rotation, degrees",
+       .help = "feature choice: standard deviation of its rotation without landmarks, degrees",
        .min = 1e-2,
        .max = 1e3},
   };
@@ -237,7 +237,7 @@ Result<Decomposition> ChooseFeatures(const World& world, const Classes& classes,
       required = GrowStations(neighbours, std::move(required), decomposition.tau);
     }
     count(region, -1);
-    // A region of which no station needs it is redundant, and stays as it is.
+    // A region that no station needs is redundant, and stays as it is.
     if (required.empty()) required = region.stations;
     ShrinkingRegion shrinking(region.stations, std::move(required), options.min_kept_ratio, &finder);
     CAIRN_ASSIGN_OR_RETURN(region.features, chooser.Choose(region.features.size(), &shrinking));

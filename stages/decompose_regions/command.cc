@@ -12,7 +12,7 @@
 namespace cairn::decompose_regions {
 namespace {
 
-// Bytes of memory for one of the world, and of the classes that landmarks are chosen by.
+// Bytes of memory per byte of the world, and of the classes from which landmarks are chosen.
 constexpr double kMemoryPerWorldByte = 8;
 constexpr double kMemoryPerClassesByte = 1.5;
 
@@ -32,7 +32,8 @@ void WarnIfDisconnected(const World& world) {
   const auto components = ComponentFinder(neighbours).Components(all);
   if (components.size() < 2) return;
   spdlog::warn(
-      "the graph of stations has {} unconnected parts; no region spans two (station {} is not joined to {})",
+      "the graph of stations has {} unconnected parts, and no region spans two (station {} is not connected "
+      "to {})",
       components.size(), components[1][0], components[0][0]);
 }
 
@@ -42,7 +43,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     ChooseFeaturesOptions of_choice;
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         NamesOf(DescribeOptions(&of_choice)),
-        "features are chosen among those of the classes; give --classes, or leave it out"));
+        "chooses features among those of the classes; give --classes, or leave it out"));
   }
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("decomposing the world", arguments.world, kMemoryPerWorldByte,
                                            environment.memory_mib));
@@ -98,20 +99,19 @@ Command DecomposeRegionsCommand() {
   auto arguments = std::make_shared<Arguments>();
   Command command;
   command.name = "decompose-regions";
-  command.summary = "Divide a world into few regions in each of which the same k features are visible";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("world", arguments->world, "world: database (world.db) or JSON")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("--classes", arguments->classes,
-                   "feature classes that the world was made from (classes.db): regions then keep "
-                   "the features that fix poses best (--feature-choice)")
-        ->type_name("FILE");
-    app.add_option("-o,--output", arguments->output, "regions to write: .json, or else a database")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("--svg", arguments->svg, "also draw the regions as SVG")->type_name("FILE.svg");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.summary = "Divide the stations into few regions that see the same k features (stage 5)";
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("world", arguments->world, "world: database (world.db) or JSON").Required().Type("FILE");
+    parser
+        .Add("--classes", arguments->classes,
+             "feature classes that the world was made from (classes.db): regions then keep the features that "
+             "determine poses best (--feature-choice)")
+        .Type("FILE");
+    parser.Add("-o,--output", arguments->output, "regions to write: .json, or else a database")
+        .Required()
+        .Type("FILE");
+    parser.Add("--svg", arguments->svg, "also draw the regions as SVG").Type("FILE.svg");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
   return command;

@@ -4,9 +4,9 @@
 
 namespace cairn::decompose_regions {
 
-// cairn decompose-regions WORLD -o OUT
+// cairn stage decompose-regions WORLD -o OUT
 Command DecomposeRegionsCommand();
-// cairn check-regions WORLD REGIONS
+// cairn stage check-regions WORLD REGIONS
 Command CheckRegionsCommand();
 
 }  // namespace cairn::decompose_regions

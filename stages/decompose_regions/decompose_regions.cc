@@ -21,12 +21,11 @@ Error NothingCoverable(const World& world, const ReducedWorld& reduced,
         options.tau, world.num_stations());
   }
   const Eigen::Vector2d position = world.positions[reduced.max_set_station];
-  return MakeError(
-      ErrorCode::kNoData,
-      "no station is coverable: k = {} features must be visible within tau = {} hops, the best station "
-      "({} at {:.2f}, {:.2f}) has {}; choose k <= {}",
-      options.k, options.tau, reduced.max_set_station, position.x(), position.y(), reduced.max_set_size,
-      reduced.max_set_size);
+  return MakeError(ErrorCode::kNoData,
+                   "no station is coverable: k = {} features must be visible within tau = {} hops, but the "
+                   "best station ({} at {:.2f}, {:.2f}) has {}; choose k <= {}",
+                   options.k, options.tau, reduced.max_set_station, position.x(), position.y(),
+                   reduced.max_set_size, reduced.max_set_size);
 }
 
 int NumUncovered(const Cover& cover) {
@@ -46,14 +45,15 @@ void RunAlgorithm(const DecomposeRegionsOptions& options, uint64_t seed, Cover* 
   if (is_b2) AlgorithmB2(cover);
   if (options.algorithm == "c") AlgorithmC(options.alpha, cover);
   bool added = options.max_hole >= 0 && cover->num_open() == 0 && LimitHoles(options.max_hole, cover);
-  // `best` leaves as many stations uncovered as it is given, anywhere: no more in all than one hole may have.
+  // `best` may leave as many stations uncovered as `start` does, anywhere: so allow no more in all than one
+  // hole may have.
   if (options.algorithm == "best" && options.max_hole >= 0 && NumUncovered(*cover) > options.max_hole)
     added |= LimitHoles(0, cover);
   // [Sala06 §V-D] B.2 leaves no redundant region.
   if (!is_b2 || added) DropRedundantRegions(cover);
 }
 
-// [Theorem 4.2] Grows the regions back and names their features as the world does.
+// [Sala06 Theorem 4.2] Grows the regions back and gives their features the world's numbers.
 Region GrownRegion(const CoreRegion& core, const ReducedWorld& reduced, int tau) {
   Region region;
   for (const int32_t feature : core.features) region.features.push_back(reduced.original[feature]);
@@ -62,8 +62,8 @@ Region GrownRegion(const CoreRegion& core, const ReducedWorld& reduced, int tau)
   return region;
 }
 
-// A region grown by two or more hops can contain the whole neighbourhood of stations that its core does not
-// have.  Takes the cores of the grown regions, and drops regions that have become redundant.
+// A region grown by two or more hops can contain the whole neighbourhood of stations outside its core.  Takes
+// the cores of the grown regions, and drops regions that have become redundant.
 std::vector<CoreRegion> RegionsAfterGrowth(const Cover& cover, int tau) {
   const ReducedWorld& reduced = cover.world();
   std::vector<CoreRegion> kept;
@@ -77,6 +77,7 @@ std::vector<CoreRegion> RegionsAfterGrowth(const Cover& cover, int tau) {
   std::vector<const CoreRegion*> cores;
   for (const CoreRegion& region : cover.regions()) {
     if (region.stations.empty()) continue;
+    // [Sala06 Lemma 4.1] the stations whose neighbourhood lies in the grown region
     CoreRegion core{region.features, {}};
     for (const StationIdx station :
          ShrinkStations(reduced.neighbours, GrowStations(reduced.neighbours, region.stations, tau), tau)) {
@@ -113,7 +114,7 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .min = 0},
       {.name = "max_hole",
        .value = &o->max_hole,
-       .help = "most connected coverable stations that may be in no region; -1: what rho leaves",
+       .help = "most connected coverable stations that may be in no region; -1: whatever rho leaves",
        .min = -1},
       {.name = "alpha",
        .value = &o->alpha,
@@ -131,7 +132,7 @@ OptionTable DescribeOptions(DecomposeRegionsOptions* o) {
        .min = 0},
       {.name = "best_num_repairs",
        .value = &o->best_num_repairs,
-       .help = "algorithm best: neighbourhoods that are covered anew; time grows with it",
+       .help = "algorithm best: number of neighbourhoods that are covered again; time grows with it",
        .min = 0},
       {.name = "best_max_stations",
        .value = &o->best_max_stations,

@@ -13,9 +13,10 @@
 
 namespace cairn::decompose_regions {
 
-// Divides a world into few large regions of stations, such that everywhere in a region the same k features
-// are visible: they are the landmarks that a robot needs there.  Before: filter_visibility.  After: emit_map.
-// Implements [Sala06 §III-V].  Problem (tau-MORDP, 3.8): the smallest set D of connected regions R with
+// Divides a world into few large regions of stations, so that the same k features are visible everywhere in a
+// region: these are the landmarks that a robot needs there.  Before: filter_visibility.  After: emit_map.
+// Implements [Sala06 §III, §IV, §V].  The problem, tau-MORDP [Sala06 Def. 3.8]: the smallest set D of regions
+// R, each connected, with
 //   |intersection of F_v over v in R| >= k           for every R in D, and
 //   N_tau(v) inside of some R in D                   for every station v
 // where N_tau(v) are the stations within tau hops of v.  NP-complete; the algorithms are approximations.
@@ -29,19 +30,19 @@ namespace cairn::decompose_regions {
 // | L     | CoreRegion::features                                                                        |
 // | rho   | a region must cover more than rho stations that nothing else covers                         |
 struct DecomposeRegionsOptions {
-  // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, V-C], or "best" (algorithm_best.h).
+  // "a1", "a2", "a3", "b1", "b2" or "c" [Sala06 §V-B, §V-C], or "best" (algorithm_best.h).
   std::string algorithm = "best";
   // Number of features that are visible everywhere in a region [Sala06: 4 and 10; here more, so that a
   // query may miss some].  REQUIRES: >= 1
   int k = 40;
-  // Overlap: the tau-neighbourhood of every station lies in some region, hops [Sala06: 0 and 1].  REQUIRES:
-  // >= 0
+  // Overlap: the tau-neighbourhood of every station lies in some region, hops [Sala06: 0 and 1].
+  // REQUIRES: >= 0
   int tau = 1;
   // A region is kept only if it covers more than this many stations that nothing else covers [Sala06: 9 in
   // simulated worlds, 3 in the real one].  REQUIRES: >= 0
   int rho = 0;
-  // Most connected coverable stations that no region may cover; -1: what rho leaves.  Remainders that rho
-  // lets go one by one can add up to larger holes; those get regions.  REQUIRES: >= -1
+  // Largest number of connected coverable stations that may be in no region; -1: whatever rho leaves.
+  // Remainders that rho drops one by one can add up to larger holes, which then get regions.  REQUIRES: >= -1
   int max_hole = -1;
   // Algorithm C: least share of a disc's stations that are open [Sala06: 0.85].  REQUIRES: in [0, 1]
   double alpha = 0.85;
@@ -51,28 +52,28 @@ struct DecomposeRegionsOptions {
   // Algorithm best: exchanges of a region for another, per coverable station, so that fewer stations are
   // uncovered (cover_annealing.h).  REQUIRES: >= 0
   int best_exchanges_per_station = 400;
-  // Algorithm best: neighbourhoods that are covered anew (cover_search.h).  REQUIRES: >= 0
+  // Algorithm best: number of neighbourhoods that are covered again (cover_search.h).  REQUIRES: >= 0
   int best_num_repairs = 60;
   // Column generation takes seconds for some thousand stations and memory for a few thousand regions: worlds
   // larger than this get the regions of B.2 instead of best's, and the counted bound.  REQUIRES: >= 0
   int best_max_stations = 20000;
-  // Which features regions keep: for ChooseFeatures, once the regions are made and where the classes are
-  // known.
+  // Which features regions keep: used by ChooseFeatures after the regions are made, where the classes
+  // are known.
   ChooseFeaturesOptions choose_features;
 };
 OptionTable DescribeOptions(DecomposeRegionsOptions* options);
 
 // Pure: same world, options and seed, same result.  B.2 costs O(incidences) per reading of the world plus,
 // for each region, O(k) passes over the incidences of the region's stations; memory is proportional to the
-// incidences. REQUIRES: CheckWorld(world) is ok. Errors: InvalidArgument for a bad option, NoData when no
-// station is coverable (says what k the best one allows) or no region covers more than rho, Cancelled.
+// incidences.  REQUIRES: CheckWorld(world) is ok.  Errors: InvalidArgument for a bad option, NoData when no
+// station is coverable (says which k the best station allows) or no region covers more than rho, Cancelled.
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed, Progress& progress);
 Result<Decomposition> DecomposeRegions(const World& world, const DecomposeRegionsOptions& options,
                                        uint64_t seed);
 
 // Stations that a decomposition has to cover [Sala06 §V-A]: at least k features are visible from all of
-// N_tau(v). Ascending.
+// N_tau(v).  Ascending.
 std::vector<StationIdx> CoverableStations(const World& world, int k, int tau);
 
 }  // namespace cairn::decompose_regions

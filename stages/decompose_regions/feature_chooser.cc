@@ -1,5 +1,5 @@
-// [Sala06 Fig. 4, lines 3-9] Shrinking a region until k features are visible all over it; B.1, B.2 and C do
-// it.
+// [Sala06 Fig. 4, Fig. 5] Lines 3-9 and 7-13: shrinking a region until k features are visible all over it;
+// B.1, B.2 and C do it.
 #include <algorithm>
 
 #include "stages/decompose_regions/algorithms/algorithms.h"
@@ -22,7 +22,7 @@ void FeatureChooser::Uncount(const std::vector<StationIdx>& stations) {
   }
 }
 
-// [line 5] f = argmax over f in F \ L of |{v in R : f in F_v}|
+// [Sala06 Fig. 4 line 5, Fig. 5 line 9] f = argmax over f in F \ L (C: Phi \ L) of |{v in R : f in F_v}|
 int32_t FeatureChooser::MostVisible(const std::vector<int32_t>* allowed,
                                     const std::vector<int32_t>& chosen) const {
   int32_t best = -1;
@@ -36,7 +36,7 @@ int32_t FeatureChooser::MostVisible(const std::vector<int32_t>* allowed,
 
 CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
   const ReducedWorld& world = cover_.world();
-  // [line 3] R = U, L = {}; the first feature of [line 5] is known from the counts over U
+  // [Sala06 Fig. 4 line 3, Fig. 5 line 7] R = U, L = {}; the first feature is known from the counts over U
   CoreRegion region;
   if (allowed) {
     region.features.push_back(*std::max_element(allowed->begin(), allowed->end(), [&](int32_t a, int32_t b) {
@@ -50,12 +50,12 @@ CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
     if (cover_.IsOpen(station)) stations.push_back(station);
   }
   if (world.k > 1) Count(stations);
-  // [lines 4-8]
+  // [Sala06 Fig. 4 line 4, Fig. 5 line 8] for i = 1 to k
   while (static_cast<int>(region.features.size()) < world.k) {
     const int32_t feature = MostVisible(allowed, region.features);
-    region.features.push_back(feature);
+    region.features.push_back(feature);  // [Sala06 Fig. 4 line 7, Fig. 5 line 11] L = L u {f}
     if (counts_[feature] == static_cast<int32_t>(stations.size())) continue;  // R stays
-    // [line 6] R = {v in R : f in F_v}
+    // [Sala06 Fig. 4 line 6, Fig. 5 line 10] R = {v in R : f in F_v}
     removed.clear();
     KeepCommon(world.areas[feature], &stations, &removed);
     if (removed.size() <= stations.size()) {
@@ -69,7 +69,7 @@ CoreRegion FeatureChooser::Choose(const std::vector<int32_t>* allowed) {
   for (const int32_t feature : counted_) counts_[feature] = 0;
   counted_.clear();
 
-  // [line 9] R = {v in V : L is a subset of F_v}
+  // [Sala06 Fig. 4 line 9, Fig. 5 line 13] R = {v in V : L is a subset of F_v}
   region.stations = CommonStations(world.areas, region.features);
   return region;
 }

@@ -16,8 +16,8 @@ std::vector<char> KeptFeatures(const World& world, const Decomposition& decompos
   return kept;
 }
 
-// Stations whose tau-neighbourhood lies in some region, as flags: what is left of a region after tau times
-// taking away the stations that have a neighbour outside.
+// Stations whose tau-neighbourhood lies in some region, as flags: the part of a region that is left after
+// removing the stations with a neighbour outside, tau times.
 std::vector<char> CoveredStations(const World& world, const Decomposition& decomposition) {
   const IndexLists neighbours = NeighbourLists(world);
   std::vector<char> covered(world.num_stations(), 0), is_inside(world.num_stations(), 0);

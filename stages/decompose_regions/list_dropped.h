@@ -10,14 +10,14 @@ namespace cairn::decompose_regions {
 
 // The features of a world that no region of a decomposition keeps, and the stations whose tau-neighbourhood
 // lies in none, each with the reason:
-//   not_common           no region has it in view from all of its stations
-//   not_chosen           some region has
+//   not_common           in no region do all stations see it
+//   not_chosen           in some region all stations see it
 //   few_features         fewer than k features are visible from the station
 //   few_common_features  at least k are, but fewer from the station and all others within tau hops
 //   left_over            the station is coverable: decomposition.uncovered
-// First features, then stations, ascending.  Derived from the decomposition alone, whatever made it.
-// O(incidences * regions of a station + edges * tau).
-// REQUIRES: CheckWorld(world) is ok, and `decomposition` is valid for it (CheckRegions).
+// First features, then stations, ascending.  Derived from the decomposition alone, independently of the
+// algorithm.  O(incidences * regions of a station + edges * tau).  REQUIRES: CheckWorld(world) is ok, and
+// `decomposition` is valid for it (CheckRegions).
 std::vector<DroppedItem> ListDropped(const World& world, const Decomposition& decomposition);
 
 }  // namespace cairn::decompose_regions

@@ -11,16 +11,14 @@
 
 #include <fmt/format.h>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/pose.h"
+#include "core/picture/floor_frame.h"
 #include "core/picture/svg.h"
 
 namespace cairn::decompose_regions {
 namespace {
 
-// Okabe and Ito's colours without black and yellow, then Paul Tol's muted ones.
-constexpr std::array kColours = {"#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00",
-                                 "#332288", "#999933", "#882255", "#44aa99", "#ddcc77", "#117733"};
 // The longer side of the picture, while a cell of the grid is neither tiny nor huge.
 constexpr double kLongSidePx = 1000, kMinCellPx = 8, kMaxCellPx = 56;
 constexpr int kMaxLegendRegions = 30;
@@ -45,7 +43,7 @@ struct Grid {
       direction += std::polar(1.0, 4.0 * std::atan2(difference.y(), difference.x()));
     }
     if (!lengths.empty()) {
-      side_m = Median(std::move(lengths));
+      side_m = UpperMedian(std::move(lengths));
       angle_rad = std::abs(direction) > 1e-9 ? std::arg(direction) / 4.0 : 0.0;
     }
     if (world.lattice_spacing_m > 0) side_m = world.lattice_spacing_m;
@@ -58,15 +56,6 @@ struct Grid {
   Vec2 FloorFromGrid(double x, double y) const {
     return origin + Eigen::Rotation2Dd(angle_rad) * Vec2(x, y) * side_m;
   }
-};
-
-// Maps the floor (metres, y up) to pixels (y down).
-struct Canvas {
-  double scale = 1, left = 0, top = 0;  // top: largest y of the floor
-
-  double X(const Vec2& point) const { return (point.x() - left) * scale; }
-  double Y(const Vec2& point) const { return (top - point.y()) * scale; }
-  std::string Point(const Vec2& point) const { return fmt::format("{:.1f} {:.1f}", X(point), Y(point)); }
 };
 
 class Picture {
@@ -91,30 +80,25 @@ class Picture {
     const int num_rows =
         std::min<int>(kMaxLegendRegions, static_cast<int>(decomposition_.regions.size())) + 6;
     const double height = std::max(height_ + 60, 18.0 * num_rows + 20);
-    Write(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0f}\" height=\"{:.0f}\" "
-        "font-family=\"sans-serif\" "
-        "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-        width_ + 300, height);
+    svg_.Begin(width_ + 300, height, 12);
     DrawStations();
     DrawOutlines();
-    DrawScaleBar();
+    svg_.Append(ScaleBar(1.5 * cell_px_, height_ + 20, frame_.px_per_m, 0.4 * width_));
     DrawLegend();
-    Write("</svg>\n");
-    return fmt::to_string(text_);
+    return svg_.End();
   }
 
  private:
-  template <typename... Args>
-  void Write(fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(text_), format, std::forward<Args>(args)...);
+  std::string Point(const Vec2& place) const {
+    const Vec2 pixel = frame_.Pixel(place);
+    return fmt::format("{:.1f} {:.1f}", pixel.x(), pixel.y());
   }
 
   // Each region in turn takes the colour that the fewest regions around it have.
   void ChooseColours() {
     std::map<Cell, std::vector<int>> regions_at;
     for (size_t i = 0; i < region_cells_.size(); ++i) {
-      std::array<int, kColours.size()> uses{};
+      std::array<int, kSvgManyColours.size()> uses{};
       std::set<int> around;
       for (const auto& [x, y] : region_cells_[i]) {
         for (const Cell& cell :
@@ -125,9 +109,9 @@ class Picture {
       }
       for (const int other : around) ++uses[colours_[other]];
       // Among unused colours start where the index points, so that neighbours in the list differ as well.
-      int best = static_cast<int>(i % kColours.size());
-      for (size_t step = 0; step < kColours.size(); ++step) {
-        const int colour = static_cast<int>((i + step) % kColours.size());
+      int best = static_cast<int>(i % kSvgManyColours.size());
+      for (size_t step = 0; step < kSvgManyColours.size(); ++step) {
+        const int colour = static_cast<int>((i + step) % kSvgManyColours.size());
         if (uses[colour] < uses[best]) best = colour;
       }
       colours_.push_back(best);
@@ -145,11 +129,11 @@ class Picture {
     const double margin = 1.5 * grid_.side_m;
     const double long_side = (high - low).maxCoeff() + 2 * margin;
     cell_px_ = std::clamp(kLongSidePx * grid_.side_m / long_side, kMinCellPx, kMaxCellPx);
-    canvas_.scale = cell_px_ / grid_.side_m;
-    canvas_.left = low.x() - margin;
-    canvas_.top = high.y() + margin;
-    width_ = (high.x() - low.x() + 2 * margin) * canvas_.scale;
-    height_ = (high.y() - low.y() + 2 * margin) * canvas_.scale;
+    frame_.px_per_m = cell_px_ / grid_.side_m;
+    frame_.low = low.array() - margin;
+    frame_.high = high.array() + margin;
+    width_ = frame_.WidthPx();
+    height_ = frame_.HeightPx();
   }
 
   // The shape of a station around its place: a square of the grid, or a sector for a heading.
@@ -160,18 +144,17 @@ class Picture {
       for (const auto& [x, y] :
            {std::pair(-0.5, -0.5), std::pair(0.5, -0.5), std::pair(0.5, 0.5), std::pair(-0.5, 0.5)}) {
         const Vec2 corner = at + size * (grid_.FloorFromGrid(x, y) - grid_.origin);
-        path += (path.empty() ? "M" : "L") + canvas_.Point(corner);
+        path += (path.empty() ? "M" : "L") + Point(corner);
       }
       return path + "Z";
     }
     const double radius = 0.5 * size * grid_.side_m;
-    std::string path = "M" + canvas_.Point(at);
+    std::string path = "M" + Point(at);
     for (const double side : {-0.5, 0.5}) {
       const double angle = RadFromDeg(world_.headings_deg[station] + side * HeadingWidthDeg());
       const Vec2 corner = at + radius * Vec2(std::cos(angle), std::sin(angle));
-      path += side < 0
-                  ? "L" + canvas_.Point(corner)
-                  : fmt::format("A{0:.1f} {0:.1f} 0 0 0 {1}", radius * canvas_.scale, canvas_.Point(corner));
+      path += side < 0 ? "L" + Point(corner)
+                       : fmt::format("A{0:.1f} {0:.1f} 0 0 0 {1}", radius * frame_.px_per_m, Point(corner));
     }
     return path + "Z";
   }
@@ -196,25 +179,25 @@ class Picture {
     }
     std::vector<bool> uncovered(world_.num_stations(), false);
     for (const StationIdx station : decomposition_.uncovered) uncovered[station] = true;
-    Write("<g id=\"stations\">\n");
+    svg_.Write("<g id=\"stations\">\n");
     for (StationIdx station = 0; station < world_.num_stations(); ++station) {
       if (uncovered[station]) {
-        Write("<path d=\"{}\" fill=\"white\" stroke=\"black\" stroke-width=\"1.2\"/>\n",
-              StationPath(station, 0.6));
+        svg_.Write("<path d=\"{}\" fill=\"white\" stroke=\"black\" stroke-width=\"1.2\"/>\n",
+                   StationPath(station, 0.6));
       } else if (owner[station] >= 0) {
-        Write("<path d=\"{}\" fill=\"{}\" fill-opacity=\"0.45\"/>\n", StationPath(station, 0.94),
-              kColours[colours_[owner[station]]]);
+        svg_.Write("<path d=\"{}\" fill=\"{}\" fill-opacity=\"0.45\"/>\n", StationPath(station, 0.94),
+                   kSvgManyColours[colours_[owner[station]]]);
       } else {
-        Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\" fill=\"#888\"/>\n",
-              canvas_.X(world_.positions[station]), canvas_.Y(world_.positions[station]));
+        svg_.Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\" fill=\"#888\"/>\n",
+                   frame_.Pixel(world_.positions[station]).x(), frame_.Pixel(world_.positions[station]).y());
       }
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   // One side of a cell at the border of a region, moved inwards so that outlines of regions that share a
-  // border lie beside each other; shortened at convex corners and lengthened at concave ones, so that sides
-  // meet.
+  // border lie beside each other; shortened at convex corners and lengthened at concave ones, so that
+  // sides meet.
   void AddSide(const std::set<Cell>& cells, const Cell& cell, int nx, int ny, double inset,
                std::string* path) const {
     const int tx = -ny, ty = nx;
@@ -226,14 +209,14 @@ class Picture {
       } else if (inside(sign * tx + nx, sign * ty + ny)) {
         along += inset;
       }
-      return canvas_.Point(grid_.FloorFromGrid(cell.first + nx * (0.5 - inset) + sign * tx * along,
-                                               cell.second + ny * (0.5 - inset) + sign * ty * along));
+      return Point(grid_.FloorFromGrid(cell.first + nx * (0.5 - inset) + sign * tx * along,
+                                       cell.second + ny * (0.5 - inset) + sign * ty * along));
     };
     *path += "M" + end(-1) + "L" + end(1);
   }
 
   void DrawOutlines() {
-    Write("<g id=\"outlines\" fill=\"none\" stroke-width=\"1.6\" stroke-linecap=\"round\">\n");
+    svg_.Write("<g id=\"outlines\" fill=\"none\" stroke-width=\"1.6\" stroke-linecap=\"round\">\n");
     for (size_t i = 0; i < region_cells_.size(); ++i) {
       std::string path;
       const double inset = 0.06 + 0.08 * static_cast<double>(i % 4);
@@ -244,59 +227,47 @@ class Picture {
           }
         }
       }
-      Write("<path d=\"{}\" stroke=\"{}\"/>\n", path, kColours[colours_[i]]);
+      svg_.Write("<path d=\"{}\" stroke=\"{}\"/>\n", path, kSvgManyColours[colours_[i]]);
     }
-    Write("</g>\n<g id=\"numbers\" font-weight=\"bold\" text-anchor=\"middle\">\n");
+    svg_.Write("</g>\n<g id=\"numbers\" font-weight=\"bold\" text-anchor=\"middle\">\n");
     for (size_t i = 0; i < centres_.size(); ++i) {
-      Write(
+      svg_.Write(
           "<text x=\"{0:.1f}\" y=\"{1:.1f}\" stroke=\"white\" stroke-width=\"3\">{2}</text>"
           "<text x=\"{0:.1f}\" y=\"{1:.1f}\">{2}</text>\n",
-          canvas_.X(centres_[i]), canvas_.Y(centres_[i]) + 4, i);
+          frame_.Pixel(centres_[i]).x(), frame_.Pixel(centres_[i]).y() + 4, i);
     }
-    Write("</g>\n");
-  }
-
-  void DrawScaleBar() {
-    double length_m = 0.1;
-    for (const double next : {0.5, 1.0, 2.0, 5.0, 10.0, 50.0, 100.0}) {
-      if (next * canvas_.scale <= 0.4 * width_) length_m = next;
-    }
-    const double x = 1.5 * cell_px_, y = height_ + 20;
-    Write(
-        "<path d=\"M{0:.1f} {1:.1f}v8h{2:.1f}v-8\" fill=\"none\" stroke=\"black\"/>"
-        "<text x=\"{0:.1f}\" y=\"{3:.1f}\">{4:g} m</text>\n",
-        x, y, length_m * canvas_.scale, y + 24, length_m);
+    svg_.Write("</g>\n");
   }
 
   void DrawLegend() {
     double y = 24;
     const double x = width_ + 10;
-    Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{}</text>\n", x, y,
-          NumRegionsText(decomposition_.regions.size(), decomposition_.lower_bound));
+    svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{}</text>\n", x, y,
+               NumRegionsText(decomposition_.regions.size(), decomposition_.lower_bound));
     y += 18;
-    Write("<text x=\"{:.0f}\" y=\"{:.0f}\">algorithm {}, k = {}, tau = {}, rho = {}</text>\n", x, y,
-          EscapeXml(decomposition_.algorithm), decomposition_.k, decomposition_.tau, decomposition_.rho);
+    svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">algorithm {}, k = {}, tau = {}, rho = {}</text>\n", x, y,
+               EscapeXml(decomposition_.algorithm), decomposition_.k, decomposition_.tau, decomposition_.rho);
     y += 6;
     for (size_t i = 0; i < decomposition_.regions.size() && i < kMaxLegendRegions; ++i) {
       y += 18;
-      Write(
+      svg_.Write(
           "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"{2}\" fill-opacity=\"0.45\" "
           "stroke=\"{2}\"/><text x=\"{3:.0f}\" y=\"{4:.0f}\">{5}: {6} stations, {7} landmarks</text>\n",
-          x, y - 10, kColours[colours_[i]], x + 20, y, i, decomposition_.regions[i].stations.size(),
+          x, y - 10, kSvgManyColours[colours_[i]], x + 20, y, i, decomposition_.regions[i].stations.size(),
           decomposition_.regions[i].features.size());
     }
     if (decomposition_.regions.size() > kMaxLegendRegions) {
       y += 18;
-      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">and {} more</text>\n", x + 20, y,
-            decomposition_.regions.size() - kMaxLegendRegions);
+      svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">and {} more</text>\n", x + 20, y,
+                 decomposition_.regions.size() - kMaxLegendRegions);
     }
     y += 18;
-    Write(
+    svg_.Write(
         "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"10\" height=\"10\" fill=\"white\" stroke=\"black\"/>"
         "<text x=\"{2:.0f}\" y=\"{3:.0f}\">in no region: {4} coverable stations</text>\n",
         x + 1, y - 9, x + 20, y, decomposition_.uncovered.size());
     y += 18;
-    Write(
+    svg_.Write(
         "<circle cx=\"{0:.0f}\" cy=\"{1:.0f}\" r=\"1.5\" fill=\"#888\"/>"
         "<text x=\"{2:.0f}\" y=\"{3:.0f}\">sees fewer than k all around</text>\n",
         x + 6, y - 4, x + 20, y);
@@ -305,13 +276,13 @@ class Picture {
   const World& world_;
   const Decomposition& decomposition_;
   const Grid grid_;
-  Canvas canvas_;
+  FloorFrame frame_;
   double width_ = 0, height_ = 0, cell_px_ = 0;
   std::vector<Cell> station_cells_;
   std::vector<std::set<Cell>> region_cells_;
   std::vector<Vec2> centres_;
   std::vector<int> colours_;
-  fmt::memory_buffer text_;
+  SvgWriter svg_;
 };
 
 }  // namespace

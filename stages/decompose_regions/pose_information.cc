@@ -51,7 +51,7 @@ Result<std::vector<SightInformation>> SightsOf(const FeatureClass& feature_class
         std::lower_bound(classes.cameras.begin(), classes.cameras.end(), image->camera_id,
                          [](const Camera& candidate, CameraId id) { return candidate.camera_id < id; });
     if (camera == classes.cameras.end() || camera->camera_id != image->camera_id) {
-      return MakeError(ErrorCode::kInvalidArgument, "image {} is of camera {}, which is not there",
+      return MakeError(ErrorCode::kInvalidArgument, "image {} is of camera {}, which does not exist",
                        image->image_id, image->camera_id);
     }
     const double sigma_px =

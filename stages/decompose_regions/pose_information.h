@@ -17,11 +17,12 @@ struct SightInformation {
 };
 
 // The sights of a class with weight p_l = `distinctiveness`, in [0, 1].  An image in which the class lies at
-// the camera's own centre is left out.  Errors: InvalidArgument, naming an image or camera that is not there.
+// the camera's own centre is left out.  Errors: InvalidArgument, naming an image or camera that does
+// not exist.
 Result<std::vector<SightInformation>> SightsOf(const FeatureClass& feature_class, double distinctiveness,
                                                const Classes& classes, const ChooseFeaturesOptions& options);
 
-// What every survey image knows of its pose from the landmarks taken so far.
+// The information that the landmarks taken so far give each survey image about its pose.
 class PoseInformation {
  public:
   PoseInformation(size_t num_images, const ChooseFeaturesOptions& options);

@@ -12,8 +12,6 @@ using Vec2 = Eigen::Vector2d;
 
 constexpr int64_t kItemsPerBlock = 4096;
 
-Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
 // Half-edge 2e runs along edge e, 2e + 1 against it.
 class FaceWalker {
  public:
@@ -27,6 +25,7 @@ class FaceWalker {
     std::vector<bool> seen(num_halves, false);
     std::vector<int64_t> walk;
     progress.Begin("faces", num_halves, "sides of edges");
+    // [Simsarian96 §2.2 step IV] "while there is an unused edge": its counter-clockwise cycle is a region
     for (int64_t first = 0; first < num_halves; ++first) {
       if (first % kItemsPerBlock == kItemsPerBlock - 1) {
         progress.Advance(kItemsPerBlock);
@@ -94,7 +93,8 @@ class FaceWalker {
     for (int64_t i = offsets_[vertex]; i < offsets_[vertex + 1]; ++i) place_[around_[i]] = i;
   }
 
-  // The half-edge that follows with the same face to its left: at the target, the next one clockwise.
+  // [Simsarian96 §2.2 step IV] "turning as sharply as possible to the left": the half-edge that follows with
+  // the same face to its left is, at the target, the next one clockwise.
   int64_t Next(int64_t half) const {
     const int32_t vertex = Target(half);
     const int64_t at = place_[half ^ 1];
@@ -148,6 +148,7 @@ std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
 Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
                             Progress& progress) {
   Arrangement arrangement;
+  // [Simsarian96 §2.2 step II] view boundaries intersect: interior vertices
   CAIRN_ASSIGN_OR_RETURN(NodedSegments result, noder.Node(num_threads, progress));
   arrangement.vertices = std::move(result.vertices);
   std::vector<NodedEdge> noded = std::move(result.edges);

@@ -11,7 +11,7 @@
 
 namespace cairn::decompose_views {
 
-// The planar graph of walls and view boundaries, and its faces [Simsarian96 §2.2, steps II and IV].
+// The planar graph of walls and view boundaries, and its faces [Simsarian96 §2.2 step II, §2.2 step IV].
 struct Arrangement {
   // A line between two vertices, start < end.
   struct Edge {
@@ -40,14 +40,14 @@ struct Arrangement {
   }
 };
 
-// The lines of the planar graph.  Tags: boundaries from 0, pieces of walls from -1 down, then the box's
-// sides.
+// The lines of the planar graph.  Tags: boundaries from 0, pieces of walls from -1 down, then the
+// box's sides.
 std::vector<TaggedSegment> ArrangedSegments(const FloorPlan& plan,
                                             const std::vector<ViewBoundary>& boundaries);
 
-// Nodes the lines on the plan's grid and walks around the faces, turning as sharply left as possible.
-// `noder`: of ArrangedSegments.  O((B + I) log(B + I)) for B boundaries with I intersections.
-// Errors: Cancelled, Unsupported.
+// Nodes the lines on the plan's grid and walks around the faces, always turning left as sharply as possible.
+// `noder`: of ArrangedSegments.  O((B + I) log(B + I)) for B boundaries with I intersections.  Errors:
+// Cancelled, Unsupported.
 Result<Arrangement> Arrange(const FloorPlan& plan, const SegmentNoder& noder, int num_threads,
                             Progress& progress);
 

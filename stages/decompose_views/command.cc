@@ -74,8 +74,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (result->loss.num_regions > 0) {
     *environment.out << fmt::format(
         "decompose_views: {} regions of {:.3f} m2 together joined to neighbours, whose label sets differ "
-        "from theirs by "
-        "{:.2f} labels in the mean\n",
+        "from theirs by {:.2f} labels in the mean\n",
         result->loss.num_regions, result->loss.area_m2,
         static_cast<double>(result->loss.num_labels) / static_cast<double>(result->loss.num_regions));
   }
@@ -96,18 +95,18 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 Command DecomposeViewsCommand() {
   auto arguments = std::make_shared<Arguments>();
   Command command;
-  command.name = "decompose-views";
+  command.name = "decompose";
+  command.stage = "decompose_views";
+  command.former_names = {"decompose-views"};
   command.summary = "Divide a floor plan into regions from which a laser sees the same walls";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("plan", arguments->plan,
-                   "floor plan in metres: GeoJSON polygons, or lines x0,y0,x1,y1 of walls")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("-o,--output", arguments->output, "regions to write (views.db)")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("--svg", arguments->svg, "also draw the regions as SVG")->type_name("FILE.svg");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser
+        .Add("plan", arguments->plan, "floor plan in metres: GeoJSON polygons, or lines x0,y0,x1,y1 of walls")
+        .Required()
+        .Type("FILE");
+    parser.Add("-o,--output", arguments->output, "regions to write (views.db)").Required().Type("FILE");
+    parser.Add("--svg", arguments->svg, "also draw the regions as SVG").Type("FILE.svg");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
   return command;

@@ -4,7 +4,7 @@
 
 namespace cairn::decompose_views {
 
-// cairn decompose-views PLAN -o views.db [--svg FILE]
+// cairn plan decompose PLAN -o views.db [--svg FILE]
 Command DecomposeViewsCommand();
 
 }  // namespace cairn::decompose_views

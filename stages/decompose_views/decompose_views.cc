@@ -17,15 +17,15 @@
 namespace cairn::decompose_views {
 namespace {
 
-// Bytes of memory for a boundary and for an edge of the arrangement, measured (bench/README.md).
+// Bytes of memory for a boundary and for an edge of the arrangement, measured (bench/views/README.md).
 constexpr int64_t kBytesPerBoundary = 250;
 constexpr double kBytesPerEdge = 250;
 constexpr size_t kNumSampledVertices = 256, kNumSampledBoundaries = 4000;
-// By how much what follows from a sample may be too large.
+// Factor by which an estimate from a sample may be too large.
 constexpr double kSampleError = 1.5;
 constexpr int64_t kFacesPerBlock = 1024;
 
-// The plan where the options say that it lies.
+// The plan moved to the place that the options give.
 InputPlan Placed(InputPlan plan, const DecomposeViewsOptions& options) {
   const Eigen::Vector2d origin(options.plan_x_m, options.plan_y_m);
   if (origin.isZero(0) && options.plan_heading_deg == 0) return plan;
@@ -40,7 +40,7 @@ InputPlan Placed(InputPlan plan, const DecomposeViewsOptions& options) {
   return plan;
 }
 
-// Refuses what would not fit: boundaries, and the regions that they make.
+// Refuses plans whose boundaries and regions would not fit into memory.
 Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossings, int64_t memory_mib) {
   const double num_edges = plan.num_walls() + num_boundaries + 2 * num_crossings;
   const std::string work =
@@ -52,12 +52,12 @@ Status CheckSize(const FloorPlan& plan, double num_boundaries, double num_crossi
   const Status fits = CheckMemory(work, static_cast<int64_t>(num_bytes), memory_mib);
   if (!fits.ok()) return MakeError(fits.error().code, "{}{}", fits.error().message, remedy);
   if (num_edges > std::numeric_limits<int32_t>::max())
-    return MakeError(ErrorCode::kUnsupported, "{}: 32 bits do not number them{}", work, remedy);
+    return MakeError(ErrorCode::kUnsupported, "{}: more than 32 bits can number{}", work, remedy);
   return Ok();
 }
 
-// Refuses a large plan that by a sample of its boundaries takes much more memory than there is, before the
-// rest of them is found.  Of n boundaries in N, (n / N)^2 of the crossings are found.
+// Refuses a large plan that, by a sample of its boundaries, takes much more memory than there is, before the
+// other boundaries are found.  Of n boundaries in N, (n / N)^2 of the crossings are found.
 Status CheckSample(const FloorPlan& plan, const WallRays& rays, int num_threads, int64_t memory_mib,
                    Progress& progress) {
   const auto stride = static_cast<int>(plan.vertices.size() / kNumSampledVertices);
@@ -79,7 +79,7 @@ Status CheckSample(const FloorPlan& plan, const WallRays& rays, int num_threads,
   return fits.ok() ? fits : CheckSize(plan, num_boundaries, all_crossings, memory_mib);
 }
 
-// Index values from the centroids.  Blocks begin with a label set of their own.
+// Index values from the centroids.  Each block begins with a complete label set.
 Status AddIndex(Views* views, int num_threads, Progress& progress) {
   const int64_t num_blocks = (views->num_faces() + kFacesPerBlock - 1) / kFacesPerBlock;
   views->index.resize(views->num_faces());
@@ -100,6 +100,7 @@ Status AddIndex(Views* views, int num_threads, Progress& progress) {
         labels = views->LabelSet(face);
       }
       ViewIndex& index = views->index[face];
+      // [Simsarian96 §2.3] index values: the number of visible edges, their total length, what is seen of it
       index.num_labels = static_cast<int32_t>(labels.size());
       double walls = 0, length = 0, area = 0, longest = 0;
       for (const LabelIdx label : labels) walls += views->plan.walls[WallOf(label)].Length();
@@ -127,10 +128,14 @@ OptionTable DescribeOptions(DecomposeViewsOptions* o) {
   return {
       {.name = "plan_x_m",
        .value = &o->plan_x_m,
-       .help = "where the origin of the plan's file lies in the survey's floor frame, x in metres",
+       .help = "place of the origin of the plan's file in the survey's floor frame, x in metres",
        .min = -1e7,
        .max = 1e7},
-      {.name = "plan_y_m", .value = &o->plan_y_m, .help = "the same, y in metres", .min = -1e7, .max = 1e7},
+      {.name = "plan_y_m",
+       .value = &o->plan_y_m,
+       .help = "place of the origin of the plan's file in the survey's floor frame, y in metres",
+       .min = -1e7,
+       .max = 1e7},
       {.name = "plan_heading_deg",
        .value = &o->plan_heading_deg,
        .help = "direction of the plan's x axis in the survey's floor frame, counter-clockwise, degrees",
@@ -154,7 +159,7 @@ OptionTable DescribeOptions(DecomposeViewsOptions* o) {
        .max = 1},
       {.name = "margin_m",
        .value = &o->clean.margin_m,
-       .help = "how far the domain reaches beyond walls that are no polygons, metres",
+       .help = "how far the domain extends beyond walls that do not form polygons, metres",
        .min = 0.01,
        .max = 1000},
       {.name = "min_region_area_m2",

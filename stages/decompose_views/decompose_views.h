@@ -27,10 +27,10 @@ namespace cairn::decompose_views {
 // | faces (IV)                     | Arrange                                              |
 struct DecomposeViewsOptions {
   CleanPlanOptions clean;
-  // Where the plan lies: its origin, and the direction of its x axis counter-clockwise, in the frame that the
-  // views are wanted in (a survey's floor).  Regions, walls and lists of changes are in that frame.
+  // Where the plan lies: its origin, and the direction of its x axis, counter-clockwise, in the frame of the
+  // views (a survey's floor).  Regions, walls and lists of changes are in that frame.
   double plan_x_m = 0, plan_y_m = 0, plan_heading_deg = 0;
-  // Regions smaller than this are joined to a neighbour, whose labels they get; 0: none.  What that loses is
+  // Regions smaller than this are joined to a neighbour, whose labels they get; 0: none.  The loss is
   // reported.  REQUIRES: >= 0
   double min_region_area_m2 = 0;
 };
@@ -40,8 +40,8 @@ struct DecomposeViewsResult {
   Views views;
   std::vector<PlanChange> changes;  // of the plan, by cleaning
   int64_t num_boundaries = 0;
-  // Regions whose label sets do not differ from their neighbours' by what lies between them; 0 but for
-  // rounding.
+  // Borders whose two label sets do not differ by the labels of the boundaries between them; 0 except
+  // for rounding.
   int64_t num_disagreements = 0;
   MergeLoss loss;
 };
@@ -49,8 +49,8 @@ struct DecomposeViewsResult {
 // Pure: same plan and options, same result for any number of threads.  O(n^2 log n + I log I) for n walls
 // whose boundaries cross I times; memory is proportional to I.  Plans that take more than `memory_mib` are
 // refused: those far beyond it by a sample of their boundaries, others when all crossings are counted, before
-// they are kept.  Work goes by small parts, each reported; cancelling ends within one.
-// Errors: those of CleanPlan, InvalidArgument (options), Failed (memory), Cancelled.
+// they are kept.  Work is done in small parts, each reported; cancelling takes effect within one.  Errors:
+// those of CleanPlan, InvalidArgument (options), Failed (memory), Cancelled.
 Result<DecomposeViewsResult> DecomposeViews(const InputPlan& input, const DecomposeViewsOptions& options,
                                             int num_threads, int64_t memory_mib, Progress& progress);
 

@@ -13,13 +13,11 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// Directions closer than this are one, rad.
+// Directions closer than this count as equal, rad.
 constexpr double kSameDirection = 1e-12;
-// Regions so deep in the tree begin one of their own, so that a label set is found in few steps.
+// Regions this deep in the tree begin a new tree, so that a label set is found in few steps.
 constexpr int kMaxDepth = 128;
-constexpr int64_t kItemsPerBlock = 4096;  // between questions whether to stop
-
-Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
+constexpr int64_t kItemsPerCheck = 4096;  // between checks for cancellation
 
 class FaceLabeller {
  public:
@@ -60,7 +58,7 @@ class FaceLabeller {
       return !edge.is_wall && edge.left >= 0 && edge.right >= 0 && edge.left != edge.right;
     };
     for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
-      if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
+      if (i % kItemsPerCheck == 0 && progress.Cancelled()) return false;
       const Arrangement::Edge& edge = arrangement_.edges[i];
       if (!is_link(edge)) continue;
       ++border_offsets_[edge.left + 1];
@@ -70,7 +68,7 @@ class FaceLabeller {
     borders_.resize(border_offsets_.back());
     std::vector<int64_t> next(border_offsets_.begin(), border_offsets_.end() - 1);
     for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
-      if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
+      if (i % kItemsPerCheck == 0 && progress.Cancelled()) return false;
       const Arrangement::Edge& edge = arrangement_.edges[i];
       if (!is_link(edge)) continue;
       borders_[next[edge.left]++] = {static_cast<int64_t>(i), edge.right};
@@ -91,7 +89,7 @@ class FaceLabeller {
       seen[face] = true;
       open.push_back(face);
       while (!open.empty()) {
-        if (++num_visited % kItemsPerBlock == 0 && progress.Cancelled()) return {};
+        if (++num_visited % kItemsPerCheck == 0 && progress.Cancelled()) return {};
         const int32_t at = open.back();
         open.pop_back();
         largest = std::max(largest, {Area(at), -at});
@@ -140,6 +138,7 @@ class FaceLabeller {
   }
 
   // Crosses an edge with the counts of windows; the labels that become or cease to be visible, ascending.
+  // [Simsarian96 §2.2 step III] Into the light side a boundary's label is added, into the dark side dropped.
   std::vector<LabelIdx> Cross(int64_t edge, bool to_left) {
     std::vector<LabelIdx> touched;
     VisitChanges(edge, to_left, [&](LabelIdx label, int) { touched.push_back(label); });
@@ -171,6 +170,8 @@ class FaceLabeller {
   }
 
   // Depth first over a connected part, carrying the counts of windows along.
+  // [Simsarian96 §2.2 step III] From region to region instead of along each boundary; so [Simsarian96 §2.2
+  // step IV] a region's label set comes out by itself, not as the intersection of its vertices'.
   bool Walk(int32_t root, Progress& progress) {
     std::fill(windows_.begin(), windows_.end(), 0);
     hash_ = 0;
@@ -228,13 +229,14 @@ class FaceLabeller {
     return labels;
   }
 
+  // [Simsarian96 §4.1] The region adjacency graph.
   // Ascending: gathered by their lower region, then sorted among its others.
   bool TakeLinks(Progress& progress) {
     Views& views = result_->views;
     std::vector<int64_t> ends(num_faces_ + 1, 0);
     const auto visit_links = [&](auto&& visit) {
       for (size_t i = 0; i < arrangement_.edges.size(); ++i) {
-        if (i % kItemsPerBlock == 0 && progress.Cancelled()) return false;
+        if (i % kItemsPerCheck == 0 && progress.Cancelled()) return false;
         const Arrangement::Edge& edge = arrangement_.edges[i];
         if (edge.is_wall || edge.left < 0 || edge.right < 0 || edge.left == edge.right) continue;
         const FaceIdx left = new_index_[edge.left], right = new_index_[edge.right];
@@ -272,6 +274,7 @@ class FaceLabeller {
 
 }  // namespace
 
+// [Simsarian96 §2] The label set of a point: the edges visible from it.
 std::vector<WindowChange> CountWindows(const FloorPlan& plan, const WallRays& rays, const Vec2& place) {
   std::vector<double> angles;
   for (const GridPoint& vertex : plan.vertices) {

@@ -12,20 +12,20 @@
 namespace cairn::decompose_views {
 
 // How many windows each label is seen through from a point, by looking between all vertices: labels
-// ascending.  The oracle for label sets, and their beginning.  `place`: grid coordinates.  O(n) rays.
+// ascending.  Tests compare label sets with it, and walks begin with it.  `place`: grid coordinates.
+// O(n) rays.
 std::vector<WindowChange> CountWindows(const FloorPlan& plan, const WallRays& rays,
                                        const Eigen::Vector2d& place);
 
 struct LabelFacesResult {
   Views views;  // without index
-  // Borders across which the label sets of their two regions do not differ by what their boundaries say:
-  // never, up to rounding.
+  // Borders whose two label sets do not differ by the labels of their boundaries: 0 except for rounding.
   int64_t num_disagreements = 0;
 };
 
-// Gives the faces their label sets: those of the largest of each connected part by looking around, the others
-// by what changes on the borders on the way [Simsarian96 §2.2, step III].  Faces are renumbered in the order
-// of the walk.  O(faces + changes).  Errors: Cancelled.
+// Gives the faces their label sets: that of the largest face of each connected part by looking around, the
+// others by the changes at the borders on the way [Simsarian96 §2.2 step III].  Faces are renumbered in the
+// order of the walk.  O(faces + changes).  Errors: Cancelled.
 Result<LabelFacesResult> LabelFaces(const FloorPlan& plan, const WallRays& rays,
                                     const std::vector<ViewBoundary>& boundaries, Arrangement arrangement,
                                     Progress& progress);

@@ -98,7 +98,7 @@ class Merger {
       ++loss_.num_regions;
       loss_.area_m2 += areas_[face];
       loss_.num_labels += static_cast<int64_t>(num_different);
-      // What it is joined to may be small itself, and still be so.
+      // The neighbour may be a small region itself, and may still be one.
       small_.erase({areas_[other], other});
       areas_[other] += areas_[face];
       if (areas_[other] < min_area_) small_.insert({areas_[other], other});
@@ -119,7 +119,8 @@ class Merger {
     return face;
   }
 
-  // What is left keeps its order and its label sets; the tree is drawn anew, each after an earlier neighbour.
+  // The remaining regions keep their order and label sets; the tree is built again, with an earlier neighbour
+  // as the parent of each.
   void Rebuild() {
     Views merged;
     merged.plan = views_.plan;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/picture/floor_frame.h"
 #include "core/picture/svg.h"
 
 namespace cairn::decompose_views {
@@ -17,62 +18,42 @@ using Vec2 = Eigen::Vector2d;
 constexpr double kLongSidePx = 1400, kMarginPx = 24, kLegendPx = 260;
 // Regions smaller than this are not drawn, square pixels.
 constexpr double kMinAreaPx = 0.5;
-// Okabe and Ito's colours, for paths and robots.
-constexpr std::array kColours = {"#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
+// Of poses and paths.
+constexpr std::array kColours = {kSvgVermilion, kSvgBlue, kSvgGreen, kSvgPurple, kSvgOrange, kSvgSky};
 
 // From light to dark along one hue, for a share in [0, 1].
 std::string Shade(double share) {
-  constexpr std::array<std::array<double, 3>, 4> kStops = {
+  static constexpr std::array<Rgb, 4> kStops = {
       {{247, 251, 255}, {198, 219, 239}, {107, 174, 214}, {33, 113, 181}}};
-  const double at = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
-  const size_t stop = std::min<size_t>(static_cast<size_t>(at), kStops.size() - 2);
-  const double part = at - static_cast<double>(stop);
-  std::array<int, 3> colour{};
-  for (size_t i = 0; i < 3; ++i)
-    colour[i] =
-        static_cast<int>(std::lround(kStops[stop][i] + part * (kStops[stop + 1][i] - kStops[stop][i])));
-  return fmt::format("#{:02x}{:02x}{:02x}", colour[0], colour[1], colour[2]);
+  return SvgRamp(kStops, share);
 }
 
 class Picture {
  public:
   explicit Picture(const Views& views) : views_(views) {
-    const Vec2 low = views.plan.Metres(views.plan.low), high = views.plan.Metres(views.plan.high);
-    const Vec2 size = (high - low).cwiseMax(1e-3);
-    scale_ = kLongSidePx / size.maxCoeff();
-    low_ = low;
-    width_ = size.x() * scale_ + 2 * kMarginPx;
-    height_ = size.y() * scale_ + 2 * kMarginPx;
+    frame_.low = views.plan.Metres(views.plan.low);
+    frame_.high = views.plan.Metres(views.plan.high);
+    frame_.px_per_m = kLongSidePx / (frame_.high - frame_.low).cwiseMax(1e-3).maxCoeff();
+    frame_.left_px = frame_.top_px = kMarginPx;
+    width_ = frame_.WidthPx() + 2 * kMarginPx;
+    height_ = frame_.HeightPx() + 2 * kMarginPx;
   }
 
   std::string Draw(const ViewsOverlay& overlay, bool regions) {
-    Write(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0f}\" height=\"{:.0f}\" "
-        "font-family=\"sans-serif\" "
-        "font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-        width_ + kLegendPx,
-        std::max(height_ + 40, 160.0 + 18.0 * static_cast<double>(overlay.captions.size())));
+    svg_.Begin(width_ + kLegendPx,
+               std::max(height_ + 40, 160.0 + 18.0 * static_cast<double>(overlay.captions.size())), 13);
     if (regions) DrawRegions();
     DrawWalls();
     DrawOverlay(overlay);
-    DrawScaleBar();
+    svg_.Append(ScaleBar(kMarginPx, height_ + 8, frame_.px_per_m, 240));
     DrawLegend(overlay, regions);
-    Write("</svg>\n");
-    return fmt::to_string(text_);
+    return svg_.End();
   }
 
  private:
-  template <typename... Args>
-  void Write(fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(text_), format, std::forward<Args>(args)...);
-  }
+  Vec2 Px(const Vec2& metres) const { return frame_.Pixel(metres); }
 
-  Vec2 Px(const Vec2& metres) const {
-    return {(metres.x() - low_.x()) * scale_ + kMarginPx,
-            height_ - kMarginPx - (metres.y() - low_.y()) * scale_};
-  }
-
-  // Every shade a group, its regions one path.
+  // One group per shade, its regions as one path.
   void DrawRegions() {
     int most = 1, least = 1 << 30;
     for (const ViewIndex& index : views_.index) {
@@ -83,23 +64,23 @@ class Picture {
     most_ = most;
     std::vector<std::vector<FaceIdx>> by_count(most + 1);
     for (FaceIdx face = 0; face < views_.num_faces(); ++face) {
-      if (views_.Area(face) * scale_ * scale_ < kMinAreaPx) continue;
+      if (views_.Area(face) * frame_.px_per_m * frame_.px_per_m < kMinAreaPx) continue;
       by_count[views_.index[face].num_labels].push_back(face);
     }
-    Write("<g id=\"regions\" stroke=\"#ffffff\" stroke-width=\"0.25\" stroke-linejoin=\"round\">\n");
+    svg_.Write("<g id=\"regions\" stroke=\"#ffffff\" stroke-width=\"0.25\" stroke-linejoin=\"round\">\n");
     for (int count = 0; count <= most; ++count) {
       if (by_count[count].empty()) continue;
-      Write("<path fill=\"{}\" d=\"", Shade(Share(count)));
+      svg_.Write("<path fill=\"{}\" d=\"", Shade(Share(count)));
       for (const FaceIdx face : by_count[count]) {
         for (int64_t i = views_.face_offsets[face]; i < views_.face_offsets[face + 1]; ++i) {
           const Vec2 px = Px(views_.plan.Metres(views_.vertices[views_.face_vertices[i]]));
-          Write("{}{:.1f} {:.1f}", i == views_.face_offsets[face] ? "M" : "L", px.x(), px.y());
+          svg_.Write("{}{:.1f} {:.1f}", i == views_.face_offsets[face] ? "M" : "L", px.x(), px.y());
         }
-        Write("Z");
+        svg_.Write("Z");
       }
-      Write("\"/>\n");
+      svg_.Write("\"/>\n");
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   double Share(int count) const {
@@ -107,43 +88,44 @@ class Picture {
   }
 
   void DrawWalls() {
-    Write("<g id=\"walls\" stroke=\"black\" stroke-width=\"2\" stroke-linecap=\"round\">\n");
+    svg_.Write("<g id=\"walls\" stroke=\"black\" stroke-width=\"2\" stroke-linecap=\"round\">\n");
     for (const PlanWall& wall : views_.plan.walls) {
       const Vec2 a = Px(wall.start), b = Px(wall.end);
-      Write("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
+      svg_.Write("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n", a.x(), a.y(), b.x(),
+                 b.y());
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   void DrawOverlay(const ViewsOverlay& overlay) {
-    Write("<g id=\"scan\" stroke-linecap=\"round\">\n");
+    svg_.Write("<g id=\"scan\" stroke-linecap=\"round\">\n");
     for (const ViewsOverlay::Line& line : overlay.segments) {
       const Vec2 a = Px(line.start), b = Px(line.end);
-      Write(
+      svg_.Write(
           "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" "
           "stroke-width=\"{}\"{}/>\n",
-          a.x(), a.y(), b.x(), b.y(), line.strong ? "#d55e00" : "#cc79a7", line.strong ? 4 : 3,
+          a.x(), a.y(), b.x(), b.y(), line.strong ? kSvgVermilion : kSvgPurple, line.strong ? 4 : 3,
           line.strong ? "" : " stroke-dasharray=\"6 4\"");
     }
-    Write("</g>\n<g id=\"paths\" fill=\"none\" stroke-width=\"2.5\">\n");
+    svg_.Write("</g>\n<g id=\"paths\" fill=\"none\" stroke-width=\"2.5\">\n");
     for (size_t i = 0; i < overlay.paths.size(); ++i) {
       const std::vector<Vec2>& path = overlay.paths[i];
       const char* colour = kColours[i % kColours.size()];
-      Write("<polyline stroke=\"{}\" points=\"", colour);
-      for (const Vec2& point : path) Write("{:.1f},{:.1f} ", Px(point).x(), Px(point).y());
-      Write("\"/>\n");
+      svg_.Write("<polyline stroke=\"{}\" points=\"", colour);
+      for (const Vec2& point : path) svg_.Write("{:.1f},{:.1f} ", Px(point).x(), Px(point).y());
+      svg_.Write("\"/>\n");
       for (const Vec2& point : path)
-        Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\" fill=\"{}\"/>\n", Px(point).x(), Px(point).y(),
-              colour);
+        svg_.Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\" fill=\"{}\"/>\n", Px(point).x(),
+                   Px(point).y(), colour);
       if (path.size() > 1) DrawArrow(Px(path[path.size() - 2]), Px(path.back()), colour);
     }
-    Write("</g>\n<g id=\"robots\">\n");
+    svg_.Write("</g>\n<g id=\"robots\">\n");
     for (size_t i = 0; i < overlay.robots.size(); ++i) {
       const ViewsOverlay::Robot& robot = overlay.robots[i];
       const Vec2 at = Px(robot.position);
       const Vec2 ahead(std::cos(robot.heading_rad), -std::sin(robot.heading_rad));
       const char* colour = kColours[i % kColours.size()];
-      Write(
+      svg_.Write(
           "<circle cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"7\" fill=\"{2}\" stroke=\"white\" stroke-width=\"1.5\"/>"
           "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{3:.1f}\" y2=\"{4:.1f}\" stroke=\"{2}\" "
           "stroke-width=\"3\"/>"
@@ -152,44 +134,29 @@ class Picture {
           at.x(), at.y(), colour, at.x() + 16 * ahead.x(), at.y() + 16 * ahead.y(), at.x() + 10, at.y() - 9,
           EscapeXml(robot.caption));
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   void DrawArrow(const Vec2& from, const Vec2& to, const char* colour) {
     const Vec2 along = (to - from).normalized(), across(-along.y(), along.x());
     const Vec2 a = to - 11 * along + 5 * across, b = to - 11 * along - 5 * across;
-    Write("<polygon fill=\"{}\" stroke=\"none\" points=\"{:.1f},{:.1f} {:.1f},{:.1f} {:.1f},{:.1f}\"/>\n",
-          colour, to.x(), to.y(), a.x(), a.y(), b.x(), b.y());
-  }
-
-  void DrawScaleBar() {
-    double length = std::pow(10.0, std::floor(std::log10(200 / scale_)));
-    for (const double factor : {5.0, 2.0}) {
-      if (factor * length * scale_ <= 240) {
-        length *= factor;
-        break;
-      }
-    }
-    const double y = height_ + 12;
-    Write(
-        "<path d=\"M{0:.1f} {1:.1f}h{2:.1f}\" stroke=\"black\" stroke-width=\"3\"/><text x=\"{3:.1f}\" "
-        "y=\"{4:.1f}\">{5:g} "
-        "m</text>\n",
-        kMarginPx, y, length * scale_, kMarginPx + length * scale_ + 8, y + 5, length);
+    svg_.Write(
+        "<polygon fill=\"{}\" stroke=\"none\" points=\"{:.1f},{:.1f} {:.1f},{:.1f} {:.1f},{:.1f}\"/>\n",
+        colour, to.x(), to.y(), a.x(), a.y(), b.x(), b.y());
   }
 
   void DrawLegend(const ViewsOverlay& overlay, bool regions) {
     const double x = width_ + 4;
     double y = kMarginPx + 10;
-    Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{} regions, {} walls</text>\n", x, y,
-          views_.num_faces(), views_.plan.num_walls());
+    svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\" font-weight=\"bold\">{} regions, {} walls</text>\n", x, y,
+               views_.num_faces(), views_.plan.num_walls());
     if (regions) {
       y += 24;
-      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">walls seen from a region:</text>\n", x, y);
+      svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">walls seen from a region:</text>\n", x, y);
       for (int i = 0; i < 5; ++i) {
         y += 18;
         const int count = least_ + (most_ - least_) * i / 4;
-        Write(
+        svg_.Write(
             "<rect x=\"{:.0f}\" y=\"{:.0f}\" width=\"14\" height=\"14\" fill=\"{}\" stroke=\"#888\"/><text "
             "x=\"{:.0f}\" "
             "y=\"{:.0f}\">{}</text>\n",
@@ -199,15 +166,15 @@ class Picture {
     y += 8;
     for (const std::string& caption : overlay.captions) {
       y += 18;
-      Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", x, y, EscapeXml(caption));
+      svg_.Write("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", x, y, EscapeXml(caption));
     }
   }
 
   const Views& views_;
-  double scale_ = 1, width_ = 0, height_ = 0;
-  Vec2 low_;
+  FloorFrame frame_;
+  double width_ = 0, height_ = 0;
   int least_ = 0, most_ = 1;
-  fmt::memory_buffer text_;
+  SvgWriter svg_;
 };
 
 }  // namespace

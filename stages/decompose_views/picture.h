@@ -10,7 +10,7 @@
 
 namespace cairn::decompose_views {
 
-// What is drawn over a plan, floor frame, metres.
+// Things drawn over a plan, floor frame, metres.
 struct ViewsOverlay {
   struct Robot {
     Eigen::Vector2d position;
@@ -28,9 +28,9 @@ struct ViewsOverlay {
 };
 
 // A plan and its regions from above as SVG: each region in a shade for the number of walls that it sees
-// (darker: more), view boundaries between them, walls in black, a scale bar and a legend; over it what
-// `overlay` has. Regions too small to be seen are left to their neighbours' shade; with `regions` false only
-// the walls are drawn.  Same views, same bytes.
+// (darker: more), view boundaries between them, walls in black, a scale bar and a legend, with `overlay` on
+// top.  Regions too small to be seen are not drawn; with `regions` false only the walls are drawn.  Same
+// views, same bytes.
 std::string DrawViews(const Views& views, const ViewsOverlay& overlay = {}, bool regions = true);
 
 }  // namespace cairn::decompose_views

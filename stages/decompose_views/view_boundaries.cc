@@ -23,18 +23,16 @@ int64_t Left(const Direction& direction, const GridPoint& from, const GridPoint&
   return direction.x * (to.y - from.y) - direction.y * (to.x - from.x);
 }
 
-Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
-// What a ray that passes a vertex closely on one side runs into there, -1: nothing.
+// The label that a ray meets at a vertex when it passes closely on one side of it, -1: none.
 struct VertexView {
   LabelIdx left = -1, right = -1;
   bool Blocks() const { return left >= 0 && right >= 0; }
 };
 
-// Vertices in one line that see each other, between where the line is blocked at both ends.
+// Vertices on one line that see each other, up to where the line is blocked at both ends.
 struct Chord {
   std::vector<int32_t> vertices;
-  WallRays::Hit before, after;  // what ends it; .none() where a vertex blocks it, or nothing does
+  WallRays::Hit before, after;                   // what blocks it; .none() where a vertex does, or nothing
   bool open_before = false, open_after = false;  // it goes on beyond the first, the last vertex
 };
 
@@ -44,6 +42,7 @@ class BoundaryFinder {
 
   // Boundaries on chords whose first pair of neighbours, in the order of ids, contains `vertex` as the lower.
   void FindFrom(int32_t vertex, std::vector<ViewBoundary>* boundaries) const {
+    // [Simsarian96 §2.2 step I] a vertex's scan: by rays to the other vertices, not by one walk around
     for (int32_t other = vertex + 1; other < static_cast<int32_t>(plan_.vertices.size()); ++other) {
       if (!Extends(vertex, other) && !Extends(other, vertex)) continue;
       if (plan_.closed && !InsideFrom(vertex, other)) continue;
@@ -67,7 +66,7 @@ class BoundaryFinder {
       const bool outward = piece.start == vertex;
       const GridPoint& other = At(outward ? piece.end : piece.start);
       const int64_t side = Left(direction, At(vertex), other);
-      // The first on the way is the one that turns least from where the ray comes from.
+      // The ray first meets the wall that turns least from the ray's origin.
       if (side > 0 && (view.left < 0 || Orientation(At(vertex), nearest_left, other) > 0)) {
         nearest_left = other;
         view.left = LabelOf(piece.wall, !outward);
@@ -141,7 +140,7 @@ class BoundaryFinder {
     return chord;
   }
 
-  // A chord is found from each pair of neighbours on it; one does the work.
+  // A chord is found from each pair of neighbours on it; only one pair handles it.
   bool IsFirstPair(const Chord& chord, int32_t a, int32_t b) const {
     std::pair<int32_t, int32_t> first{std::numeric_limits<int32_t>::max(), 0};
     for (size_t i = 0; i + 1 < chord.vertices.size(); ++i) {
@@ -167,8 +166,8 @@ class BoundaryFinder {
     return -1;
   }
 
-  // Looking along vertices in a row, from just beside their line: what the ray sees that passes the first
-  // `split` of them on one side and the others on the other.
+  // Looking along vertices in a row, from just beside their line: the label seen by the ray that passes the
+  // first `split` of them on one side and the others on the other.
   LabelIdx Window(const std::vector<int32_t>& row, const std::vector<VertexView>& views, LabelIdx beyond,
                   size_t split, bool first_on_left) const {
     for (size_t i = 0; i < row.size(); ++i) {
@@ -184,14 +183,16 @@ class BoundaryFinder {
   }
 
   // Adds windows seen from the left of the line minus those seen from its right, looking along the row.
-  // Returns what lies to the left of it all.
+  // Returns the label to the left of all of them.
   LabelIdx AddChanges(const std::vector<int32_t>& row, const Direction& direction, LabelIdx beyond, int sign,
                       std::map<LabelIdx, int>* changes) const {
     std::vector<VertexView> views;
     for (const int32_t vertex : row) views.push_back(ViewAt(vertex, direction));
     const LabelIdx leftmost = Window(row, views, beyond, row.size(), true);
     if (row.size() < 2) return leftmost;
-    // From the left: the nearer a vertex, the farther right it is.
+    // [Simsarian96 Fig. 4] Which labels a boundary exposes or occludes: read off the windows on its two
+    // sides, in place of the source's cases (a) to (c).  From the left: the nearer a vertex, the farther
+    // right it is.
     LabelIdx before = -2;
     for (size_t split = row.size() + 1; split-- > 0;) {
       const LabelIdx label = Window(row, views, beyond, split, /*first_on_left=*/true);
@@ -237,6 +238,7 @@ class BoundaryFinder {
       const LabelIdx seen_ahead = AddChanges(ahead, direction, beyond, +1, &changes);
       const LabelIdx seen_behind = AddChanges(behind, direction.Reversed(), before, -1, &changes);
       if (plan_.closed && (IsRightSide(seen_ahead) || IsRightSide(seen_behind))) continue;
+      // [Simsarian96 §2.2 step I] a view boundary and its labels, one or several
       ViewBoundary boundary;
       for (const auto& [label, windows] : changes) {
         if (windows != 0) boundary.changes.push_back({label, windows});

@@ -10,13 +10,13 @@
 
 namespace cairn::decompose_views {
 
-// By how much the number of windows through which a label is seen changes.
+// The change of the number of windows through which a label is seen.
 struct WindowChange {
   LabelIdx label = 0;
   int32_t windows = 0;
 };
 
-// A line along which the view changes [Simsarian96 §2.2, steps I and III].
+// A line along which the view changes [Simsarian96 §2.2 step I, §2.2 step III].
 struct ViewBoundary {
   Eigen::Vector2d start, end;  // grid coordinates
   // Crossing from the right of start -> end to its left.
@@ -25,10 +25,10 @@ struct ViewBoundary {
 
 // All view boundaries of a plan.
 //
-// A label set is what a point in general position sees: sides of walls.  Through gaps between other walls one
-// side may be seen in several windows, so windows are counted, and a label is visible while it has one.  (In
-// a polygon without holes there is never more than one: crossing into the light side of a boundary adds its
-// label, crossing into the dark side drops it, as the source has it.)
+// A label set contains the sides of walls that a point in general position sees.  Through gaps between other
+// walls one side may be seen in several windows, so windows are counted, and a label is visible while it has
+// one.  (In a polygon without holes there is never more than one: crossing into the light side of a boundary
+// adds its label, crossing into the dark side drops it, as the source has it.)
 //
 // The view changes only along lines through vertices that see each other.  On such a line, between two
 // neighbouring vertices of it, everything that changes lies straight ahead or straight behind: the vertices
@@ -36,10 +36,9 @@ struct ViewBoundary {
 // are read off, exactly, from the walls at each.  That covers the source's cases (a) to (c), any number of
 // vertices in one line, walls along the line (seen edge-on), and walls that are seen from both sides.
 //
-// Walls lie on no boundary's inside.  Both ends of a boundary lie on walls, or on the domain's border.
-// Deterministic for any number of threads.  O(n^2) rays.
-// `stride`: only those that begin at every stride-th vertex, a sample of them all.  Errors: Cancelled, Failed
-// (more than `max_num`; nothing beyond is kept).
+// No wall lies in the inside of a boundary.  Both ends of a boundary lie on walls, or on the domain's border.
+// Deterministic for any number of threads.  O(n^2) rays.  `stride`: finds only those that begin at every
+// stride-th vertex, a sample of all.  Errors: Cancelled, Failed (more than `max_num`; no more are kept).
 Result<std::vector<ViewBoundary>> FindViewBoundaries(const FloorPlan& plan, const WallRays& rays, int stride,
                                                      int64_t max_num, int num_threads, Progress& progress);
 

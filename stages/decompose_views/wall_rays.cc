@@ -93,7 +93,7 @@ void WallRays::Walk(const Vec2& origin, const Vec2& direction, double t_end, Vis
                               : (low_.y() + (r + (step_y > 0)) * cell_ - origin.y()) / direction.y();
   };
   double next_x = t_at_column(column), next_y = t_at_row(row);
-  // In units of t, what rounding may move a hit out of its cell.
+  // In units of t: how far rounding may move a hit out of its cell.
   const double slack = kSlack / direction.norm();
   double best = kInfinity;
   while (column >= 0 && row >= 0 && column < num_columns_ && row < num_rows_) {
@@ -161,6 +161,7 @@ WallRays::Hit WallRays::Beyond(int32_t through, int32_t from) const {
   return hit;
 }
 
+// [Simsarian96 §2] "visible": nothing between two vertices.
 bool WallRays::Free(int32_t from, int32_t to) const {
   const GridPoint &p = plan_.vertices[from], &q = plan_.vertices[to];
   const int64_t dx = q.x - p.x, dy = q.y - p.y;
@@ -209,8 +210,8 @@ LabelIdx WallRays::Look(const Vec2& origin, const Vec2& direction, double* dista
     if (t <= 0) return kInfinity;
     if (t < nearest) {
       nearest = t;
-      // Seen against its direction from the right: the origin lies left of the piece if start -> end turns
-      // so.
+      // Seen against its direction from the right: the origin lies left of the piece if start -> end
+      // turns so.
       label = LabelOf(piece.wall, Cross(start, end) < 0);
     }
     return t;

@@ -6,14 +6,14 @@
 
 namespace cairn::decompose_views {
 
-// Asks what lies along a ray or between two vertices, exactly.  Pieces lie in the cells of a grid.
+// Finds what lies along a ray or between two vertices, exactly.  Pieces lie in the cells of a grid.
 class WallRays {
  public:
   // `plan` outlives this.
   explicit WallRays(const FloorPlan& plan);
 
-  // What a ray from vertex `from`, through where it left `through` behind, meets first: a vertex on it, or a
-  // piece that it crosses.
+  // What a ray from vertex `from`, in the direction from `through` to `from`, meets first: a vertex on it, or
+  // a piece that it crosses.
   struct Hit {
     int32_t vertex = -1;
     int32_t piece = -1;
@@ -26,8 +26,8 @@ class WallRays {
   // Whether nothing touches the open segment between two vertices, except a piece that joins them.
   bool Free(int32_t a, int32_t b) const;
 
-  // What a ray in general position meets first: the side of the wall that it sees, -1: nothing.
-  // REQUIRES: origin and direction in grid coordinates, no vertex near to the ray.
+  // The side of the wall that a ray in general position meets first, -1: none.  REQUIRES: origin and
+  // direction in grid coordinates, no vertex near to the ray.
   LabelIdx Look(const Eigen::Vector2d& origin, const Eigen::Vector2d& direction,
                 double* distance = nullptr) const;
 

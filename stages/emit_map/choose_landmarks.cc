@@ -11,12 +11,12 @@
 namespace cairn::emit_map {
 namespace {
 
-// An image looks at a class from about where it was seen: no farther than this many times the farthest image
-// that saw it, and along a ray within the widest angle from the mean ray, and this much more, degrees.
+// An image looks at a class from about where it was seen if it is no farther away than this many times the
+// farthest image that saw it, and its ray is within the widest angle from the mean ray plus this, degrees.
 constexpr double kFarther = 1.2;
 constexpr double kWiderDeg = 10;
 
-// Who looks at the classes of a survey, and who sees them.
+// The images that look at the classes of a survey, and those that see them.
 class Viewers {
  public:
   explicit Viewers(const Classes& classes) : classes_(classes) {
@@ -42,7 +42,7 @@ class Viewers {
     return images;
   }
 
-  // Of those that could see it, the part that does.
+  // Of the images that could see it, the part that does.
   double Repeatability(const FeatureClass& feature_class, const std::vector<int>& seen_by) const {
     if (seen_by.empty()) return 0;
     double farthest = 0;
@@ -97,15 +97,14 @@ std::vector<size_t> OrderByUse(const Classes& classes, const std::vector<size_t>
     repeatability[i] = viewers.Repeatability(feature_class, seen_by[i]);
   });
 
-  // exp(-m / enough) per image: one class more takes this part of it away.
+  // exp(-m / enough) per image: another class reduces it.
   std::vector<double> lack(viewers.num_images(), 1);
   const auto gain = [&](size_t i) {
     double sum = 0;
     for (const int image : seen_by[i]) sum += lack[image];
     return sum * (1 - std::exp(-repeatability[i] / enough));
   };
-  // Gains only fall: one that was computed earlier is a bound [Minoux, "Accelerated greedy algorithms",
-  // 1978].
+  // Gains only fall: an earlier value is a bound [Minoux, "Accelerated greedy algorithms", 1978].
   struct Candidate {
     double bound;
     size_t index;

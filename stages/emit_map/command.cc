@@ -43,7 +43,7 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// Images that extract-features rejected: a table of its own in features.db and what is made from it.
+// Images that extract-features rejected: from its table in features.db and files made from it.
 Result<int64_t> CountRejects(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<int64_t> {
@@ -52,7 +52,7 @@ Result<int64_t> CountRejects(const std::string& path) {
   });
 }
 
-// What a map says of where it comes from, and in which frame, whatever landmarks it keeps.
+// The origin and the frame of a map, which do not depend on the landmarks that it keeps.
 Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   MapHead head;
   head.name = arguments.name;
@@ -87,7 +87,8 @@ Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   return head;
 }
 
-// What all stages before have dropped.  Images that were not read have no image_id: the total says it all.
+// What all earlier stages have dropped.  Images that were not read have no image_id and count in the
+// total only.
 Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
   std::vector<DroppedItem> all;
   const auto add = [&](const std::string& path, const char* table) -> Status {
@@ -141,7 +142,7 @@ Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, M
   return Ok();
 }
 
-// The classes that a limit of bytes keeps out, beside those that the stages before dropped.
+// Adds the classes that a limit of bytes keeps out to those that earlier stages dropped.
 std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<char>& may_keep,
                                      const std::vector<char>& keep) {
   std::vector<DroppedItem> dropped = inputs.dropped;
@@ -152,7 +153,7 @@ std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<cha
   return dropped;
 }
 
-// The whole map but for its self-test.  `classes` and `parts` may be those of a part of the survey.
+// The whole map except its self-test.  `classes` and `parts` may be those of a part of the survey.
 Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const SurveyParts& parts,
                          EmitMapOptions options, const std::vector<char>* keep, int num_threads) {
   CAIRN_ASSIGN_OR_RETURN(MapRows rows,
@@ -186,19 +187,18 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, int max
                         100 * fitted.trial_of_all.RightRatio());
   return fmt::format(
       "emit_map: at most {} bytes: {} bits a descriptor value; at least {} common landmarks in every region; "
-      "{} of "
-      "{} stations see fewer than k = {}; {}\n",
+      "{} of {} stations see fewer than k = {}; {}\n",
       max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks, guarantee.num_stations_below_k,
       rows.stations.size(), rows.k, recall);
 }
 
-// The rows of the best map within max_bytes, and what it promises.
+// The rows of the best map within max_bytes, and its guarantees.
 Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& arguments, const Inputs& inputs,
                                                        const CommandEnvironment& environment) {
   if (arguments.matches_path.empty()) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "emit_map: max_bytes needs --matches: landmarks are chosen by what the survey's images show");
+        "emit_map: max_bytes needs --matches: landmarks are chosen by the features of the survey's images");
   }
   EmitMapOptions options = arguments.options;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep, KeptClasses(inputs.classes, inputs.parts.world,
@@ -261,28 +261,44 @@ Command EmitMapCommand() {
   auto arguments = std::make_shared<Arguments>();
   return {
       .name = "emit-map",
-      .summary = "Puts landmarks, regions and vocabulary together into a map",
+      .summary = "Put landmarks, regions and vocabulary together into a map (stage 9)",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("--matches", arguments->matches_path,
-                           "matches.db, to count which images and pairs were dropped [not counted]");
-            app.add_option("--classes", arguments->classes_path, "classes.db")->required();
-            app.add_option("--world", arguments->world_path, "world.db")->required();
-            app.add_option("--regions", arguments->regions_path, "regions.db")->required();
-            app.add_option("--vocabulary", arguments->vocabulary_path, "vocabulary.db")->required();
-            app.add_option("--appearance", arguments->appearance_path,
-                           "appearance.db: which images see the same, and which are kept [not in the map]");
-            app.add_option("--views", arguments->views_path,
-                           "views.db: the floor plan and its view-invariant regions [not in the map]");
-            app.add_option("--frame", arguments->frame_path,
-                           "frame.json of the poses: unit and place on the Earth [metres, anywhere]");
-            app.add_option("--sessions", arguments->sessions_path,
-                           "sessions.txt of the capture: image SESSION/NAME is of that survey [one survey]");
-            app.add_option("--name", arguments->name, "name of the map")->required();
-            app.add_option("--stage-options", arguments->stage_options,
-                           "STAGE=FILE.toml, once per stage: options to note in the map");
-            app.add_option("-o,--output", arguments->output_path, "map to write, not yet sealed")->required();
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser
+                .Add("--matches", arguments->matches_path,
+                     "matches.db, to count which images and pairs were dropped [not counted]")
+                .Type("matches.db");
+            parser.Add("--classes", arguments->classes_path, "classes.db").Required().Type("classes.db");
+            parser.Add("--world", arguments->world_path, "world.db").Required().Type("world.db");
+            parser.Add("--regions", arguments->regions_path, "regions.db").Required().Type("regions.db");
+            parser.Add("--vocabulary", arguments->vocabulary_path, "vocabulary.db")
+                .Required()
+                .Type("vocabulary.db");
+            parser
+                .Add("--appearance", arguments->appearance_path,
+                     "appearance.db: which images show the same, and which are kept [not in the map]")
+                .Type("appearance.db");
+            parser
+                .Add("--views", arguments->views_path,
+                     "views.db: the floor plan and its view-invariant regions [not in the map]")
+                .Type("views.db");
+            parser
+                .Add("--frame", arguments->frame_path,
+                     "frame.json of the poses: unit and place on the Earth [metres, anywhere]")
+                .Type("frame.json");
+            parser
+                .Add("--sessions", arguments->sessions_path,
+                     "sessions.txt of the capture: image SESSION/NAME belongs to that survey [one survey]")
+                .Type("sessions.txt");
+            parser.Add("--name", arguments->name, "name of the map").Required().Type("NAME");
+            parser
+                .Add("--stage-options", arguments->stage_options,
+                     "STAGE=FILE.toml, once per stage: options to record in the map")
+                .Type("STAGE=FILE.toml");
+            parser.Add("-o,--output", arguments->output_path, "map to write, not yet sealed")
+                .Required()
+                .Type("MAP");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
       .may_be_output = {"--name"},

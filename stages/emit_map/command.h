@@ -4,9 +4,8 @@
 
 namespace cairn::emit_map {
 
-// cairn emit-map --classes classes.db --world world.db --regions regions.db --vocabulary vocabulary.db --name
-// NAME
-//                -o unsealed.cairn
+// cairn stage emit-map --classes classes.db --world world.db --regions regions.db
+//                      --vocabulary vocabulary.db --name NAME -o unsealed.cairn
 Command EmitMapCommand();
 
 }  // namespace cairn::emit_map

@@ -13,7 +13,7 @@ namespace {
 template <typename... Args>
 Error Foreign(const DroppedItem& item, fmt::format_string<Args...> format, Args&&... args) {
   return MakeError(ErrorCode::kInvalidArgument,
-                   "emit_map: dropped as {}: {}; do the stages' files belong together?",
+                   "emit_map: dropped as {}: {}; the stages' files do not belong together: compile again",
                    DescribeDropReason(item.reason).name, fmt::format(format, std::forward<Args>(args)...));
 }
 
@@ -27,7 +27,7 @@ class StationFinder {
     }
   }
 
-  // The stations at which an item counts: ascending, but for keypoints and views each once.
+  // The stations at which an item counts: ascending; each once, except for keypoints and views.
   Result<std::vector<StationIdx>> StationsOf(const DroppedItem& item) const {
     std::vector<StationIdx> stations;
     const DropReasonEntry& reason = DescribeDropReason(item.reason);

@@ -38,11 +38,10 @@ Result<std::vector<std::vector<size_t>>> ClassesOfRegions(const Classes& classes
       }
       const auto found = class_index.find(world.class_ids[feature]);
       if (found == class_index.end()) {
-        return MakeError(
-            ErrorCode::kInvalidArgument,
-            "emit_map: feature {} of the world is class {}, which the classes lack; was the world made from "
-            "other classes?",
-            feature, world.class_ids[feature]);
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "emit_map: feature {} of the world is class {}, which the classes lack; was the "
+                         "world made from other classes?",
+                         feature, world.class_ids[feature]);
       }
       classes_of_regions[region].push_back(found->second);
     }
@@ -254,36 +253,39 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .choices = {"regions", "all"}},
       {.name = "max_bytes",
        .value = &options->max_bytes,
-       .help = "most bytes of the sealed map; the landmarks are kept with which left-out survey images are "
-               "localized "
-               "best; 0: no limit",
+       .help = "most bytes of the sealed map, which keeps the landmarks with which left-out survey images "
+               "are localized best; 0: no limit",
        .min = 0},
       {.name = "left_out_max_error_m",
        .value = &options->left_out_max_error_m,
-       .help = "with max_bytes: a left-out survey image is localized right within this of its place, m",
+       .help =
+           "with max_bytes: a left-out survey image counts as localized within this distance of its place, m",
        .min = 1e-6},
       {.name = "left_out_max_error_deg",
        .value = &options->left_out_max_error_deg,
-       .help = "with max_bytes: and within this of its rotation, degrees",
+       .help = "with max_bytes: and within this angle of its rotation, degrees",
        .min = 1e-6},
       {.name = "descriptor_bits",
        .value = &options->descriptor_bits,
-       .help = "bits in which a value of a landmark's descriptor is stored; 8: as it is",
+       .help = "bits in which a value of a landmark's descriptor is stored; 8: unchanged",
        .min = 1,
        .max = 8},
       {.name = "min_num_landmarks_for_words",
        .value = &options->min_num_landmarks_for_words,
-       .help = "least landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
+       .help = "fewest landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
        .min = 0},
       {.name = "landmarks_per_word",
        .value = &options->landmarks_per_word,
        .help = "most landmarks of a word that could be split",
        .min = 1},
-      {.name = "max_num_words", .value = &options->max_num_words, .help = "most words, about", .min = 1},
+      {.name = "max_num_words",
+       .value = &options->max_num_words,
+       .help = "approximate maximum number of words",
+       .min = 1},
       {.name = "words",
        .value = &options->words,
        .help = "what words count: landmarks that an image sees, or all features of survey images (a larger "
-               "map that knows places better)",
+               "map that recognises places better)",
        .choices = {"landmarks", "survey"}},
       {.name = "documents",
        .value = &options->documents,
@@ -291,11 +293,11 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .choices = {"all", "kept"}},
       {.name = "visual_map",
        .value = &options->visual_map,
-       .help =
-           "store how every landmark looks from where: the visual map, for localization without 3-D points"},
+       .help = "store how every landmark looks from different places: the visual map, for localization "
+               "without 3-D points"},
       {.name = "max_num_sights",
        .value = &options->max_num_sights,
-       .help = "most sights of a landmark that its models store",
+       .help = "most sights that the models of a landmark store",
        .min = 16,
        .max = kMaxNumSights},
       {.name = "bad_model_px",

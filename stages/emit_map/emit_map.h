@@ -16,39 +16,39 @@
 
 namespace cairn::emit_map {
 
-// Puts together what a robot needs to localize: the landmarks that the regions keep, which region and which
-// survey image has which of them, and the visual words that lead from a view to survey images.  Before:
-// group_classes, filter_visibility, decompose_regions, build_vocabulary.  After: check_map. A landmark is a
+// Puts together what a robot needs to localize: the landmarks that the regions keep, the regions and survey
+// images in which each of them is seen, and the visual words that lead from a view to survey images.  Before:
+// group_classes, filter_visibility, decompose_regions, build_vocabulary.  After: check_map.  A landmark is a
 // feature class that some region keeps ([Sala06 §III]); option "all" keeps every class as a landmark while
-// the regions stay as they are: the map to compare with.
+// the regions stay as they are: a map for comparison.
 struct EmitMapOptions {
   // "regions": the classes that regions keep; "all": every class.
   std::string landmarks = "regions";
-  // Most bytes of the sealed map, 0: no limit.  Of the classes that become landmarks, those are kept with
-  // which left-out survey images are localized best (fit_size.h).  REQUIRES: >= 0
+  // Most bytes of the sealed map, 0: no limit.  Of the classes that become landmarks, the map keeps those
+  // with which left-out survey images are localized best (fit_size.h).  REQUIRES: >= 0
   int max_bytes = 0;
-  // A left-out image is localized right within this of its place and rotation, metres (units where the map's
-  // is arbitrary) and degrees.  REQUIRES: > 0
+  // A left-out image counts as localized within this distance of its place, metres (the map's units where
+  // they are arbitrary), and this angle of its rotation, degrees.  REQUIRES: > 0
   double left_out_max_error_m = 0.1;
   double left_out_max_error_deg = 5;
-  // Bits in which a value of a landmark's descriptor is stored; 8: as it is.  REQUIRES: in [1, 8]
+  // Bits in which a value of a landmark's descriptor is stored; 8: unchanged.  REQUIRES: in [1, 8]
   int descriptor_bits = 5;
-  // A map with at least so many landmarks gets a vocabulary; in a smaller one every landmark is its own word.
-  // REQUIRES: >= 0
+  // A map with at least this many landmarks gets a vocabulary; in a smaller one every landmark is its own
+  // word.  REQUIRES: >= 0
   int min_num_landmarks_for_words = 16384;
   // Most landmarks of a word that could be split, and most words.  REQUIRES: >= 1
   double landmarks_per_word = 40;
   int max_num_words = 65536;
   // What a word's inverted file counts: "landmarks" that an image sees, or, "survey", all features of survey
-  // images [Mariottini11 §IV]: a larger map that knows places better, for robots that find out where they are
-  // without a fix (runtime/drive/place_model.h).
+  // images [Mariottini11 §IV]: a larger map that recognises places better, for robots that localize
+  // themselves without a fix (runtime/drive/place_model.h).
   std::string words = "landmarks";
   // Survey images that retrieval finds: "all", or "kept": those of the connected dominating set alone.
   std::string documents = "all";
-  // Whether the map gets a model of how every landmark looks from where, for localization without 3-D points
-  // and calibration (runtime/visual_map/visual_map.h).
+  // Whether the map gets a model of how every landmark looks from different places, for localization without
+  // 3-D points and calibration (runtime/visual_map/visual_map.h).
   bool visual_map = false;
-  // Most sights of a landmark that its models store: 5 bytes each.  REQUIRES: in [16, 512]
+  // Most sights that the models of a landmark store: 5 bytes each.  REQUIRES: in [16, 512]
   int max_num_sights = 96;
   // Models whose errors of left-out sights have a larger standard deviation are marked and count less, px.
   // REQUIRES: >= 0
@@ -58,22 +58,23 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 
 // Landmarks are ordered by the first region that has them (of no region: last), then by the first image that
 // sees them, then by class: a region's landmarks lie together.  `vocabulary` is a tree over the survey's
-// features, with its inverted files for words = "survey".  `appearance` may be null: the map then leads from
-// no image to another. Its images that `classes` lacks are left out.  `keep`, where given, marks the classes
-// that may be landmarks; a region then has all of them that can be seen from all of its stations.  The result
-// has no name, seed, options or hashes: those are the caller's. Pure.  O(observations). Errors:
-// InvalidArgument (inputs that do not belong together: a region's feature, a feature's class or a station's
-// image does not exist; documents = "kept" without kept images), NoData (no class is kept).
+// features, with its inverted files for words = "survey".  `appearance` may be null: the map then has no
+// links between images.  Images of `appearance` that `classes` lacks are left out.  `keep`, where given,
+// marks the classes that may be landmarks; a region then has all of them that can be seen from all of its
+// stations.  The result has no name, seed, options or hashes: those are the caller's.  Pure.
+// O(observations).  Errors: InvalidArgument (inputs that do not belong together: a region's feature, a
+// feature's class or a station's image does not exist; documents = "kept" without kept images), NoData (no
+// class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr);
 
-// The classes that a map keeps where nothing limits it: per class.  Errors: as EmitMap.
+// Per class, whether a map without a limit of bytes keeps it.  Errors: as EmitMap.
 Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
                                       const Decomposition& decomposition, const EmitMapOptions& options);
 
 // Puts a floor plan and its regions, floor frame, into a map.  Errors: InvalidArgument where the map's unit
-// is not the metre, in which plans are.
+// is not the metre: plans are in metres.
 Status AddViews(Views views, MapRows* rows);
 
 }  // namespace cairn::emit_map

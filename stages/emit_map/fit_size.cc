@@ -14,20 +14,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Landmarks an image that it aims at (OrderByUse).
+// Numbers of landmarks per image that are aimed at (OrderByUse).
 constexpr std::array<double, 3> kEnough = {20, 8, 50};
 constexpr std::array<int, 4> kBits = {5, 4, 3, 2};
-// Fewer bits, and other numbers than the first, have to pay: with few bits, other things look like landmarks.
+// Fewer bits, and other numbers than the first, must be better by this much: with few bits, other things look
+// like landmarks.
 constexpr double kClearMargin = 0.03;
-// The search for a size ends so near below the limit.
+// The search for a size ends at this part of the limit.
 constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
-// Figures of the self-test that are yet to come: more than check_map knows, and longer names.
+// Placeholders for figures of the self-test, which are added later: more than check_map has, with
+// longer names.
 constexpr int kNumFigures = 30;
 constexpr size_t kFigureNameBytes = 26;
 constexpr size_t kCheckMapOptionsBytes = 2048;
 
-// Bytes of the file once its self-test is in it.
+// Bytes of the file including its self-test.
 Result<int64_t> SealedBytes(MapRows rows, const std::string& scratch_path) {
   for (int i = 0; i < kNumFigures; ++i)
     rows.self_test[fmt::format("{:a>{}}", i, kFigureNameBytes)] = 1.0 / (i + 3);
@@ -49,7 +51,7 @@ class SizeFitter {
              Progress& progress)
       : emit_(emit), options_(options), scratch_path_(std::move(scratch_path)), progress_(progress) {}
 
-  // The most of the first classes of `order` that fit; 0: not even one.
+  // The largest number of first classes of `order` that fit; 0: not even one.
   Result<size_t> MostThatFit(const Classes& classes, const std::vector<size_t>& order, int bits,
                              int64_t* num_bytes) {
     const auto measure = [&](size_t n) -> Result<int64_t> {
@@ -62,7 +64,7 @@ class SizeFitter {
     CAIRN_ASSIGN_OR_RETURN(int64_t most_bytes, measure(order.size()));
     *num_bytes = most_bytes;
     if (most_bytes <= options_.max_bytes) return order.size();
-    // Bytes grow about in proportion: aim a little below the limit, then narrow down.
+    // Bytes grow roughly in proportion: aim a little below the limit, then narrow down.
     size_t fits = 1, too_many = order.size();
     *num_bytes = fewest_bytes;
     for (int i = 0; i < kMaxNumMeasurements && too_many - fits > 1; ++i) {
@@ -127,7 +129,7 @@ std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
   return pool;
 }
 
-// More images right; of as many, by a clearly wider margin.
+// Whether more images are localized, or as many by a clearly wider margin.
 bool IsBetter(const LeftOutTrial& a, const LeftOutTrial& b) {
   if (a.num_right != b.num_right) return a.num_right > b.num_right;
   return a.mean_margin > b.mean_margin + kClearMargin;
@@ -147,7 +149,7 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   }
   bits_tried.insert(bits_tried.begin(), options.descriptor_bits);
 
-  // How many landmarks fit, by bits: it hardly depends on which.
+  // How many landmarks fit, by bits: it hardly depends on which ones.
   const std::vector<size_t> usual_order = OrderByUse(classes, pool, kEnough[0], num_threads);
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
@@ -158,8 +160,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   }
   if (*std::max_element(num_that_fit.begin(), num_that_fit.end()) == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "emit_map: max_bytes = {}, but {} {} with a single landmark: the rest are "
-                     "{} images and their appearance graph, stations, options and findings",
+                     "emit_map: max_bytes = {}, but {} {} with a single landmark: the rest are {} images and "
+                     "their appearance graph, stations, options and findings",
                      options.max_bytes, kLeastPossible, fitter.least_bytes(), classes.images.size());
   }
 
@@ -175,7 +177,7 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
                          LeaveOutImages(classes, matches_path, options.max_num_left_out));
   const std::vector<size_t> survey_pool = PoolIn(survey, classes, may_keep);
   const auto try_first = [&](const std::vector<size_t>& order, size_t n, int bits) -> Result<LeftOutTrial> {
-    // Where no class outlives the images that are left out, a map of the rest shows nothing.
+    // Where no class is left without the left-out images, a map of the rest is no test.
     if (order.empty()) return LeftOutTrial{.num_tried = static_cast<int>(survey.images.size())};
     CAIRN_ASSIGN_OR_RETURN(
         MapRows rows,

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kErrorPx = 2;
 constexpr size_t kMinNumLandmarks = 20, kMinNumSights = 4;
-// Enough to know one number.
+// Enough to estimate one number.
 constexpr size_t kMaxNumLandmarks = 500;
 constexpr double kLeastWidths = 0.2, kMostWidths = 5;
 constexpr int kNumSteps = 40;
@@ -30,7 +30,7 @@ Axes AxesOf(const FloorSight& sight) {
   return {{c, s}, {s, -c}};
 }
 
-// Where the sights meet: least squares of their distances as angles, from those as lengths.
+// Where the sights meet: least squares of angular distances, starting from least squares of lengths.
 Eigen::Vector2d MeetingPoint(const std::vector<FloorSight>& sights, double focal_px) {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   for (int round = 0; round < 3; ++round) {

@@ -6,8 +6,8 @@
 #include <map>
 #include <optional>
 
-#include "core/base/deciles.h"
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/floor_pose.h"
 #include "runtime/visual_map/visual_estimate.h"
 
@@ -15,16 +15,15 @@ namespace cairn::emit_map {
 namespace {
 
 constexpr double kReachSpacings = 1.05;
-// Models reach from the diagonal neighbours, the nearest that are left on a lattice, to the place in
-// question.
+// Models extend from the diagonal neighbours, the nearest ones left on a lattice, to the tested place.
 constexpr double kExtentSpacings = 1.5;
-// Tried at most, and needed.
+// Largest number of images tried, and smallest numbers needed.
 constexpr size_t kNumImages = 80, kMinNumImages = 8, kMinNumSeen = 8;
 constexpr size_t kNumModels = 400, kNumSightsOfModel = 12, kMinNumOfModel = 8;
 constexpr double kUnknownSpacings = 0.5, kUnknownDeg = 5;
 // Nine of ten squares of normal numbers, and mean squares of three, lie below.
 constexpr double kNineOfTen1 = 2.706, kNineOfTen2 = 4.605, kNineOfTen3 = 2.084;
-// What rounding alone is off by, added to models' variances: px, px, octaves.
+// Errors by rounding, added to models' variances: px, px, octaves.
 const Eigen::Vector3d kRounding(0.01, 0.01, 1e-4);
 
 // Every step-th makes at most about `count` of `size`.
@@ -95,7 +94,7 @@ class Learner {
     return data;
   }
 
-  // From the errors at which single sights are predicted, in their models' standard deviations.
+  // From the errors of predicted single sights, in units of their models' standard deviations.
   double LearnGrowth() const {
     std::vector<const HeadingModel*> models;
     for (const std::vector<HeadingModel>& of_landmark : data_.landmarks) {
@@ -157,8 +156,8 @@ class Learner {
       own_rad.push_back(tried->own_rad);
     }
     if (squared_m.size() < kMinNumImages) return;
-    const double of_m = Decile(squared_m, 9) / kNineOfTen2 - Median(own_m);
-    const double of_rad = Decile(squared_rad, 9) / kNineOfTen1 - Median(own_rad);
+    const double of_m = Decile(squared_m, 9) / kNineOfTen2 - UpperMedian(own_m);
+    const double of_rad = Decile(squared_rad, 9) / kNineOfTen1 - UpperMedian(own_rad);
     errors_.shared_m = static_cast<float>(std::sqrt(std::max(0.0, of_m)));
     errors_.shared_rad = static_cast<float>(std::sqrt(std::max(0.0, of_rad)));
   }

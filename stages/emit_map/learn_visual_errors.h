@@ -7,12 +7,12 @@
 
 namespace cairn::emit_map {
 
-// Finds out how much to trust a visual map [cross-validation, as of the models themselves, but over places]:
-// images of the survey are placed by models that lack all sights from within 1.05 spacings around, and so are
-// single landmarks predicted.  Shared errors are such that nine of ten images lie as a normal distribution
-// says, beside what the landmarks' own errors explain; those with a flag do not count.  Where fewer than
-// eight images can be tried nothing is known, and half a spacing and 5 degrees are taken.  data.errors' tilt
-// stays. Pure; same result for any number of threads.  Errors: Corrupt (no stations).
+// Measures how accurate a visual map is [cross-validation, as of the models themselves, but over places]:
+// images of the survey are localized with models that lack all sights from within 1.05 spacings around, and
+// single landmarks are predicted with them too.  Shared errors are chosen so that, together with the
+// landmarks' own errors, nine of ten images lie within the bound of a normal distribution; images with a flag
+// do not count.  Where fewer than eight images can be tried, half a spacing and 5 degrees are assumed.  The
+// tilt of data.errors is kept.  Pure; same result for any number of threads.  Errors: Corrupt (no stations).
 Result<VisualErrors> LearnVisualErrors(const Classes& classes, const MapRows& rows, const VisualMapData& data,
                                        int num_threads);
 

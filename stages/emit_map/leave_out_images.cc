@@ -6,15 +6,15 @@
 #include <set>
 #include <unordered_map>
 
-#include "core/base/deciles.h"
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/colmap/colmap_database.h"
 #include "runtime/localize/localizer.h"
 
 namespace cairn::emit_map {
 namespace {
 
-constexpr size_t kMinNumImages = 12;  // of which a run of four is left out
+constexpr size_t kMinNumSurveyImages = 12;  // of which a run of four is left out
 constexpr size_t kRunLength = 4;
 constexpr size_t kMinStep = 4;
 constexpr int kPlentyOfInliers = 50;
@@ -53,7 +53,7 @@ Status DescribeAnew(SQLite::Database& database, const std::set<size_t>& affected
   return Ok();
 }
 
-// Leaves out the features of vanished classes; the rest are numbered anew in their order.
+// Leaves out the features of removed classes; the rest are renumbered in their order.
 void LeaveOutFeatures(const std::set<ClassId>& class_ids, World* world, Decomposition* decomposition) {
   constexpr FeatureIdx kGone = -1;
   std::vector<FeatureIdx> number_of(world->class_ids.size(), kGone);
@@ -73,7 +73,7 @@ void LeaveOutFeatures(const std::set<ClassId>& class_ids, World* world, Decompos
   }
 }
 
-// A kept node that lost all its images leaves its neighbours without one to be found by: they are kept.
+// Neighbours of a kept node that lost all its images could no longer be found, so they are kept.
 void LeaveOutNodes(const std::set<ImageId>& images, Appearance* appearance) {
   const std::vector<NodeIdx> kept = appearance->Kept();
   for (AppearanceNode& node : appearance->nodes)
@@ -91,12 +91,11 @@ void LeaveOutNodes(const std::set<ImageId>& images, Appearance* appearance) {
 
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
                                      int max_num_images) {
-  if (classes.images.size() < kMinNumImages) {
-    return MakeError(
-        ErrorCode::kNoData,
-        "emit_map: max_bytes chooses landmarks by leaving survey images out, and there are {}; at least "
-        "{} are needed",
-        classes.images.size(), kMinNumImages);
+  if (classes.images.size() < kMinNumSurveyImages) {
+    return MakeError(ErrorCode::kNoData,
+                     "emit_map: max_bytes chooses landmarks by leaving survey images out, but there are only "
+                     "{}; at least {} are needed",
+                     classes.images.size(), kMinNumSurveyImages);
   }
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<LeftOutSurvey> {
@@ -153,7 +152,7 @@ Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage
   // Fixes are in the frame of the stated poses; the true ones here are the map's own.
   rows.camera_from_given = Pose();
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::FromRows(std::move(rows)));
-  std::vector<double> error_of(images.size(), -1);  // negative: not localized right
+  std::vector<double> error_of(images.size(), -1);  // negative: not localized within the limits
   std::vector<int> num_inliers(images.size(), 0);
   std::vector<Status> statuses(images.size());
   ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
@@ -176,7 +175,7 @@ Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage
                       std::max<double>(1, kPlentyOfInliers * static_cast<double>(images.size()));
   std::erase_if(error_of, [](double error) { return error < 0; });
   trial.num_right = static_cast<int>(error_of.size());
-  if (!error_of.empty()) trial.median_error_m = Median(std::move(error_of));
+  if (!error_of.empty()) trial.median_error_m = UpperMedian(std::move(error_of));
   return trial;
 }
 

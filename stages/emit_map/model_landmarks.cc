@@ -6,8 +6,8 @@
 #include <map>
 #include <numeric>
 
-#include "core/base/deciles.h"
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/camera/camera_turn.h"
 #include "core/geometry/floor_pose.h"
 #include "stages/emit_map/learn_focal.h"
@@ -15,27 +15,27 @@
 namespace cairn::emit_map {
 namespace {
 
-// Headings nearer than this are one, and at most so many are the survey's own.
+// Headings closer than this count as equal; a survey with more headings than this gets regular ones.
 constexpr double kSameHeadingDeg = 5;
 constexpr size_t kMaxNumOwnHeadings = 16;
 constexpr double kDrivenHeadingStepDeg = 45;
-// Sights on which kernels are compared, at most.
+// Largest number of sights on which kernels are compared.
 constexpr size_t kNumSightsToCompare = 48;
 
-// Cameras nearer than this to their mean height stand as high as each other, metres.
+// Cameras within this of their mean height count as equally high, metres.
 constexpr double kSameHeightM = 0.005;
 
 // Nine of ten squares of normal numbers lie below.
 constexpr double kNineOfTen = 2.706;
 
-// A turn may move a sight out of its image; farther off than this it is not stored, px.
+// A turn may move a sight out of its image; farther outside than this it is not stored, px.
 constexpr double kFarthestOutPx = 2000;
 
 bool IsFarOut(const Eigen::Vector3d& from_middle, const Eigen::Vector2d& middle) {
   return (from_middle.head<2>().cwiseAbs() - middle).maxCoeff() > kFarthestOutPx;
 }
 
-// To a camera at the same place with the same heading that neither pitches nor rolls.
+// Rotation to a camera at the same place with the same heading but without pitch and roll.
 Eigen::Matrix3d LevelFromCamera(const Pose& cam_from_world, const Pose& floor_from_world) {
   const double heading_rad = RadFromDeg(FloorPoseOf(cam_from_world, floor_from_world).heading_deg);
   const double c = std::cos(heading_rad), s = std::sin(heading_rad);
@@ -71,7 +71,7 @@ std::vector<double> FindHeadings(const std::vector<FloorPose>& poses) {
     headings.clear();
     for (double heading = 0; heading < 360; heading += kDrivenHeadingStepDeg) headings.push_back(heading);
   }
-  // As the file stores them; a hair below a full turn is none.
+  // Rounded as the file stores them; slightly below a full turn becomes 0.
   for (double& heading : headings) {
     heading = std::round(heading * 100) / 100;
     if (heading >= 360) heading = 0;
@@ -89,7 +89,8 @@ int NearestHeading(const std::vector<double>& headings, double heading_deg) {
   return nearest;
 }
 
-// Up to `count` of them, far from each other: each the farthest from those before, the first one first.
+// Up to `count` sights, far from each other: beginning with the first, each is the farthest from
+// those before.
 std::vector<PlacedSight> Thin(std::vector<PlacedSight> sights, size_t count) {
   if (sights.size() <= count) return sights;
   std::vector<double> distance(sights.size(), std::numeric_limits<double>::infinity());
@@ -219,8 +220,8 @@ class Modeller {
     return models;
   }
 
-  // Moves sights to where a camera at the survey's mean height would have had them.  How far it says how
-  // things move to the side as the camera does, which heights leave alone.
+  // Moves sights to where a camera at the survey's mean height would have had them.  The size of the effect
+  // follows from how things move sideways with the camera, which does not depend on heights.
   void LevelHeights(int heading, std::vector<PlacedSight>* placed) const {
     const auto is_level = [&](const PlacedSight& sight) {
       return std::abs(heights_m_[sight.stored.image] - mean_height_m_) < kSameHeightM;
@@ -248,6 +249,7 @@ class Modeller {
     const auto errors = LandmarkModel::LeaveOneOutErrors(SightsOf(placed), choice->shape);
     if (!errors) return std::nullopt;
     HeadingModel model{.heading = heading, .shape = choice->shape};
+    // [Sala06 §VI-C: after Sim & Dudek] e's covariance from cross-validation, of nine in ten errors
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::VectorXd squares = errors->row(axis).cwiseAbs2();
       model.sigma[axis] = std::sqrt(Decile({squares.begin(), squares.end()}, 9) / kNineOfTen);

@@ -79,21 +79,24 @@ Command ExtractFeaturesCommand() {
   return {.name = "extract-features",
           .summary = "Find SIFT features in the survey images of a capture (stage 1)",
           .add_arguments =
-              [arguments](CLI::App& app) {
-                app.add_option("capture", arguments->capture,
-                               "Capture folder (COLMAP text layout, or a flat folder of images)")
-                    ->required();
-                app.add_option("-o,--output", arguments->output, "COLMAP database to write")
-                    ->required()
-                    ->type_name("features.db");
-                app.add_option("--depfile", arguments->depfile,
-                               "Also write a fragment for Make: the variable CAPTURE_IMAGES gets every file "
-                               "read and its folder")
-                    ->type_name("FILE.d");
-                arguments->reuse.Add(app, "images");
-                app.add_flag("--no-space-check", arguments->no_space_check,
-                             "Begin even if the disk seems too full for the result");
-                arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+              [arguments](ArgumentParser& parser) {
+                parser
+                    .Add("capture", arguments->capture,
+                         "Capture folder (COLMAP text layout, or a flat folder of images)")
+                    .Required()
+                    .Type("CAPTURE");
+                parser.Add("-o,--output", arguments->output, "COLMAP database to write")
+                    .Required()
+                    .Type("features.db");
+                parser
+                    .Add("--depfile", arguments->depfile,
+                         "Also write a fragment for Make that adds every file read and its folder to the "
+                         "variable CAPTURE_IMAGES")
+                    .Type("FILE.d");
+                arguments->reuse.Add(parser, "images");
+                parser.AddFlag("--no-space-check", arguments->no_space_check,
+                               "Begin even if the disk seems too full for the result");
+                arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
           .may_be_output = {"--reuse"}};

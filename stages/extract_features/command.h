@@ -4,7 +4,7 @@
 
 namespace cairn::extract_features {
 
-// cairn extract-features CAPTURE -o features.db [--depfile FILE.d]
+// cairn stage extract-features CAPTURE -o features.db [--depfile FILE.d]
 Command ExtractFeaturesCommand();
 
 }  // namespace cairn::extract_features

@@ -10,8 +10,8 @@ bool FitsInMakefile(const std::string& path) {
   return !path.empty() && path.back() != '\\' && path.find_first_of("\n\r") == std::string::npos;
 }
 
-// A path as Make reads it where a rule names its prerequisites: a backslash before each special character,
-// and those that stand before it doubled.
+// A path in the form that Make reads among a rule's prerequisites: a backslash before each special character,
+// and backslashes just before that one doubled.
 std::string EscapeForMake(const std::string& path) {
   static constexpr std::string_view kSpecial = " \t#:;|*?[";
   std::string escaped;
@@ -25,7 +25,7 @@ std::string EscapeForMake(const std::string& path) {
   return escaped;
 }
 
-// The same where '%' would stand for any text.
+// The same for a pattern, where '%' would match any text.
 std::string EscapeForPattern(const std::string& path) {
   std::string escaped;
   for (const char c : EscapeForMake(path)) {
@@ -54,7 +54,7 @@ std::vector<std::string> FoldersOf(const std::vector<std::string>& files, const 
   for (const std::string& file : files) {
     if (!file.starts_with(root + "/")) continue;
     for (size_t slash = file.rfind('/'); slash > root.size(); slash = file.rfind('/', slash - 1)) {
-      if (!folders.insert(file.substr(0, slash)).second) break;  // and so are those above it
+      if (!folders.insert(file.substr(0, slash)).second) break;  // and so were those above it
     }
   }
   return {folders.begin(), folders.end()};

@@ -6,14 +6,14 @@
 namespace cairn::extract_features {
 
 // A fragment for GNU Make that adds every input to the variable CAPTURE_IMAGES, as words of a rule's
-// prerequisites: blanks, colons and the like are escaped.  Below each folder of `roots` a file that is gone
-// counts as changed, instead of being an error.  Names that no Makefile can hold (line breaks, a backslash at
-// the end) are left out.  Paths are written as they are given; absolute ones let the fragment be read from
+// prerequisites: blanks, colons and the like are escaped.  Below each folder of `roots` a missing file counts
+// as changed instead of being an error.  Names that cannot be written in a Makefile (line breaks, a backslash
+// at the end) are left out.  Paths are written as they are given; absolute ones let the fragment be read from
 // any folder.
 std::string DependencyFile(const std::vector<std::string>& inputs, const std::vector<std::string>& roots);
 
-// Every folder between `root` and the files, the root first, then ascending: a file that comes or goes
-// changes the date of its folder.  REQUIRES: every file lies below the root; others are passed over.
+// Every folder between `root` and the files, the root first, then ascending: adding or removing a file
+// changes the date of its folder.  Files that do not lie below the root are skipped.
 std::vector<std::string> FoldersOf(const std::vector<std::string>& files, const std::string& root);
 
 }  // namespace cairn::extract_features

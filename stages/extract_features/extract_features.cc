@@ -8,21 +8,20 @@
 #include "core/base/parallel.h"
 #include "core/colmap/colmap_database.h"
 #include "stages/extract_features/extract_image.h"
+#include "stages/extract_features/resources.h"
 
 namespace cairn::extract_features {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBatchSize = 64;
-
 constexpr char kOwnSchema[] = R"sql(
 CREATE TABLE cairn_images (image_id INTEGER PRIMARY KEY NOT NULL, content_hash TEXT NOT NULL);
 CREATE TABLE cairn_rejects (name TEXT NOT NULL, reason TEXT NOT NULL);
 )sql";
 
-// A run of the stage: what it reads and how far it has come.
-struct Run {
+// A run of the stage: its inputs and its progress.
+struct ExtractionRun {
   const Capture& capture;
   const ExtractFeaturesOptions& options;
   std::string masks;                 // absolute, "" if none
@@ -32,9 +31,10 @@ struct Run {
   std::vector<ReuseEntry> entries;
 };
 
-Result<std::vector<Extraction>> ExtractBatch(int64_t begin, int num_threads, Progress& progress, Run* run) {
+Result<std::vector<Extraction>> ExtractBatch(int64_t begin, int num_threads, Progress& progress,
+                                             ExtractionRun* run) {
   std::vector<Extraction> batch(
-      std::min<int64_t>(kBatchSize, static_cast<int64_t>(run->images.size()) - begin));
+      std::min<int64_t>(kNumImagesPerBatch, static_cast<int64_t>(run->images.size()) - begin));
   ParallelFor(static_cast<int64_t>(batch.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
     const CaptureImage& image = run->images[begin + i];
@@ -63,7 +63,7 @@ void WriteRejects(std::vector<Reject>* rejects, SQLite::Database& database) {
   }
 }
 
-Status WriteAll(int num_threads, Progress& progress, Run* run, SQLite::Database& database) {
+Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite::Database& database) {
   for (const auto& [camera_id, camera] : run->capture.cameras) {
     const bool is_panorama = camera.model == CameraModel::kEquirectangular;
     WriteDatabaseCamera(database, is_panorama ? PanoramaViewCamera(camera, run->options.panorama) : camera);
@@ -72,7 +72,7 @@ Status WriteAll(int num_threads, Progress& progress, Run* run, SQLite::Database&
   SQLite::Statement hash_row(database, "INSERT INTO cairn_images VALUES (?, ?)");
   ExtractFeaturesSummary& summary = run->summary;
   ImageId next_id = 1;
-  for (int64_t begin = 0; begin < static_cast<int64_t>(run->images.size()); begin += kBatchSize) {
+  for (int64_t begin = 0; begin < static_cast<int64_t>(run->images.size()); begin += kNumImagesPerBatch) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Extraction> batch,
                            ExtractBatch(begin, num_threads, progress, run));
     for (size_t i = 0; i < batch.size(); ++i) {
@@ -102,8 +102,8 @@ Status WriteAll(int num_threads, Progress& progress, Run* run, SQLite::Database&
   return Ok();
 }
 
-// Every n-th image of n shards: which images are new depends on their contents, and new ones lie side by
-// side.
+// Every n-th image for n shards: which images are new depends on their contents, and new ones lie
+// side by side.
 std::vector<CaptureImage> ImagesOfShard(const std::vector<CaptureImage>& images, const Shard& shard) {
   std::vector<CaptureImage> share;
   for (size_t i = shard.index - 1; i < images.size(); i += shard.count) share.push_back(images[i]);
@@ -111,7 +111,7 @@ std::vector<CaptureImage> ImagesOfShard(const std::vector<CaptureImage>& images,
 }
 
 // Every file that the run reads.
-std::vector<std::string> ListInputs(const Run& run) {
+std::vector<std::string> ListInputs(const ExtractionRun& run) {
   std::vector<std::string> inputs;
   std::error_code error;
   for (const char* list : {"cameras.txt", "images.txt", "queries.txt"}) {
@@ -130,10 +130,10 @@ std::vector<std::string> ListInputs(const Run& run) {
 OptionTable DescribeOptions(ExtractFeaturesOptions* options) {
   OptionTable table = DescribeOptions(&options->sift);
   for (OptionTable::value_type& option : DescribeOptions(&options->panorama)) table.push_back(option);
-  table.push_back(
-      {.name = "masks",
-       .value = &options->masks,
-       .help = "folder of masks NAME.png, absolute or relative to the capture; zero switches a pixel off"});
+  table.push_back({.name = "masks",
+                   .value = &options->masks,
+                   .help = "folder of masks NAME.png, absolute or relative to the capture; pixels that are "
+                           "zero in a mask are ignored"});
   return table;
 }
 
@@ -148,10 +148,10 @@ Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const Ext
   if (!masks.empty() && !fs::is_directory(masks, error)) {
     return MakeError(ErrorCode::kNotFound, "option masks: {} is not a folder", masks);
   }
-  Run run{.capture = capture,
-          .options = options,
-          .masks = masks,
-          .images = reuse.shard ? ImagesOfShard(capture.images, *reuse.shard) : capture.images};
+  ExtractionRun run{.capture = capture,
+                    .options = options,
+                    .masks = masks,
+                    .images = reuse.shard ? ImagesOfShard(capture.images, *reuse.shard) : capture.images};
   ReuseSources& named = reuse.shard ? run.earlier.to_leave : run.earlier.to_take_over;
   CAIRN_ASSIGN_OR_RETURN(run.summary.not_reused,
                          AddReuseSources(reuse, features_path, &named, &run.earlier.to_take_over));

@@ -17,11 +17,11 @@ namespace cairn::extract_features {
 // line; after it: match_features and build_vocabulary.
 //
 // Images get ids 1, 2, ... in the order of their names.  An image that cannot be read, or whose size is not
-// its camera's, is a listed reject; the rest goes on.  A mask MASKS/NAME.png (or MASKS/NAME with its suffix
-// replaced) of the image's size switches pixels off where it is zero.
+// its camera's, is listed as rejected; the others are processed.  A mask MASKS/NAME.png (or MASKS/NAME with
+// its suffix replaced) of the image's size excludes the pixels where it is zero.
 //
 // A panorama (camera EQUIRECTANGULAR) becomes pinhole views with the names NAME#0of6, NAME#1of6, ... and one
-// camera that bears the panorama's id; each keypoint is in the one view whose axis is nearest.
+// camera with the panorama's id; each keypoint is in the one view whose axis is nearest.
 struct ExtractFeaturesOptions {
   SiftOptions sift;
   PanoramaOptions panorama;
@@ -44,10 +44,10 @@ struct ExtractFeaturesSummary {
 // Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
 // cairn_rejects; and its ReuseFile (core/line/reuse.h).  An image's features are taken over from `reuse`
 // where an earlier run of this program found them in the same image file, with the same mask, camera size and
-// options (the name does not matter): same bytes as without.  A shard has every n-th image, those that
-// `reuse.files` have left out; it may have none.  Memory: features of all images of one batch (64 images),
-// and for each thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads.
-// Errors: InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files`
+// options (the name may differ): same bytes as without.  A shard has every n-th of the images that
+// `reuse.files` lack; it may have none.  Memory: features of all images of one batch (64 images), and for
+// each thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads.  Errors:
+// InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files`
 // NotFound, Corrupt.
 Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
                                                const std::string& features_path, int num_threads,

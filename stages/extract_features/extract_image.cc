@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of a camera only the size matters (a panorama's has no parameters), and which of the two kinds it is.
+// Of a camera only its size and its kind matter (a panorama's has no parameters).
 ContentHash KeyOf(const Camera& camera, ContentHash image, const std::optional<ContentHash>& mask,
                   ExtractFeaturesOptions options) {
   ContentHasher key;
@@ -43,7 +43,7 @@ std::vector<std::string> ViewNames(const CaptureImage& image, const Camera& came
   return names;
 }
 
-// Views as an earlier run wrote them; nothing where the rows are not those that it wrote.
+// Views that an earlier run wrote; nothing where the rows were changed since.
 std::optional<std::vector<View>> FindViews(const ContentHash& key, const std::vector<std::string>& names,
                                            ReuseSources* sources) {
   return sources->Find(key, [&](const ReuseEntry& entry, ReuseSources::Source& source) {

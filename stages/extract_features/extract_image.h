@@ -17,17 +17,17 @@ struct View {
   Features features;
 };
 
-// What one image file gave: its views (several for a panorama), or the reason why not.
+// The result of one image file: its views (several for a panorama), or the reason why there are none.
 struct Extraction {
   std::string content_hash;
-  ContentHash key;  // of all that the views' features depend on
+  ContentHash key;  // of everything that the views' features depend on
   std::vector<View> views;
   bool is_taken_over = false;
-  bool is_elsewhere = false;  // a file of ReuseOptions::files has it, and a shard leaves it there: no views
+  bool is_elsewhere = false;  // a file of ReuseOptions::files has it, so a shard leaves it out: no views
   std::optional<std::string> reject_reason;
 };
 
-// Where a run of the stage finds what earlier ones did.
+// Where a run of the stage finds results of earlier runs.
 struct EarlierExtractions {
   ReuseSources to_take_over;
   ReuseSources to_leave;  // a shard's
@@ -36,8 +36,8 @@ struct EarlierExtractions {
 // The mask of an image, if the folder `masks` has one; "" if not, or if `masks` is "".
 std::string FindMask(const std::string& masks, const std::string& name);
 
-// The features of one image file, taken over where an earlier run has them.  Any thread.  Errors: those of
-// the image and its mask: they make it a reject.
+// The features of one image file, taken over where an earlier run has them.  May be called from any thread.
+// Errors: those of the image and its mask, which make it a reject.
 Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
                                 const ExtractFeaturesOptions& options, const std::string& mask_path,
                                 EarlierExtractions* earlier);

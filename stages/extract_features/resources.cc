@@ -14,16 +14,14 @@ namespace {
 // 4 * 11 * 4/3 bytes per pixel of the image; its own grey values and the file come on top.
 constexpr int64_t kPyramidBytesPerPixel = 240;
 constexpr int64_t kImageBytesPerPixel = 8;
-// Features of the images of one batch wait to be written.
-constexpr int64_t kBatchSize = 64;
 constexpr int64_t kBytesPerKeypoint = kDescriptorDim + sizeof(Keypoint);
-// SIFT finds no more than one keypoint on so many pixels.
+// SIFT finds at most one keypoint per this many pixels.
 constexpr int64_t kPixelsPerKeypoint = 100;
 constexpr double kKeypointsOfThoseAllowed = 0.75;
 
 int64_t NumPixels(const Camera& camera) { return static_cast<int64_t>(camera.width) * camera.height; }
 
-// Of the image that SIFT looks at.
+// Pixels of the image that SIFT searches.
 int64_t NumPixelsSearched(const Camera& camera, const ExtractFeaturesOptions& options) {
   const int longer_side = std::max({camera.width, camera.height, 1});
   const double scale = std::min(1.0, static_cast<double>(options.sift.max_image_side_px) / longer_side);
@@ -43,7 +41,8 @@ Result<int> ThreadsThatFit(const Capture& capture, const ExtractFeaturesOptions&
   for (const auto& [camera_id, camera] : capture.cameras) {
     bytes_per_thread = std::max(bytes_per_thread, kPyramidBytesPerPixel * NumPixelsSearched(camera, options) +
                                                       kImageBytesPerPixel * NumPixels(camera));
-    batch_bytes = std::max(batch_bytes, kBatchSize * kBytesPerKeypoint * MostKeypoints(camera, options));
+    batch_bytes =
+        std::max(batch_bytes, kNumImagesPerBatch * kBytesPerKeypoint * MostKeypoints(camera, options));
   }
   CAIRN_RETURN_IF_ERROR(CheckMemory("finding features in an image as large as this capture's",
                                     bytes_per_thread + batch_bytes, memory_mib));

@@ -8,8 +8,11 @@
 
 namespace cairn::extract_features {
 
+// Number of images whose features are held in memory before they are written.
+inline constexpr int64_t kNumImagesPerBatch = 64;
+
 // How many of `num_threads` threads (0: all cores) can each work on a capture's largest image within
-// `memory_mib`. Errors: Failed when not even one can: says what one takes.
+// `memory_mib`.  Errors: Failed when not even one fits: says how much memory one takes.
 Result<int> ThreadsThatFit(const Capture& capture, const ExtractFeaturesOptions& options, int num_threads,
                            int64_t memory_mib);
 

@@ -6,7 +6,7 @@
 namespace cairn::filter_visibility {
 namespace {
 
-// Bytes of memory for one of the input file.
+// Bytes of memory per byte of the input file.
 constexpr double kMemoryPerFileByte = 1.5;
 
 struct Arguments {
@@ -42,15 +42,13 @@ Command FilterVisibilityCommand() {
   auto arguments = std::make_shared<Arguments>();
   Command command;
   command.name = "filter-visibility";
-  command.summary = "Find a survey's stations and keep the feature classes that are widely visible from them";
-  command.add_arguments = [arguments](CLI::App& app) {
-    app.add_option("classes", arguments->classes, "feature classes (classes.db)")
-        ->required()
-        ->type_name("FILE");
-    app.add_option("-o,--output", arguments->output, "world to write: .json, or else a database")
-        ->required()
-        ->type_name("FILE");
-    arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+  command.summary = "Find stations, and the feature classes that are widely visible (stage 4)";
+  command.add_arguments = [arguments](ArgumentParser& parser) {
+    parser.Add("classes", arguments->classes, "feature classes (classes.db)").Required().Type("FILE");
+    parser.Add("-o,--output", arguments->output, "world to write: .json, or else a database")
+        .Required()
+        .Type("FILE");
+    arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
   };
   command.run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); };
   return command;

@@ -4,7 +4,7 @@
 
 namespace cairn::filter_visibility {
 
-// cairn filter-visibility CLASSES -o WORLD
+// cairn stage filter-visibility CLASSES -o WORLD
 Command FilterVisibilityCommand();
 
 }  // namespace cairn::filter_visibility

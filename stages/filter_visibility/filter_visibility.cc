@@ -35,20 +35,24 @@ std::vector<StationIdx> LargestComponent(const std::vector<StationIdx>& area,
   return largest;
 }
 
-// [Sala06 §VI-B] The part of a class's area that stays, empty if none, with the reason.
+// The part of a class's area that stays, empty if none, with the reason.
 std::vector<StationIdx> FilterLatticeArea(const std::vector<StationIdx>& area, const Stations& stations,
                                           const std::vector<std::vector<StationIdx>>& neighbours,
                                           const FilterVisibilityOptions& options, DropReason* reason) {
+  // [Sala06 §VI-B] "visible from at least 16 poses"
   *reason = DropReason::kFewStations;
   if (static_cast<int>(area.size()) < options.min_num_stations) return {};
+  // [Sala06 §VI-B] "few small holes"; how many and how small are options
   *reason = DropReason::kHoles;
   const std::vector<int> holes = HoleSizes(area, stations);
   if (static_cast<int>(holes.size()) > options.max_num_holes ||
       std::any_of(holes.begin(), holes.end(), [&](int size) { return size > options.max_hole_stations; })) {
     return {};
   }
+  // [Sala06 §VI-B] "at least one connected component of at least 3 by 3 poses": a full block
   *reason = DropReason::kNoBlock;
   if (!HasBlock(area, stations, options.min_block_side)) return {};
+  // [Sala06 §VI-B] of "the largest connected component" what has "a neighbor with at least 7 out of 8"
   *reason = DropReason::kTrimmedAway;
   return TrimArea(LargestComponent(area, neighbours), stations, options.min_num_neighbours);
 }
@@ -64,6 +68,7 @@ std::vector<StationIdx> FilterDrivenArea(const std::vector<StationIdx>& area,
   return component;
 }
 
+// [Sala06 Def. 3.2] The visibility area of a class, {v : f in F_v}.
 Result<std::vector<StationIdx>> AreaOfClass(const FeatureClass& feature_class, const Stations& stations) {
   std::vector<StationIdx> area;
   for (const Observation& observation : feature_class.observations) {
@@ -93,7 +98,7 @@ OptionTable DescribeOptions(FilterVisibilityOptions* o) {
        .help = "direction of up in the world frame as x,y,z, or auto: mean of the cameras' up"},
       {.name = "up_snap_deg",
        .value = &o->up_snap_deg,
-       .help = "an automatic up within this angle of a world axis is that axis",
+       .help = "an automatic up within this angle of a world axis is replaced by that axis, degrees",
        .min = 0,
        .max = 45},
       {.name = "same_place_m",
@@ -113,7 +118,7 @@ OptionTable DescribeOptions(FilterVisibilityOptions* o) {
        .max = 360},
       {.name = "min_num_stations",
        .value = &o->min_num_stations,
-       .help = "least number of stations that see a class (lattice; Sala06: 16)",
+       .help = "fewest stations that see a class (lattice; Sala06: 16)",
        .min = 1},
       {.name = "max_hole_stations",
        .value = &o->max_hole_stations,
@@ -130,13 +135,13 @@ OptionTable DescribeOptions(FilterVisibilityOptions* o) {
        .max = 1000},
       {.name = "min_num_neighbours",
        .value = &o->min_num_neighbours,
-       .help = "least number of a station's 8 neighbours in the area for it and them to stay; 0 trims "
-               "nothing (lattice; Sala06: 7)",
+       .help = "fewest of a station's 8 neighbours in the area for it and them to stay; 0 trims nothing "
+               "(lattice; Sala06: 7)",
        .min = 0,
        .max = 8},
       {.name = "min_num_stations_driven",
        .value = &o->min_num_stations_driven,
-       .help = "least number of connected stations that see a class (driven)",
+       .help = "fewest connected stations that see a class (driven)",
        .min = 1},
   };
   AddCondition({"up", {"auto"}}, {"up_snap_deg"}, &table);
@@ -185,8 +190,7 @@ Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
       reasons += fmt::format("{}{} by {}", reasons.empty() ? "" : ", ", count, reason);
     return MakeError(ErrorCode::kNoData,
                      "none of {} classes is visible enough from the {} stations of a {} survey ({}): loosen "
-                     "the options of "
-                     "filter_visibility or survey more densely",
+                     "the options of filter_visibility or survey more densely",
                      classes.classes.size(), stations.cells.size(),
                      stations.is_lattice ? "lattice" : "driven",
                      reasons.empty() ? "there was none" : "dropped " + reasons);

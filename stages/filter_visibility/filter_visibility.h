@@ -13,10 +13,10 @@ namespace cairn::filter_visibility {
 // Turns a survey into a world instance: the stations at which the robot stood, which of them are next to each
 // other, and for each feature class that a robot can expect to see again (visible from enough stations, in
 // one compact, nearly convex area) the stations that see it.  Before: group_classes.  After:
-// decompose_regions. Implements [Sala06 §VI-B] for lattice surveys.  Differs from it: a station counts among
-// its own neighbours when areas are trimmed, so that the middle of a lone 3 x 3 block stays; equal components
-// go to the one with the smallest station. Surveys that are no lattice have stations of their own kind (a
-// cell of the floor and a heading) and need only enough connected stations.
+// decompose_regions.  Implements [Sala06 §VI-B] for lattice surveys.  Differs from it: a station counts among
+// its own neighbours when areas are trimmed, so that the middle of a lone 3 x 3 block stays; of equal
+// components the one with the smallest station stays.  In surveys that are not lattices a station is a cell
+// of the floor and a heading, and a class only needs enough connected stations.
 struct FilterVisibilityOptions {
   // How the survey was taken: "lattice" (places on a grid, each with several headings), "driven" (a
   // trajectory), or "auto" (lattice if at least half of the places have headings 30 degrees apart and nine in
@@ -24,9 +24,10 @@ struct FilterVisibilityOptions {
   std::string survey = "auto";
   // Direction of up in the capture's world frame, "x,y,z", or "auto": mean of the cameras' up.
   std::string up = "auto";
-  // An automatic up within this angle of an axis of the world frame is that axis.  REQUIRES: in [0, 45]
+  // An automatic up within this angle of an axis of the world frame is replaced by that
+  // axis.  REQUIRES: in [0, 45]
   double up_snap_deg = 3;
-  // Images within this distance of a place were taken at it (lattice).  REQUIRES: > 0
+  // Images within this distance of a place belong to it (lattice).  REQUIRES: > 0
   double same_place_m = 0.1;
   // Edge of a station's cell (driven).  REQUIRES: > 0
   double cell_size_m = 0.5;
@@ -56,9 +57,9 @@ struct FilterVisibilityResult {
   std::vector<DroppedItem> dropped_items;
 };
 
-// Pure: no files, no clock, no globals.  O(observations log observations).
-// Errors: InvalidArgument (a bad option, or survey = "lattice" for images that are on no grid), Corrupt (a
-// class observed in an unknown image), NoData (no image, or no class left: says which filter took how many).
+// Pure: no files, no clock, no globals.  O(observations log observations).  Errors: InvalidArgument (a bad
+// option, or survey = "lattice" for images that do not lie on a grid), Corrupt (a class observed in an
+// unknown image), NoData (no image, or no class left: says how many each filter dropped).
 Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
                                                 const FilterVisibilityOptions& options);
 

@@ -118,6 +118,7 @@ std::vector<StationIdx> TrimArea(const std::vector<StationIdx>& area, const Stat
     for (int dy = -1; dy <= 1 && !keep; ++dy) {
       for (int dx = -1; dx <= 1 && !keep; ++dx) {
         const Cell cell(x + dx, y + dy);
+        // [Sala06 §VI-B] a neighbour, here or the station itself, with enough of its 8 neighbours in the area
         keep = window.InArea(cell) && NumNeighboursInside(window, cell) >= min_num_neighbours;
       }
     }

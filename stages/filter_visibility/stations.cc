@@ -7,7 +7,7 @@
 #include <optional>
 #include <tuple>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/floor_pose.h"
 
 namespace cairn::filter_visibility {
@@ -17,7 +17,7 @@ namespace {
 constexpr double kTurnedDeg = 30;
 // Largest distance from a grid point, in grid spacings, at which a place lies on the grid.
 constexpr double kOnGridRatio = 0.2;
-// Positions are written to the micrometre, so that last bits of a refinement do not show.
+// Positions are rounded to the micrometre, so that the last bits of a refinement have no effect.
 double Quantized(double metres) { return std::round(metres * 1e6) / 1e6; }
 
 Result<Eigen::Vector3d> UpDirection(const std::vector<SurveyImage>& images,
@@ -113,7 +113,7 @@ double MedianNearestDistance(const std::vector<Place>& places) {
       if (i != j) nearest[i] = std::min(nearest[i], (places[i].position - places[j].position).norm());
     }
   }
-  return Median(std::move(nearest));
+  return UpperMedian(std::move(nearest));
 }
 
 // The grid that the places lie on: spacing from neighbouring pairs, direction and origin as circular means.
@@ -181,6 +181,7 @@ void AssignStations(const std::vector<SurveyImage>& images, const std::vector<Ke
   }
   for (std::vector<ImageId>& list : world.station_images) std::sort(list.begin(), list.end());
 
+  // [Sala06 Def. 3.1] E: contiguous places are adjacent, and here contiguous headings at one place
   const auto link = [&](StationIdx station, const Key& other) {
     const auto entry = index.find(other);
     if (entry == index.end() || entry->second == station) return;
@@ -266,11 +267,10 @@ Result<Stations> FindStations(const std::vector<SurveyImage>& images,
   std::optional<Lattice> lattice;
   if (options.survey != "driven") lattice = RecogniseLattice(poses, options);
   if (options.survey == "lattice" && !lattice) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "option survey = 'lattice', but the positions of the {} images lie on no square grid (at least "
-        "4 places, 9 in 10 within {} of a spacing): use 'driven' or 'auto'",
-        images.size(), kOnGridRatio);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "option survey = 'lattice', but the positions of the {} images do not lie on a square "
+                     "grid (at least 4 places, 9 in 10 within {} of a spacing): use 'driven' or 'auto'",
+                     images.size(), kOnGridRatio);
   }
   if (lattice) {
     MakeLatticeStations(images, poses, *lattice, &stations);

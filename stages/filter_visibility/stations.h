@@ -25,10 +25,10 @@ struct Stations {
   std::map<ImageId, StationIdx> station_of_image;
 };
 
-// Rotation that takes `up` (any length) to +z and turns as little as possible; identity within 1e-6 of +z.
+// The smallest rotation that takes `up` (any length) to +z; identity within 1e-6 of +z.
 Pose FloorFromUp(const Eigen::Vector3d& up);
 
-// Recognises the survey and groups its images into stations.  Errors: as FilterVisibility.
+// Recognises the kind of survey and groups its images into stations.  Errors: as FilterVisibility.
 Result<Stations> FindStations(const std::vector<SurveyImage>& images, const FilterVisibilityOptions& options);
 
 }  // namespace cairn::filter_visibility

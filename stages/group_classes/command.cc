@@ -6,7 +6,7 @@
 namespace cairn::group_classes {
 namespace {
 
-// Bytes of memory for one of the input file.
+// Bytes of memory per byte of the input file.
 constexpr double kMemoryPerFileByte = 3;
 
 struct Arguments {
@@ -23,7 +23,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches, kMemoryPerFileByte,
                                            environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
-  // A reconstruction refines the database's cameras, under their numbers, along with the poses.
+  // A reconstruction refines the database's cameras, with the same numbers, along with the poses.
   if (capture.frame && capture.frame->is_reconstructed) {
     for (const auto& [camera_id, camera] : capture.cameras) matched.cameras[camera_id] = camera;
   }
@@ -66,16 +66,15 @@ Command GroupClassesCommand() {
   return {.name = "group-classes",
           .summary = "Group matching keypoints into triangulated feature classes (stage 3)",
           .add_arguments =
-              [arguments](CLI::App& app) {
-                app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
-                    ->required()
-                    ->type_name("matches.db");
-                app.add_option("--capture", arguments->capture, "Capture folder with the survey's poses")
-                    ->required();
-                app.add_option("-o,--output", arguments->output, "File to write")
-                    ->required()
-                    ->type_name("classes.db");
-                arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+              [arguments](ArgumentParser& parser) {
+                parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
+                    .Required()
+                    .Type("matches.db");
+                parser.Add("--capture", arguments->capture, "Capture folder with the survey's poses")
+                    .Required()
+                    .Type("CAPTURE");
+                parser.Add("-o,--output", arguments->output, "File to write").Required().Type("classes.db");
+                arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }

@@ -4,7 +4,7 @@
 
 namespace cairn::group_classes {
 
-// cairn group-classes matches.db --capture CAPTURE -o classes.db
+// cairn stage group-classes matches.db --capture CAPTURE -o classes.db
 Command GroupClassesCommand();
 
 }  // namespace cairn::group_classes

@@ -15,7 +15,7 @@ namespace {
 // Sets of fewer pairs than this are compared one by one.
 constexpr size_t kFewPairs = 64 * 64;
 
-// The least dot product of two centres that lie within `angle_rad` of each other.
+// The smallest dot product of two centres that lie within `angle_rad` of each other.
 int32_t LeastDot(double angle_rad) {
   int32_t low = 0, high = static_cast<int32_t>(kSquaredDescriptorNorm);
   while (low < high) {
@@ -30,8 +30,8 @@ int32_t LeastDot(double angle_rad) {
 }
 
 // All pairs of classes of which one lies within the other's radius.  Classes are compared in the order of
-// their radii, the widest first: of any two the first one's radius then counts, and a row's largest dot
-// product with a set of later columns says by itself whether the set has a look-alike of the row.
+// their radii, the widest first: for any two the first one's radius then decides, and a row's largest dot
+// product with a set of later columns shows whether the set has a look-alike of the row.
 class LookAlikeSearch {
  public:
   LookAlikeSearch(const std::vector<ClassAppearance>& classes, double ratio)
@@ -79,8 +79,8 @@ class LookAlikeSearch {
     }
     std::vector<BestTwo> row_bests, column_bests;
     FindBestTwo(Centres(rows), Centres(columns), FastestKernel(), &row_bests, &column_bests);
-    // Rows of one look-alike are done; those of more are looked at again, with the columns that may be
-    // theirs.
+    // Rows with one look-alike are done; those with more are searched again, with the columns that may
+    // be look-alikes.
     std::vector<int> other_rows, other_columns;
     for (size_t i = 0; i < rows.size(); ++i) {
       const int32_t least_dot = least_dots_[rows[i]];
@@ -126,6 +126,7 @@ void DescribeClass(const std::vector<const uint8_t*>& descriptors, ClassAppearan
     const double angle = DescriptorAngleRad(DescriptorDot(descriptor, appearance->centre.data()));
     squared_sum += angle * angle;
   }
+  // [Sala06 §VI-B] "the radius of the classes in the feature space": root mean square about the centre
   appearance->radius_rad =
       std::sqrt(squared_sum / static_cast<double>(std::max<size_t>(1, descriptors.size())));
 }
@@ -134,6 +135,7 @@ std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes
                                      const FindAmbiguousOptions& options) {
   std::vector<Ambiguity> ambiguity(classes.size(), Ambiguity::kNone);
   if (options.min_separation_ratio <= 0) return ambiguity;
+  // [Sala06 §VI-B] where the distance is "not significantly larger than the radius", both classes go
   LookAlikeSearch(classes, options.min_separation_ratio).ForEachPair([&](int i, int k) {
     if ((classes[i].position - classes[k].position).norm() > options.max_duplicate_distance_m) {
       ambiguity[i] = ambiguity[k] = Ambiguity::kAmbiguous;

@@ -9,7 +9,7 @@
 
 namespace cairn::group_classes {
 
-// What the ambiguity rule knows of a class: centre of its descriptors, its radius (root mean square angle
+// What the ambiguity rule reads of a class: centre of its descriptors, its radius (root mean square angle
 // between its descriptors and the centre, radians), its place, and how many keypoints it has.
 struct ClassAppearance {
   Eigen::Matrix<uint8_t, 1, kDescriptorDim> centre;
@@ -32,14 +32,14 @@ struct FindAmbiguousOptions {
   double max_duplicate_distance_m = 0.05;
 };
 
-// kAmbiguous goes before kDuplicate.
+// kAmbiguous takes precedence over kDuplicate.
 enum class Ambiguity : uint8_t { kNone, kAmbiguous, kDuplicate };
 
-// Per class.  Every pair of classes is judged, not only the nearest ones: of a class's look-alikes the
-// nearest may be its duplicate, and another that lies within a wide class's radius may have nearer
-// neighbours.  Both classes of an ambiguous pair go [Sala06 §VI-B: all features of both classes], also where
-// only one's radius reaches the other.  Exact, whatever the order of the classes; O(n^2) dot products, by the
-// kernels of core/features/descriptor_matcher.h, and as many again as look-alikes are dense.
+// Per class.  Every pair of classes is tested, not only the nearest ones: the nearest look-alike of a class
+// may be its duplicate, and another one within a wide class's radius may have nearer neighbours.  Both
+// classes of an ambiguous pair are dropped [Sala06 §VI-B: all features of both classes], also where only
+// one's radius reaches the other.  Exact, whatever the order of the classes; O(n^2) dot products, by the
+// kernels of core/features/descriptor_matcher.h, and more where look-alikes are dense.
 std::vector<Ambiguity> FindAmbiguous(const std::vector<ClassAppearance>& classes,
                                      const FindAmbiguousOptions& options);
 

@@ -157,7 +157,7 @@ void ListUnposed(const MatchedFeatures& matched, const PosedImages& posed,
   }
 }
 
-// How far the refined poses moved from the stated ones, once the common offset is taken off.
+// How far the refined poses moved from the stated ones, without the common offset.
 void MeasurePoseNoise(Classes* classes) {
   double squared_m = 0, squared_deg = 0;
   for (const SurveyImage& image : classes->images) {
@@ -166,7 +166,7 @@ void MeasurePoseNoise(Classes* classes) {
     squared_deg += std::pow(RotationErrorDeg(in_given_frame, image.given_cam_from_world), 2);
   }
   const double num_axes = 3.0 * static_cast<double>(classes->images.size());
-  // Below a micrometre it is arithmetic, not noise.
+  // Less than a micrometre is rounding, not noise.
   classes->stated_pose_sigma_m = std::round(1e6 * std::sqrt(squared_m / num_axes)) / 1e6;
   classes->stated_pose_sigma_deg = std::round(1e4 * std::sqrt(squared_deg / num_axes)) / 1e4;
 }
@@ -187,14 +187,13 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
        .min = 1e-3},
       {.name = "min_triangulation_angle_deg",
        .value = &t.min_triangulation_angle_deg,
-       .help = "least angle between two rays to a class, degrees",
+       .help = "smallest angle between two rays to a class, degrees",
        .min = 1e-3,
        .max = 180},
       {.name = "refine_poses",
        .value = &o->refine_poses,
-       .help = "refine the survey's poses; auto: not reconstructed ones, others when the first "
-               "triangulation's error exceeds "
-               "auto_refine_error_px",
+       .help = "refine the survey's poses; auto: all but reconstructed ones, when the first triangulation's "
+               "error exceeds auto_refine_error_px",
        .choices = {"auto", "always", "never"}},
       {.name = "auto_refine_error_px",
        .value = &o->auto_refine_error_px,
@@ -246,7 +245,7 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
        .min = 1},
       {.name = "min_separation_ratio",
        .value = &o->ambiguity.min_separation_ratio,
-       .help = "classes closer in feature space than this many of their radii are ambiguous; 0: rule off",
+       .help = "classes closer in feature space than this many of their radii are ambiguous; 0: none are",
        .min = 0},
       {.name = "max_duplicate_distance_m",
        .value = &o->ambiguity.max_duplicate_distance_m,
@@ -313,7 +312,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   const PosedImages posed = CollectPosedImages(matched, capture, num_threads);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
-                     "{}: no image has a pose; landmarks are triangulated from posed images: give an "
+                     "{}: no image has a pose, but landmarks are triangulated from posed images; give an "
                      "images.txt with cam_from_world poses",
                      capture.root);
   }

@@ -18,7 +18,7 @@
 namespace cairn::group_classes {
 
 // Turns keypoints that match into feature classes: one per scene feature, with its place in space and one
-// descriptor. Before: match_features.  After: filter_visibility, emit_map. Implements [Sala06 §VI-B]
+// descriptor.  Before: match_features.  After: filter_visibility, emit_map.  Implements [Sala06 §VI-B]
 // (equivalence classes, ambiguity).  Differs from it: keypoints are joined by verified matches
 // (union_matches.h), not by distance in feature space alone; classes are triangulated from the survey's
 // poses, which are themselves refined as far as their stated noise allows (refine_poses.h); a class whose
@@ -26,8 +26,8 @@ namespace cairn::group_classes {
 struct GroupClassesOptions {
   TriangulateOptions triangulation;
   // "never": the stated poses are exact.  "always": refine them.  "auto": refine when the first
-  // triangulation's root mean square error exceeds auto_refine_error_px; reconstructed poses, which are the
-  // optimum of such an adjustment already, never.
+  // triangulation's root mean square error exceeds auto_refine_error_px; reconstructed poses, which already
+  // are the optimum of such an adjustment, are never refined.
   std::string refine_poses = "auto";
   double auto_refine_error_px = 1.0;  // REQUIRES: > 0
   // Largest reprojection error in the first triangulation, before poses are refined, pixels.  REQUIRES: > 0
@@ -54,16 +54,16 @@ struct GroupClassesResult {
   std::vector<DroppedItem> dropped_items;
   int64_t num_tracks = 0;
   int64_t num_conflicts = 0;  // matches not followed because they join two keypoints of one image
-  // Refinement: root mean square reprojection errors before and after, pixels; equal when poses were not
-  // refined.
+  // Refinement: root mean square reprojection errors before and after, pixels; equal when poses were
+  // not refined.
   double initial_rms_px = 0;
   double final_rms_px = 0;
   bool poses_refined = false;
 };
 
-// Pure; same result for any thread count.  Classes are ascending by their first observation.
-// Errors: InvalidArgument (options), NoData (no posed image, no class left: says what took the most),
-// Cancelled.
+// Pure; same result for any thread count.  Classes are ascending by their first observation.  Errors:
+// InvalidArgument (options), NoData (no posed image, or no class left: says what dropped the
+// most), Cancelled.
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress);

@@ -19,7 +19,7 @@ DropReason ReasonOf(const Track& track, const Triangulation& triangulation,
                                                                        : DropReason::kReprojectionError;
 }
 
-// The keypoints of a track: all of them, or those that are no inliers.
+// The keypoints of a track: all of them, or those that are not inliers.
 std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& track,
                                   const std::vector<int>& matched_idx, const std::vector<int>& without) {
   std::vector<uint32_t> keypoints;

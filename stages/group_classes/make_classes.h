@@ -11,10 +11,10 @@
 namespace cairn::group_classes {
 
 // Classes from the tracks that triangulate, without the ambiguous ones, ascending by first observation;
-// counts what is dropped in classes->dropped and appends it to `dropped_items`: each track either becomes a
-// class or is dropped for one reason, and each keypoint of a track that becomes one is an observation or an
-// outlier. triangulations[t] is that of tracks[t]; matched_idx[i] is where image i of the tracks is in
-// matched.images.
+// counts dropped tracks and keypoints in classes->dropped and appends them to `dropped_items`: each track
+// either becomes a class or is dropped for one reason, and each keypoint of a track that becomes one is an
+// observation or an outlier.  triangulations[t] is that of tracks[t]; matched_idx[i] is where image i of the
+// tracks is in matched.images.
 void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                  const std::vector<Triangulation>& triangulations, const std::vector<int>& matched_idx,
                  const GroupClassesOptions& options, Classes* classes,

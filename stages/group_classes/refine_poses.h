@@ -20,7 +20,7 @@ struct RefinePosesOptions {
   // Refine one rigid offset between all stated poses and their cameras (the poses may be a depth camera's or
   // a body's).
   bool refine_camera_offset = true;
-  // Standard deviations of that offset about none, metres and degrees.  REQUIRES: > 0
+  // Standard deviations of that offset about zero, metres and degrees.  REQUIRES: > 0
   double offset_sigma_m = 0.05;
   double offset_sigma_deg = 3.0;
   // Refine one factor on the focal length of each pinhole camera, and its standard deviation about 1.
@@ -38,7 +38,7 @@ struct PoseProblem {
     int point_idx = 0;
     PixelRay ray;  // by the unrefined focal length
   };
-  std::vector<Pose> stated_poses;      // cam_from_world as the capture states them
+  std::vector<Pose> stated_poses;      // cam_from_world, from the capture
   std::vector<int> camera_idx;         // per image
   std::vector<bool> is_focal_refined;  // per camera: false for models with distortion
   std::vector<Observation> observations;
@@ -57,11 +57,11 @@ struct RefinePosesSummary {
 };
 
 // Minimises over poses T_i, points X_j, offset O and focal ratios s_c
-//   sum_ij rho( |residual_ij(diag(s, s, 1) T_i X_j)|^2 / sigma_px^2 )   reprojection
-//   (core/camera/pixel_ray.h), Cauchy loss
-//   + sum_i |log(T_i (O G_i)^-1)|^2 weighted by the pose sigmas          stated poses G_i, trusted as far as
-//   they go
-//   + |log O|^2 weighted by the offset sigmas + ((s - 1) / sigma_s)^2.
+//   sum_ij rho( |residual_ij(diag(s, s, 1) T_i X_j)|^2 / sigma_px^2 )
+//   + sum_i |log(T_i (O G_i)^-1)|^2 weighted by the pose sigmas
+//   + |log O|^2 weighted by the offset sigmas + ((s - 1) / sigma_s)^2
+// with reprojection residuals (core/camera/pixel_ray.h), Cauchy's loss rho, and stated poses G_i, trusted as
+// far as their sigmas say.
 // One thread: bit-stable.  Ceres with a sparse Schur complement (Eigen's Cholesky).
 RefinePosesSummary RefinePoses(const RefinePosesOptions& options, PoseProblem* problem);
 

@@ -100,7 +100,7 @@ Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOp
       least_total = total;
     }
   }
-  // Refine on the rays that agree, then see which agree with the refined point; twice.
+  // Refine on the rays that agree, then find those that agree with the refined point; twice.
   for (int round = 0; round < 2; ++round) {
     if (static_cast<int>(result.inliers.size()) < options.min_num_observations) return result;
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {

@@ -18,7 +18,7 @@ struct PosedRay {
 struct TriangulateOptions {
   // Largest reprojection error of an observation that is kept, pixels.  REQUIRES: > 0
   double max_reprojection_error_px = 4.0;
-  // Least angle between two of the rays that are kept, degrees.  REQUIRES: in (0, 180)
+  // Smallest angle between two of the rays that are kept, degrees.  REQUIRES: in (0, 180)
   double min_triangulation_angle_deg = 1.5;
   // Fewest observations of a point.  REQUIRES: >= 2
   int min_num_observations = 3;

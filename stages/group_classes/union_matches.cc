@@ -7,7 +7,7 @@
 namespace cairn::group_classes {
 namespace {
 
-// Union-find whose sets know the images that their keypoints come from.
+// Union-find whose sets store the images of their keypoints.
 class TrackSets {
  public:
   explicit TrackSets(const std::vector<int>& num_keypoints) {
@@ -80,6 +80,7 @@ std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vect
   TrackSets sets(num_keypoints);
   *num_conflicts = 0;
   for (const ScoredMatch& match : matches) {
+    // [Sala06 §VI-B] keypoints are equivalent where verified matches join them, not by their distance alone
     if (!sets.Union(sets.NodeOf(match.element1), sets.NodeOf(match.element2))) ++*num_conflicts;
   }
   return sets.Tracks();

@@ -28,7 +28,7 @@ struct ScoredMatch {
 // Joins keypoints that match into tracks [Sala06 §VI-B: equivalence classes], most alike first.  A match that
 // would put two keypoints of one image into a class is not followed: the class stays split there.  Counts
 // such matches in `num_conflicts`.  Tracks of fewer than two keypoints are left out; ascending by first
-// element. num_keypoints[i]: keypoints of image i.  O(matches log matches).
+// element.  num_keypoints[i]: number of keypoints of image i.  O(matches log matches).
 std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
                                 int64_t* num_conflicts);
 

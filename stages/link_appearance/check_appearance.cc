@@ -13,7 +13,7 @@
 namespace cairn::link_appearance {
 namespace {
 
-// What is chosen: a set that meets its demands, or the order of a curve.
+// A kind of chosen set: one that meets its demands, or the order of a curve.
 struct Kind {
   std::string name;
   LinkAppearanceOptions options;
@@ -62,7 +62,7 @@ std::vector<Kind> CurveKinds(const LinkAppearanceOptions& base, const CheckAppea
   return {{"greedy", greedy}, {"weighted", weighted}, {"2-fold", twofold}};
 }
 
-// Chance that `num_kept` random ones of `num_nodes` hold one of `num_linked`.
+// Probability that `num_kept` random nodes of `num_nodes` contain one of `num_linked`.
 double ChanceOfRandom(int num_nodes, int num_linked, double num_kept) {
   const int k = static_cast<int>(std::lround(num_kept));
   double none = 1;
@@ -70,7 +70,7 @@ double ChanceOfRandom(int num_nodes, int num_linked, double num_kept) {
   return 1 - none;
 }
 
-// What one graph's sets are: the marks of each kind, and each node's position in each curve's order.
+// The sets of one graph: the marks of each kind, and each node's position in each curve's order.
 struct ChosenSets {
   std::vector<std::vector<char>> kept;
   std::vector<int> num_kept;
@@ -80,7 +80,7 @@ struct ChosenSets {
 ChosenSets Choose(const AppearanceGraph& graph, NodeIdx left_out, const std::vector<Kind>& sets,
                   const std::vector<Kind>& curves, int max_size, uint64_t seed, Progress& progress) {
   ChosenSets chosen;
-  CancelOnly quiet(progress);  // what is left out is reported, not the tries of each search
+  CancelOnly quiet(progress);  // only left-out images are reported, not the tries of each search
   for (const Kind& kind : sets) {
     const std::vector<NodeRole> roles = ChooseKept(graph, kind.options, seed, nullptr, &quiet);
     std::vector<char> kept(graph.num_nodes(), 0);
@@ -115,6 +115,7 @@ struct Outcome {
 Outcome Locate(const LeftOutImage& image, const ChosenSets& chosen) {
   Outcome outcome;
   outcome.num_kept = chosen.num_kept;
+  // [Booij06 §V-A] localized: "a link in the original graph to one of the nodes in the computed CDS"
   for (const std::vector<char>& kept : chosen.kept) {
     outcome.by_set.push_back(
         std::any_of(image.linked.begin(), image.linked.end(), [&](NodeIdx node) { return kept[node] != 0; }));
@@ -189,7 +190,7 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (left_out.empty()) return MakeError(ErrorCode::kNoData, "no image is left out: nothing to check");
   if (graph.num_nodes() == 0)
-    return MakeError(ErrorCode::kNoData, "all images are held out: no survey is left to keep images of");
+    return MakeError(ErrorCode::kNoData, "all images are held out: no survey images are left to choose from");
   AppearanceCheck check;
   const bool is_of_graph = left_out[0].node >= 0;
   check.num_nodes = graph.num_nodes() - (is_of_graph ? 1 : 0);
@@ -210,6 +211,7 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
   if (is_of_graph) {
     ParallelFor(static_cast<int64_t>(left_out.size()), num_threads, [&](int64_t i) {
       if (progress.Cancelled()) return;
+      // [Booij06 §V-A] one node with its links is left out, the set is computed of the rest
       const AppearanceGraph rest = WithoutLinksOf(graph, left_out[i].node);
       outcomes[i] =
           Locate(left_out[i], Choose(rest, left_out[i].node, sets, curves, max_size, seed, progress));
@@ -226,7 +228,7 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
 }
 
 Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::string>& names) {
-  std::map<std::string, bool> wanted;  // whether an image of the name, or of the folder, was met
+  std::map<std::string, bool> wanted;  // whether an image of this name, or in this folder, was found
   for (const std::string& name : names) wanted[name] = false;
   const auto is_wanted = [&](const std::string& name) {
     bool found = false;

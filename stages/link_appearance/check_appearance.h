@@ -11,7 +11,7 @@
 
 namespace cairn::link_appearance {
 
-// How many left-out images the kept ones of the rest locate [Booij06 §V]: an image is localized when it is
+// How many left-out images the kept ones of the rest locate [Booij06 §V-A]: an image is localized when it is
 // linked to a kept one.
 struct CheckAppearanceOptions {
   // The curve's sizes, as parts of the nodes.  REQUIRES: in [0, 1]
@@ -26,19 +26,19 @@ OptionTable DescribeOptions(CheckAppearanceOptions* options);
 // A left-out image: its links to nodes of the graph.
 struct LeftOutImage {
   std::vector<NodeIdx> linked;  // ascending
-  NodeIdx node = -1;            // that of the graph which it is itself, -1: none
+  NodeIdx node = -1;            // the node of the graph that is this image, -1: none
 };
 
-// A set, or sets of one size or kind, and what they locate.
+// The results of a set, or of sets of one size or kind.
 struct AppearanceFigure {
   double num_kept = 0;       // mean over the left-out images
   double num_localized = 0;  // of the left-out images
   double num_by_random = 0;  // expected of random sets of the same size
 };
 struct AppearanceCheck {
-  int num_nodes = 0;  // that sets are chosen from, the left-out one not counted
+  int num_nodes = 0;  // nodes that sets are chosen from, without the left-out one
   int num_left_out = 0;
-  int num_linked = 0;  // of these, with any link: more no set can locate
+  int num_linked = 0;  // of these, with any link: no set can locate more
   std::vector<std::string>
       set_names;  // of sets that meet their demands: "greedy", "improved", "weighted", ...
   std::vector<AppearanceFigure> sets;
@@ -48,14 +48,14 @@ struct AppearanceCheck {
 };
 
 // Leave-one-out: each node in turn is taken out of the graph, and the sets are chosen from the rest, per
-// component where that falls apart; ties go to the smallest node.
+// component where the graph falls apart; ties go to the smallest node.
 std::vector<LeftOutImage> EachNodeLeftOut(const AppearanceGraph& graph);
 
 // Sets by `link_options` (its num_tries for the improved ones), by links that count by inliers, and of m-fold
-// domination; and of the curve's sizes, greedily.  Random sets of the same size are expected to locate an
-// image of d neighbours among n with 1 - C(n - d, k) / C(n, k), no sampling.
-// Same figures for any number of threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options),
-// NoData (nothing, or all, is left out), Cancelled.
+// domination; and greedy sets of the curve's sizes.  The probability that a random set of k of n nodes
+// locates an image with d neighbours is computed, without sampling: 1 - C(n - d, k) / C(n, k).  Same figures
+// for any number of threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options), NoData (nothing,
+// or all, is left out), Cancelled.
 Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
                                         const std::vector<LeftOutImage>& left_out,
                                         const LinkAppearanceOptions& link_options,
@@ -63,8 +63,8 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
                                         Progress& progress);
 
 // Takes images out of a survey by name, or by folder (a name with '/' at its end: a session of joined
-// captures): what is left, and what their links were.  A panorama's views are one held-out image.  Errors:
-// NotFound (a name that the survey does not have).
+// captures): the remaining survey, and the links of the images taken out.  A panorama's views are one
+// held-out image.  Errors: NotFound (a name that the survey does not have).
 struct HeldOutSplit {
   ImageLinks survey;
   std::vector<std::vector<int>> linked;  // per held-out image: indices of survey images, ascending

@@ -10,7 +10,7 @@
 namespace cairn::link_appearance {
 namespace {
 
-struct Arguments {
+struct CheckArguments {
   std::string matches;
   std::string capture;
   std::string held_out;
@@ -19,9 +19,8 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// The options of link_appearance that choose links, nodes and sets: what the line's own set is made by
-// otherwise (its algorithm, cycles and bound) and what is told of places that look alike has no part in this
-// check.
+// The options of link_appearance that choose links, nodes and sets: the other options of the stage's own set
+// (its algorithm, cycles and bound) and those for places that look alike are not used by this check.
 OptionTable LinkOptionsRead(LinkAppearanceOptions* options) {
   static const std::set<std::string> kRead = {"min_num_inliers",
                                               "max_link_distance_m",
@@ -40,7 +39,7 @@ OptionTable LinkOptionsRead(LinkAppearanceOptions* options) {
   return table;
 }
 
-// Names of one a line, or of COLMAP's images.txt, where they end every line of ten words.
+// Names, one per line, or from COLMAP's images.txt, where they end every line of ten words.
 Result<std::vector<std::string>> ReadNames(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   std::vector<std::string> names;
@@ -84,16 +83,15 @@ std::string Table(const AppearanceCheck& check) {
   return text;
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
+Status RunCheck(const CheckArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   const LinkAppearanceOptions& options = arguments.options;
   if (!arguments.capture.empty() && options.fuse != "place" && options.max_link_distance_m == 0 &&
       options.max_link_turn_deg == 180) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "--capture {}: poses are for --fuse place, --max-link-distance-m and --max-link-turn-deg; give "
-        "one of them, or leave the capture out",
-        arguments.capture);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--capture {}: poses are used for --fuse place, --max-link-distance-m and "
+                     "--max-link-turn-deg only; give one of them, or leave the capture out",
+                     arguments.capture);
   }
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
@@ -131,30 +129,32 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 }  // namespace
 
 Command CheckAppearanceCommand() {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CheckArguments>();
   // Sets are chosen once for each image that is left out.
   arguments->options.num_tries = 500;
   return {.name = "check-appearance",
-          .summary = "Leave images out and count those that the kept ones of the rest still locate",
+          .summary = "Leave images out and count those that the kept ones still locate",
           .add_arguments =
-              [arguments](CLI::App& app) {
-                app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
-                    ->required()
-                    ->type_name("matches.db");
-                app.add_option(
-                    "--capture", arguments->capture,
-                    "Capture folder with the survey's poses, for fuse = place, max_link_distance_m "
-                    "and max_link_turn_deg");
-                app.add_option("--held-out", arguments->held_out,
-                               "Images of the database that are no survey: names, folders (ending in /) or "
-                               "queries.txt; these are left out "
-                               "together, instead of each image in turn")
-                    ->type_name("FILE");
+              [arguments](ArgumentParser& parser) {
+                parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
+                    .Required()
+                    .Type("matches.db");
+                parser
+                    .Add("--capture", arguments->capture,
+                         "Capture folder with the survey's poses, for fuse = place, max_link_distance_m "
+                         "and max_link_turn_deg")
+                    .Type("CAPTURE");
+                parser
+                    .Add("--held-out", arguments->held_out,
+                         "Images of the database that do not belong to the survey: names, folders (ending in "
+                         "/) or queries.txt; these are left out together, instead of each image in turn")
+                    .Type("FILE");
                 OptionTable table = LinkOptionsRead(&arguments->options);
                 for (Option& option : DescribeOptions(&arguments->check_options)) table.push_back(option);
-                arguments->option_arguments.Add(app, std::move(table));
+                arguments->option_arguments.Add(parser, std::move(table));
               },
-          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+          .run = [arguments](
+                     const CommandEnvironment& environment) { return RunCheck(*arguments, environment); }};
 }
 
 }  // namespace cairn::link_appearance

@@ -12,7 +12,7 @@
 namespace cairn::link_appearance {
 namespace {
 
-// Bytes: links as read, of the survey, fused, and of the graph both ways.
+// Bytes per pair: links as read, those of the survey, fused ones, and the graph's in both directions.
 constexpr int64_t kMemoryPerPair = 96;
 
 struct Arguments {
@@ -45,7 +45,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     AmbiguityOptions of_ambiguity;
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         NamesOf(DescribeOptions(&of_ambiguity)),
-        "places look alike by the words of vocabulary.db; give it, or leave this out"));
+        "places are compared by the words of vocabulary.db; give --vocabulary, or leave this out"));
   }
   std::optional<Capture> capture;
   if (!arguments.capture.empty()) {
@@ -92,26 +92,27 @@ Command LinkAppearanceCommand() {
   const auto arguments = std::make_shared<Arguments>();
   return {
       .name = "link-appearance",
-      .summary = "Link images that see the same and keep the fewest that still locate the robot (stage 7)",
+      .summary = "Link images that see the same and keep the fewest that locate the robot (stage 7)",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
-                ->required()
-                ->type_name("matches.db");
-            app.add_option("vocabulary", arguments->vocabulary,
-                           "visual words, to tell which places look alike [not told]")
-                ->type_name("vocabulary.db");
-            app.add_option("--capture", arguments->capture,
-                           "Capture folder: only images of its survey count, and its poses are there for "
-                           "fuse = place, for max_link_distance_m and max_link_turn_deg, and for the picture "
-                           "[all images]");
-            app.add_option("-o,--output", arguments->output, "File to write")
-                ->required()
-                ->type_name("appearance.db");
-            app.add_option("--svg", arguments->svg,
-                           "also draw the graph as SVG: over the floor, or without poses as a matrix")
-                ->type_name("FILE.svg");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
+                .Required()
+                .Type("matches.db");
+            parser
+                .Add("vocabulary", arguments->vocabulary,
+                     "visual words, to find places that look alike [not searched]")
+                .Type("vocabulary.db");
+            parser
+                .Add("--capture", arguments->capture,
+                     "Capture folder: only images of its survey are used, and its poses are used for fuse = "
+                     "place, max_link_distance_m, max_link_turn_deg and the picture [all images]")
+                .Type("CAPTURE");
+            parser.Add("-o,--output", arguments->output, "File to write").Required().Type("appearance.db");
+            parser
+                .Add("--svg", arguments->svg,
+                     "also draw the graph as SVG: over the floor, or without poses as a matrix")
+                .Type("FILE.svg");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }

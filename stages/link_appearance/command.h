@@ -4,9 +4,9 @@
 
 namespace cairn::link_appearance {
 
-// cairn link-appearance MATCHES -o APPEARANCE
+// cairn stage link-appearance MATCHES -o APPEARANCE
 Command LinkAppearanceCommand();
-// cairn check-appearance MATCHES
+// cairn stage check-appearance MATCHES
 Command CheckAppearanceCommand();
 
 }  // namespace cairn::link_appearance

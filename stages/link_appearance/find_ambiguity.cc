@@ -7,16 +7,16 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/base/deciles.h"
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 
 namespace cairn::link_appearance {
 namespace {
 
-// As stored: the last bits of sums may differ between machines.
+// Rounded as stored: the last bits of sums may differ between machines.
 double AsStored(double value) { return OfThousandths(Thousandths(value)); }
 
-// Nodes that together are less likely than this make an entropy no greater than the last digit stored.
+// Nodes that together are less likely than this change the entropy by no more than the last digit stored.
 constexpr double kNegligible = 1e-4;
 
 // A node that looks like another one.
@@ -25,12 +25,12 @@ struct LookAlike {
   double score = 0;
 };
 
-// What a node's images, as queries, get.
+// The scores that a node's images get as queries.
 struct NodeScores {
   double entropy = 0;
   std::vector<LookAlike> apart;
-  // Over places: the best score at another image that shows the same, 0 where there is none; and the least
-  // that an image gets where any other one was taken: `again` changes nothing up to it.
+  // Over places: the best score at another image that shows the same place, 0 where there is none, and the
+  // value up to which `again` changes nothing.
   double best_nearby = 0;
   double least_best = std::numeric_limits<double>::infinity();
 };
@@ -61,7 +61,7 @@ class AmbiguitySearch {
 
   bool OverPlaces() const { return options_.entropy_over == "places"; }
 
-  // `again`: what an image scores at least where it was taken, when it is taken another time.
+  // `again`: the least score of an image at its own place if it were taken again.
   NodeScores Score(NodeIdx node, double again) const {
     const size_t num_nodes = appearance_.nodes.size();
     NodeScores result;
@@ -85,9 +85,10 @@ class AmbiguitySearch {
         best[other] = std::max(best[other], scores[i]);
       }
     }
-    double sum = 0;  // less than 1 where other documents share nothing either
+    double sum = 0;  // less than 1 where other documents share no words either
     for (const double p : probabilities) sum += p;
     for (double& p : probabilities) p = sum > 0 ? p / sum : 1.0 / static_cast<double>(num_nodes);
+    // [Mariottini11 eq. 1] H_i, over places instead of images unless entropy_over asks for these
     result.entropy = Entropy(OverPlaces() ? OfPlaces(node, probabilities) : probabilities);
     best[node] = 0;
     const double best_other = *std::max_element(best.begin(), best.end());
@@ -99,12 +100,12 @@ class AmbiguitySearch {
   std::vector<double> ScoresOf(int32_t document) const {
     std::vector<double> scores = ScoreDocuments(vocabulary_, bags_[document]);
     for (size_t i = 0; i < scores.size(); ++i) {
-      if (node_of_document_[i] < 0) scores[i] = 0;  // of no node: no survey image
+      if (node_of_document_[i] < 0) scores[i] = 0;  // in no node: not a survey image
     }
     return scores;
   }
 
-  // The best score at another image that shows the same as the node; 0 where there is none.
+  // The best score at another image that shows the same place as the node; 0 where there is none.
   double BestNearby(NodeIdx node, const std::vector<double>& scores) const {
     double best = 0;
     for (size_t i = 0; i < scores.size(); ++i) {
@@ -113,9 +114,9 @@ class AmbiguitySearch {
     return best;
   }
 
-  // Of places instead of nodes: the first is the node's own, each other one that of the likeliest node that
-  // is left; a place takes in the nodes that show the same as its first one.  What is left of nodes that are
-  // next to impossible counts as one place.
+  // Probabilities of places instead of nodes: the first is the node's own, each other one that of the
+  // likeliest remaining node; a place includes the nodes that show the same as its first one.  The remaining,
+  // very unlikely nodes count as one place.
   std::vector<double> OfPlaces(NodeIdx node, const std::vector<double>& probabilities) const {
     std::vector<NodeIdx> left = {node};
     double rest = 1 - probabilities[node];
@@ -181,12 +182,13 @@ OptionTable DescribeOptions(AmbiguityOptions* options) {
   return {
       {.name = "score_exponent",
        .value = &options->score_exponent,
-       .help = "probabilities go with scores to this power; more: the best-looking place counts for more",
+       .help =
+           "probabilities are proportional to scores to this power; a larger one favours the best place more",
        .min = 1e-3,
        .max = 100},
       {.name = "entropy_over",
        .value = &options->entropy_over,
-       .help = "what a place's entropy counts: places, each with the images around it, or every image",
+       .help = "what a place's entropy is taken over: places, each with the images around it, or all images",
        .choices = {"places", "images"}},
       {.name = "confusable_score_ratio",
        .value = &options->confusable_score_ratio,
@@ -195,11 +197,11 @@ OptionTable DescribeOptions(AmbiguityOptions* options) {
        .max = 1},
       {.name = "confusable_distance_m",
        .value = &options->confusable_distance_m,
-       .help = "and when they lie at least so far apart, m",
+       .help = "confusable places lie at least this far apart, m",
        .min = 1e-6},
       {.name = "max_num_confusable",
        .value = &options->max_num_confusable,
-       .help = "most confusable places of one",
+       .help = "most confusable places of a place",
        .min = 0},
   };
 }

@@ -65,8 +65,8 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
       const auto [image_id1, image_id2] = ImageIdsFromPairId(pairs.getColumn(0).getInt64());
       const int64_t num_inliers = pairs.getColumn(1).getInt64();
       if (num_inliers < 0 || num_inliers > std::numeric_limits<int32_t>::max()) {
-        return MakeError(ErrorCode::kCorrupt, "{}: pair ({}, {}) says that it has {} inliers", matches_path,
-                         image_id1, image_id2, num_inliers);
+        return MakeError(ErrorCode::kCorrupt, "{}: pair ({}, {}) states {} inliers", matches_path, image_id1,
+                         image_id2, num_inliers);
       }
       const std::optional<int> index1 = IndexOfImage(result.images, image_id1);
       const std::optional<int> index2 = IndexOfImage(result.images, image_id2);
@@ -75,6 +75,7 @@ Result<ImageLinks> ReadImageLinks(const std::string& matches_path, int min_num_i
                          "{}: a pair names images {} and {}, expected two different images of the database",
                          matches_path, image_id1, image_id2);
       }
+      // [Booij06 §III; Mariottini11 §V] S_ij = 1: enough matches that one geometry of two views explains
       if (num_inliers < min_num_inliers || !IsVerified(pairs.getColumn(2).getInt64())) continue;
       result.links.push_back({*index1, *index2, static_cast<int32_t>(num_inliers)});
     }
@@ -126,7 +127,7 @@ Result<std::vector<NodeIdx>> FuseImages(const std::vector<DatabaseImage>& images
   for (const DatabaseImage& image : images) {
     const std::string name = CapturedName(image.name);
     const size_t end = fuse == "name" ? name.rfind('_') : std::string::npos;
-    // Names without '_' are whole; a mark keeps them apart from beginnings of others.
+    // Names without '_' are used whole; a mark distinguishes them from the beginnings of other names.
     const std::string key = end == std::string::npos ? name + '/' : name.substr(0, end);
     node_of_image.push_back(nodes.emplace(key, static_cast<NodeIdx>(nodes.size())).first->second);
   }

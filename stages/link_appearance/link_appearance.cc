@@ -32,11 +32,12 @@ std::vector<NodeIdx> ArriveOneByOne(const AppearanceGraph& graph, int max_num_dr
   return online.kept();
 }
 
-// A set of exactly num_kept nodes, as far as there are so many: a dominating one, and more, where that many
-// suffice; otherwise the connected one that misses least.
+// A set of exactly num_kept nodes, if there are that many: a dominating set and further nodes where that many
+// suffice; otherwise the connected set with the smallest shortfall.
 std::vector<NodeIdx> ChooseExactly(const Domination& domination, const LinkAppearanceOptions& options,
                                    const std::vector<NodeIdx>& dominating, uint64_t seed,
                                    Progress* progress) {
+  // [Booij06 §VI: asks for it] "the number of images in the pruned set at a fixed size"
   const ImproveOptions improve{.num_tries = options.num_tries};
   const int target = options.num_kept;
   if (static_cast<int>(dominating.size()) <= target) {
@@ -72,7 +73,7 @@ int64_t NumTries(const Domination& domination, const LinkAppearanceOptions& opti
   return num_searches * options.num_tries * (options.num_kept > 0 ? 2 : 1);
 }
 
-// The bound of one component; shrinks the kept nodes where the search for it finds fewer.
+// The bound of one component; replaces the kept nodes where the search finds fewer.
 int BoundComponent(const AppearanceGraph& graph, const LinkAppearanceOptions& options, Progress* progress,
                    std::vector<NodeIdx>* kept) {
   const Domination domination(graph, DominationOf(options));
@@ -97,7 +98,8 @@ void BoundAll(const Domination& domination, const LinkAppearanceOptions& options
     for (size_t i = 0; i < nodes.size(); ++i) {
       if (appearance->nodes[nodes[i]].role == NodeRole::kDominating) kept.push_back(static_cast<NodeIdx>(i));
     }
-    // With a size given the set may not dominate, or hold more than it takes: a set that does is bounded.
+    // With a given size the set may not dominate, or may be larger than needed: the bound is for a
+    // dominating set.
     const bool is_chosen = options.num_kept == 0 && options.algorithm != "all";
     if (!is_chosen) kept = GreedyDominatingSet(part);
     const size_t size_before = kept.size();
@@ -124,8 +126,8 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
                                    [](const std::vector<NodeIdx>& nodes) { return nodes.size() == 1; });
   std::vector<std::string>& notes = result->notes;
   if (domination.graph().num_links() == 0 && num_nodes > 1) {
-    notes.push_back(fmt::format("no two of the {} nodes are linked by {} inliers: each stands alone",
-                                num_nodes, options.min_num_inliers));
+    notes.push_back(fmt::format("no two of the {} nodes are linked by {} inliers: each is alone", num_nodes,
+                                options.min_num_inliers));
   } else if (components.size() > 1) {
     notes.push_back(
         fmt::format("the graph has {} components, {} of them of one node; no path leads from one "
@@ -157,10 +159,9 @@ Result<std::vector<AppearanceLink>> NearLinks(const ImageLinks& images, const Ca
     }
   }
   if (poses.empty()) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "max_link_distance_m and max_link_turn_deg go by the capture's poses, and there are none: "
-        "give --capture with poses, or leave them out");
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "max_link_distance_m and max_link_turn_deg need the capture's poses, and there are "
+                     "none; give --capture with poses, or leave them out");
   }
   std::vector<std::optional<Pose>> pose_of;
   for (const DatabaseImage& image : images.images) pose_of.push_back(FindPose(poses, image.name));
@@ -183,8 +184,7 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
       {"max_link_distance_m", &options->max_link_distance_m,
        "images that stand farther apart are not linked, by the capture's poses, m; 0: any", 0},
       {"max_link_turn_deg", &options->max_link_turn_deg,
-       "images that are turned by more against each other are not linked, by the capture's poses, degrees", 0,
-       180},
+       "images whose directions differ by more are not linked, by the capture's poses, degrees", 0, 180},
       {.name = "fuse",
        .value = &options->fuse,
        .help =
@@ -200,16 +200,16 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options) {
        .choices = {"greedy", "online", "all"}},
       {"max_num_dropped", &options->max_num_dropped, "online: most kept nodes that an arrival drops", 0},
       {"num_dominators", &options->num_dominators,
-       "how many kept neighbours every other node has, where it has that many neighbours [Booij06: 1]", 1},
+       "number of kept neighbours of every other node that has as many neighbours [Booij06: 1]", 1},
       {"strong_num_inliers", &options->strong_num_inliers,
        "links of fewer inliers count in proportion; 1: all links count alike [Booij06: 1]", 1},
       {"min_component_nodes", &options->min_component_nodes,
-       "of components with fewer nodes than this none is kept", 1},
-      {"num_kept", &options->num_kept, "nodes to keep, exactly; 0: as many as are needed", 0},
+       "no nodes are kept of components with fewer nodes than this", 1},
+      {"num_kept", &options->num_kept, "exact number of nodes to keep; 0: as many as are needed", 0},
       {"num_tries", &options->num_tries, "tries of the local search for a better set; 0: none", 0},
       {"max_detour_links", &options->max_detour_links,
-       "cycles are restored until kept neighbours of neighbours are fewer links apart than this; 0: not "
-       "[Booij06: c]",
+       "cycles are restored until kept neighbours of neighbours are fewer links apart than this; 0: none are "
+       "restored [Booij06: c]",
        0},
       {.name = "lower_bound",
        .value = &bound.lower_bound,

@@ -12,15 +12,16 @@
 
 #include "core/camera/panorama.h"
 #include "core/geometry/pose.h"
+#include "core/picture/floor_frame.h"
 #include "core/picture/svg.h"
 
 namespace cairn::link_appearance {
 namespace {
 
-// Okabe and Ito's blue and vermilion, which people who see colours differently tell apart.
-constexpr char kKeptColour[] = "#0072b2", kRestoredColour[] = "#d55e00";
+constexpr const char* kKeptColour = kSvgBlue;
+constexpr const char* kRestoredColour = kSvgVermilion;
 constexpr double kLongSidePx = 1000, kMarginPx = 40, kTitlePx = 56, kLegendPx = 60;
-// Matrices of more nodes have less than a pixel for each.
+// Largest cell of a matrix; with many nodes a cell is less than a pixel.
 constexpr double kMaxCellPx = 12;
 
 class Picture {
@@ -33,7 +34,7 @@ class Picture {
     DrawLinks();
     DrawNodes();
     DrawFloorLegend();
-    return End();
+    return svg_.End();
   }
 
   // Rows in the order of the names, numbers in them by their values: as the images were taken.
@@ -52,34 +53,26 @@ class Picture {
     Begin(width_px_, height_px_);
     DrawMatrix();
     DrawMatrixLegend();
-    return End();
+    return svg_.End();
   }
 
  private:
-  template <typename... Args>
-  void Write(fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(text_), format, std::forward<Args>(args)...);
-  }
   bool IsKept(NodeIdx node) const { return appearance_.nodes[node].role != NodeRole::kDropped; }
   const char* Colour(NodeIdx node) const {
     return appearance_.nodes[node].role == NodeRole::kRestored ? kRestoredColour : kKeptColour;
   }
 
   void Begin(double width, double height) {
-    Write("{}", BeginSvg(width, height, 14));
+    svg_.Begin(width, height, 14);
     const size_t num_kept = appearance_.Kept().size();
     const int bound = appearance_.LowerBound();
-    Write(
+    svg_.Write(
         "<text x=\"{:.0f}\" y=\"32\" font-size=\"18\"><tspan font-weight=\"bold\">{} of {} nodes "
         "kept</tspan>{}",
         kMarginPx, num_kept, appearance_.nodes.size(),
         bound > 0 ? fmt::format(", at least {} needed", bound) : std::string());
-    Write("; {} links, {} component{}</text>\n", appearance_.graph.num_links(), appearance_.NumComponents(),
-          appearance_.NumComponents() == 1 ? "" : "s");
-  }
-  std::string End() {
-    Write("</svg>\n");
-    return fmt::to_string(text_);
+    svg_.Write("; {} links, {} component{}</text>\n", appearance_.graph.num_links(),
+               appearance_.NumComponents(), appearance_.NumComponents() == 1 ? "" : "s");
   }
 
   // Chooses the scale and places all nodes that have one; nodes at one place move apart.
@@ -143,8 +136,7 @@ class Picture {
     return dominators;
   }
 
-  // All links pale, the more there are the paler; each dropped node's best link to a kept one; links of kept
-  // ones.
+  // All links, paler where there are many; each dropped node's best link to a kept one; links of kept ones.
   void DrawLinks() {
     const std::vector<NodeIdx> dominators = Dominators();
     const double opacity =
@@ -160,54 +152,47 @@ class Picture {
                                       {"dominating_links", kKeptColour, 0.8, 0.45},
                                       {"kept_links", kKeptColour, 2.2, 0.9}};
     for (int layer = 0; layer < kNumLayers; ++layer) {
-      Write("<g id=\"{}\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{:.2f}\">\n", layers[layer].id,
-            layers[layer].colour, layers[layer].width, layers[layer].opacity);
+      svg_.Write("<g id=\"{}\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{:.2f}\">\n",
+                 layers[layer].id, layers[layer].colour, layers[layer].width, layers[layer].opacity);
       for (const AppearanceLink& link : appearance_.graph.Links()) {
         const bool dominates = dominators[link.node1] == link.node2 || dominators[link.node2] == link.node1;
         const bool both_kept = IsKept(link.node1) && IsKept(link.node2);
         if ((both_kept ? kKept : dominates ? kDominating : kOther) != layer) continue;
         if (!pixels_[link.node1] || !pixels_[link.node2]) continue;
         const Eigen::Vector2d &a = *pixels_[link.node1], &b = *pixels_[link.node2];
-        Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
+        svg_.Write("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>\n", a.x(), a.y(), b.x(), b.y());
       }
-      Write("</g>\n");
+      svg_.Write("</g>\n");
     }
   }
 
   void DrawMark(double x, double y, NodeRole role) {
     if (role == NodeRole::kRestored) {
-      Write("<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"{3}\"/>\n",
-            x - radius_px_, y - radius_px_, 2 * radius_px_, kRestoredColour);
+      svg_.Write("<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"{3}\"/>\n",
+                 x - radius_px_, y - radius_px_, 2 * radius_px_, kRestoredColour);
     } else {
       const bool kept = role == NodeRole::kDominating;
-      Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" {}/>\n", x, y,
-            kept ? 1.3 * radius_px_ : 0.7 * radius_px_,
-            kept ? fmt::format("fill=\"{}\"", kKeptColour)
-                 : std::string("fill=\"#ffffff\" stroke=\"#555555\" stroke-width=\"1\""));
+      svg_.Write("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" {}/>\n", x, y,
+                 kept ? 1.3 * radius_px_ : 0.7 * radius_px_,
+                 kept ? fmt::format("fill=\"{}\"", kKeptColour)
+                      : std::string("fill=\"#ffffff\" stroke=\"#555555\" stroke-width=\"1\""));
     }
   }
 
   void DrawNodes() {
-    Write("<g id=\"nodes\">\n");
+    svg_.Write("<g id=\"nodes\">\n");
     for (const bool kept : {false, true}) {
       for (size_t i = 0; i < appearance_.nodes.size(); ++i) {
         if (!pixels_[i] || IsKept(static_cast<NodeIdx>(i)) != kept) continue;
         DrawMark(pixels_[i]->x(), pixels_[i]->y(), appearance_.nodes[i].role);
       }
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   void DrawFloorLegend() {
     const double y = height_px_ - 24;
-    double length_m = 0.1;
-    for (const double next : {0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0}) {
-      if (next * px_per_m_ <= 140) length_m = next;
-    }
-    Write(
-        "<path d=\"M{0:.1f} {1:.1f}v8h{2:.1f}v-8\" fill=\"none\" stroke=\"#000000\"/>\n<text x=\"{3:.1f}\" "
-        "y=\"{4:.1f}\">{5:g} m</text>\n",
-        kMarginPx, y - 6, length_m * px_per_m_, kMarginPx + length_m * px_per_m_ + 8, y + 5, length_m);
+    svg_.Append(ScaleBar(kMarginPx, y - 6, px_per_m_, 140));
     radius_px_ = 5;
     double x = 270;
     const bool is_restored =
@@ -218,24 +203,25 @@ class Picture {
           std::pair(NodeRole::kRestored, "kept for a cycle")}) {
       if (role == NodeRole::kRestored && !is_restored) continue;
       DrawMark(x, y, role);
-      Write("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 12, y + 5, label);
+      svg_.Write("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 12, y + 5, label);
       x += 95;
     }
     if (is_restored) x += 60;
-    Write("<path d=\"M{0:.1f} {1:.1f}h24\" stroke=\"{2}\" stroke-width=\"0.8\" stroke-opacity=\"0.6\"/>",
-          x - 6, y, kKeptColour);
-    Write("<text x=\"{:.1f}\" y=\"{:.1f}\">located from there</text>\n", x + 24, y + 5);
+    svg_.Write("<path d=\"M{0:.1f} {1:.1f}h24\" stroke=\"{2}\" stroke-width=\"0.8\" stroke-opacity=\"0.6\"/>",
+               x - 6, y, kKeptColour);
+    svg_.Write("<text x=\"{:.1f}\" y=\"{:.1f}\">located from there</text>\n", x + 24, y + 5);
   }
 
   double MatrixX(NodeIdx node) const { return kMarginPx + row_[node] * cell_px_; }
   double MatrixY(NodeIdx node) const { return kTitlePx + kMarginPx / 2 + row_[node] * cell_px_; }
 
+  // [Booij06 Fig. 8]
   void DrawMatrix() {
     const int num_nodes = appearance_.graph.num_nodes();
     std::vector<int32_t> sorted;
     for (const AppearanceLink& link : appearance_.graph.Links()) sorted.push_back(link.num_inliers);
     std::sort(sorted.begin(), sorted.end());
-    Write(
+    svg_.Write(
         "<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{2:.1f}\" fill=\"none\" "
         "stroke=\"#888888\"/>\n<g id=\"matrix\" shape-rendering=\"crispEdges\">\n",
         kMarginPx, kTitlePx + kMarginPx / 2, num_nodes * cell_px_);
@@ -248,32 +234,32 @@ class Picture {
           both ? std::string(kRestoredColour) : fmt::format("#{0:02x}{0:02x}{0:02x}", gray);
       for (const auto& [row, column] :
            {std::pair(link.node1, link.node2), std::pair(link.node2, link.node1)}) {
-        Write("<rect x=\"{0:.2f}\" y=\"{1:.2f}\" width=\"{2:.2f}\" height=\"{2:.2f}\" fill=\"{3}\"/>\n",
-              MatrixX(column), MatrixY(row), std::max(cell_px_, 1.0), colour);
+        svg_.Write("<rect x=\"{0:.2f}\" y=\"{1:.2f}\" width=\"{2:.2f}\" height=\"{2:.2f}\" fill=\"{3}\"/>\n",
+                   MatrixX(column), MatrixY(row), std::max(cell_px_, 1.0), colour);
       }
     }
-    Write("</g>\n<g id=\"kept\">\n");
+    svg_.Write("</g>\n<g id=\"kept\">\n");
     for (const NodeIdx node : appearance_.Kept()) {
       const double thick = std::max(cell_px_, 2.0);
-      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"10\" fill=\"{}\"/>\n", MatrixX(node),
-            kTitlePx + kMarginPx / 2 - 14, thick, Colour(node));
-      Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"10\" height=\"{:.2f}\" fill=\"{}\"/>\n", kMarginPx - 14,
-            MatrixY(node), thick, Colour(node));
+      svg_.Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"10\" fill=\"{}\"/>\n",
+                 MatrixX(node), kTitlePx + kMarginPx / 2 - 14, thick, Colour(node));
+      svg_.Write("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"10\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+                 kMarginPx - 14, MatrixY(node), thick, Colour(node));
     }
-    Write("</g>\n");
+    svg_.Write("</g>\n");
   }
 
   void DrawMatrixLegend() {
     const double y = height_px_ - 22;
-    Write(
+    svg_.Write(
         "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"#000000\"/><text x=\"{2:.0f}\" "
         "y=\"{3:.0f}\">linked (lighter: fewer inliers)</text>\n",
         kMarginPx, y - 10, kMarginPx + 18, y);
-    Write(
+    svg_.Write(
         "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"{4}\"/><text x=\"{2:.0f}\" "
         "y=\"{3:.0f}\">both kept</text>\n",
         kMarginPx + 240, y - 10, kMarginPx + 258, y, kRestoredColour);
-    Write(
+    svg_.Write(
         "<rect x=\"{0:.0f}\" y=\"{1:.0f}\" width=\"12\" height=\"12\" fill=\"{4}\"/><text x=\"{2:.0f}\" "
         "y=\"{3:.0f}\">kept</text>\n",
         kMarginPx + 350, y - 10, kMarginPx + 368, y, kKeptColour);
@@ -283,7 +269,7 @@ class Picture {
   double width_px_ = 0, height_px_ = 0, radius_px_ = 4, px_per_m_ = 1, cell_px_ = 1;
   std::vector<std::optional<Eigen::Vector2d>> pixels_;
   std::vector<int> row_;  // of the matrix, per node
-  fmt::memory_buffer text_;
+  SvgWriter svg_;
 };
 
 }  // namespace

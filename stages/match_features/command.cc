@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Size of matches.db by that of features.db, which it has a copy of.
+// Size of matches.db over that of features.db, which it contains a copy of.
 constexpr double kMatchesPerFeaturesBytes = 1.25;
 
 struct Arguments {
@@ -55,7 +55,7 @@ void Print(const MatchFeaturesSummary& summary, const ReuseOptions& reuse, std::
       summary.num_taken_over, summary.num_left_to_others);
 }
 
-// What says which pairs to match is read, or refused.
+// Refuses arguments for choosing pairs that are not used.
 Status CheckWhatChoosesPairs(const Arguments& arguments) {
   const bool is_listed = !arguments.inputs.pair_list_path.empty();
   if (is_listed) {
@@ -66,16 +66,17 @@ Status CheckWhatChoosesPairs(const Arguments& arguments) {
     std::erase_if(names, [&](const std::string& name) {
       return std::find(for_pairs.begin(), for_pairs.end(), name) != for_pairs.end();
     });
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        names, "--pair-list says which pairs are matched; leave one of them out"));
+    CAIRN_RETURN_IF_ERROR(
+        arguments.option_arguments.RefuseGiven(names, "--pair-list gives the pairs; leave one of them out"));
   }
   const std::string& pairs = arguments.options.pairs;
   const bool reads_words = !is_listed && (pairs == "auto" || pairs == "retrieval" || pairs == "sequence");
   if (reads_words || arguments.inputs.vocabulary_path.empty()) return Ok();
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "--vocabulary {}: words are for --pairs retrieval, sequence or auto, and {}; leave it out",
-                   arguments.inputs.vocabulary_path,
-                   is_listed ? "the pairs are those of --pair-list" : "--pairs is " + pairs);
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "--vocabulary {}: words are used for --pairs retrieval, sequence or auto only, and {}; leave it out",
+      arguments.inputs.vocabulary_path,
+      is_listed ? "the pairs are those of --pair-list" : "--pairs is " + pairs);
 }
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
@@ -93,7 +94,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const auto share_mib = static_cast<int>(std::min<int64_t>(environment.memory_mib * 3 / 4, 1 << 24));
   budget_mib = std::max(1, environment.memory_given ? share_mib : std::min(share_mib, budget_mib));
   if (capture) inputs.capture = &*capture;
-  std::error_code error;  // a file that is not there is the stage's to tell
+  std::error_code error;  // the stage reports a missing file
   const auto features_bytes = static_cast<double>(fs::file_size(inputs.features_path, error));
   if (!arguments.no_space_check && !error) {
     CAIRN_RETURN_IF_ERROR(CheckDiskSpace("a copy of the features with matches",
@@ -123,27 +124,31 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 Command MatchFeaturesCommand() {
   const auto arguments = std::make_shared<Arguments>();
   return {.name = "match-features",
-          .summary = "Match and verify image pairs (stage 2)",
+          .summary = "Match and verify pairs of images (stage 2)",
           .add_arguments =
-              [arguments](CLI::App& app) {
-                app.add_option("features", arguments->inputs.features_path, "COLMAP database with features")
-                    ->required()
-                    ->type_name("features.db");
-                app.add_option("--capture", arguments->capture,
-                               "Capture folder: its poses choose and verify pairs");
-                app.add_option("--vocabulary", arguments->inputs.vocabulary_path,
-                               "Vocabulary for retrieval and loop candidates [one grown from the images]")
-                    ->type_name("vocabulary.db");
-                app.add_option("--pair-list", arguments->inputs.pair_list_path,
-                               "Match these pairs instead: a line has the names of two images, as in COLMAP")
-                    ->type_name("FILE");
-                app.add_option("-o,--output", arguments->output, "COLMAP database to write")
-                    ->required()
-                    ->type_name("matches.db");
-                arguments->reuse.Add(app, "pairs");
-                app.add_flag("--no-space-check", arguments->no_space_check,
-                             "Begin even if the disk seems too full for the result");
-                arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+              [arguments](ArgumentParser& parser) {
+                parser.Add("features", arguments->inputs.features_path, "COLMAP database with features")
+                    .Required()
+                    .Type("features.db");
+                parser
+                    .Add("--capture", arguments->capture,
+                         "Capture folder: its poses are used to choose and verify pairs")
+                    .Type("CAPTURE");
+                parser
+                    .Add("--vocabulary", arguments->inputs.vocabulary_path,
+                         "Vocabulary for retrieval and loop candidates [one grown from the images]")
+                    .Type("vocabulary.db");
+                parser
+                    .Add("--pair-list", arguments->inputs.pair_list_path,
+                         "Match these pairs instead: the names of two images per line, as in COLMAP")
+                    .Type("FILE");
+                parser.Add("-o,--output", arguments->output, "COLMAP database to write")
+                    .Required()
+                    .Type("matches.db");
+                arguments->reuse.Add(parser, "pairs");
+                parser.AddFlag("--no-space-check", arguments->no_space_check,
+                               "Begin even if the disk seems too full for the result");
+                arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
               },
           .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
           .may_be_output = {"--reuse"}};

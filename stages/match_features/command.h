@@ -4,7 +4,7 @@
 
 namespace cairn::match_features {
 
-// cairn match-features features.db [--capture CAPTURE] -o matches.db
+// cairn stage match-features features.db [--capture CAPTURE] -o matches.db
 Command MatchFeaturesCommand();
 
 }  // namespace cairn::match_features

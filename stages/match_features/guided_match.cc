@@ -7,7 +7,7 @@
 
 #include <Eigen/Dense>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/two_view_error.h"
@@ -16,7 +16,7 @@
 namespace cairn::match_features {
 namespace {
 
-// The two best candidates seen so far; equal dot products go to the smaller index, whatever the order.
+// The two best candidates seen so far; of equal dot products the smaller index wins, in any order.
 struct BestTwoCandidates {
   int32_t idx = -1, best = -1, second = -1;
 
@@ -48,7 +48,7 @@ class KeypointChange {
       sine += std::sin(Turn(match));
       cosine += std::cos(Turn(match));
     }
-    log_ratio_ = Median(std::move(log_ratios));
+    log_ratio_ = UpperMedian(std::move(log_ratios));
     turn_ = std::atan2(sine, cosine);
   }
 
@@ -95,7 +95,7 @@ class CandidateMatcher {
     for (const Match& match : inliers) is_matched1_[match.idx1] = is_matched2_[match.idx2] = 1;
   }
 
-  // Nothing depends on a pair of which both are matched: neither can be part of a new match.
+  // A pair whose keypoints are both matched is not needed: neither can be part of a new match.
   bool IsNeeded(int idx1, int idx2) const { return !(is_matched1_[idx1] && is_matched2_[idx2]); }
 
   void Offer(int idx1, int idx2) {
@@ -181,7 +181,7 @@ std::vector<Match> GuideByEpipolarLines(const GuidedView& view1, const GuidedVie
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU);
   const double largest = svd.singularValues()[0];
   Eigen::Vector3d epipole2 = svd.matrixU().col(2);
-  // Signs of M and of the epipole: such that the planes of matches turn the same way.
+  // Signs of M and of the epipole, chosen so that the planes of matches turn the same way.
   int sign = 0;
   for (const Match& match : inliers) {
     sign += epipole2.cross(bearings2[match.idx2]).dot(M * bearings1[match.idx1]) > 0 ? 1 : -1;

@@ -25,7 +25,7 @@ std::optional<std::vector<int>> FindNumbers(const ContentHash& key, ReuseSources
   });
 }
 
-// Computes the results of `idxs`, into their places.
+// Computes the results of `idxs` and stores them at their places.
 Status Compute(const ImageStep& step, const std::vector<int>& idxs, std::vector<std::vector<int>>* results) {
   if (idxs.empty()) return Ok();
   CAIRN_ASSIGN_OR_RETURN(std::vector<std::vector<int>> computed, step.compute(idxs));

@@ -11,7 +11,8 @@
 
 namespace cairn::match_features {
 
-// Work on each image before there are pairs, of which a shard does its share: its result is a row of numbers.
+// Work on each image before pairs are known, divided among shards: the result of an image is a row
+// of numbers.
 struct ImageStep {
   std::string name;  // "words"
   // Hash of all that the result of an image depends on.
@@ -21,8 +22,8 @@ struct ImageStep {
 };
 
 // The results of all images, by index, taken over from reuse.files or computed.  A shard that lacks some
-// computes its share of them, writes that to the database, and is done: nothing is returned.  Without a
-// database no shard. Errors: those of the step; throws SQLite::Exception.
+// computes its share of them, writes it to the database and is done: nothing is returned.
+// REQUIRES: a database for a shard.  Errors: those of the step; throws SQLite::Exception.
 Result<std::optional<std::vector<std::vector<int>>>> RunImageStep(const ImageStep& step,
                                                                   SQLite::Database* shard_database,
                                                                   MatchRun* run);

@@ -29,8 +29,8 @@ Result<std::vector<PosedCamera>> PosedCameras(const MatchImages& images) {
   for (const MatchImage& image : images.images) {
     if (!image.cam_from_world) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "pairs = frustum needs a pose for every image, {} has none; give --capture, or choose "
-                       "pairs = retrieval or exhaustive",
+                       "pairs = frustum needs a pose for every image, but {} has none; give --capture, or "
+                       "choose pairs = retrieval or exhaustive",
                        image.name);
     }
     posed.push_back({images.cameras.at(image.camera_id), *image.cam_from_world});
@@ -73,8 +73,8 @@ Result<std::optional<IndexPairs>> SelectRetrievedPairs(SQLite::Database* shard_d
   return std::optional(PairsFromPartners(*partners));
 }
 
-// Pairs by every method but frustum.  Nothing: the run is a shard that has done its share of choosing them,
-// and has written it to its database.
+// Pairs by every method but frustum.  Nothing where the run is a shard that has computed its share of
+// choosing them and written it to its database.
 Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, MatchRun* run) {
   const std::string& method = run->summary.pairs;
   if (method == "list") {
@@ -87,7 +87,7 @@ Result<std::optional<IndexPairs>> SelectPairs(SQLite::Database* shard_database, 
                               : SelectRetrievedPairs(shard_database, run);
 }
 
-// What the predictor knows of the images, in the world frame.
+// What the predictor reads of the images, in the world frame.
 Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, const MatchImages& images,
                                                    const Progress& progress) {
   std::vector<PairPredictor::View> views;
@@ -106,7 +106,7 @@ Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, c
   return views;
 }
 
-// Matches the pairs of largest overlap, then again and again those that the matches so far predict.
+// Matches the pairs of largest overlap, then repeatedly those that the matches so far predict.
 Status MatchFrustum(SQLite::Database& database, MatchRun* run) {
   const MatchFeaturesOptions& options = run->options;
   const int num_threads = run->num_threads;

@@ -28,20 +28,21 @@ struct MatchFeaturesOptions {
   std::string pairs = "auto";
   // auto: most images that are matched exhaustively.  REQUIRES: >= 0
   int max_num_exhaustive_images = 500;
-  // Retrieval: how many images most like it each image is matched with [COLMAP's vocabulary matcher: 100].
-  // REQUIRES: >= 1
+  // Retrieval: number of most similar images that each image is matched with [COLMAP's vocabulary matcher:
+  // 100].  REQUIRES: >= 1
   int num_retrieved = 50;
-  // Sequence: how many successors each image is matched with.  REQUIRES: >= 1
+  // Sequence: number of successors that each image is matched with.  REQUIRES: >= 1
   int sequence_window = 10;
-  // Sequence: how many images most like it, but no neighbours, each image is matched with.  REQUIRES: >= 0
+  // Sequence: number of most similar images, without neighbours, that each image is matched
+  // with.  REQUIRES: >= 0
   int num_loop_candidates = 10;
   FrustumOverlapOptions frustum;
-  // Frustum: how many images of largest overlap each image is matched with at first; then pairs are matched
-  // that these matches predict (predict_pairs.h).  0: every pair whose frusta overlap is matched.
-  // REQUIRES: >= 0
+  // Frustum: number of images of largest overlap that each image is matched with at first; then the pairs
+  // that these matches predict are matched (predict_pairs.h).  0: every pair whose frusta overlap is
+  // matched.  REQUIRES: >= 0
   int num_frustum_seeds = 20;
-  // Frustum: how many images, spread evenly over those of smaller overlap, each is matched with at first.
-  // REQUIRES: >= 0
+  // Frustum: number of images, spread evenly over those of smaller overlap, that each is matched with at
+  // first.  REQUIRES: >= 0
   int num_frustum_scouts = 5;
   // Frustum: fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
   int min_num_expected_matches = 25;
@@ -66,29 +67,28 @@ struct MatchFeaturesSummary {
   DropCounts dropped_pairs;    // of those tried: why they were not verified (core/world/drop_reason.h)
   std::string pairs;           // how pairs were chosen
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
-  int num_rounds = 0;          // of pairs; after a shard's last one the pairs of the next are not known yet
+  int num_rounds = 0;          // of pairs; after a shard's last round the pairs of the next are not known yet
   // What a shard worked on instead of pairs, to choose them: "words" or "partners" of images; empty: nothing.
   std::string image_step;
   int num_image_results = 0;
   int64_t num_left_to_others = 0;       // pairs, or images, of a shard's last round that other shards work on
-  std::vector<std::string> not_reused;  // why earlier outputs gave nothing
+  std::vector<std::string> not_reused;  // why earlier outputs gave no results
 };
 
 // Reads a COLMAP database with features, writes `matches_path`: its contents and the verified pairs as
 // two_view_geometries; and its reuse file (core/line/reuse.h).  A pair is taken over from `reuse` where an
 // earlier run of this program matched images with the same features and cameras, in the same relative pose,
-// with the same options: same bytes as without.  Same bytes for any number of threads and any memory budget.
-// O(pairs
-// * features^2).
+// with the same options: same bytes as without.  Same bytes for any number of threads and any memory
+// budget.  O(pairs * features^2).
 //
-// A shard goes through the rounds of pairs with what `reuse.files` know (before these, where pairs are those
-// that look alike, the words of the images and their partners); of the first round that these do not know
-// whole it matches its share of what is missing, a contiguous stretch of the order in which pairs are
-// matched, and writes a database with these pairs alone; it may have none.
+// A shard goes through the rounds of pairs with the results in `reuse.files` (and before these, where pairs
+// are those that look alike, through the words of the images and their partners).  Of the first round that
+// the files do not have completely, it matches its share of the missing pairs, a contiguous stretch of the
+// order in which pairs are matched, and writes a database with these pairs only; it may have none.
 //
 // Errors: Corrupt (a database), NoData (fewer than two images with features, no pair verified, a vocabulary
-// without words), InvalidArgument (options; a line of the pair list), Io, Cancelled; of `reuse.files`
-// NotFound.
+// without words), InvalidArgument (options; a line of the pair list), Io, Cancelled; of
+// `reuse.files` NotFound.
 Result<MatchFeaturesSummary> MatchFeatures(const MatchFeaturesInputs& inputs,
                                            const MatchFeaturesOptions& options,
                                            const std::string& matches_path, uint64_t seed, int num_threads,

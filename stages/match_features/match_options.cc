@@ -17,7 +17,7 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .min = 0},
       {.name = "num_retrieved",
        .value = &o->num_retrieved,
-       .help = "pairs = retrieval: number of images most like it that each image is matched with",
+       .help = "pairs = retrieval: number of most similar images that each image is matched with",
        .min = 1},
       {.name = "sequence_window",
        .value = &o->sequence_window,
@@ -25,8 +25,8 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .min = 1},
       {.name = "num_loop_candidates",
        .value = &o->num_loop_candidates,
-       .help =
-           "pairs = sequence: number of images most like it, but no neighbours, that each is matched with",
+       .help = "pairs = sequence: number of most similar images, without neighbours, that each image is "
+               "matched with",
        .min = 0},
       {.name = "frustum_near_m",
        .value = &o->frustum.near_m,
@@ -38,23 +38,23 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .min = 1e-3},
       {.name = "min_overlap_ratio",
        .value = &o->frustum.min_overlap_ratio,
-       .help = "pairs = frustum: least part of either frustum that the other camera sees",
+       .help = "pairs = frustum: smallest part of either frustum that the other camera sees",
        .min = 0,
        .max = 1},
       {.name = "num_frustum_seeds",
        .value = &o->num_frustum_seeds,
-       .help = "pairs = frustum: images of largest overlap that each image is matched with at first, before "
-               "the pairs that these matches predict; 0: match every pair whose frusta overlap",
+       .help = "pairs = frustum: number of images of largest overlap that each image is matched with at "
+               "first, before the pairs that these matches predict; 0: match every pair whose frusta overlap",
        .min = 0},
       {.name = "num_frustum_scouts",
        .value = &o->num_frustum_scouts,
-       .help = "pairs = frustum: images spread over those of smaller overlap that each is matched with at "
-               "first",
+       .help = "pairs = frustum: number of images, spread over those of smaller overlap, that each is "
+               "matched with at first",
        .min = 0},
       {.name = "min_num_expected_matches",
        .value = &o->min_num_expected_matches,
-       .help = "pairs = frustum: fewest matches that a pair must promise, by the matches of both images with "
-               "others, to be matched after the seeds",
+       .help = "pairs = frustum: fewest expected matches, by the matches of both images with others, of a "
+               "pair that is matched after the seeds",
        .min = 1},
       {.name = "max_view_angle_deg",
        .value = &o->frustum.max_view_angle_deg,
@@ -91,9 +91,8 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .max = 3.2},
       {.name = "two_view",
        .value = &o->verification.two_view,
-       .help = "how pairs are verified: by stated poses or five points, or, poses or not, by eight points in "
-               "plain RANSAC "
-               "[Booij06]",
+       .help = "how pairs are verified: by stated poses or five points; or, with poses or without, by eight "
+               "points in plain RANSAC [Booij06]",
        .choices = {"five_point", "eight_point"}},
       {.name = "max_epipolar_error_px",
        .value = &o->verification.max_epipolar_error_px,
@@ -110,7 +109,7 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .min = 1e-3},
       {.name = "max_ray_angle_deg",
        .value = &o->verification.max_ray_angle_deg,
-       .help = "with known poses: rays that differ by more are no match, degrees",
+       .help = "with known poses: largest angle between the two rays of a match, degrees",
        .min = 1,
        .max = 180},
       {.name = "min_num_inliers",
@@ -119,23 +118,23 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .min = 8},
       {.name = "min_homography_ratio",
        .value = &o->verification.min_homography_ratio,
-       .help = "part of the inliers on one homography that makes a pair planar or panoramic (COLMAP: 0.8)",
+       .help = "part of the inliers on one homography from which a pair is planar or panoramic (COLMAP: 0.8)",
        .min = 0,
        .max = 1},
       {.name = "min_essential_ratio",
        .value = &o->verification.min_essential_ratio,
-       .help = "without poses: least inliers of the essential over those of the fundamental matrix for the "
-               "intrinsics to be believed (COLMAP: 0.95)",
+       .help = "without poses: smallest ratio of the inliers of the essential to those of the fundamental "
+               "matrix for the intrinsics to be accepted (COLMAP: 0.95)",
        .min = 0,
        .max = 1},
       {.name = "min_baseline_m",
        .value = &o->verification.min_baseline_m,
-       .help = "with known poses: a shorter baseline is none, metres",
+       .help = "with known poses: a shorter baseline counts as zero, metres",
        .min = 1e-12},
       {.name = "min_watermark_ratio",
        .value = &o->verification.min_watermark_ratio,
-       .help =
-           "part of the inliers on the image borders, shifted alike, that makes a watermark (COLMAP: 0.7)",
+       .help = "part of the inliers on the image borders, shifted alike, from which a pair is a watermark "
+               "(COLMAP: 0.7)",
        .min = 0.5,
        .max = 1},
       {.name = "watermark_border_ratio",
@@ -164,8 +163,8 @@ OptionTable DescribeOptions(MatchPairsOptions* o) {
        .min = 1},
       {.name = "guided_max_turn_deg",
        .value = &o->verification.guided.max_turn_deg,
-       .help = "guided matching: largest angle of a match's change of orientation off that of the inliers, "
-               "degrees",
+       .help = "guided matching: largest angle between a match's change of orientation and that of the "
+               "inliers, degrees",
        .min = 1e-3,
        .max = 180},
   };

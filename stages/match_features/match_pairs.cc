@@ -11,7 +11,7 @@
 namespace cairn::match_features {
 namespace {
 
-// Results that wait to be taken, pairs.
+// Number of pairs whose results may wait to be taken.
 constexpr int64_t kBatchSize = 512;
 
 using FeaturesOfImages = std::unordered_map<int, std::shared_ptr<const ImageFeatures>>;
@@ -30,7 +30,7 @@ uint64_t CurvePosition(const std::pair<int, int>& pair) {
   return SpreadBits(static_cast<uint32_t>(pair.first)) << 1 | SpreadBits(static_cast<uint32_t>(pair.second));
 }
 
-// Features of all images of pairs [begin, end); those that `held` has are not read again.
+// Features of all images of pairs [begin, end); those in `held` are not read again.
 Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImages& images,
                                      const IndexPairs& pairs, int64_t begin, int64_t end,
                                      const FeaturesOfImages& held, const Progress& progress) {
@@ -52,7 +52,7 @@ Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImag
   return result;
 }
 
-struct PairResult {
+struct MatchedPair {
   TwoViewGeometry geometry;
   int num_putative = 0;
 };
@@ -63,14 +63,14 @@ ViewForVerification ForVerification(const MatchImages& images, const MatchImage&
           image.cam_from_world};
 }
 
-PairResult MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
-                     const FeaturesOfImages& features, const MatchPairsOptions& options) {
+MatchedPair MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
+                      const FeaturesOfImages& features, const MatchPairsOptions& options) {
   const MatchImage& image1 = images.images[pair.first];
   const MatchImage& image2 = images.images[pair.second];
   const ImageFeatures& features1 = *features.at(pair.first);
   const ImageFeatures& features2 = *features.at(pair.second);
   const std::vector<Match> matches = MatchDescriptors(features1.packed, features2.packed, options.matcher);
-  PairResult result;
+  MatchedPair result;
   result.num_putative = static_cast<int>(matches.size());
   result.geometry = VerifyPair(ForVerification(images, image1, features1),
                                ForVerification(images, image2, features2), matches, options.verification);
@@ -128,14 +128,14 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
       });
     }
     for (; begin < ends[stretch]; begin = std::min(begin + kBatchSize, ends[stretch])) {
-      std::vector<PairResult> results(std::min(kBatchSize, ends[stretch] - begin));
+      std::vector<MatchedPair> results(std::min(kBatchSize, ends[stretch] - begin));
       ParallelFor(static_cast<int64_t>(results.size()), num_threads, [&](int64_t i) {
         if (progress.Cancelled()) return;
         results[i] = MatchPair(images, pairs[begin + i], features, options);
         progress.Advance();
       });
       if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while matching features");
-      for (const PairResult& result : results) take(result.geometry, result.num_putative);
+      for (const MatchedPair& result : results) take(result.geometry, result.num_putative);
     }
     if (next.valid()) {
       CAIRN_ASSIGN_OR_RETURN(features, next.get());

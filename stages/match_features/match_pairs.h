@@ -15,18 +15,18 @@
 namespace cairn::match_features {
 
 struct MatchPairsOptions {
-  // Most memory that the features of images may take at a time, MiB: beyond it they are read again when they
-  // are needed.  Two images are always held.  REQUIRES: >= 1
+  // Largest memory that the features of images may take at a time, MiB: features beyond it are read again
+  // when they are needed.  Two images are always held.  REQUIRES: >= 1
   int memory_budget_mib = 1024;
   DescriptorMatcherOptions matcher;
   VerifyPairOptions verification;
 };
-// Without memory_budget_mib, which like the number of threads changes no result.
+// Without memory_budget_mib, which changes no result, like the number of threads.
 OptionTable DescribeOptions(MatchPairsOptions* options);
 
-// Pairs in the order in which they are matched: along a Z-order curve through the (idx1, idx2) square
-// [Morton 1966].  Any stretch of the curve touches few images, whatever the length of the stretch, so that
-// one order serves every budget.
+// Pairs in the order in which they are matched: along a Z-order curve through the (idx1, idx2) square [Morton
+// 1966].  Any stretch of the curve contains few images, whatever its length, so one order serves
+// every budget.
 void SortAlongCurve(IndexPairs* pairs);
 
 // Stretches of `pairs` whose images take at most `max_num_bytes`: the end of each, ascending, the last is

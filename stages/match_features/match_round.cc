@@ -78,8 +78,8 @@ Status TakeOver(const IndexPairs& pairs, size_t begin, size_t end, const std::ve
   return Ok();
 }
 
-// All results go to the database in the order of `pairs`, so that its bytes do not tell which were taken
-// over.
+// All results are written to the database in the order of `pairs`, so that its bytes do not depend on which
+// were taken over.
 Status WritePairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources,
                   PairPredictor* predictor, SQLite::Database& database, MatchRun* run) {
   CAIRN_ASSIGN_OR_RETURN(const std::vector<size_t> missing, FindMissing(pairs, sources, run));

@@ -7,9 +7,9 @@
 namespace cairn::match_features {
 
 // Matches the pairs of one round, or takes them over, writes the verified ones to the database in the order
-// in which MatchPairs gives them, and tells them to `predictor` (may be null).  Returns whether there may be
-// a next round: a shard that finds pairs that no named file has matches its share of these, and then it is
-// done; where it finds none it writes nothing.  Errors: those of MatchPairs.
+// in which MatchPairs gives them, and adds them to `predictor` (may be null).  Returns whether there may be a
+// next round: a shard that finds pairs that no named file has matches its share of these and is then done;
+// where it finds none it writes nothing.  Errors: those of MatchPairs.
 Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Database& database,
                         MatchRun* run);
 

@@ -11,7 +11,7 @@
 
 namespace cairn::match_features {
 
-// A run of the stage: what it reads, and how far it has come.
+// A run of the stage: its inputs and its progress.
 struct MatchRun {
   SQLite::Database& features;
   const MatchImages& images;

@@ -32,7 +32,7 @@ Eigen::Matrix3d MatrixFrom(const SQLite::Column& column) {
   return matrix;
 }
 
-// A row of two_view_geometries, without the ids.  What it holds is checked by its hash.
+// A row of two_view_geometries, without the ids.  Its contents are checked by a hash.
 std::optional<TwoViewGeometry> ReadRow(SQLite::Database& database, int64_t pair_id) {
   SQLite::Statement query(database,
                           "SELECT data, config, F, E, H FROM two_view_geometries WHERE pair_id = ?");

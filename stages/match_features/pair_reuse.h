@@ -13,15 +13,15 @@
 
 namespace cairn::match_features {
 
-// What matching and verifying a pair gives.
+// The result of matching and verifying a pair.
 struct PairResult {
   TwoViewGeometry geometry;  // no inliers: not verified
   int num_putative = 0;
 };
 
 // Keys of pairs: hashes of all that a pair's result depends on (core/line/reuse.h): the features and cameras
-// of both images, their relative pose as stated, and the options.  Not their names, ids, or places in the
-// world.
+// of both images, their relative pose as stated, and the options.  Not their names, ids, or places in
+// the world.
 class PairKeys {
  public:
   PairKeys(SQLite::Database& features, const MatchImages& images, const MatchPairsOptions& options);
@@ -37,7 +37,7 @@ class PairKeys {
   std::vector<std::optional<ContentHash>> image_keys_;  // by index
 };
 
-// The result of a pair of images as an earlier run has it, if one does.
+// The result of a pair of images from an earlier run, if one has it.
 std::optional<PairResult> FindPairResult(const ContentHash& key, const MatchImage& image1,
                                          const MatchImage& image2, ReuseSources* sources);
 

@@ -8,7 +8,7 @@
 namespace cairn::match_features {
 namespace {
 
-// Of what sorts descriptors into words.
+// Hash of the tree that assigns words to descriptors.
 ContentHash HashTree(const Vocabulary& vocabulary) {
   ContentHasher hasher;
   for (const VocabularyNode& node : vocabulary.nodes) hasher.UInt(node.num_children);

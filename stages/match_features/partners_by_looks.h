@@ -11,7 +11,7 @@
 
 namespace cairn::match_features {
 
-// How images that look alike are made partners.
+// The rule that makes images that look alike partners.
 struct LooksRule {
   // Hash of all that the partners depend on besides the images' words.
   ContentHash key;
@@ -21,7 +21,7 @@ struct LooksRule {
       partners;
 };
 
-// The partners of all images, in two steps of which a shard does its share (image_step.h): the words of each
+// The partners of all images, in two steps that are divided among shards (image_step.h): the words of each
 // image, then its partners.  Errors: those of retrieve_pairs.h.
 Result<std::optional<std::vector<std::vector<int>>>> PartnersByLooks(const LooksRule& rule,
                                                                      SQLite::Database* shard_database,

@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
 #include "core/geometry/two_view_error.h"
@@ -18,11 +18,11 @@ struct Limits {
   double epipolar = 0, homography = 0, prior = 0;  // rad
 };
 
-// What the matches say, on bearings.
+// The models that the matches support, on bearings.
 struct Model {
   TwoViewConfig config = TwoViewConfig::kDegenerate;
   std::optional<Eigen::Matrix3d> E, F, H;
-  // The one whose inliers are kept: E or F, else H.
+  // Which model's inliers are kept: E or F, else H.
   bool is_homography = false;
   std::vector<int> inliers;
 
@@ -67,8 +67,8 @@ bool IsPart(size_t num, double ratio, size_t num_all) {
   return static_cast<double>(num) > ratio * static_cast<double>(num_all);
 }
 
-// Whether the rays of a match can show one thing, seen from the stated poses: from the same side, and meeting
-// in front of both cameras, up to the poses' error.
+// Whether the rays of a match can show the same thing from the stated poses: seen from the same side, and
+// meeting in front of both cameras, up to the poses' error.
 bool CanMeet(const Pose& stated, const Eigen::Vector3d& bearing1, const Eigen::Vector3d& bearing2,
              const Limits& limits, const VerifyPairOptions& options) {
   const Eigen::Vector3d ray1 = stated.rotation * bearing1;
@@ -77,7 +77,7 @@ bool CanMeet(const Pose& stated, const Eigen::Vector3d& bearing1, const Eigen::V
   return RaysConverge(ray1, bearing2, -stated.translation, limits.prior);
 }
 
-// No baseline, no epipolar line: a match must lie where the rotation takes it.
+// Without a baseline there are no epipolar lines: a match must lie where the rotation takes it.
 Model TurnedCamera(const Pose& stated, const Correspondences& c, const Limits& limits) {
   Model model;
   model.is_homography = true;
@@ -105,8 +105,8 @@ void RecogniseHomography(const Pose& pose, const Correspondences& c, const Limit
     model->H = R;
     return;
   }
-  // Where no homography has most of the inliers, a few samples show it: 30 miss one that has 4 of 5 in 1 of
-  // 10 million.
+  // A few samples show that no homography has most of the inliers: 30 samples miss one with 4 of 5 inliers
+  // once in 10 million.
   constexpr int kNumSamples = 30;
   model->H = EstimateHomography(inliers, {limits.homography, kNumSamples});
   if (model->H && IsPart(HomographyInliers(*model->H, inliers, limits.homography).size(),
@@ -158,7 +158,7 @@ Model UnposedCameras(bool has_intrinsics, const Correspondences& c, const Limits
   const auto is_enough = [&](const std::vector<int>& inliers) {
     return static_cast<int>(inliers.size()) >= options.min_num_inliers;
   };
-  // E that explains nearly all matches leaves no room for a better F.
+  // If E explains nearly all matches, no F can be better.
   if (!model.E || !IsPart(model.inliers.size(), options.min_essential_ratio, c.size())) {
     const auto F = EstimateFundamentalMatrix(c, {.max_error_rad = limits.epipolar});
     std::vector<int> inliers = F ? EpipolarInliers(*F, c, limits.epipolar) : std::vector<int>();
@@ -189,6 +189,7 @@ Model UnposedCameras(bool has_intrinsics, const Correspondences& c, const Limits
 
 Model EightPointCameras(bool has_intrinsics, const Correspondences& c, const Limits& limits) {
   Model model;
+  // [Booij06 §III] a link: the local space can be reconstructed from the two images
   const auto M = EstimateByEightPoints(c, has_intrinsics, {.max_error_rad = limits.epipolar});
   if (!M) return model;
   (has_intrinsics ? model.E : model.F) = M;
@@ -233,7 +234,7 @@ bool IsWatermark(const ViewForVerification& view1, const ViewForVerification& vi
   const auto median = [&](int axis) {
     std::vector<double> values;
     for (const Eigen::Vector2d& shift : shifts) values.push_back(shift[axis]);
-    return Median(std::move(values));
+    return UpperMedian(std::move(values));
   };
   const Eigen::Vector2d shift(median(0), median(1));
   const auto num_followers = std::count_if(shifts.begin(), shifts.end(), [&](const Eigen::Vector2d& s) {

@@ -7,10 +7,12 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include "core/base/quantiles.h"
+
 namespace cairn::reconstruct {
 namespace {
 
-constexpr double kMaxSigmas = 3;         // beyond, a target is off
+constexpr double kMaxSigmas = 3;         // beyond this a target is off
 constexpr double kMinSpreadSigmas = 2;   // root mean square of the targets about their centre
 constexpr size_t kMaxHypotheses = 2000;  // from triples
 constexpr size_t kMaxHypothesisTargets = 64;
@@ -187,13 +189,6 @@ Status CheckSpread(const std::vector<PositionTarget>& targets) {
                    std::sqrt(squared_m), max_sigma_m);
 }
 
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
 }  // namespace
 
 Pose TransformPose(const Similarity& world_from_model, const Pose& cam_from_model) {
@@ -211,8 +206,8 @@ Result<Alignment> AlignToPositions(const std::vector<PositionTarget>& targets,
   const std::optional<Similarity> initial = BestHypothesis(targets, up_model, up_sigma_rad);
   if (!initial) {
     return MakeError(ErrorCode::kNoData,
-                     "the images with known positions all stand at one place of the reconstruction, or one "
-                     "above the other: no scale");
+                     "the images with known positions are all at one place of the reconstruction, or one "
+                     "above the other, which gives no scale");
   }
   Alignment alignment;
   alignment.world_from_model = Refine(targets, up_model, up_sigma_rad, *initial);

@@ -10,7 +10,7 @@
 
 namespace cairn::reconstruct {
 
-// world = scale * rotation * model + translation: takes the frame that a reconstruction came in to the map's.
+// world = scale * rotation * model + translation: from the frame of a reconstruction to the map's.
 struct Similarity {
   double scale = 1;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -24,7 +24,7 @@ struct Similarity {
 // The pose of the same camera in the new frame.
 Pose TransformPose(const Similarity& world_from_model, const Pose& cam_from_model);
 
-// Where a camera is known to stand, with standard deviations per axis, metres.
+// A known position of a camera, with standard deviations per axis, metres.
 struct PositionTarget {
   Eigen::Vector3d model = Eigen::Vector3d::Zero();  // the camera's centre in the reconstruction
   Eigen::Vector3d world = Eigen::Vector3d::Zero();
@@ -33,18 +33,17 @@ struct PositionTarget {
 
 struct Alignment {
   Similarity world_from_model;
-  std::vector<double>
-      residuals_m;           // per target: distance between where it is put and where it is known to be
-  std::vector<bool> is_off;  // per target: more than three standard deviations away
+  std::vector<double> residuals_m;  // per target: distance between its aligned and its known position
+  std::vector<bool> is_off;         // per target: more than three standard deviations away
 };
 
-// The similarity that puts cameras where they are known to stand and their mean up along +z, robustly:
+// The similarity that best puts cameras at their known positions and their mean up along +z, robustly:
 //   min sum_i rho( |(x_i - (s R c_i + t)) / sigma_i|^2 ) + rho( |R u - e_z|^2 / sigma_up^2 ),  Cauchy loss,
 // from the best of the closed forms over pairs (with the cameras' up) and triples [Umeyama91] of targets.
-// The term in up decides what positions leave open: about a straight street, the roll.  COLMAP's
-// model_aligner has no such term and gives no residuals.
-// No randomness.  Errors: NoData for fewer than three targets, or targets less than twice their standard
-// deviations from their common centre, which fix no scale.
+// The term in up determines what positions leave undetermined, such as the roll about a straight street.
+// COLMAP's model_aligner has no such term and gives no residuals.  No randomness.  Errors: NoData for fewer
+// than three targets, or targets less than twice their standard deviations from their common centre, which
+// determine no scale.
 Result<Alignment> AlignToPositions(const std::vector<PositionTarget>& targets,
                                    const Eigen::Vector3d& up_model, double up_sigma_deg);
 
@@ -54,8 +53,8 @@ struct DistanceTarget {
   double world_m = 0;
 };
 
-// Median over the targets of known over reconstructed distance.  Errors: NoData without a target whose
-// cameras are apart.
+// Median over the targets of known over reconstructed distance.  Errors: NoData without a target with two
+// cameras at different places.
 Result<double> ScaleFromDistances(const std::vector<DistanceTarget>& targets);
 
 // Mean of the cameras' up directions (-y), of length 1; +z where they cancel out.
@@ -65,7 +64,7 @@ Eigen::Vector3d MeanUp(const std::vector<Pose>& cams_from_model);
 // view along +x as far as it is level.  REQUIRES: not empty
 Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale);
 
-// Median distance of a camera to its nearest other; 0 with fewer than two cameras.  O(n^2).
+// Median distance of a camera to the nearest other one; 0 with fewer than two cameras.  O(n^2).
 double MedianStep(const std::vector<Pose>& cams_from_model);
 
 }  // namespace cairn::reconstruct

@@ -43,7 +43,7 @@ std::string ReportJson(const ReconstructResult& result) {
   return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-// The capture that the result is: the image lists, and a link to the images.
+// Writes the result as a capture: the image lists, and a link to the images.
 Status WritePosesFolder(const ReconstructResult& result, const Capture& capture, const std::string& folder) {
   CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", result.cameras));
   CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/images.txt", result.images));
@@ -117,8 +117,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   if (capture.has_poses) {
-    spdlog::warn("{}: has poses of its own (images.txt), which the reconstruction does not look at",
-                 capture.root);
+    spdlog::warn("{}: has poses of its own (images.txt), which the reconstruction ignores", capture.root);
   }
   CAIRN_ASSIGN_OR_RETURN(const MapperInput input, ReadMapperInput(arguments.matches));
   ReconstructResult result;
@@ -143,24 +142,24 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 
 Command ReconstructCommand() {
   const auto arguments = std::make_shared<Arguments>();
-  return {
-      .name = "reconstruct",
-      .summary =
-          "Find the poses of a capture without any, with COLMAP, in metres where they can be had (stage 2b)",
-      .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("matches", arguments->matches, "COLMAP database with verified matches")
-                ->required()
-                ->type_name("matches.db");
-            app.add_option("--capture", arguments->capture, "Capture folder: the images and their EXIF")
-                ->required();
-            app.add_option("-o,--output", arguments->output,
-                           "Folder to write: a capture with poses (COLMAP text layout)")
-                ->required()
-                ->type_name("poses/");
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
-          },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+  return {.name = "reconstruct",
+          .summary = "Find the poses of a capture without any, with COLMAP (stage 2b)",
+          .add_arguments =
+              [arguments](ArgumentParser& parser) {
+                parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
+                    .Required()
+                    .Type("matches.db");
+                parser.Add("--capture", arguments->capture, "Capture folder: the images and their EXIF")
+                    .Required()
+                    .Type("CAPTURE");
+                parser
+                    .Add("-o,--output", arguments->output,
+                         "Folder to write: a capture with poses (COLMAP text layout)")
+                    .Required()
+                    .Type("poses/");
+                arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
+              },
+          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
 }  // namespace cairn::reconstruct

@@ -4,7 +4,7 @@
 
 namespace cairn::reconstruct {
 
-// cairn reconstruct matches.db --capture CAPTURE -o poses/
+// cairn stage reconstruct matches.db --capture CAPTURE -o poses/
 Command ReconstructCommand();
 
 }  // namespace cairn::reconstruct

@@ -5,7 +5,7 @@
 #include <functional>
 #include <set>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/base/text.h"
 #include "core/files/file.h"
 
@@ -18,13 +18,14 @@ std::set<std::string> NamesOf(const Capture& capture) {
   return names;
 }
 
-// Words [first, last) as they would stand in a name with single spaces.
+// Words [first, last) joined with single spaces, as in a name.
 std::string Join(const std::vector<std::string>& words, size_t first, size_t last) {
   return fmt::format("{}", fmt::join(words.begin() + static_cast<std::ptrdiff_t>(first),
                                      words.begin() + static_cast<std::ptrdiff_t>(last), " "));
 }
 
-// Calls `read` with the words of each line that says something; its error gets the line's place.
+// Calls `read` with the words of each line that is not empty or a comment; adds the line's place to
+// its error.
 Status ReadLines(const std::string& path,
                  const std::function<Status(const std::vector<std::string>& words)>& read) {
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
@@ -112,9 +113,9 @@ GeodeticPosition MedianPosition(const std::map<std::string, ExifTags>& tags) {
     longitudes.push_back(WrapLongitude(exif.gps->longitude_deg - first));
     if (exif.has_altitude) altitudes.push_back(exif.gps->altitude_m);
   }
-  return {std::round(1e7 * Median(latitudes)) / 1e7,
-          std::round(1e7 * WrapLongitude(first + Median(longitudes))) / 1e7,
-          altitudes.empty() ? 0 : std::round(100 * Median(altitudes)) / 100};
+  return {std::round(1e7 * UpperMedian(latitudes)) / 1e7,
+          std::round(1e7 * WrapLongitude(first + UpperMedian(longitudes))) / 1e7,
+          altitudes.empty() ? 0 : std::round(100 * UpperMedian(altitudes)) / 100};
 }
 
 }  // namespace cairn::reconstruct

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr double kSecondsPerHour = 3600;
 
-// The camera as the mapper gets it.
+// The camera that is given to the mapper.
 Camera MapperCamera(Camera camera, const MapperOptions& options) {
   if (options.refine_distortion && camera.model == CameraModel::kSimplePinhole) {
     camera.model = CameraModel::kSimpleRadial;
@@ -49,7 +49,7 @@ std::vector<std::string> MapperWords(const std::string& database, const std::str
   return {"colmap", "mapper", "--database_path", database, "--image_path", images_folder, "--output_path",
           models, "--random_seed", "0", "--Mapper.num_threads", options.deterministic ? "1" : "-1",
           "--Mapper.extract_colors", "0", "--Mapper.min_num_matches", std::to_string(kMinNumMatches),
-          // Small models too: they are listed, and a small capture may be one.
+          // Also small models: they are listed, and a small capture may have only one.
           "--Mapper.min_model_size", "3", "--Mapper.ba_refine_focal_length",
           Flag(options.refine_focal_length), "--Mapper.ba_refine_extra_params",
           Flag(options.refine_distortion)};
@@ -60,7 +60,7 @@ std::string LastLines(const ProgramOutcome& outcome) {
   return fmt::format("its last lines:\n  {}", fmt::join(outcome.last_lines, "\n  "));
 }
 
-// "Registering image #12 (5)": the fifth image of the model at hand.
+// "Registering image #12 (5)": the fifth image of the current model.
 int RegisteredCount(const std::string& line) {
   if (line.find("Registering image #") == std::string::npos) return 0;
   const size_t bracket = line.rfind('(');
@@ -102,8 +102,8 @@ Result<ProgramOutcome> RunColmap(const MapperInput& input, const std::vector<std
   progress.End();
   if (!outcome.ok() && outcome.error().code == ErrorCode::kNotFound) {
     return MakeError(ErrorCode::kNotFound,
-                     "there is no program colmap on PATH, which reconstructs captures without poses; install "
-                     "it (apt install colmap), or give the capture an images.txt with poses");
+                     "no program colmap on PATH, which reconstructs captures without poses; install it (apt "
+                     "install colmap), or give the capture an images.txt with poses");
   }
   return outcome;
 }
@@ -164,11 +164,10 @@ Result<MapperInput> ReadMapperInput(const std::string& matches_path) {
       }
     }
     if (input.geometries.empty()) {
-      return MakeError(
-          ErrorCode::kNoData,
-          "{}: no pair of images has the {} verified matches that a reconstruction needs; do the "
-          "images show the same place?",
-          matches_path, kMinNumMatches);
+      return MakeError(ErrorCode::kNoData,
+                       "{}: no pair of images has the {} verified matches that a reconstruction needs; do "
+                       "the images show the same place?",
+                       matches_path, kMinNumMatches);
     }
     return input;
   });
@@ -202,7 +201,7 @@ Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::
   CAIRN_ASSIGN_OR_RETURN(std::vector<ColmapModel> models, ReadModels(models_folder));
   std::erase_if(models, [](const ColmapModel& model) { return model.images.empty(); });
   if (models.empty()) {
-    return MakeError(ErrorCode::kFailed, "colmap mapper ended well, but left no model; {}",
+    return MakeError(ErrorCode::kFailed, "colmap mapper ended without an error, but left no model; {}",
                      LastLines(outcome));
   }
   return models;

@@ -12,18 +12,18 @@ namespace cairn::reconstruct {
 
 // How COLMAP's incremental mapper is run [Schönberger, Frahm: Structure-from-Motion Revisited, CVPR 2016].
 struct MapperOptions {
-  // Then it is ended, hours.  REQUIRES: > 0
+  // Time limit after which it is ended, hours.  REQUIRES: > 0
   double max_hours = 12;
-  // Let it refine what EXIF or a guess says of the cameras.  Distortion: one radial parameter of cameras
-  // that are given without any.
+  // Whether it refines the cameras' parameters, which come from EXIF or a guess.  Distortion: one radial
+  // parameter for cameras that are given without any.
   bool refine_focal_length = true;
   bool refine_distortion = true;
   // One thread, and the same bytes on every run.  False: all cores in bundle adjustment, faster for hundreds
-  // of images, and no two runs alike.
+  // of images, but no two runs give the same result.
   bool deterministic = true;
 };
 
-// What the mapper needs of matches.db: no descriptors.
+// What the mapper reads of matches.db: no descriptors.
 struct MapperInput {
   std::map<CameraId, Camera> cameras;
   std::vector<DatabaseImage> images;             // ascending image_id
@@ -37,13 +37,12 @@ inline constexpr int kMinNumMatches = 15;
 // Errors: those of the database's readers; NoData without a verified pair.
 Result<MapperInput> ReadMapperInput(const std::string& matches_path);
 
-// Runs `colmap mapper` on a database of its own in `work_folder` (an existing folder; what it leaves there is
-// the caller's to remove): older versions cannot read every database that we can, and it writes to the one
+// Runs `colmap mapper` on a database of its own in `work_folder` (an existing folder; the caller removes what
+// it leaves there): older versions cannot read every database that we can, and the mapper writes to the one
 // that it reads.  Returns its models, most images first (ties: more points, then COLMAP's order), in the
-// arbitrary frame and scale that it gives them.
-// Errors: NotFound (no `colmap`); NoData (it found no pair of images to start from); Failed (with its last
-// lines: it failed, took longer than max_hours, or left no model); Corrupt (a model that cannot be read);
-// Cancelled.
+// mapper's arbitrary frame and scale.  Errors: NotFound (no `colmap`); NoData (it found no pair of images to
+// start from); Failed (with its last lines: it failed, took longer than max_hours, or left no model); Corrupt
+// (a model that cannot be read); Cancelled.
 Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::string& images_folder,
                                            const MapperOptions& options, const std::string& work_folder,
                                            Progress& progress);

@@ -13,7 +13,7 @@ namespace cairn::reconstruct {
 namespace {
 
 constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
-constexpr double kMaxSigmas = 3;
+constexpr double kMaxResidualSigmas = 3;
 
 // The poses of the kept model, by image name, in its own frame.
 using ModelPoses = std::map<std::string, Pose>;
@@ -104,7 +104,7 @@ Result<Similarity> ScaleByDistances(const ModelPoses& model, const Capture& capt
   for (size_t i = 0; i < targets.size(); ++i) {
     const double residual_m = std::abs(*scale * targets[i].model - targets[i].world_m);
     const double sigma_m = options.distance_sigma_ratio * targets[i].world_m;
-    result->residuals.push_back({names[i], residual_m, residual_m > kMaxSigmas * sigma_m});
+    result->residuals.push_back({names[i], residual_m, residual_m > kMaxResidualSigmas * sigma_m});
   }
   result->frame.source = "distances";
   return LevelledFrame(PosesOf(model), *scale);
@@ -144,8 +144,8 @@ size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
 }
 
-// The mapper's models.  From two images nobody can tell distortion from shape: where too few images are
-// registered with it, once more without.
+// The mapper's models.  Distortion and shape cannot be distinguished from two images: where too few images
+// are registered with distortion, the mapper runs once more without.
 Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
                                            const ReconstructOptions& options, const std::string& work_folder,
                                            Progress& progress, ReconstructResult* result) {
@@ -168,11 +168,11 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   Result<std::vector<ColmapModel>> without = run(simpler, "without_distortion");
   if (!without.ok() && without.error().code == ErrorCode::kCancelled) return without;
   const bool is_better = NumRegistered(without) > NumRegistered(models);
-  result->warnings.push_back(fmt::format(
-      "{} of {} images were registered with the cameras' distortion refined, {} without; taken is "
-      "the reconstruction {}",
-      NumRegistered(models), input.images.size(), NumRegistered(without),
-      is_better ? "without: refine_distortion = false saves the first attempt" : "with"));
+  result->warnings.push_back(
+      fmt::format("{} of {} images were registered with the cameras' distortion refined, {} without; the "
+                  "reconstruction is the one {}",
+                  NumRegistered(models), input.images.size(), NumRegistered(without),
+                  is_better ? "without: refine_distortion = false saves the first attempt" : "with"));
   return is_better ? std::move(without) : std::move(models);
 }
 
@@ -182,7 +182,7 @@ std::string RejectReason(ImageId image_id, const MapperInput& input, const std::
   for (size_t m = 1; m < models.size(); ++m) {
     for (const ModelImage& image : models[m].images) {
       if (image.image_id == image_id) {
-        return fmt::format("not registered with the others: in a part of its own, of {} images",
+        return fmt::format("not registered with the others: in a separate part of {} images",
                            models[m].images.size());
       }
     }
@@ -226,9 +226,9 @@ Status CheckRegistered(const MapperInput& input, const ReconstructOptions& optio
   for (size_t i = 0; i < std::min<size_t>(result->rejects.size(), 5); ++i)
     reasons += fmt::format("\n  {}: {}", result->rejects[i].name, result->rejects[i].reason);
   return MakeError(ErrorCode::kNoData,
-                   "{}, below min_registered_ratio = {:g}; images that join the parts or more features per "
-                   "image (extract_features: max_num_features) help; a lower ratio accepts the largest part. "
-                   "The first that are missing:{}",
+                   "{}, below min_registered_ratio = {:g}; take images that join the parts, or more features "
+                   "per image (extract_features: max_num_features); a lower ratio accepts the largest part. "
+                   "The first missing images:{}",
                    text, options.min_registered_ratio, reasons);
 }
 
@@ -256,10 +256,9 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
     }
   }
   if (options.scale_from == "auto" && !options.control_points.empty() && !options.distances.empty()) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "control_points and distances are both given, and one of them gives the scale; say which "
-        "with scale_from, and leave the other out");
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "control_points and distances are both given, but only one can give the scale; choose "
+                     "one with scale_from, and leave the other out");
   }
   if (options.hold_out_every == 1)
     return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
@@ -272,20 +271,20 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
   OptionTable table = {
       {.name = "max_hours",
        .value = &o->mapper.max_hours,
-       .help = "longest time that COLMAP's mapper gets, hours",
+       .help = "time limit of COLMAP's mapper, hours",
        .min = 1e-6},
       {.name = "refine_focal_length",
        .value = &o->mapper.refine_focal_length,
        .help = "refine the cameras' focal lengths"},
       {.name = "refine_distortion",
        .value = &o->mapper.refine_distortion,
-       .help = "refine distortion; cameras given without any get one radial parameter"},
+       .help = "refine the cameras' distortion; cameras given without any get one radial parameter"},
       {.name = "deterministic",
        .value = &o->mapper.deterministic,
        .help = "one thread and the same bytes on every run; false: all cores in bundle adjustment"},
       {.name = "min_registered_ratio",
        .value = &o->min_registered_ratio,
-       .help = "least part of the images that must be registered together",
+       .help = "smallest part of the images that must be registered together",
        .min = 0,
        .max = 1},
       {.name = "scale_from",
@@ -324,11 +323,11 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .max = 180},
       {.name = "unscaled_step",
        .value = &o->unscaled_step,
-       .help = "without any scale: median distance of an image to its nearest other, in the map's unit",
+       .help = "without any scale: median distance of an image to the nearest other one, in the map's unit",
        .min = 1e-6},
       {.name = "hold_out_every",
        .value = &o->hold_out_every,
-       .help = "every so many registered images one is kept out of the map, as a query; 0: none",
+       .help = "one in this many registered images is kept out of the map, as a query; 0: none",
        .min = 0},
   };
   AddCondition({"scale_from", {"auto", "control_points"}}, {"control_points", "control_point_sigma_m"},

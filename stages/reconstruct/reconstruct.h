@@ -15,19 +15,19 @@
 namespace cairn::reconstruct {
 
 // Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
-// (mapper.h), which GPS, known positions or known distances then fix (align.h).  Where too few images are
-// registered with the cameras' distortion refined, the mapper runs once more without.  Before:
-// match_features. After: group_classes and all that reads poses.
+// (mapper.h), which GPS, known positions or known distances then determine (align.h).  Where too few images
+// are registered with the cameras' distortion refined, the mapper runs once more without.  Before:
+// match_features.  After: group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;
-  // Least part of the capture's images that the largest model must have; below, there is no result.
-  // REQUIRES: in [0, 1]
+  // Smallest part of the capture's images that the largest model must have; with fewer there is no
+  // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
   // Where scale and axes come from: "gps" (EXIF), "control_points", "distances", or "none"; "auto": the
-  // control points if their file is given, else the distances if theirs is, else GPS where three images with
-  // it spread far enough, else none.
+  // control points if their file is given, else the distances if theirs is, else GPS where at least three
+  // images have it and are far enough apart, else none.
   std::string scale_from = "auto";
-  // Files, absolute or relative to the capture (known_places.h says what is in them).
+  // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
   std::string distances;
   // Standard deviations: of a GPS position, level and in altitude; of a control point; of a known distance,
@@ -38,19 +38,19 @@ struct ReconstructOptions {
   double distance_sigma_ratio = 0.02;
   double up_sigma_deg = 5;
   // Where nothing gives a scale: median distance of an image to the nearest other, in the map's unit, so that
-  // the later stages' lengths mean something.  REQUIRES: > 0
+  // lengths in options of later stages are meaningful.  REQUIRES: > 0
   double unscaled_step = 0.5;
-  // Every so many registered images, in the order of names, one is kept out of the map and becomes a query
+  // One in this many registered images, in the order of names, is kept out of the map and becomes a query
   // with its reconstructed pose; 0: none.  REQUIRES: >= 0, not 1
   int hold_out_every = 0;
 };
 OptionTable DescribeOptions(ReconstructOptions* options);
 
-// How far an image is from where it is known to be; for distances, by how much the two are wrong.
+// Distance of an image from its known position; for distances, the error of the distance.
 struct AlignmentResidual {
   std::string name;  // an image, or "IMAGE1 IMAGE2"
   double residual_m = 0;
-  bool is_off = false;  // by more than three standard deviations: it hardly counted
+  bool is_off = false;  // by more than three standard deviations: it had little weight
 };
 
 struct ReconstructResult {
@@ -67,9 +67,9 @@ struct ReconstructResult {
 };
 
 // Runs COLMAP on the matches and puts the largest model into a frame.  `work_folder` is an empty folder.
-// Same result on every run where options.mapper.deterministic.
-// Errors: InvalidArgument (options); NoData (too few images registered, the asked-for scale cannot be had, no
-// image of the database in the capture); those of RunMapper and of the files.
+// Same result on every run where options.mapper.deterministic.  Errors: InvalidArgument (options); NoData
+// (too few images registered, the requested scale is not available, no image of the database in the capture);
+// those of RunMapper and of the files.
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       Progress& progress);

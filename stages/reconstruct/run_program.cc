@@ -25,7 +25,7 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Cuts what arrives into lines and keeps the last ones.
+// Divides the output into lines and keeps the last ones.
 class LineReader {
  public:
   LineReader(const RunProgramOptions& options, std::vector<std::string>* last_lines)
@@ -56,7 +56,7 @@ class LineReader {
   std::string line_;
 };
 
-// Whether the process has ended.  It is not waited for: its group's number stays its own.
+// Whether the process has ended.  Does not reap it, so that its group's number is not used again.
 bool HasEnded(pid_t pid) {
   siginfo_t state = {};
   return waitid(P_PID, pid, &state, WEXITED | WNOHANG | WNOWAIT) == 0 && state.si_pid == pid;
@@ -98,7 +98,8 @@ Result<pid_t> Spawn(const std::vector<std::string>& words, const std::vector<std
                    words[0], std::strerror(reason));
 }
 
-// Reads until the process has ended and what it wrote is read, or it has to be ended; returns whether it has.
+// Reads until the process has ended and all its output is read, or it has to be ended; returns whether it
+// has ended.
 bool ReadUntilEnd(pid_t pid, int read_fd, const Progress& progress, double max_seconds, LineReader* lines,
                   bool* timed_out) {
   const auto start = Clock::now();
@@ -112,7 +113,7 @@ bool ReadUntilEnd(pid_t pid, int read_fd, const Progress& progress, double max_s
       is_open = size != 0;
       lines->Add(block, size);
     } else if (HasEnded(pid)) {
-      return true;  // what it started may still keep its outputs open
+      return true;  // its child processes may still keep its outputs open
     }
   }
 }
@@ -123,7 +124,7 @@ Result<ProgramOutcome> RunProgram(const std::vector<std::string>& words, const R
                                   const Progress& progress) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    return MakeError(ErrorCode::kIo, "{}: no pipe to read it by: {}", words[0], std::strerror(errno));
+    return MakeError(ErrorCode::kIo, "{}: no pipe for its output: {}", words[0], std::strerror(errno));
   const Result<pid_t> pid = Spawn(words, options.environment, ends[1]);
   close(ends[1]);
   if (!pid.ok()) {

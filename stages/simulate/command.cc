@@ -38,14 +38,17 @@ Command SimulateCommand() {
   auto arguments = std::make_shared<Arguments>();
   return {
       .name = "simulate",
-      .summary = "Renders a survey of a synthetic building, with known poses and held-out queries",
+      .summary = "Render a survey of a synthetic building, with poses and held-out queries",
       .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option(
-                "recipe", arguments->recipe_path,
-                "Recipe with a [simulate] table, or a file with that table's keys; without it, defaults");
-            app.add_option("-o,--output", arguments->output_path, "Capture folder to write")->required();
-            arguments->option_arguments.Add(app, DescribeOptions(&arguments->options));
+          [arguments](ArgumentParser& parser) {
+            parser
+                .Add("recipe", arguments->recipe_path,
+                     "Recipe with a [simulate] table, or a file with that table's keys; without it, defaults")
+                .Type("RECIPE.toml");
+            parser.Add("-o,--output", arguments->output_path, "Capture folder to write")
+                .Required()
+                .Type("FOLDER");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },
       .run =
           [arguments](const CommandEnvironment& environment) {

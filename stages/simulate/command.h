@@ -4,7 +4,7 @@
 
 namespace cairn::simulate {
 
-// `cairn simulate RECIPE.toml -o CAPTURE`
+// `cairn stage simulate RECIPE.toml -o CAPTURE`
 Command SimulateCommand();
 
 }  // namespace cairn::simulate

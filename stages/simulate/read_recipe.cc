@@ -8,11 +8,10 @@ Status ReadSimulateRecipe(const std::string& path, sim::SimulateOptions* options
   CAIRN_ASSIGN_OR_RETURN(const toml::table document, ReadTomlFile(path));
   const toml::node* node = document.get("simulate");
   if (node == nullptr && (document.contains("name") || document.contains("capture"))) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: a recipe without [simulate]: there is nothing to render; add the table, or compile the "
-        "recipe's own capture",
-        path);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: a recipe without [simulate], so there is nothing to render; add the table, or "
+                     "compile the recipe's own capture",
+                     path);
   }
   if (node == nullptr) return SetOptionsFromToml(document, path, DescribeOptions(options));
   if (!node->is_table()) {

@@ -101,7 +101,7 @@ TEST(RerankPlaces, MeasuresTheBaselineInDistancesOfWhatIsSeen) {
 }
 
 TEST(RerankPlaces, ScoresTheSameImageOneAlsoTurned) {
-  // No essential matrix is to be had without a baseline.
+  // There is no essential matrix without a baseline.
   const Room room(1);
   PlaceView turned = room.View(0, 0);
   for (int i = 0; i < 2; ++i) {

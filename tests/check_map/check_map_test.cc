@@ -39,7 +39,7 @@ TEST(CheckMap, ImagesThatCannotBeLocalizedCountAgainstRecallWithTheirReason) {
   EXPECT_EQ(report->figures.at("num_held_out"), 2);
   EXPECT_EQ(report->figures.at("num_localized"), 0);
   EXPECT_EQ(report->figures.at("localized_ratio"), 0);
-  EXPECT_EQ(report->figures.count("median_error_m"), 0u);  // of no fix there is none
+  EXPECT_EQ(report->figures.count("median_error_m"), 0u);  // no fix, no error
   EXPECT_THAT(report->images[1].rejected, HasSubstr("no such file"));
 }
 

@@ -48,8 +48,8 @@ Views RoomViews(const std::vector<Vec2>& corners) {
 //    0        6    10
 const std::vector<Vec2> kCorners = {{0, 0}, {10, 0}, {10, 4}, {6, 4}, {6, 8}, {0, 8}};
 
-// Landmarks on the walls with 2 cm noise, some of furniture, some of the ceiling; images where all walls are
-// seen.
+// Landmarks on the walls with 2 cm noise, some of furniture, some of the ceiling; images where all walls
+// are seen.
 MapRows SurveyOfRoom() {
   Random random(5);
   MapRows rows;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "core/base/quantiles.h"
 #include "stages/check_map/report.h"
 #include "tests/runtime/localize/synthetic_room.h"
 

@@ -10,8 +10,8 @@
 namespace cairn::decompose_regions {
 
 // Every region of a small world by the definitions [Sala06 §III] alone, by trying all sets of k features: the
-// oracle that bounds and decompositions are held against.  Sets of stations are bit masks.  REQUIRES: at most
-// 16 stations
+// oracle that bounds and decompositions are held against.  Sets of stations are bit masks.
+// REQUIRES: at most 16 stations
 class AllRegions {
  public:
   AllRegions(const World& world, int k, int tau)

@@ -108,8 +108,8 @@ TEST(DecomposeRegions, MaxHoleHoldsOnRandomWorlds) {
   }
 }
 
-// Cancels once as many stations are assigned as `limit`.  Stations are the first task; `best` has a second
-// one.
+// Cancels once as many stations are assigned as `limit`.  Stations are the first task; `best` has a
+// second one.
 class CancelAfter : public Progress {
  public:
   explicit CancelAfter(int64_t limit) : limit_(limit) {}

@@ -35,8 +35,8 @@ std::vector<std::pair<StationIdx, StationIdx>> Edges(int shape, Random* random) 
   return {edges.begin(), edges.end()};
 }
 
-// Nine stations and seven features whose areas are intervals of station numbers with or without holes, or
-// anything.
+// Nine stations and seven features whose areas are intervals of station numbers with or without holes,
+// or anything.
 World SmallWorld(uint64_t seed) {
   Random random(MixSeed(7, seed));
   World world;

@@ -48,8 +48,8 @@ TEST(Picture, ShowsStationsByRegionHolesAndWhatIsNotCoverable) {
   EXPECT_EQ(Count(body, "fill-opacity"), 6);           // in a region
   EXPECT_EQ(Count(body, "fill=\"white\" stroke"), 1);  // a hole
   EXPECT_EQ(Count(body, "<circle"), 1);                // not coverable
-  EXPECT_EQ(Count(body, "fill=\"#0072b2\""), 4);       // region 0
-  EXPECT_EQ(Count(body, "fill=\"#e69f00\""), 2);       // region 1, which touches it
+  EXPECT_EQ(Count(body, "fill=\"#0072B2\""), 4);       // region 0
+  EXPECT_EQ(Count(body, "fill=\"#E69F00\""), 2);       // region 1, which touches it
   const std::string outlines = svg.substr(svg.find("<g id=\"outlines\""));
   // Sides of the outlines: 8 around 2 x 2 cells, 6 around 2 x 1.
   EXPECT_EQ(Count(outlines.substr(0, outlines.find("</g>")), "M"), 8 + 6);

@@ -194,14 +194,14 @@ TEST(DecomposeViews, RegionsAreConvexAndCoverTheDomain) {
     };
     for (int64_t i = 0; i < count; ++i) {
       const Vec2 along = corner(i + 1) - corner(i), next = corner(i + 2) - corner(i + 1);
-      // Up to what rounding to the grid bends.
+      // Up to the bend that rounding to the grid causes.
       EXPECT_GE(along.x() * next.y() - along.y() * next.x(),
                 -3 * views.plan.grid_m * (along.norm() + next.norm()));
     }
   }
 }
 
-// The source's families (Fig. 7): niches along a corridor; the regions grow with a power of their number.
+// [Simsarian96 Fig. 7] Niches along a corridor: the regions grow with a power of their number.
 TEST(DecomposeViews, NichesMakeRegionsGrowAboutWithTheSquare) {
   const auto niches = [](int count) {
     Corners ring{{0, 0}, {20, 0}, {20, 20}};
@@ -413,7 +413,7 @@ TEST(DecomposeViews, SmallRegionsAreJoinedOnRequestAndTheLossIsSaid) {
   EXPECT_EQ(merged.views.num_faces() + merged.loss.num_regions, exact.views.num_faces());
   EXPECT_NEAR(TotalArea(merged.views), TotalArea(exact.views), 1e-6);
   EXPECT_TRUE(CheckViews(merged.views, "merged").ok());
-  // Large regions keep their labels, and all area but what was joined sees what it saw.
+  // Large regions keep their labels, and all area except the joined part sees the same as before.
   const FaceLocator in_exact(exact.views), in_merged(merged.views);
   Random random(0);
   int same = 0, num = 0;

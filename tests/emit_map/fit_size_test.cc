@@ -81,7 +81,7 @@ TEST(OrderByUse, IsWithinItsBoundOfTheBestChoiceAndNestedForAnyNumberOfThreads) 
       seen_by.push_back(images);
     }
     Classes classes = WallOf(6, seen_by);
-    for (SurveyImage& image : classes.images) image.camera_id = 2;  // unknown: nobody misses a class
+    for (SurveyImage& image : classes.images) image.camera_id = 2;  // unknown: no class is missed
     const std::vector<size_t> order = OrderByUse(classes, All(classes), 1, 1);
     EXPECT_EQ(OrderByUse(classes, All(classes), 1, 3), order);
     const auto value = [&](unsigned chosen) {

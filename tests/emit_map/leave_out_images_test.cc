@@ -75,7 +75,7 @@ TEST(PartsOf, NeighboursOfAKeptPlaceWithoutImagesAreKept) {
   EXPECT_THAT(parts.appearance->Kept(), ElementsAre(0, 1, 3));
   EXPECT_THAT(parts.appearance->nodes[1].images, IsEmpty());
   EXPECT_EQ(parts.appearance->nodes[1].role, NodeRole::kDominating);
-  // A place that was not kept leaves nobody alone.
+  // Without a place that was not kept, all other places keep their nodes.
   parts = PartsOf(Without(example, 4), PartsOfExample(example));
   EXPECT_THAT(parts.appearance->Kept(), ElementsAre(1));
   parts = PartsOf(Without(example, 1), {.world = example.world, .decomposition = example.decomposition});

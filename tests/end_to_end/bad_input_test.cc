@@ -39,7 +39,7 @@ class BadInput : public testing::Test {
     return RunShell("cairn compile " + Path("bad.toml") + " -o " + Path("bad.cairn") + " --progress none " +
                     arguments);
   }
-  // Of an impossible capture: the stage's code, a message, and neither a map nor half of one.
+  // An impossible capture gives the stage's code and a message, and neither a map nor part of one.
   static void ExpectFailure(const ProgramRun& run, int exit_code, const std::string& message) {
     EXPECT_EQ(run.exit_code, exit_code) << run.out << run.err;
     EXPECT_THAT(run.err, HasSubstr(message));
@@ -170,15 +170,15 @@ TEST_F(BadInput, DamagedStageFilesAreNamed) {
   ASSERT_TRUE(WriteFileAtomically(Path("features.db"), "").ok());
   using Case = std::pair<std::string, int>;  // command, exit code
   for (const auto& [command, exit_code] :
-       {Case{"match-features " + Path("features.db") + " -o " + Path("out.db"), 4},
-        Case{"group-classes " + Path("features.db") + " --capture " + Path("capture") + " -o " +
+       {Case{"stage match-features " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"stage group-classes " + Path("features.db") + " --capture " + Path("capture") + " -o " +
                  Path("out.db"),
              4},
-        Case{"filter-visibility " + Path("features.db") + " -o " + Path("out.db"), 4},
-        Case{"decompose-regions " + Path("features.db") + " -o " + Path("out.db"), 4},
-        Case{"build-vocabulary " + Path("features.db") + " -o " + Path("out.db"), 4},
-        Case{"link-appearance " + Path("features.db") + " -o " + Path("out.db"), 4},
-        Case{"check-map " + Path("features.db") + " -o " + Path("out.cairn"), 11},
+        Case{"stage filter-visibility " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"stage decompose-regions " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"stage build-vocabulary " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"stage link-appearance " + Path("features.db") + " -o " + Path("out.db"), 4},
+        Case{"check " + Path("features.db") + " -o " + Path("out.cairn"), 11},
         Case{"inspect " + Path("features.db"), 11}}) {
     const ProgramRun run = RunShell("cairn " + command);
     EXPECT_EQ(run.exit_code, exit_code) << command << "\n" << run.err;
@@ -189,51 +189,51 @@ TEST_F(BadInput, DamagedStageFilesAreNamed) {
 
 TEST_F(BadInput, OutputThatIsAnInputIsRefusedByEveryCommand) {
   for (const char* name : {"in", "other"}) ASSERT_TRUE(WriteFileAtomically(Path(name), "kept").ok());
-  for (const char* words :
-       {"extract-features capture -o capture/images.txt",
-        "extract-features capture -o f.db --depfile ./in --options in",
-        "match-features in -o in",
-        "match-features other --capture capture -o capture/images.txt",
-        "match-features other --pair-list in -o in",
-        "reconstruct other --capture capture -o capture",
-        "group-classes in --capture capture -o in",
-        "filter-visibility in -o in",
-        "decompose-regions in -o in",
-        "decompose-regions other --classes in -o in",
-        "decompose-regions in -o new --svg in",
-        "build-vocabulary in -o in",
-        "link-appearance in other -o in",
-        "link-appearance other in -o in",
-        "decompose-views in -o in",
-        "emit-map --name a --classes in --world other --regions other --vocabulary other --frame in -o in",
-        "check-map in -o in",
-        "check-map other --queries in -o in",
-        "check-map in --details in",
-        "compile in -o in",
-        "import capture --queries in -o capture",
-        "join-captures a=capture -o capture",
-        "export in -o .",
-        "inspect in --svg in",
-        "inspect in --ambiguity-svg in",
-        "localize other --list in -o in",
-        "locate-scan in other --svg in",
-        "plan-path in --from 0,0 --to 1,1 --svg in",
-        "tell-apart in --a 0,0,0 --b 1,1,0 --svg in",
-        "drive other --building in --start 0,0,0 --goal a -o in",
-        "sign in --key other -o in",
-        "sign other --key in -o in",
-        "migrate in -o in",
-        "delta in other -o in",
-        "apply other in -o in",
-        "apply in other -o in",
-        "pareto in -o in",
-        "report in -o in"}) {
+  for (const char* words : {"stage extract-features capture -o capture/images.txt",
+                            "stage extract-features capture -o f.db --depfile ./in --options in",
+                            "stage match-features in -o in",
+                            "stage match-features other --capture capture -o capture/images.txt",
+                            "stage match-features other --pair-list in -o in",
+                            "stage reconstruct other --capture capture -o capture",
+                            "stage group-classes in --capture capture -o in",
+                            "stage filter-visibility in -o in",
+                            "stage decompose-regions in -o in",
+                            "stage decompose-regions other --classes in -o in",
+                            "stage decompose-regions in -o new --svg in",
+                            "stage build-vocabulary in -o in",
+                            "stage link-appearance in other -o in",
+                            "stage link-appearance other in -o in",
+                            "plan decompose in -o in",
+                            "stage emit-map --name a --classes in --world other --regions other --vocabulary "
+                            "other --frame in -o in",
+                            "check in -o in",
+                            "check other --queries in -o in",
+                            "check in --details in",
+                            "compile in -o in",
+                            "import capture --queries in -o capture",
+                            "join a=capture -o capture",
+                            "export in -o .",
+                            "inspect in --svg in",
+                            "inspect in --ambiguity-svg in",
+                            "localize other --list in -o in",
+                            "plan locate in other --svg in",
+                            "plan path in --from 0,0 --to 1,1 --svg in",
+                            "plan tell-apart in --a 0,0,0 --b 1,1,0 --svg in",
+                            "drive other --building in --start 0,0,0 --goal a -o in",
+                            "sign in --key other -o in",
+                            "sign other --key in -o in",
+                            "migrate in -o in",
+                            "update delta in other -o in",
+                            "update apply other in -o in",
+                            "update apply in other -o in",
+                            "pareto in -o in",
+                            "report in -o in"}) {
     const ProgramRun run = RunShell("cd " + folder_->string() + " && cairn " + words);
     EXPECT_EQ(run.exit_code, 2) << words;
     EXPECT_THAT(run.err, HasSubstr(" cannot be the ")) << words;
     EXPECT_EQ(ReadFile(Path("in")).value(), "kept") << words;
   }
-  const std::string extract = "cairn extract-features " + Path("capture") + " -o " + Path("f.db");
+  const std::string extract = "cairn stage extract-features " + Path("capture") + " -o " + Path("f.db");
   ASSERT_EQ(RunShell(extract).exit_code, 0);
   const ProgramRun again = RunShell(extract + " --reuse " + Path("f.db"));
   EXPECT_EQ(again.exit_code, 0) << again.err;
@@ -245,7 +245,7 @@ TEST_F(BadInput, SpaceInAPathIsRefusedWithASentence) {
   const ProgramRun run =
       RunShell("cairn compile " + Path("bad.toml") + " -o '" + Path("my maps/a.cairn") + "'");
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.err, HasSubstr("has a space in its path, which Make cannot carry"));
+  EXPECT_THAT(run.err, HasSubstr("has a space in its path, which Make cannot handle"));
 }
 
 TEST_F(BadInput, FolderThatAnotherCompileHoldsIsBusy) {

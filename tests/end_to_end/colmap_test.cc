@@ -50,19 +50,19 @@ TEST_F(Colmap, TheirFeaturesAndMatchesBecomeAMapThatLocalizes) {
   Succeed(RunColmap("exhaustive_matcher --database_path " + Path("theirs.db") +
                     " --SiftMatching.use_gpu 0 --SiftMatching.num_threads 2"));
   const std::string bytes = *ReadFile(Path("theirs.db"));
-  Succeed(RunShell("cairn match-features " + Path("theirs.db") + " --capture " + Path("capture") + " -o " +
-                   Path("our_matches.db")));
+  Succeed(RunShell("cairn stage match-features " + Path("theirs.db") + " --capture " + Path("capture") +
+                   " -o " + Path("our_matches.db")));
   EXPECT_GT(Count("our_matches.db", "SELECT count(*) FROM two_view_geometries"), 40);
 
-  Succeed(
-      RunShell("cd " + Path("") +
-               " && cairn group-classes theirs.db --capture capture -o classes.db"
-               " && cairn filter-visibility classes.db --survey driven --cell-size-m 0.7 --heading-bin-deg 90"
-               " --min-num-stations-driven 2 -o world.db"
-               " && cairn decompose-regions world.db --k 4 --tau 0 -o regions.db"
-               " && cairn build-vocabulary theirs.db -o vocabulary.db"
-               " && cairn emit-map --classes classes.db --world world.db --regions regions.db"
-               " --vocabulary vocabulary.db --name theirs --landmarks all -o theirs.cairn"));
+  Succeed(RunShell(
+      "cd " + Path("") +
+      " && cairn stage group-classes theirs.db --capture capture -o classes.db"
+      " && cairn stage filter-visibility classes.db --survey driven --cell-size-m 0.7 --heading-bin-deg 90"
+      " --min-num-stations-driven 2 -o world.db"
+      " && cairn stage decompose-regions world.db --k 4 --tau 0 -o regions.db"
+      " && cairn stage build-vocabulary theirs.db -o vocabulary.db"
+      " && cairn stage emit-map --classes classes.db --world world.db --regions regions.db"
+      " --vocabulary vocabulary.db --name theirs --landmarks all -o theirs.cairn"));
   EXPECT_EQ(*ReadFile(Path("theirs.db")), bytes);
   EXPECT_FALSE(fs::exists(Path("theirs.db-wal")));
   const auto survey = ReadCapture(Path("capture"));
@@ -91,7 +91,7 @@ TEST_F(Colmap, TheirFeaturesAndMatchesBecomeAMapThatLocalizes) {
 
 TEST_F(Colmap, TheirMatcherTakesOurFeatures) {
   CopyCapture(Path("survey"), Path("few"), 16);
-  Succeed(RunShell("cairn extract-features " + Path("few") + " --max-num-features 400 -o " +
+  Succeed(RunShell("cairn stage extract-features " + Path("few") + " --max-num-features 400 -o " +
                    Path("features.db")));
   fs::copy_file(Path("features.db"), Path("matched_by_colmap.db"));
   Succeed(RunColmap("exhaustive_matcher --database_path " + Path("matched_by_colmap.db") +
@@ -100,15 +100,15 @@ TEST_F(Colmap, TheirMatcherTakesOurFeatures) {
 }
 
 TEST_F(Colmap, DamagedDatabasesEndWithAnErrorOrAValidResult) {
-  Succeed(RunShell("cairn extract-features " + Path("capture") + " --max-num-features 200 -o " +
-                   Path("whole.db") + " && cairn match-features " + Path("whole.db") +
+  Succeed(RunShell("cairn stage extract-features " + Path("capture") + " --max-num-features 200 -o " +
+                   Path("whole.db") + " && cairn stage match-features " + Path("whole.db") +
                    " --pairs exhaustive -o " + Path("whole_matches.db")));
   const std::string bytes = *ReadFile(Path("whole_matches.db"));
   const auto run_stages = [&](const std::string& damaged, bool must_fail) {
     std::ofstream(Path("damaged.db"), std::ios::binary) << damaged;
     for (const std::string& command :
-         {"match-features " + Path("damaged.db"),
-          "group-classes " + Path("damaged.db") + " --capture " + Path("capture")}) {
+         {"stage match-features " + Path("damaged.db"),
+          "stage group-classes " + Path("damaged.db") + " --capture " + Path("capture")}) {
       const ProgramRun run = RunShell("cairn " + command + " -o " + Path("damaged_out.db"));
       EXPECT_TRUE(run.exit_code >= (must_fail ? 1 : 0) && run.exit_code <= 9) << command << run.err;
       if (run.exit_code != 0) {

@@ -206,7 +206,7 @@ int64_t NumDropped(const std::vector<DroppedItem>& items, DropKind kind) {
                        [&](const DroppedItem& item) { return DescribeDropReason(item.reason).kind == kind; });
 }
 
-// What a stage reports that it took in ("in") or made ("out").
+// The counts that a stage reports for its input ("in") or its output ("out").
 int64_t NumReported(const std::string& output, const std::string& side, const std::string& what) {
   return nlohmann::json::parse(ReadFile(output + ".report.json").value())[side].at(what).get<int64_t>();
 }
@@ -306,7 +306,7 @@ TEST_F(Compile, RejectedImagesAreCountedInTheMap) {
   SQLite::Database(Path("rejects.db"), SQLite::OPEN_READWRITE)
       .exec("INSERT INTO cairn_rejects VALUES ('broken.png', 'truncated'), ('none.png', 'no such file')");
   const ProgramRun emit =
-      RunShell("cairn emit-map --matches " + Path("rejects.db") + " --classes " + build +
+      RunShell("cairn stage emit-map --matches " + Path("rejects.db") + " --classes " + build +
                "classes.db --world " + build + "world.db --regions " + build + "regions.db --vocabulary " +
                build + "vocabulary.db --name rejects -o " + Path("rejects.cairn"));
   ASSERT_EQ(emit.exit_code, 0) << emit.err;
@@ -320,17 +320,17 @@ TEST_F(Compile, RejectedImagesAreCountedInTheMap) {
 TEST_F(Compile, SparseMapIsComparedWithAllImagesAndLeadsFromOneToAnother) {
   const std::string build = Path("tiny.build/");
   const ProgramRun emit =
-      RunShell("cairn emit-map --classes " + build + "classes.db --world " + build + "world.db --regions " +
-               build + "regions.db --vocabulary " + build + "vocabulary.db --appearance " + build +
-               "appearance.db --options " + build +
+      RunShell("cairn stage emit-map --classes " + build + "classes.db --world " + build +
+               "world.db --regions " + build + "regions.db --vocabulary " + build +
+               "vocabulary.db --appearance " + build + "appearance.db --options " + build +
                "options/emit_map.toml --documents kept --name sparse -o " + Path("sparse.cairn"));
   ASSERT_EQ(emit.exit_code, 0) << emit.err;
-  const ProgramRun check = RunShell("cairn check-map " + Path("sparse.cairn") + " --queries " + build +
-                                    "capture/queries.txt --json");
+  const ProgramRun check =
+      RunShell("cairn check " + Path("sparse.cairn") + " --queries " + build + "capture/queries.txt --json");
   ASSERT_EQ(check.exit_code, 0) << check.err;
   const auto figures = nlohmann::json::parse(check.out);
   const auto full = nlohmann::json::parse(
-      RunShell("cairn check-map " + Path("tiny.cairn") + " --queries " + build + "capture/queries.txt --json")
+      RunShell("cairn check " + Path("tiny.cairn") + " --queries " + build + "capture/queries.txt --json")
           .out);
   EXPECT_EQ(figures["all_images_num_localized"], full["num_localized"]);
   EXPECT_LE(figures["num_by_retrieval"], figures["num_localized"]);
@@ -354,7 +354,7 @@ TEST_F(Compile, SparseMapIsComparedWithAllImagesAndLeadsFromOneToAnother) {
   EXPECT_EQ(nowhere.exit_code, 3);
   EXPECT_THAT(nowhere.err, HasSubstr("has no survey image 'nobody.jpg'"));
 
-  const ProgramRun left_out = RunShell("cairn check-appearance " + build + "matches.db --num-tries 20");
+  const ProgramRun left_out = RunShell("cairn stage check-appearance " + build + "matches.db --num-tries 20");
   ASSERT_EQ(left_out.exit_code, 0) << left_out.err;
   EXPECT_THAT(left_out.out, HasSubstr("left-out images"));
 }
@@ -375,13 +375,14 @@ TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
 
   // A map of all features, in which every image is kept: ways over them by each weight.
   const auto emit = [&](const std::string& arguments) {
-    return RunShell(
-        "cd " + Path("tiny.build") + " && cairn emit-map --classes classes.db --world world.db --regions " +
-        "regions.db --vocabulary vocabulary.db --name tiny -o ../memory.cairn --progress none " + arguments);
+    return RunShell("cd " + Path("tiny.build") +
+                    " && cairn stage emit-map --classes classes.db --world world.db --regions " +
+                    "regions.db --vocabulary vocabulary.db --name tiny -o ../memory.cairn --progress none " +
+                    arguments);
   };
   const ProgramRun link =
       RunShell("cd " + Path("tiny.build") +
-               " && cairn link-appearance matches.db vocabulary.db --capture capture --algorithm "
+               " && cairn stage link-appearance matches.db vocabulary.db --capture capture --algorithm "
                "all -o ../all.db --progress none");
   ASSERT_EQ(link.exit_code, 0) << link.err;
   ASSERT_EQ(emit("--appearance ../all.db --words survey").exit_code, 0);
@@ -399,9 +400,9 @@ TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
   EXPECT_EQ(emit("--appearance ../all.db --words survey --documents kept").exit_code, 2);
 
   // Without the vocabulary nothing is known, and that is said.
-  ASSERT_EQ(
-      RunShell("cd " + Path("tiny.build") + " && cairn link-appearance matches.db -o ../all.db").exit_code,
-      0);
+  ASSERT_EQ(RunShell("cd " + Path("tiny.build") + " && cairn stage link-appearance matches.db -o ../all.db")
+                .exit_code,
+            0);
   ASSERT_EQ(emit("--appearance ../all.db").exit_code, 0);
   const ProgramRun none =
       RunShell("cairn inspect " + Path("memory.cairn") + " --ambiguity-svg " + Path("none.svg"));
@@ -412,7 +413,7 @@ TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
 
 TEST_F(Compile, GateOfRegionsKeepsAMapFromBeingWritten) {
   // Nothing is localized to better than a nanometre: every fix is a gross error.
-  const std::string check = "cairn check-map " + Path("tiny.build/unsealed.cairn") + " --queries " +
+  const std::string check = "cairn check " + Path("tiny.build/unsealed.cairn") + " --queries " +
                             Path("tiny.build/capture/queries.txt") + " --gross-error-m 1e-6 -o " +
                             Path("gated.cairn") + " --min-region-held-out 1 --min-region-precision-ratio ";
   const ProgramRun gated = RunShell(check + "0.01");
@@ -420,52 +421,10 @@ TEST_F(Compile, GateOfRegionsKeepsAMapFromBeingWritten) {
   EXPECT_THAT(gated.err, HasSubstr("precision_ratio of region"));
   EXPECT_FALSE(fs::exists(Path("gated.cairn")));
   EXPECT_EQ(RunShell(check + "0").exit_code, 0);
-  const ProgramRun unasked = RunShell("cairn check-map " + Path("tiny.build/unsealed.cairn") +
+  const ProgramRun unasked = RunShell("cairn check " + Path("tiny.build/unsealed.cairn") +
                                       " --min-localized-ratio 0.5 -o " + Path("unasked.cairn"));
   EXPECT_EQ(unasked.exit_code, 8);
   EXPECT_THAT(unasked.err, HasSubstr("no held-out images"));
-}
-
-TEST(CompileFolder, WritesTheRecipeThatItUsesAndNeverOverAnother) {
-  TemporaryFolder folder("compile_folder_test");
-  ASSERT_NO_FATAL_FAILURE(RenderTinySurvey(folder / "survey"));
-  fs::create_directories(folder / "maps");
-  const auto compile = [&](const std::string& arguments) {
-    return RunShell("cd " + folder.string() + "/maps && cairn compile " + arguments +
-                    " --until extract_features --progress none");
-  };
-  const ProgramRun first = compile("../survey");
-  ASSERT_EQ(first.exit_code, 0) << first.err;
-  EXPECT_THAT(first.out,
-              HasSubstr("survey.toml: the recipe of ../survey, with defaults; to change something, "
-                        "edit it and compile it\n"));
-  EXPECT_TRUE(fs::exists(folder / "maps/survey.build/features.db"));
-  const ProgramRun again = compile("../survey");
-  EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_THAT(again.out, testing::AllOf(HasSubstr("up to date"), testing::Not(HasSubstr("the recipe of"))));
-  // The recipe alone says the same.
-  EXPECT_THAT(compile("survey.toml").out, HasSubstr("up to date"));
-  std::ofstream(folder / "maps/survey.toml", std::ios::app) << "[extract_features]\nmax_num_features = 300\n";
-  const ProgramRun edited = compile("../survey");
-  EXPECT_EQ(edited.exit_code, 2);
-  EXPECT_THAT(edited.err,
-              HasSubstr("compile it (cairn compile survey.toml -o survey.cairn), or give another -o"));
-  EXPECT_EQ(compile("survey.toml").exit_code, 0);
-}
-
-// What no stage reads is told, not refused: one recipe may serve several captures.
-TEST(CompileFolder, KeysThatNothingReadsAreTold) {
-  TemporaryFolder folder("unread_keys_test");
-  WriteTinyRecipe(folder / "tiny.toml",
-                  "[match_features]\npairs = \"exhaustive\"\nnum_retrieved = 3\n"
-                  "[reconstruct]\nhold_out_every = 5\n");
-  const ProgramRun run =
-      RunShell("cairn configure " + (folder / "tiny.toml") + " -o " + (folder / "tiny.cairn"));
-  EXPECT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.err,
-              HasSubstr("[match_features] num_retrieved is only read where pairs is auto or retrieval"));
-  EXPECT_THAT(run.err,
-              HasSubstr("[reconstruct] hold_out_every is not read: the capture has poses of its own"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What a killed compile and a full disk leave behind, and that the next run finishes to the same bytes.
+// The files that a killed compile and a full disk leave, and that the next run finishes to the same bytes.
 
 #include <sys/mount.h>
 #include <unistd.h>
@@ -43,7 +43,7 @@ const std::vector<Stage>& Line() {
       {"build-vocabulary", "vocabulary.db", "vocabulary.db"},
       {"link-appearance", "appearance.db", "appearance.db"},
       {"emit-map", "unsealed.cairn", "unsealed.cairn"},
-      {"check-map", "../small.cairn", "map"},
+      {"check", "../small.cairn", "map"},
   };
   return line;
 }
@@ -104,8 +104,8 @@ class Workplace {
     fs::remove_all(Build(stage.output));
   }
 
-  // Every file is the whole one of the clean build or that of `old`; temporaries may lie about where they are
-  // `allowed`.
+  // Every file is the whole one of the clean build or that of `old`; temporaries may lie about where they
+  // are `allowed`.
   void ExpectOnlyWholeFiles(const Contents& old, bool temporaries_allowed) const {
     for (const auto& [name, hash] : ContentsOf(folder_)) {
       if (name.find(".tmp-") != std::string::npos) {
@@ -160,7 +160,7 @@ TEST(Kill, AnywhereThenCompileGivesTheSameBytesAndNoTemporaryIsLeft) {
   std::map<std::string, int> num_moments, num_killed;
   std::map<std::string, double> seconds;
   for (const auto& stage : workplace.Report()["stages"]) {
-    std::string command = stage["stage"];
+    std::string command = stage["stage"] == "check_map" ? "check" : stage["stage"].get<std::string>();
     std::replace(command.begin(), command.end(), '_', '-');
     seconds[command] = stage["seconds"];
   }
@@ -201,7 +201,7 @@ TEST(Kill, AnywhereThenCompileGivesTheSameBytesAndNoTemporaryIsLeft) {
   EXPECT_GE(2 * total, NumKills());
 }
 
-// A file system of its own, as large as told.
+// A separate file system of a given size.
 class SmallDisk {
  public:
   explicit SmallDisk(const std::string& path) : path_(path) {
@@ -214,7 +214,7 @@ class SmallDisk {
   SmallDisk(const SmallDisk&) = delete;
   SmallDisk& operator=(const SmallDisk&) = delete;
   bool is_mounted() const { return is_mounted_; }
-  // Leaves room for so many bytes more.
+  // Leaves room for this many more bytes.
   bool LeaveRoom(uint64_t num_bytes) const {
     const fs::space_info space = fs::space(path_);
     const std::string size = fmt::format("size={}", space.capacity - space.free + num_bytes);
@@ -244,7 +244,7 @@ TEST(FullDisk, EveryStageSaysSoLeavesNothingBehindAndFinishesOnceThereIsRoom) {
   for (const Stage& stage : Line()) {
     const uint64_t size = NumBytes(workplace.Build(stage.output));
     workplace.Forget(stage);
-    // Two blocks at least: one is for the message of whoever fails.
+    // Two blocks at least: one is for the message of the failing stage.
     ASSERT_TRUE(disk.LeaveRoom(4096 * (2 + random() % (size / 4096 - 2))));
     SCOPED_TRACE(stage.command);
     const ProgramRun full = workplace.Compile("", "--no-space-check");
@@ -321,7 +321,7 @@ TEST(Clean, RemovesWhatCairnMadeAndNothingElse) {
                            "small.build/capture/images/holiday.jpg"}) {
     EXPECT_TRUE(left.contains(name)) << name;
   }
-  // What is no build folder is not touched.
+  // A folder that is not a build folder is not touched.
   EXPECT_EQ(RunShell("cairn clean " + (folder / "small.build")).exit_code, 2);
   fs::remove_all(folder / "small.build");
   // Without such files, nothing is left.
@@ -340,14 +340,15 @@ std::vector<std::string> StageCommands(const Workplace& workplace, const std::st
                        workplace.Build("options/" + stage + ".toml"), out);
   };
   const std::string capture = workplace.Build("capture");
-  return {
-      command("extract-features " + capture, "extract_features"),
-      command("match-features " + workplace.Build("features.db") + " --capture " + capture, "match_features"),
-      command("group-classes " + workplace.Build("matches.db") + " --capture " + capture, "group_classes"),
-      command("filter-visibility " + workplace.Build("classes.db"), "filter_visibility"),
-      command("decompose-regions " + workplace.Build("world.db"), "decompose_regions"),
-      command("build-vocabulary " + workplace.Build("features.db"), "build_vocabulary"),
-      command("link-appearance " + workplace.Build("matches.db"), "link_appearance")};
+  return {command("stage extract-features " + capture, "extract_features"),
+          command("stage match-features " + workplace.Build("features.db") + " --capture " + capture,
+                  "match_features"),
+          command("stage group-classes " + workplace.Build("matches.db") + " --capture " + capture,
+                  "group_classes"),
+          command("stage filter-visibility " + workplace.Build("classes.db"), "filter_visibility"),
+          command("stage decompose-regions " + workplace.Build("world.db"), "decompose_regions"),
+          command("stage build-vocabulary " + workplace.Build("features.db"), "build_vocabulary"),
+          command("stage link-appearance " + workplace.Build("matches.db"), "link_appearance")};
 }
 
 TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
@@ -359,7 +360,7 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
   const Workplace workplace(folder / "work");
   for (const std::string& command : StageCommands(workplace, folder / "out")) {
     SCOPED_TRACE(command);
-    // What a process may write to, stacks of threads included, is held to what it was told.
+    // The writable memory of a process, stacks of threads included, stays within the given limit.
     const ProgramRun honest = RunShell("ulimit -d $((256 * 1024)); " + command + " --memory 256");
     EXPECT_EQ(honest.exit_code, 0) << honest.err;
     EXPECT_TRUE(fs::exists(folder / "out"));
@@ -367,7 +368,7 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
     const ProgramRun refused = RunShell(command + " --memory 60");
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_THAT(refused.err, ContainsRegex("takes about [0-9]+ MiB of memory, but --memory allows 60"));
-    // Less than it was told: whatever gives out first, an error that names --memory and no crash.
+    // With less than the given limit, any failed allocation gives an error that names --memory, and no crash.
     for (const int limit_mib : {32, 48, 64}) {
       const ProgramRun cut_short =
           RunShell(fmt::format("ulimit -d $(({} * 1024)); {} --memory 4000", limit_mib, command));

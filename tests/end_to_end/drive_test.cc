@@ -39,7 +39,7 @@ class Drive : public testing::Test {
 TemporaryFolder* Drive::folder_ = nullptr;
 
 TEST_F(Drive, ALostRobotReachesItsGoalAndRecordsTheWay) {
-  const std::string arguments = "--start 0.9,0.95,340 --goal d0040.jpg --picture " + Path("run.svg") + " -o ";
+  const std::string arguments = "--start 0.9,0.95,340 --goal d0040.jpg --svg " + Path("run.svg") + " -o ";
   const ProgramRun run = Run(arguments + Path("run.json"));
   ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
   EXPECT_THAT(run.out, HasSubstr("arrived: "));

@@ -1,4 +1,4 @@
-// What commands that write maps leave behind when any one of their calls of the system fails.
+// The files that commands which write maps leave when any one of their system calls fails.
 
 #include <sys/stat.h>
 
@@ -53,7 +53,7 @@ class Faults : public testing::Test {
     for (const std::string epoch : {"1", "2", "3"})
       Run("cairn sign " + folder_ / "unsigned" + " --key " + folder_ / "key" + " --epoch " + epoch + " -o " +
           folder_ / epoch);
-    Run("cairn delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
+    Run("cairn update delta " + folder_ / "2" + " " + folder_ / "3" + " --key " + folder_ / "key" + " -o " +
         folder_ / "delta");
   }
 
@@ -65,8 +65,8 @@ class Faults : public testing::Test {
   std::string Bytes(const std::string& name) const { return ReadFile(folder_ / name).value(); }
 
   // Runs a command on a fresh folder with `before` in it, and lets one call after the other fail, for all
-  // kinds, until there is none left.  `check`: the run and what is in the folder then, less what is
-  // temporary.
+  // kinds, until there is none left.  `check`: the run and what is in the folder then, less what
+  // is temporary.
   void ForEachFault(const std::string& command, const Contents& before,
                     const std::function<void(const ProgramRun&, const Contents&)>& check) {
     int num_sites = 0, num_runs = 0;
@@ -79,9 +79,7 @@ class Faults : public testing::Test {
           for (const auto& [name, bytes] : before) WriteFile(work_ + "/" + name, bytes);
           const std::string log = folder_ / "log";
           fs::remove(log);
-          const ProgramRun run = RunShell(fmt::format(
-              "LD_PRELOAD='{}' FAULT_KIND={} FAULT_ERROR={} FAULT_AT={} FAULT_FOLDER='{}' FAULT_LOG='{}' {}",
-              CAIRN_FAULT_LIBRARY, kind.name, error, at, Scope(), log, command));
+          const ProgramRun run = RunWithFault(kind.name, error, at, log, command);
           if (!fs::exists(log)) {
             EXPECT_EQ(run.exit_code, 0) << run.err;
             if (&error == &kind.errors.front()) num_sites += at - 1;
@@ -106,6 +104,14 @@ class Faults : public testing::Test {
     EXPECT_GT(num_sites, 10);
   }
 
+  // Lets one call of a kind fail; `log` is made if there was one.
+  ProgramRun RunWithFault(const std::string& kind, int error, int at, const std::string& log,
+                          const std::string& command) const {
+    return RunShell(fmt::format(
+        "LD_PRELOAD='{}' FAULT_KIND={} FAULT_ERROR={} FAULT_AT={} FAULT_FOLDER='{}' FAULT_LOG='{}' {}",
+        CAIRN_FAULT_LIBRARY, kind, error, at, Scope(), log, command));
+  }
+
   // Calls that may fail: those on the test's own files; all of the program's, where somebody asks for it.
   std::string Scope() const {
     return std::getenv("CAIRN_FAULTS_EVERYWHERE") != nullptr ? "" : folder_.string();
@@ -124,7 +130,7 @@ class Faults : public testing::Test {
 
 TEST_F(Faults, UpdateInPlaceLeavesTheOldOrTheNewMapAndTheRightOneBefore) {
   const std::string older = Bytes("1"), old_map = Bytes("2"), new_map = Bytes("3");
-  const std::string command = "cairn apply " + work_ + "/map " + folder_ / "delta" +
+  const std::string command = "cairn update apply " + work_ + "/map " + folder_ / "delta" +
                               " --in-place --public-key " + folder_ / "key.pub";
   ForEachFault(command, {{"map", old_map}, {"map.previous", older}},
                [&](const ProgramRun& run, const Contents& after) {
@@ -141,7 +147,7 @@ TEST_F(Faults, UpdateInPlaceLeavesTheOldOrTheNewMapAndTheRightOneBefore) {
 }
 
 TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
-  const std::string command = "cairn apply " + work_ + "/map " + folder_ / "delta" + " --in-place";
+  const std::string command = "cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place";
   ForEachFault(command, {{"map", Bytes("2")}}, [&](const ProgramRun& run, const Contents& after) {
     const bool is_new = after.at("map") == Bytes("3");
     EXPECT_TRUE(is_new || (after.at("map") == Bytes("2") && run.exit_code != 0));
@@ -156,26 +162,26 @@ TEST_F(Faults, FirstUpdateInPlaceLeavesNoMapBeforeWhereItFails) {
 TEST_F(Faults, UpdateWithoutHardLinksKeepsTheMapBeforeToo) {
   WriteFile(work_ + "/map", Bytes("2"));
   chmod((work_ + "/map").c_str(), 0640);
-  const ProgramRun run = RunShell(fmt::format(
-      "LD_PRELOAD='{}' FAULT_KIND=link FAULT_ERROR={} FAULT_AT=1 FAULT_FOLDER='{}' FAULT_LOG='{}' "
-      "cairn apply {}/map {} --in-place",
-      CAIRN_FAULT_LIBRARY, EPERM, Scope(), folder_ / "log", work_, folder_ / "delta"));
+  const ProgramRun run =
+      RunWithFault("link", EPERM, 1, folder_ / "log",
+                   "cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(fs::exists(folder_ / "log"));  // a link was tried
   EXPECT_EQ(ContentsOf(work_), (Contents{{"map", Bytes("3")}, {"map.previous", Bytes("2")}}));
   EXPECT_EQ(fs::status(work_ + "/map.previous").permissions(), fs::perms{0640});
 }
 
-// What stands there has the size of what is to be written: for maps and keys of one place it mostly does.
+// The old file has the size of the new one, as maps and keys of one place mostly have.
 TEST_F(Faults, OutputIsTheOldOneOrTheWholeNewOne) {
   const std::string one = folder_ / "unsigned", key = " --key " + folder_ / "key";
   struct Case {
     std::string command, expected;
   };
-  for (const Case& each : {Case{"cairn apply " + folder_ / "2" + " " + folder_ / "delta", "3"},
-                           Case{"cairn sign " + one + key + " --epoch 3", "3"},
-                           Case{"cairn sign " + one + key + " --after " + folder_ / "2", "3"},
-                           Case{"cairn delta " + folder_ / "2" + " " + folder_ / "3" + key, "delta"}}) {
+  for (const Case& each :
+       {Case{"cairn update apply " + folder_ / "2" + " " + folder_ / "delta", "3"},
+        Case{"cairn sign " + one + key + " --epoch 3", "3"},
+        Case{"cairn sign " + one + key + " --after " + folder_ / "2", "3"},
+        Case{"cairn update delta " + folder_ / "2" + " " + folder_ / "3" + key, "delta"}}) {
     const std::string expected = Bytes(each.expected), old_bytes(expected.size(), 'x');
     ForEachFault(each.command + " -o " + work_ + "/out", {{"out", old_bytes}},
                  [&](const ProgramRun& run, const Contents& after) {
@@ -189,7 +195,7 @@ TEST_F(Faults, OutputIsTheOldOneOrTheWholeNewOne) {
 }
 
 TEST_F(Faults, RollbackExchangesBothMapsOrNone) {
-  const std::string command = "cairn rollback " + work_ + "/map --public-key " + folder_ / "key.pub";
+  const std::string command = "cairn update rollback " + work_ + "/map --public-key " + folder_ / "key.pub";
   ForEachFault(command, {{"map", Bytes("2")}, {"map.previous", Bytes("1")}},
                [&](const ProgramRun& run, const Contents& after) {
                  const bool is_back = after.at("map") == Bytes("1");
@@ -217,10 +223,10 @@ TEST_F(Faults, KeysAreAPairOrNotThere) {
 TEST_F(Faults, FullStandardOutputIsSaidWithWhatIsDone) {
   fs::copy_file(folder_ / "2", work_ + "/map");
   const ProgramRun run =
-      RunShell("cairn apply " + work_ + "/map " + folder_ / "delta" + " --in-place >/dev/full");
+      RunShell("cairn update apply " + work_ + "/map " + folder_ / "delta" + " --in-place >/dev/full");
   EXPECT_EQ(run.exit_code, static_cast<int>(ErrorCode::kIo));
   EXPECT_THAT(run.err, HasSubstr("standard output cannot be written"));
-  EXPECT_THAT(run.err, HasSubstr("files that were asked for are written"));
+  EXPECT_THAT(run.err, HasSubstr("its files are written"));
   EXPECT_EQ(ReadFile(work_ + "/map").value(), Bytes("3"));
 }
 

@@ -33,7 +33,7 @@ class FloorPlan : public testing::Test {
 };
 
 TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
-  const ProgramRun made = Run("decompose-views plan.txt -o views.db --svg views.svg");
+  const ProgramRun made = Run("plan decompose plan.txt -o views.db --svg views.svg");
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_THAT(made.out, HasSubstr("regions"));
   EXPECT_THAT(*ReadFile(Path("views.svg")), HasSubstr("</svg>"));
@@ -41,7 +41,7 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   // From (1, 1), heading +x: the left room's three outer walls and the lower part of the inner one.
   ASSERT_TRUE(
       WriteFileAtomically(Path("scan.txt"), "-1,-1,2.5,-1\n2.5,-1,2.5,0.5\n2.5,3,-1,3\n-1,3,-1,-1\n").ok());
-  const ProgramRun located = Run("locate-scan views.db scan.txt --svg scan.svg");
+  const ProgramRun located = Run("plan locate views.db scan.txt --svg scan.svg");
   ASSERT_EQ(located.exit_code, 0) << located.err;
   const json found = json::parse(located.out);
   ASSERT_FALSE(found["solutions"].empty());
@@ -50,12 +50,12 @@ TEST_F(FloorPlan, AScanIsLocatedInItAndPathsAreFound) {
   EXPECT_NEAR(found["solutions"][0]["heading_deg"].get<double>(), 0, 0.5);
   EXPECT_TRUE(fs::exists(Path("scan.svg")));
 
-  const ProgramRun path = Run("plan-path views.db --from 1,1 --to 5,1");
+  const ProgramRun path = Run("plan path views.db --from 1,1 --to 5,1");
   ASSERT_EQ(path.exit_code, 0) << path.err;
   EXPECT_GT(json::parse(path.out)["length_m"].get<double>(), 4);
-  const ProgramRun search = Run("plan-path views.db --from 1,1 --kind search");
+  const ProgramRun search = Run("plan path views.db --from 1,1 --kind search");
   ASSERT_EQ(search.exit_code, 0) << search.err;
-  const ProgramRun apart = Run("tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
+  const ProgramRun apart = Run("plan tell-apart views.db --a 1,2,0 --b 5,2,180 --svg apart.svg");
   ASSERT_EQ(apart.exit_code, 0) << apart.err;
   EXPECT_GT(json::parse(apart.out)["case"].get<int>(), 0);
   EXPECT_EQ(json::parse(apart.out)["outcome"], "found");
@@ -66,8 +66,8 @@ TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
                                   "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n"
                                   "10,0,13,0\n13,0,13,3\n13,3,10,3\n10,3,10,0\n10,2,12,2\n")
                   .ok());
-  ASSERT_EQ(Run("decompose-views twins.txt -o twins.db").exit_code, 0);
-  const std::string poses = "tell-apart twins.db --a 1,1,0 --b 11,1,0 ";
+  ASSERT_EQ(Run("plan decompose twins.txt -o twins.db").exit_code, 0);
+  const std::string poses = "plan tell-apart twins.db --a 1,1,0 --b 11,1,0 ";
   const ProgramRun alike = Run(poses);
   EXPECT_EQ(alike.exit_code, 0) << alike.err;
   EXPECT_EQ(json::parse(alike.out)["outcome"], "alike");
@@ -79,7 +79,7 @@ TEST_F(FloorPlan, AlikeAndGivenUpAreTwoAnswers) {
 }
 
 TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
-  ASSERT_EQ(Run("decompose-views plan.txt -o views.db").exit_code, 0);
+  ASSERT_EQ(Run("plan decompose plan.txt -o views.db").exit_code, 0);
   const auto write = [&](const char* name, const std::string& text) {
     ASSERT_TRUE(WriteFileAtomically(Path(name), text).ok());
   };
@@ -92,41 +92,41 @@ TEST_F(FloorPlan, BadInputHasItsCodeAndLeavesNothing) {
   write(
       "twins.txt",
       "0,0,3,0\n3,0,3,3\n3,3,0,3\n0,3,0,0\n0,2,2,2\n10,0,13,0\n13,0,13,3\n13,3,10,3\n10,3,10,0\n10,2,12,2\n");
-  ASSERT_EQ(Run("decompose-views twins.txt -o twins.db").exit_code, 0);
+  ASSERT_EQ(Run("plan decompose twins.txt -o twins.db").exit_code, 0);
   struct Case {
     std::string arguments;
     int exit_code;
     std::string message;
   };
   for (const auto& [arguments, exit_code, message] : {
-           Case{"decompose-views line.txt -o out.db", 4, "line 1"},
-           Case{"decompose-views empty.txt -o out.db", 6, "no walls"},
-           Case{"decompose-views open.json -o out.db", 4, "open"},
-           Case{"decompose-views crossing.json -o out.db", 4, "Self-intersection"},
-           Case{"decompose-views none.txt -o out.db", 3, "none.txt"},
-           Case{"decompose-views plan.txt -o out.db --grid-m 1", 2, "grid_m"},
-           Case{"locate-scan views.db one.txt", 6, "at least two"},
-           Case{"locate-scan plan.txt one.txt", 4, "plan.txt"},
-           Case{"locate-scan views.db scan.txt --scan -5", 2, "'-5': it has 1 scan(s), numbered 0 to 0"},
-           Case{"locate-scan views.db scan.txt --scan 1", 2, "1 scan(s)"},
-           Case{"locate-scan views.db scan.txt --scan nan", 2, "1 scan(s)"},
-           Case{"locate-scan views.db scan.txt --scan ''", 2, "1 scan(s)"},
-           Case{"locate-scan views.db scan.txt --scan 0.5", 2, "1 scan(s)"},
-           Case{"locate-scan views.db scan.txt --scan 99999999999", 2, "1 scan(s)"},
-           Case{"locate-scan views.db scan.txt --split-m inf", 2, "split_m"},
-           Case{"locate-scan views.db scan.txt --max-null-ratio nan", 2, "max_null_ratio"},
-           Case{"plan-path views.db --from 1,1", 2, "--to"},
-           Case{"plan-path views.db --from 1,1 --to 3.5,1", 6, "does not fit at (3.5, 1): a wall is 0.000 m"},
-           Case{"plan-path views.db --from 1,1 --to 3.5,1 --radius-m 0", 6, "lies on a wall"},
-           Case{"plan-path views.db --from nan,1 --to 1,1", 2, "no region"},
-           Case{"plan-path views.db --from 1,1 --to 5,1 --radius-m nan", 2, "radius_m"},
-           Case{"plan-path views.db --from 1,1 --to 5,1 --kind search", 2, "leave --to out"},
-           Case{"tell-apart views.db --a 1,2,0 --b 5,2,nan", 2, "--b 5,2,nan: the heading"},
-           Case{"tell-apart views.db --a 1,2,361 --b 5,2,0", 2, "--a 1,2,361: the heading"},
-           Case{"tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},
-           Case{"tell-apart views.db --a 1,2,0 --b 5,2,0 --max-num-regions 0", 2, "max_num_regions"},
-           Case{"tell-apart twins.db --a 1,1,0 --b 11,1,0 --max-num-regions 2", 1, "gave up"},
-           Case{"plan-path views.db --from 1,1 --to 50,1", 2, "no region"},
+           Case{"plan decompose line.txt -o out.db", 4, "line 1"},
+           Case{"plan decompose empty.txt -o out.db", 6, "no walls"},
+           Case{"plan decompose open.json -o out.db", 4, "open"},
+           Case{"plan decompose crossing.json -o out.db", 4, "Self-intersection"},
+           Case{"plan decompose none.txt -o out.db", 3, "none.txt"},
+           Case{"plan decompose plan.txt -o out.db --grid-m 1", 2, "grid_m"},
+           Case{"plan locate views.db one.txt", 6, "at least two"},
+           Case{"plan locate plan.txt one.txt", 4, "plan.txt"},
+           Case{"plan locate views.db scan.txt --scan -5", 2, "'-5': it has 1 scan(s), numbered 0 to 0"},
+           Case{"plan locate views.db scan.txt --scan 1", 2, "1 scan(s)"},
+           Case{"plan locate views.db scan.txt --scan nan", 2, "1 scan(s)"},
+           Case{"plan locate views.db scan.txt --scan ''", 2, "1 scan(s)"},
+           Case{"plan locate views.db scan.txt --scan 0.5", 2, "1 scan(s)"},
+           Case{"plan locate views.db scan.txt --scan 99999999999", 2, "1 scan(s)"},
+           Case{"plan locate views.db scan.txt --split-m inf", 2, "split_m"},
+           Case{"plan locate views.db scan.txt --max-null-ratio nan", 2, "max_null_ratio"},
+           Case{"plan path views.db --from 1,1", 2, "--to"},
+           Case{"plan path views.db --from 1,1 --to 3.5,1", 6, "does not fit at (3.5, 1): a wall is 0.000 m"},
+           Case{"plan path views.db --from 1,1 --to 3.5,1 --radius-m 0", 6, "lies on a wall"},
+           Case{"plan path views.db --from nan,1 --to 1,1", 2, "no region"},
+           Case{"plan path views.db --from 1,1 --to 5,1 --radius-m nan", 2, "radius_m"},
+           Case{"plan path views.db --from 1,1 --to 5,1 --kind search", 2, "leave --to out"},
+           Case{"plan tell-apart views.db --a 1,2,0 --b 5,2,nan", 2, "--b 5,2,nan: the heading"},
+           Case{"plan tell-apart views.db --a 1,2,361 --b 5,2,0", 2, "--a 1,2,361: the heading"},
+           Case{"plan tell-apart views.db --a 1,2,0 --b 5,inf,0", 2, "no region"},
+           Case{"plan tell-apart views.db --a 1,2,0 --b 5,2,0 --max-num-regions 0", 2, "max_num_regions"},
+           Case{"plan tell-apart twins.db --a 1,1,0 --b 11,1,0 --max-num-regions 2", 1, "gave up"},
+           Case{"plan path views.db --from 1,1 --to 50,1", 2, "no region"},
        }) {
     const ProgramRun run = Run(arguments);
     EXPECT_EQ(run.exit_code, exit_code) << arguments << "\n" << run.err;
@@ -168,14 +168,14 @@ TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
   EXPECT_EQ(inspected["self_test"]["plan_fits"], 1);
   EXPECT_EQ(inspected["self_test"]["plan_images_free_ratio"], 1);
   EXPECT_THAT(inspected["stage_options"]["decompose_views"].get<std::string>(), HasSubstr("snap_m"));
-  EXPECT_THAT(Run("check-map tiny.cairn").out, HasSubstr("floor plan             fits"));
+  EXPECT_THAT(Run("check tiny.cairn").out, HasSubstr("floor plan             fits"));
 
   // A map and views.db say the same of a scan: the walls of a corner.
   ASSERT_TRUE(WriteFileAtomically(Path("scan.txt"), "1,-0.2,1,0.4\n0.6,1,-0.2,1\n").ok());
-  const ProgramRun in_map = Run("locate-scan tiny.cairn scan.txt");
+  const ProgramRun in_map = Run("plan locate tiny.cairn scan.txt");
   ASSERT_EQ(in_map.exit_code, 0) << in_map.err;
   EXPECT_FALSE(json::parse(in_map.out)["solutions"].empty());
-  EXPECT_EQ(in_map.out, Run("locate-scan tiny.build/views.db scan.txt").out);
+  EXPECT_EQ(in_map.out, Run("plan locate tiny.build/views.db scan.txt").out);
 
   // A plan that is off is noticed, and only what depends on it is done again.
   const std::string plan = *ReadFile(Path("tiny.build/capture/floor_plan.geojson"));
@@ -198,7 +198,7 @@ TEST_F(FloorPlan, AMapHasItAndIsCheckedAgainstIt) {
   ReplaceInFile(Path("tiny.toml"), "floor_plan = \"moved.geojson\"\n", "");
   ASSERT_EQ(Run("compile tiny.toml -o tiny.cairn").exit_code, 0);
   EXPECT_EQ(json::parse(Run("inspect tiny.cairn --json").out)["num_view_regions"], 0);
-  EXPECT_EQ(Run("locate-scan tiny.cairn scan.txt").exit_code, static_cast<int>(ErrorCode::kNotFound));
+  EXPECT_EQ(Run("plan locate tiny.cairn scan.txt").exit_code, static_cast<int>(ErrorCode::kNotFound));
   const ProgramRun until = Run("compile tiny.toml -o tiny.cairn --until decompose_views");
   EXPECT_EQ(until.exit_code, 2);
   EXPECT_THAT(until.err, HasSubstr("floor_plan = "));

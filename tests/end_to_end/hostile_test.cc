@@ -50,16 +50,16 @@ TEST_F(Hostile, NamesOfRecipesMapsFoldersAndCapturesRunNothing) {
     SCOPED_TRACE(name);
     fs::copy_file(folder_ / "tiny.toml", folder_ / (name + ".toml"));
     // A recipe's own name is in no Makefile: any will do.
-    const ProgramRun configured = Run("cairn configure '" + name + ".toml' -o a.cairn");
+    const ProgramRun configured = Run("cairn stage configure '" + name + ".toml' -o a.cairn");
     EXPECT_EQ(configured.exit_code, 0) << configured.err;
     Run("make -f " CAIRN_MAP_RULES " -n BUILD=a.build CAIRN=cairn");
-    // What is in one is refused, before anything is written.
-    for (const char* command : {"compile", "configure", "pareto"}) {
+    // Such characters in an output's name are refused, before anything is written.
+    for (const char* command : {"compile", "stage configure", "pareto"}) {
       for (const std::string& arguments :
            {"-o '" + name + ".cairn'", "-o b.cairn --build-dir '" + name + "'"}) {
         const ProgramRun run = Run(std::string("cairn ") + command + " tiny.toml " + arguments);
         EXPECT_EQ(run.exit_code, 2) << run.err;
-        EXPECT_THAT(run.err, HasSubstr("which Make cannot carry"));
+        EXPECT_THAT(run.err, HasSubstr("which Make cannot handle"));
       }
     }
     fs::rename(folder_ / "survey", folder_ / (name + "survey"));
@@ -69,7 +69,7 @@ TEST_F(Hostile, NamesOfRecipesMapsFoldersAndCapturesRunNothing) {
     WriteCaptureRecipe(folder_ / "capture.toml", {escaped + "survey"});
     const ProgramRun run = Run("cairn compile capture.toml -o b.cairn");
     EXPECT_EQ(run.exit_code, 2) << run.err;
-    EXPECT_THAT(run.err, HasSubstr("which Make cannot carry"));
+    EXPECT_THAT(run.err, HasSubstr("which Make cannot handle"));
     fs::rename(folder_ / (name + "survey"), folder_ / "survey");
   }
 }
@@ -79,7 +79,7 @@ TEST_F(Hostile, LaunchersRunNoShell) {
        {"$(shell touch PWNED)", "touch PWNED;", "`touch PWNED`", "touch PWNED &", "a\ntouch PWNED"}) {
     const ProgramRun run = Run(std::string("cairn compile tiny.toml -o a.cairn --launch '") + launcher + "'");
     EXPECT_EQ(run.exit_code, 2);
-    EXPECT_THAT(run.err, HasSubstr("write what needs a shell into a script"));
+    EXPECT_THAT(run.err, HasSubstr("move what needs a shell into a script"));
   }
 }
 
@@ -115,7 +115,7 @@ TEST_F(Hostile, NamesOfHeldOutImagesRunNothing) {
   std::ofstream(folder_ / "evil.sh") << "#!/bin/sh\ntouch " << folder_.string() << "/PWNED\n";
   fs::permissions(folder_ / "evil.sh", fs::perms::owner_all);
   WriteCaptureRecipe(folder_ / "capture.toml", {"survey"});
-  Run("cairn configure capture.toml -o map.cairn --build-dir a.build");
+  Run("cairn stage configure capture.toml -o map.cairn --build-dir a.build");
   // What the last rule depends on is read by every run of make.
   const ProgramRun run =
       Run("cairn compile capture.toml -o map.cairn --build-dir a.build --until extract_features");

@@ -1,6 +1,6 @@
 // A library to be preloaded: kills the process group (SIGKILL) of one stage of the line, at a moment of its
 // own.  Its variables begin with LC_, which `cairn compile` passes on to the stages.
-//   LC_KILL_STAGE=match-features     the subcommand that is meant; others run on
+//   LC_KILL_STAGE=match-features     the command that is meant; others run on
 //   LC_KILL_AFTER_US=N               N microseconds after the stage has begun
 //   LC_KILL_AT_CALL=N                or before its N-th call that a crash could come between: creating,
 //   syncing, renaming
@@ -32,10 +32,11 @@ bool IsMeant() {
   const char* stage = std::getenv("LC_KILL_STAGE");
   if (stage == nullptr) return false;
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
-  std::string program, subcommand;
+  std::string program, command;
   std::getline(file, program, '\0');
-  std::getline(file, subcommand, '\0');
-  return program.ends_with("/cairn") && subcommand == stage;
+  std::getline(file, command, '\0');
+  if (command == "stage") std::getline(file, command, '\0');
+  return program.ends_with("/cairn") && command == stage;
 }
 
 void NoteCall() {

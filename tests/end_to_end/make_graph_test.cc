@@ -141,7 +141,7 @@ TEST_F(MakeGraph, PathsInAnyAlphabetWorkAndBlanksAreRefused) {
   const ProgramRun map =
       RunShell("cairn compile " + Path("tiny.toml") + " -o '" + Path("my map.cairn") + "'");
   EXPECT_EQ(map.exit_code, 2);
-  EXPECT_THAT(map.err, HasSubstr("has a space in its path, which Make cannot carry; rename"));
+  EXPECT_THAT(map.err, HasSubstr("has a space in its path, which Make cannot handle; rename"));
   fs::create_symlink(Path("survey"), Path("my survey"));
   WriteRecipe("blank.toml", "my survey");
   const ProgramRun capture = Compile("blank");
@@ -220,15 +220,15 @@ TEST_F(MakeGraph, RunInOnePartRemovesWhatAKilledOneInPartsLeft) {
   for (const std::string& output : outputs) EXPECT_FALSE(fs::exists(output + "-1-1of6.db")) << output;
 }
 
-// Compiles with a launcher that runs `change` beside the first stage: before, or after it has read the
-// images.
+// Compiles with a launcher that runs `change` beside the first stage: before, or after it has read
+// the images.
 class ChangingCapture : public MakeGraph {
  protected:
   static ProgramRun CompileWhile(const std::string& before, const std::string& after) {
-    std::ofstream(Path("launch.sh")) << "case \"$2\" in extract-features) " << before
-                                     << ";; esac\n\"$@\" || exit\ncase \"$2\" in extract-features) " << after
+    std::ofstream(Path("launch.sh")) << "case \"$3\" in extract-features) " << before
+                                     << ";; esac\n\"$@\" || exit\ncase \"$3\" in extract-features) " << after
                                      << ";; esac\n";
-    RunShell("cairn configure " + Path("changing.toml") + " -o " + Path("changing.cairn"));
+    RunShell("cairn stage configure " + Path("changing.toml") + " -o " + Path("changing.cairn"));
     return RunShell("make --silent -f " CAIRN_MAP_RULES " BUILD=" + Path("changing.build") +
                     " CAIRN=" CAIRN_PROGRAM " LAUNCH='sh " + Path("launch.sh") + "' " +
                     Path("changing.build/matches.db"));

@@ -135,24 +135,25 @@ TEST_F(MapSize, SurveyOfFewObservationsFitsItsBytesToo) {
 TEST_F(MapSize, DeltaMakesTheSmallMapFromTheWholeOneAndRollsBack) {
   const std::string deploy =
       "cp tiny.cairn robot.cairn && cairn keygen k && cairn sign small.cairn --key k -o s.cairn && "
-      "cairn delta robot.cairn s.cairn -o d --key k && cairn apply robot.cairn d --in-place --public-key "
+      "cairn update delta robot.cairn s.cairn -o d --key k && cairn update apply robot.cairn d --in-place "
+      "--public-key "
       "k.pub && "
       "cmp robot.cairn s.cairn && cmp robot.cairn.previous tiny.cairn";
   const ProgramRun run = Run(deploy);
   ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
-  EXPECT_EQ(Run("cairn apply robot.cairn d --in-place").exit_code, 0);  // sent twice
-  EXPECT_EQ(Run("cairn apply small.cairn d -o x.cairn").exit_code,
+  EXPECT_EQ(Run("cairn update apply robot.cairn d --in-place").exit_code, 0);  // sent twice
+  EXPECT_EQ(Run("cairn update apply small.cairn d -o x.cairn").exit_code,
             static_cast<int>(ErrorCode::kInvalidArgument));
-  EXPECT_EQ(Run("head -c 1000 d > half; cairn apply tiny.cairn half -o x.cairn").exit_code,
+  EXPECT_EQ(Run("head -c 1000 d > half; cairn update apply tiny.cairn half -o x.cairn").exit_code,
             static_cast<int>(ErrorCode::kCorrupt));
-  EXPECT_EQ(Run("cairn apply tiny.cairn d").exit_code, 2);
-  EXPECT_EQ(Run("cairn delta tiny.cairn s.cairn -o s.cairn").exit_code, 2);
+  EXPECT_EQ(Run("cairn update apply tiny.cairn d").exit_code, 2);
+  EXPECT_EQ(Run("cairn update delta tiny.cairn s.cairn -o s.cairn").exit_code, 2);
   EXPECT_EQ(Run("cairn verify s.cairn").exit_code, 0);
   EXPECT_FALSE(fs::exists(Path("x.cairn")));
   // The map before is not signed: a robot that requires it does not go back.
-  EXPECT_EQ(Run("cairn rollback robot.cairn --public-key k.pub").exit_code,
+  EXPECT_EQ(Run("cairn update rollback robot.cairn --public-key k.pub").exit_code,
             static_cast<int>(ErrorCode::kNotSigned));
-  EXPECT_EQ(Run("cairn rollback robot.cairn && cmp robot.cairn tiny.cairn").exit_code, 0);
+  EXPECT_EQ(Run("cairn update rollback robot.cairn && cmp robot.cairn tiny.cairn").exit_code, 0);
 }
 
 TEST_F(MapSize, DiffNamesTheOptionAndExplainTheLosses) {
@@ -161,19 +162,19 @@ TEST_F(MapSize, DiffNamesTheOptionAndExplainTheLosses) {
   EXPECT_THAT(diff.out, HasSubstr("[emit_map] max_bytes"));
   const json changes = json::parse(Run("cairn diff tiny.cairn small.cairn --json").out);
   EXPECT_EQ(changes["num_landmarks_shared"], changes["landmarks"][1]);  // all of the small map's
-  const json stations = json::parse(Run("cairn explain small.cairn --at 1,1 --json").out)["stations"];
+  const json stations = json::parse(Run("cairn inspect small.cairn --at 1,1 --json").out)["stations"];
   ASSERT_FALSE(stations.empty());
   bool lost = false;
   for (const json& drop : stations[0]["dropped"]) lost |= drop["name"] == "over_budget";
   EXPECT_TRUE(lost) << stations.dump(1);
-  EXPECT_EQ(Run("cairn explain small.cairn --at 100,100").exit_code, static_cast<int>(ErrorCode::kNotFound));
+  EXPECT_EQ(Run("cairn inspect small.cairn --at 100,100").exit_code, static_cast<int>(ErrorCode::kNotFound));
   for (const char* place : {"nowhere", "''", "1", "1,2,3,4", "nan,1", "1e300,0"})
-    EXPECT_EQ(Run(std::string("cairn explain small.cairn --at ") + place).exit_code, 2) << place;
-  EXPECT_EQ(Run("cairn explain small.cairn --image ''").exit_code, static_cast<int>(ErrorCode::kNotFound));
-  EXPECT_EQ(Run("cairn explain small.cairn --image none.jpg").exit_code,
+    EXPECT_EQ(Run(std::string("cairn inspect small.cairn --at ") + place).exit_code, 2) << place;
+  EXPECT_EQ(Run("cairn inspect small.cairn --image ''").exit_code, static_cast<int>(ErrorCode::kNotFound));
+  EXPECT_EQ(Run("cairn inspect small.cairn --image none.jpg").exit_code,
             static_cast<int>(ErrorCode::kNotFound));
   const std::string image = stations[0]["images"][0];
-  EXPECT_THAT(Run("cairn explain small.cairn --image " + image).out, HasSubstr("taken at"));
+  EXPECT_THAT(Run("cairn inspect small.cairn --image " + image).out, HasSubstr("taken at"));
 }
 
 }  // namespace

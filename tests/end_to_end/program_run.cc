@@ -80,7 +80,7 @@ void WriteCaptureRecipe(const std::string& path, const std::vector<std::string>&
 void RenderTinySurvey(const std::string& capture, const std::string& simulate_arguments) {
   WriteTinyRecipe(capture + ".toml");
   const ProgramRun run =
-      RunShell("cairn simulate " + capture + ".toml -o " + capture + " " + simulate_arguments);
+      RunShell("cairn stage simulate " + capture + ".toml -o " + capture + " " + simulate_arguments);
   ASSERT_EQ(run.exit_code, 0) << run.err;
 }
 

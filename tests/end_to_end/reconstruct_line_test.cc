@@ -35,8 +35,8 @@ horizontal_fov_deg = 65
 texel_m = 0.008
 num_queries = 0
 )";
-    const ProgramRun run =
-        RunShell("cairn simulate " + Path("simulate.toml") + " -o " + Path("posed") + " --progress none");
+    const ProgramRun run = RunShell("cairn stage simulate " + Path("simulate.toml") + " -o " + Path("posed") +
+                                    " --progress none");
     ASSERT_EQ(run.exit_code, 0) << run.err;
     fs::create_directories(Path("flat"));
     std::vector<Reject> rejects;
@@ -104,7 +104,7 @@ TEST_F(ReconstructLine, ImagesWithoutPosesBecomeAMapInTheFrameOfTheControlPoints
 
 TEST_F(ReconstructLine, HeldOutImagesAreLocalized) {
   ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
-  const ProgramRun run = RunShell("cairn check-map " + Path("flat.cairn") + " --json --queries " +
+  const ProgramRun run = RunShell("cairn check " + Path("flat.cairn") + " --json --queries " +
                                   Path("flat.build/poses/queries.txt"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto json = nlohmann::json::parse(run.out);
@@ -154,7 +154,7 @@ TEST_F(ReconstructLine, CamerasThatAreGivenAreTaken) {
     fs::copy_file(entry.path(), Path("known/images") / entry.path().filename());
   fs::copy_file(Path("posed/cameras.txt"), Path("known/cameras.txt"));
   const ProgramRun run =
-      RunShell("cairn extract-features " + Path("known") + " -o " + Path("known.db") + " && sqlite3 " +
+      RunShell("cairn stage extract-features " + Path("known") + " -o " + Path("known.db") + " && sqlite3 " +
                Path("known.db") + " 'SELECT count(*), min(prior_focal_length), min(width) FROM cameras'");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("1|1|320"));
@@ -166,7 +166,7 @@ TEST_F(ReconstructLine, FailingColmapFailsTheCompileWithItsLastLines) {
   std::ofstream(Path("fake/colmap")) << "#!/bin/sh\necho out of luck\nexit 9\n";
   fs::permissions(Path("fake/colmap"), fs::perms::owner_all);
   const ProgramRun run =
-      RunShell("PATH=" + Path("fake") + ":$PATH cairn reconstruct " + Path("flat.build/matches.db") +
+      RunShell("PATH=" + Path("fake") + ":$PATH cairn stage reconstruct " + Path("flat.build/matches.db") +
                " --capture " + Path("flat") + " -o " + Path("failed") + " --progress none");
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_THAT(run.err, HasSubstr("exit code 9"));

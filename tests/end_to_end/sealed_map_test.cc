@@ -60,7 +60,7 @@ TEST_F(SealedMap, SignedReleasesAreCounted) {
   EXPECT_EQ(RunShell(verify + " --min-epoch 3").exit_code, Code(ErrorCode::kNotNewer));
   EXPECT_EQ(RunShell(verify + " --name elsewhere").exit_code, Code(ErrorCode::kOtherMap));
   EXPECT_THAT(RunShell("cairn inspect " + Path("2.cairn")).out, HasSubstr("epoch"));
-  // What cannot be meant.
+  // Invalid arguments.
   for (const std::string& arguments :
        std::vector<std::string>{" --epoch 0", " --epoch -1", " --epoch 18446744073709551616", " --epoch one",
                                 " --epoch 2 --after " + Path("1.cairn")}) {
@@ -69,13 +69,14 @@ TEST_F(SealedMap, SignedReleasesAreCounted) {
   }
   EXPECT_EQ(RunShell(sign + Path("no.cairn") + " --after " + Path("map.cairn")).exit_code,
             Code(ErrorCode::kNotSigned));
-  const std::string back =
-      "cairn delta " + Path("2.cairn") + " " + Path("1.cairn") + " --key " + Path("key") + " -o " + Path("d");
+  const std::string back = "cairn update delta " + Path("2.cairn") + " " + Path("1.cairn") + " --key " +
+                           Path("key") + " -o " + Path("d");
   const ProgramRun refused = RunShell(back);
   EXPECT_EQ(refused.exit_code, Code(ErrorCode::kNotNewer));
   EXPECT_THAT(refused.err, HasSubstr("cairn sign --after " + Path("2.cairn")));
   ASSERT_EQ(RunShell(back + " --allow-older").exit_code, 0);
-  const std::string apply = "cairn apply " + Path("2.cairn") + " " + Path("d") + " -o " + Path("made.cairn");
+  const std::string apply =
+      "cairn update apply " + Path("2.cairn") + " " + Path("d") + " -o " + Path("made.cairn");
   EXPECT_EQ(RunShell(apply).exit_code, Code(ErrorCode::kNotNewer));
   EXPECT_EQ(RunShell(apply + " --allow-older --min-epoch 2").exit_code, Code(ErrorCode::kNotNewer));
   EXPECT_EQ(RunShell(apply + " --allow-older").exit_code, 0);

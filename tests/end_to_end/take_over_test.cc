@@ -31,10 +31,11 @@ class TakeOver : public testing::Test {
   static std::string Path(const std::string& name) { return *folder_ / name; }
 
   static ProgramRun Extract(const std::string& output, const std::string& arguments = "") {
-    return RunShell("cairn extract-features " + Path("survey") + " -o " + Path(output) + " " + arguments);
+    return RunShell("cairn stage extract-features " + Path("survey") + " -o " + Path(output) + " " +
+                    arguments);
   }
   static ProgramRun Match(const std::string& output, const std::string& arguments = "") {
-    return RunShell("cairn match-features " + Path("features.db") + " --capture " + Path("survey") +
+    return RunShell("cairn stage match-features " + Path("features.db") + " --capture " + Path("survey") +
                     " --num-frustum-seeds 3 --num-frustum-scouts 1 -o " + Path(output) + " " + arguments);
   }
   // "--reuse A --reuse B"

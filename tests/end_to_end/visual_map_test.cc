@@ -127,9 +127,9 @@ TEST_F(VisualMapRun, EachEstimatorAnswersInItsOwnWay) {
 TEST_F(VisualMapRun, WhatCannotBeDoneIsRefused) {
   const std::string build = "visual.build/";
   const ProgramRun plain =
-      RunShell("cd " + folder_->string() + " && cairn emit-map --classes " + build + "classes.db --world " +
-               build + "world.db --regions " + build + "regions.db --vocabulary " + build +
-               "vocabulary.db --name plain -o plain.cairn");
+      RunShell("cd " + folder_->string() + " && cairn stage emit-map --classes " + build +
+               "classes.db --world " + build + "world.db --regions " + build + "regions.db --vocabulary " +
+               build + "vocabulary.db --name plain -o plain.cairn");
   ASSERT_EQ(plain.exit_code, 0) << plain.err;
   for (const char* estimator : {"visual-map", "both"}) {
     const ProgramRun run = Localize("plain.cairn" + images_ + " --estimator " + estimator);

@@ -162,7 +162,7 @@ TEST_F(ExtractFeaturesReuse, AnotherProgramsFeaturesAreNotTakenOver) {
   std::ofstream(root_ + "/features.db.reuse", std::ios::binary) << bytes << end.Take();
   const auto summary = ExtractTo("features.db", {.previous = true});
   EXPECT_EQ(summary->num_taken_over, 0);
-  EXPECT_THAT(summary->not_reused, testing::ElementsAre(testing::HasSubstr("of another program")));
+  EXPECT_THAT(summary->not_reused, testing::ElementsAre(testing::HasSubstr("written by another program")));
 }
 
 TEST_F(ExtractFeaturesReuse, ShardsMergeToTheSameBytes) {

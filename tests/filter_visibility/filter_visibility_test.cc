@@ -171,7 +171,7 @@ TEST(FindStations, ForcedLatticeOfATrajectoryIsAnError) {
   }
   FilterVisibilityOptions options;
   options.survey = "lattice";
-  EXPECT_THAT(FindStations(images, options).error().message, HasSubstr("lie on no square grid"));
+  EXPECT_THAT(FindStations(images, options).error().message, HasSubstr("do not lie on a square grid"));
 }
 
 TEST(HoleSizes, CountsStationsEnclosedByTheArea) {
@@ -196,8 +196,8 @@ TEST(HoleSizes, PillarsAreNoHoles) {
 }
 
 TEST(TrimArea, KeepsNeighboursOfStationsWithSevenNeighbours) {
-  // The tail to the right has no station with 7 of 8 neighbours; (2, 2) and (3, 2) have 8, the rest are their
-  // neighbours.
+  // The tail to the right has no station with 7 of 8 neighbours; (2, 2) and (3, 2) have 8, the rest are
+  // their neighbours.
   const Stations stations = LatticeStations(kFullLattice);
   // clang-format off
   const std::vector<StationIdx> area = Area({"........",

@@ -1,5 +1,5 @@
-// Writes the fuzzer's first inputs, made from the example of tests/emit_map:  make_fuzz_seeds FOLDER
-// GOLDEN_1.0
+// Writes the fuzzer's first inputs, made from the example of tests/emit_map:  make_fuzz_seeds
+// FOLDER GOLDEN_1.0
 #include <cstdio>
 #include <string>
 

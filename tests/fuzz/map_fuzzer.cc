@@ -1,5 +1,5 @@
-// What a robot reads, fed with any bytes: libFuzzer's entry.  The first byte chooses: 0 a whole map file,
-// opened, read and asked for a place and a way; 1 to 12 a block of that kind, the next 13 bytes being
+// libFuzzer's entry: feeds any bytes to the files that a robot reads.  The first byte chooses: 0 a whole map
+// file, opened, read and asked for a place and a way; 1 to 12 a block of that kind, the next 13 bytes being
 // the counts that its directory states; 13 a directory; 14 a map of format 1; 15 a whole map some of whose
 // blocks are replaced, each by a kind, a count, a length and bytes, and sealed again.  Built with the preset
 // `fuzz`, hashes are not compared, so that what lies behind them is reached.
@@ -140,7 +140,7 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
     }
     case BlockKind::kLandmarks: {
       const auto landmarks = DecodeLandmarkBlock(bytes, entry, directory, "block");
-      // What was decoded is encoded to what decodes again.
+      // Decoded data is encoded to bytes that can be decoded.
       if (landmarks.ok() && !DecodeLandmarkBlock(EncodeBlock(*landmarks), entry, directory, "block").ok()) {
         std::abort();
       }

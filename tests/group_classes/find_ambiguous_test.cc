@@ -10,8 +10,8 @@ namespace {
 
 using testing::ElementsAre;
 
-// Norm 512 in the plane of the first axes, turned by `angle`: four entries share each axis so that they fit a
-// byte.
+// Norm 512 in the plane of the first axes, turned by `angle`: four entries share each axis so that they
+// fit a byte.
 ClassAppearance Look(double angle, double radius, double x, int num_observations) {
   ClassAppearance look;
   look.centre.setZero();

@@ -50,12 +50,12 @@ static void CheckMaps(const char* path) {
   CHECK(camera.model == 0 && camera.num_params == 3 && camera.params[0] == 280);
   CHECK_ERROR(cairn_map_camera_for_size(map, 321, 240, &camera), CAIRN_NOT_FOUND, "320");
   /* Another kind of handle, a closed one, one that never was. */
-  CHECK_ERROR(cairn_localizer_destroy((cairn_localizer*)map), CAIRN_INVALID_ARGUMENT, "no localizer");
+  CHECK_ERROR(cairn_localizer_destroy((cairn_localizer*)map), CAIRN_INVALID_ARGUMENT, "not a localizer");
   CHECK(cairn_map_close(map) == CAIRN_OK);
-  CHECK_ERROR(cairn_map_close(map), CAIRN_INVALID_ARGUMENT, "no open map");
-  CHECK_ERROR(cairn_map_describe(map, &description), CAIRN_INVALID_ARGUMENT, "no open map");
+  CHECK_ERROR(cairn_map_close(map), CAIRN_INVALID_ARGUMENT, "not an open map");
+  CHECK_ERROR(cairn_map_describe(map, &description), CAIRN_INVALID_ARGUMENT, "not an open map");
   CHECK_ERROR(cairn_map_describe((cairn_map*)&description, &description), CAIRN_INVALID_ARGUMENT,
-              "no open map");
+              "not an open map");
   CHECK(cairn_map_close(NULL) == CAIRN_OK);
   /* A map opened after another was closed is never taken for it. */
   cairn_map* next = NULL;

@@ -204,7 +204,7 @@ class Updates(Poster):
             old, new, delta = (pathlib.Path(folder) / name for name in ["old.cairn", "new.cairn", "delta"])
             old.write_bytes((POSTER / "poster.cairn").read_bytes())
             key = pathlib.Path(folder) / "key"
-            for words in [["keygen", key], ["sign", old, "--key", key, "-o", new], ["delta", old, new, "-o", delta]]:
+            for words in [["keygen", key], ["sign", old, "--key", key, "-o", new], ["update", "delta", old, new, "-o", delta]]:
                 run = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
                 self.assertEqual(run.returncode, 0, run.stderr)
             before, after = old.read_bytes(), new.read_bytes()
@@ -230,7 +230,7 @@ class Updates(Poster):
             map = POSTER / "poster.cairn"
             for words in [["keygen", key], ["sign", map, "--key", key, "-o", first],
                           ["sign", map, "--key", key, "--after", first, "-o", second],
-                          ["delta", second, first, "-o", delta, "--key", key, "--allow-older"]]:
+                          ["update", "delta", second, first, "-o", delta, "--key", key, "--allow-older"]]:
                 run = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
                 self.assertEqual(run.returncode, 0, run.stderr)
             public_key = bytes.fromhex(pathlib.Path(str(key) + ".pub").read_text())

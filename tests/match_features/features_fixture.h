@@ -14,8 +14,8 @@
 
 namespace cairn::match_features {
 
-// A features.db of `num_images` cameras side by side that see the same 80 points, each with its own
-// descriptor.
+// A features.db of `num_images` cameras side by side that see the same 80 points, each with its
+// own descriptor.
 class MatchFeaturesTest : public testing::Test {
  protected:
   void SetUp() override {

@@ -127,7 +127,7 @@ TEST_F(MatchFeaturesTest, VocabularyWithoutWordsIsAnError) {
   const auto summary = Match(false);
   ASSERT_FALSE(summary.ok());
   EXPECT_EQ(summary.error().code, ErrorCode::kNoData);
-  EXPECT_THAT(summary.error().message, HasSubstr("tells no images apart"));
+  EXPECT_THAT(summary.error().message, HasSubstr("cannot distinguish images"));
   inputs_.vocabulary_path = folder_ + "/absent.db";
   EXPECT_EQ(Match(false).error().code, ErrorCode::kNotFound);
 }

@@ -57,8 +57,8 @@ class MatchFeaturesReuse : public MatchFeaturesTest {
     ExpectAsClean("matches.db", with_poses);
     return summary->num_pairs_tried - summary->num_taken_over;
   }
-  // Runs rounds of shards until nothing is left to them; returns the files, and the number of rounds with
-  // work.
+  // Runs rounds of shards until nothing is left to them; returns the files, and the number of rounds
+  // with work.
   std::vector<std::string> RunShards(int num_shards, bool with_poses, int* num_rounds) {
     std::vector<std::string> files;
     for (*num_rounds = 0;; ++*num_rounds) {

@@ -3,8 +3,7 @@
 //   FAULT_ERROR=N             what the call says: an errno
 //   FAULT_AT=N                the N-th call of the kind fails (from 1)
 //   FAULT_FOLDER=DIR          only calls on files in this folder count; without it, all of the program's
-//   FAULT_LOG=FILE            gets a line "KIND PATH" for the call that failed; stays absent where there was
-//                             none
+//   FAULT_LOG=FILE            gets a line "KIND PATH" for the call that failed; not made where none failed
 // A close that fails has closed the file, as on Linux.
 
 #include <dlfcn.h>

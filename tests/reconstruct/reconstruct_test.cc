@@ -171,7 +171,7 @@ TEST_F(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
   EXPECT_THAT(result->images, SizeIs(9));
   ASSERT_THAT(result->rejects, SizeIs(6));
   EXPECT_EQ(result->rejects[0].name, "other00.jpg");
-  EXPECT_THAT(result->rejects[0].reason, HasSubstr("in a part of its own, of 5 images"));
+  EXPECT_THAT(result->rejects[0].reason, HasSubstr("in a separate part of 5 images"));
   EXPECT_EQ(result->rejects[5].name, "lonely.jpg");
   EXPECT_THAT(result->rejects[5].reason, HasSubstr("no 15 verified matches with any registered image"));
   ASSERT_THAT(result->warnings, SizeIs(1));

@@ -84,7 +84,7 @@ inline SyntheticSurvey MakeSyntheticSurvey(int num_images, uint64_t seed, const 
   return survey;
 }
 
-// Puts another survey's images beside the first one's, without a match between them.
+// Adds another survey's images to the first one's, without a match between them.
 inline void AppendSurvey(const SyntheticSurvey& other, SyntheticSurvey* survey) {
   const auto append = [](const auto& from, auto* to) { to->insert(to->end(), from.begin(), from.end()); };
   append(other.input.images, &survey->input.images);

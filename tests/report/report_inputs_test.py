@@ -91,7 +91,7 @@ class ReportInputsTest(unittest.TestCase):
 
     def test_a_build_report_that_is_deep_or_says_more_does_no_harm(self):
         path = os.path.join(self.folder.name, 'deep.json')
-        deep = '{"stages": [{"stage": "simulate", "more": ' + 100000 * '[' + 100000 * ']' + '}], "more": 1}'
+        deep = '{"stages": [{"stage": "simulate", "more": ' + 1000000 * '[' + 1000000 * ']' + '}], "more": 1}'
         pathlib.Path(path).write_text(deep)
         page = report(self.folder.name, MAP, '--build-report', path)
         self.assertFalse('[[[[' in page.read_text())

@@ -15,7 +15,7 @@ import sys
 
 # What a room is for stands in its CMakeLists.txt.
 ORDER = """
-core/base core/files core/options core/picture core/geometry core/features core/camera core/vocabulary core/colmap
+core/base core/files core/options core/geometry core/picture core/features core/camera core/vocabulary core/colmap
 core/capture core/plan core/world core/blocks core/seal core/map core/line
 runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/c_api
 sim/render sim/survey sim/robot sim/worlds
@@ -42,7 +42,7 @@ PARTS = ("core", "runtime", "sim", "stages", "pipeline")
 MAX_SOURCES = 12
 LARGER = {
     "core/features": "the matching kernel, once for each instruction set",
-    "pipeline/commands": "a file for each subcommand",
+    "pipeline/commands": "a file for each command",
 }
 
 INCLUDE = re.compile(r'^#\s*include\s+"([^"]+)"', re.M)

@@ -128,7 +128,8 @@ class SimulateCommandTest : public SimulateCaptureTest {
   Status RunCommand(const std::vector<std::string>& arguments, const CommandEnvironment& given = {}) {
     CLI::App app;
     const Command command = SimulateCommand();
-    command.add_arguments(app);
+    ArgumentParser parser(app);
+    command.add_arguments(parser);
     std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
     app.parse(reversed);
     CommandEnvironment environment = given;

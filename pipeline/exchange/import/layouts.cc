@@ -104,7 +104,7 @@ Status ReplaceCameras(const std::string& text, ImportedSurvey* survey) {
   return Ok();
 }
 
-// What only other layouts read is refused.
+// Refuses options that only other layouts read.
 Status CheckIsRead(const std::string& layout, const ImportOptions& options) {
   const auto check = [&](bool is_given, const char* option,
                          const std::vector<std::string>& layouts) -> Status {
@@ -144,7 +144,7 @@ Result<ImportedSurvey> ReadSurvey(const std::string& source, const ImportOptions
       std::find_if(Layouts().begin(), Layouts().end(), [&](const Layout& l) { return name == l.name; });
   if (layout == Layouts().end()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "format '{}' is none of auto, colmap, tum, 7scenes, kitti, euroc, kapture", name);
+                     "format '{}': must be one of auto, colmap, tum, 7scenes, kitti, euroc, kapture", name);
   }
   CAIRN_RETURN_IF_ERROR(CheckIsRead(name, options));
   CAIRN_ASSIGN_OR_RETURN(ImportedSurvey survey, layout->read(source, options));

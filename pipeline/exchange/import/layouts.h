@@ -23,8 +23,8 @@ struct ImportOptions {
   std::string images_folder;
   // kitti: which of the folder's sequences; empty: the only one.
   std::string sequence;
-  // kitti image_0 .. image_3, euroc cam0 .., kapture sensor ids; empty: kitti and euroc the first, kapture
-  // all.
+  // kitti image_0 .. image_3, euroc cam0 .., kapture sensor ids; empty: kitti and euroc the first,
+  // kapture all.
   std::vector<std::string> sensors;
   // tum, euroc: a frame's pose is interpolated between stated poses at most this far from it, seconds
   // [TUM's associate.py: 0.02].  REQUIRES: >= 0
@@ -51,9 +51,9 @@ struct ImportedSurvey {
 // says what each would have).
 Result<std::string> DetectLayout(const std::string& source);
 
-// Reads a data set in any layout; image files are looked for, not decoded, but for the first of each camera.
-// Errors: InvalidArgument (options), NotFound, Corrupt (a line that cannot be parsed; file and line; images
-// of another size than their camera's), NoData (no frame has a pose).
+// Reads a data set in any layout; image files are looked for but not decoded, except the first of each
+// camera.  Errors: InvalidArgument (options), NotFound, Corrupt (a line that cannot be parsed; file and line;
+// images of another size than their camera's), NoData (no frame has a pose).
 Result<ImportedSurvey> ReadSurvey(const std::string& source, const ImportOptions& options);
 
 // One layout each.  They leave missing files and image sizes to ReadSurvey.

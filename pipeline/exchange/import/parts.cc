@@ -27,7 +27,7 @@ Result<std::vector<double>> ParseNumbers(std::span<const std::string> words) {
   std::vector<double> numbers;
   for (const std::string& word : words) {
     double number = 0;
-    // A leading '+' is read by everybody but from_chars.
+    // Other programs accept a leading '+'; from_chars does not.
     if (!ParseNumber(std::string_view(word).substr(word.starts_with('+') ? 1 : 0), &number))
       return MakeError(ErrorCode::kCorrupt, "'{}' is not a number", word);
     numbers.push_back(number);
@@ -43,7 +43,7 @@ Result<Pose> PoseFromMatrix(std::span<const double> rows) {
   const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (error > kMaxRotationError || R.determinant() < 0) {
     return MakeError(ErrorCode::kCorrupt,
-                     "the pose's rotation is none: R R^T is off by {:g}, its determinant is {:g}", error,
+                     "the pose's rotation is not valid: R R^T is off by {:g}, its determinant is {:g}", error,
                      R.determinant());
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -22,7 +22,7 @@ struct ListLine {
 // The lines of `contents`, the text of the file `path`; they point into it.
 std::vector<ListLine> ListLines(std::string_view contents, const std::string& path);
 
-// Errors: Corrupt, naming the word that is no number; without the place.
+// Errors: Corrupt, naming the word that is not a number; without the place.
 Result<std::vector<double>> ParseNumbers(std::span<const std::string> words);
 
 // Pose from the rows of a 3 x 4 or 4 x 4 matrix [R t], row-major.  R is turned into the nearest rotation.

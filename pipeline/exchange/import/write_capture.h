@@ -27,7 +27,7 @@ enum class ImageTransfer {
 
 // Writes a capture (core/capture/capture.h) in one step: images/, cameras.txt, images.txt, queries.txt where
 // images are held out, left_out.txt (NAME<tab>REASON) where frames are missing.  A capture that exists is
-// replaced. Errors: Corrupt (a name that leads out of the folder), Io, Cancelled.
+// replaced.  Errors: Corrupt (a name that leads out of the folder), Io, Cancelled.
 Status WriteImportedCapture(const ImportedSurvey& survey, ImageTransfer transfer, const std::string& path,
                             Progress& progress);
 

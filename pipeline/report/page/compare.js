@@ -8,7 +8,7 @@ if (data.changes) {
     table(['bytes', 'landmarks', 'regions', 'stations', 'stations_not_covered', 'survey_images'].map(name => row(name, changes[name])), ['', 'A', 'B', 'B \u2212 A']),
     element('p', {}, `${counted(changes.num_landmarks_shared, 'landmark is', 'landmarks are')} of both; ${counted(changes.num_regions_changed, 'region differs', 'regions differ')}; `,
       `${counted(changes.coverage_lost.length, 'station')} lost coverage, ${count(changes.coverage_gained.length)} gained it.`));
-  if (changes.num_landmarks_shared === 0) $('changes-text').append(element('p', {class: 'bad'}, 'No landmark is of both maps: are they of one place, in one frame?'));
+  if (changes.num_landmarks_shared === 0) $('changes-text').append(element('p', {class: 'bad'}, 'The maps have no landmark in common: are they of one place, in one frame?'));
   const options = Object.entries(changes.options), tests = Object.entries(changes.self_test);
   if (options.length) $('changes-text').append(element('h3', {}, 'Options'), table(options.map(([name, [a, b]]) => [name, String(a), String(b)]), ['', 'A', 'B']));
   if (tests.length) $('changes-text').append(element('h3', {}, 'Self-test'), table(tests.map(([name, [a, b]]) => [name, figure(a), figure(b)]), ['', 'A', 'B']));

@@ -28,7 +28,7 @@ function drawStations(context, place, inside, scale) {
     context.stroke();
   }
 }
-// Patches under the stations: x, y and the largest value of the headings at one place; null is none.
+// Patches under the stations: x, y and the largest value of the headings at one place; null: no value.
 function byPlace(values) {
   const places = new Map();
   values.forEach((value, i) => {
@@ -220,7 +220,7 @@ function drawHeldOut(context, place, inside, scale) {
     arrow(context, [x, y], place(...image.found));
   });
 }
-// Errors are drawn as many times as large, so that they can be seen.
+// Errors are drawn enlarged by this factor, so that they can be seen.
 const errorFactor = (() => {
   const errors = heldOut.filter(isLocalized).map(image => image.error_m);
   if (!errors.length) return 1;

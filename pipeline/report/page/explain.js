@@ -1,4 +1,4 @@
-// What is said of a station, a region or a held-out image, and how one of them is chosen: click, search, keyboard.
+// The explanation of a station, a region or a held-out image, and how one of them is chosen: click, search, keyboard.
 const stationPlace = i => `${metres(S.x[i] / 100)}, ${metres(S.y[i] / 100)}${S.heading[i] === null ? '' : `, looking towards ${S.heading[i]}\u00B0`}`;
 function say(...nodes) {
   const close = button('\u00D7', () => { choose({}); sayFirst(); });
@@ -66,12 +66,12 @@ const remedies = {
   too_few_features: 'The image is blank, dark or blurred: no map helps.',
   no_candidates: 'Nothing in the map looks like it: the survey needs images from there, looking this way.',
   too_few_matches: 'Hardly any landmark was recognized: survey images from near there looking this way, or a larger k, would help.',
-  no_pose: 'Too few landmarks were recognized right: survey images from near there looking this way, or a larger k, would help.',
+  no_pose: 'Too few landmarks were recognized correctly: survey images from near there looking this way, or a larger k, would help.',
   too_few_inliers: 'Too few landmarks agree: survey images from near there looking this way, or a larger k, would help.',
   poor_spread: 'The landmarks that agree lie close together in the image: a larger k keeps more of the others.',
   uncertain: 'The landmarks that agree leave the place open: a larger k keeps more of the others.',
   far_from_survey: 'The pose that was found lies where the survey never was.',
-  ambiguous: 'Another place looks nearly the same: something unlike the rest on its walls would help.',
+  ambiguous: 'Another place looks nearly the same: something distinctive on its walls would help.',
 };
 const outcome = image => image.found ? `${image.wrong ? 'wrong, ' : ''}${lengthText(image.error_m)}, ${degrees(image.error_deg)} off` : `not localized: ${reason(image)}`;
 // Those that failed first, each a button.
@@ -224,7 +224,7 @@ map.on('mousemove', event => {
   tip.setLatLng(place).setContent(content);
   map.openTooltip(tip);
 });
-// On a phone the explanation belongs to the floor: where that is out of sight, so is this.
+// On a phone the explanation is hidden while the floor is out of sight.
 new IntersectionObserver(([floor]) => $('explanation').classList.toggle('away', !floor.isIntersecting)).observe($('map'));
 map.on('mouseout', () => map.closeTooltip(tip));
 $('map').addEventListener('keydown', event => {

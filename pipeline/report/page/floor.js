@@ -7,8 +7,8 @@ const map = leaflet.map('map', {
 leaflet.control.scale({imperial: false, metric: false}).addTo(map);
 const scaleNow = () => map.getZoomScale(map.getZoom(), 0);
 
-// A layer that draws on one canvas a little larger than what is seen: panning moves it, and it is drawn anew
-// when the hand lets go.
+// A layer that draws on one canvas a little larger than what is seen: panning moves it, and it is drawn again
+// when the pointer is released.
 const Drawing = leaflet.Layer.extend({
   initialize(draw, order, isOfDots = false) { Object.assign(this, {draw, order, isOfDots}); },
   onAdd() {

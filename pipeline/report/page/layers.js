@@ -21,12 +21,12 @@ const scaleOf = (colourOf, text, low, high) => {
 };
 const says = (...marks) => () => element('div', {}, ...marks.map(([kind, colour, text]) => element('span', {class: 'key'}, mark(kind, colour), ` ${text} `)));
 
-// Those that a map has nothing for are left out.
+// Layers without content in a map are left out.
 const layers = [
   {name: 'recall', group: 'how well', draw: drawRecall, exists: missed.length > 0,
    legend: () => element('div', {}, 'of the regions there, the one that localizes the smallest part of its held-out images: ', ...recallClasses.map(([, colour, text]) => element('span', {class: 'key'}, mark('block', colour), ` ${text} `)))},
   {name: 'entropy', group: 'how well', draw: drawEntropy, exists: heat.length > 0,
-   legend: () => scaleOf(heatShade, 'entropy: as so many places alike', '0 nats: 1 place', `${mostEntropy.toFixed(2)} nats: ${Math.exp(mostEntropy).toFixed(1)} places`)},
+   legend: () => scaleOf(heatShade, 'entropy, and the number of places that look alike', '0 nats: 1 place', `${mostEntropy.toFixed(2)} nats: ${Math.exp(mostEntropy).toFixed(1)} places`)},
   {name: 'regions', group: 'the map', draw: drawRegions, on: true, exists: R.length > 0,
    legend: () => element('div', {}, mark('ring', palette[0]), ' regions; colours and dashes only tell neighbours apart')},
   {name: 'views', group: 'the map', draw: drawViews, exists: data.views.faces.length > 0,

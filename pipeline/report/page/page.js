@@ -54,7 +54,7 @@ const terms = {
   'landmarks seen': 'landmarks that the survey images taken at the station see' + (data.landmark_choice === 'all' ? '; this map keeps every class, also those that a robot cannot expect to see again' : ''),
   'common landmarks': 'landmarks that are seen from every station of the region: by them a robot there is localized',
   region: 'neighbouring stations that all see the same k landmarks or more',
-  k: 'the least number of common landmarks of a region, [decompose_regions] k',
+  k: 'the minimum number of common landmarks of a region, [decompose_regions] k',
   class: 'one feature of the place, seen in several images',
   'held-out': 'images that the map was not made from; they test it',
   recall: 'part of the held-out images that the map localizes',
@@ -112,7 +112,7 @@ heldOut.forEach((image, i) => image.station !== null && heldOutAt[image.station]
 const isLocalized = image => Boolean(image.found);
 const isBad = image => !image.found || image.wrong;
 const heldOutOf = region => [...new Set(R[region].stations.flatMap(station => heldOutAt[station]))].sort((a, b) => a - b);
-// How images fared, in the words of a region's self-test; of none, nothing.
+// The results of images, in the form of a region's self-test; nothing where there are none.
 function fared(images) {
   if (!images.length) return undefined;
   const placed = images.filter(isLocalized), test = {held_out: images.length, localized: placed.length, wrong: placed.filter(isBad).length};
@@ -120,7 +120,7 @@ function fared(images) {
   const part = (key, at) => quantile(placed.map(image => image[key]), at);
   return {...test, median_m: part('error_m', 0.5), median_deg: part('error_deg', 0.5), p90_m: part('error_m', 0.9), p90_deg: part('error_deg', 0.9)};
 }
-// A map that is not sealed, or was checked with other images, says of its regions what these images say.
+// Where a map is not sealed, or was checked with other images, its regions have the results of these images.
 if (heldOut.length && !data.held_out_is_self_test) R.forEach((region, i) => { region.test = fared(heldOutOf(i).map(image => heldOut[image])); });
 const recall = test => (test.localized - test.wrong) / test.held_out;
 const isPoor = test => recall(test) < data.poor_localized_ratio;

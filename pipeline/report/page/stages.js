@@ -37,7 +37,7 @@ function drawStages() {
     $('stages').append(element('p', {}, `This map keeps every class ([emit_map] landmarks = "all"), also the ${count(left[0])} that a robot cannot expect to see again and the ${count(left[1])} that no region needs.`));
   }
   if (build.length) {
-    // What the map tells of itself is told above and below.
+    // The map's own counts are shown above and below.
     const isTold = reject => data.drops.some(drop => drop.name === reject.reason);
     const rejects = stage => (stage.rejected || []).filter(reject => !isTold(reject)).map(reject => `${reject.count === 1 ? reject.what.replace(/s$/, '') : reject.what}: ${reject.reason}`.replace(/^/, `${count(reject.count)} `)).join('; ');
     const anyRejects = build.some(rejects);

@@ -12,7 +12,7 @@ function setTheme(isNowDark) {
   $('charts').replaceChildren();
   drawCharts();
 }
-// What was chosen last, on this machine; where the browser does not keep it, what the system says.
+// The theme chosen last on this machine; the system's where the browser does not store it.
 function keptTheme() {
   try { return localStorage.getItem('cairn report theme'); } catch (error) { return null; }
 }

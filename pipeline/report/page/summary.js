@@ -115,7 +115,7 @@ function failedNodes() {
 if (hasSelfTest) {
   const figures = Object.entries(data.self_test);
   $('self-test-text').append(table(selfTestRows(), ['', 'found', 'asked for']), ...failedNodes(),
-    element('details', {}, element('summary', {}, 'all figures, by the names that cairn check-map gives them'), table(figures.map(([name, value]) => [name, String(Number(value.toPrecision(6)))]))));
+    element('details', {}, element('summary', {}, 'all figures, by the names that cairn check gives them'), table(figures.map(([name, value]) => [name, String(Number(value.toPrecision(6)))]))));
 } else {
   $('self-test-text').append(element('p', {}, data.sealed ? 'No held-out images were tried: the map has no self-test.' : 'The map is not sealed: it has no self-test.'), ...failedNodes());
 }

@@ -37,8 +37,8 @@ class Map:
     ) -> Map:
         """Raises Error.  `public_key`: 32 bytes; maps that this key has not signed are refused.
 
-        So are maps of another `name` (other_map) and of an earlier epoch than `min_epoch` (not_newer): to be
-        trusted only with a key, since without one anybody can write a map that says so.
+        So are maps of another `name` (other_map) and of an earlier epoch than `min_epoch` (not_newer).  Name and
+        epoch are only to be trusted with a key: without one, anybody can write a map that says so.
         """
     def camera_for_size(self, width: int, height: int) -> Camera:
         """The survey's camera of this image size.  Raises Error (not_found) when none or more than one has it."""
@@ -55,7 +55,7 @@ class Map:
     def num_regions(self) -> int: ...
     @property
     def is_metric(self) -> bool:
-        """False: nothing gave the survey its scale, "metres" are of arbitrary length."""
+        """False: nothing gave the survey its scale, and "metres" have an arbitrary length."""
 
 @final
 class Prior:
@@ -97,7 +97,7 @@ class Fix:
         """Rotation (rad), translation (m), of the left perturbation of cam_from_world: (6, 6)"""
     @property
     def region(self) -> int:
-        """With most inliers; -1: of none"""
+        """The one with most inliers; -1: none"""
     @property
     def scope(self) -> Literal["prior", "regions", "images", "all", "track"]: ...
     @property
@@ -112,23 +112,23 @@ class Fix:
 
 @final
 class Localizer:
-    """Says where a camera is.  One per thread: use by two at once raises Error (busy)."""
+    """Finds where a camera is.  One per thread: use by two at once raises Error (busy)."""
 
     def __init__(self, map: Map, **options: bool | int | float | str) -> None:
-        """`options`: any that `cairn localize --help` lists under "Stage options", as min_num_inliers=9."""
+        """`options`: any that `cairn localize --help` lists under "Stage options", such as min_num_inliers=9."""
     def localize(
         self, image: NDArray[np.uint8], camera: Camera | None = None, prior: Prior | None = None
     ) -> Fix:
-        """From grey pixels, (height, width); rows may have gaps, views of other orders raise a ValueError.
+        """From grey pixels, (height, width); rows may have gaps; other memory layouts raise a ValueError.
 
-        `camera` None: the survey's of the image's size.  Releases the interpreter's lock meanwhile.
+        `camera` None: the survey's camera of the image's size.  Releases the interpreter's lock meanwhile.
         """
 
 def update_map(
     map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None, name: str = "",
     min_epoch: int = 0, allow_older: bool = False
 ) -> bool:
-    """Brings the map's file to the one that a delta (`cairn delta`) leads to; the old one stays beside it.  False: it is the new one already.
+    """Replaces the map's file by the one that a delta (`cairn update delta`) leads to; the old one stays beside it.  False: it already is the new one.
 
     Raises Error: invalid_argument (the delta leads from another map), not_signed and wrong_key (with `public_key`), busy;
     not_newer and other_map (with `public_key`, or where the map is signed: the new one must have its name and a later epoch,
@@ -138,7 +138,7 @@ def update_map(
 def roll_back_map(
     map: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0
 ) -> None:
-    """Exchanges the map and the one before the last update; a second time exchanges them back.
+    """Exchanges the map and the one before the last update; a second call exchanges them back.
 
     Raises Error: not_found, other_map (the one before is another map), not_newer (before `min_epoch`).
     """

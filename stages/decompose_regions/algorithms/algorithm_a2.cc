@@ -11,7 +11,7 @@ void AlgorithmA2(uint64_t seed, Cover* cover) {
   const std::vector<int32_t> ranks = RandomRanks(world.num_stations(), seed);
   std::vector<StationIdx> order(world.num_stations());
   std::iota(order.begin(), order.end(), 0);
-  // [line 3] v = argmax |F_v| over v in U
+  // [Sala06 Fig. 3 line 3] v = argmax |F_v| over v in U, ties at random
   std::sort(order.begin(), order.end(), [&](StationIdx a, StationIdx b) {
     return std::pair(world.sets[b].size(), ranks[a]) < std::pair(world.sets[a].size(), ranks[b]);
   });

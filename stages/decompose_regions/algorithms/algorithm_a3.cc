@@ -7,7 +7,7 @@
 namespace cairn::decompose_regions {
 
 void AlgorithmA3(uint64_t seed, Cover* cover) {
-  // [line 3] v in U uniformly at random: the first open one of a random order
+  // [Sala06 Fig. 3 line 3] v in U uniformly at random: the first open one of a random order
   std::vector<StationIdx> order = RandomRanks(cover->world().num_stations(), seed + 1);
   GrowFromSeeds(order, seed, cover);
 }

@@ -5,10 +5,10 @@ namespace cairn::decompose_regions {
 
 void AlgorithmB1(Cover* cover) {
   FeatureChooser chooser(cover);
-  while (cover->HasOpen()) {                     // [line 2]
-    const CoreRegion region = chooser.Choose();  // [lines 3-9]
+  while (cover->HasOpen()) {                     // [Sala06 Fig. 4 line 2]
+    const CoreRegion region = chooser.Choose();  // [Sala06 Fig. 4 lines 3-9]
     cover->AddComponents(region.features,
-                         region.stations);  // [lines 10-11], subject to rho; split if unconnected
+                         region.stations);  // [Sala06 Fig. 4 lines 10-11], subject to rho, part by part
   }
 }
 

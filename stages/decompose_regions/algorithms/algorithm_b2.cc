@@ -1,5 +1,5 @@
-// [Sala06 Fig. 4] Algorithm B.2: as B.1, but a new region pushes out regions that it makes nearly
-// superfluous.
+// [Sala06 Fig. 4] Algorithm B.2: as B.1, but a new region pushes out regions that it makes
+// nearly superfluous.
 #include <queue>
 
 #include "stages/decompose_regions/algorithms/algorithms.h"
@@ -7,10 +7,9 @@
 namespace cairn::decompose_regions {
 namespace {
 
-// [Fig. 4 line 12] Drops regions, the one that covers the fewest stations alone first, as long as the total
-// number of stations that become unassigned stays below `num_gained`, the number that the new region covers
-// and nothing covered before.  So the number of assigned stations grows with every region that is added, and
-// the algorithm ends.
+// [Sala06 Fig. 4 line 12] Drops regions, the one that covers the fewest stations alone first (the source says
+// "greedily", not by what), as long as the total number of stations that become unassigned stays below
+// `num_gained`, the number that the new region covers and nothing covered before.
 class Purge {
  public:
   explicit Purge(Cover* cover) : cover_(*cover) {}
@@ -23,6 +22,8 @@ class Purge {
       }
       // Entries are stale where a region has changed since: it then has a newer entry.
       while (!losses_.empty() && IsStale(losses_.top())) losses_.pop();
+      // [Sala06 Fig. 4 line 12, fn 4] Less is lost than gained: the number of assigned stations grows with
+      // every region that is added, so the algorithm ends.
       if (losses_.empty() || num_lost + losses_.top().first >= num_gained) return;
       num_lost += losses_.top().first;
       cover_.Drop(losses_.top().second);
@@ -44,12 +45,12 @@ class Purge {
 void AlgorithmB2(Cover* cover) {
   FeatureChooser chooser(cover);
   Purge purge(cover);
-  while (cover->HasOpen()) {                     // [line 2]
-    const CoreRegion region = chooser.Choose();  // [lines 3-9]
+  while (cover->HasOpen()) {                     // [Sala06 Fig. 4 line 2]
+    const CoreRegion region = chooser.Choose();  // [Sala06 Fig. 4 lines 3-9]
     for (std::vector<StationIdx>& component : cover->Components(region.stations)) {
       const int num_gained =
-          cover->Add({region.features, std::move(component)});  // [lines 10-11], subject to rho
-      if (num_gained > 0) purge.Run(num_gained);                // [line 12]
+          cover->Add({region.features, std::move(component)});  // [Sala06 Fig. 4 lines 10-11], subject to rho
+      if (num_gained > 0) purge.Run(num_gained);                // [Sala06 Fig. 4 line 12]
     }
   }
 }

@@ -35,6 +35,7 @@ Decomposition AlgorithmBest(const World& world, const Decomposition& start, cons
   progress.Begin("save regions", 1 + options.num_repairs, "steps");
   generation.Run();
   progress.Advance();
+  // [Sala06 Def. 3.8] as few regions as can be found
   cover = SearchCover(
       &generation, wide, cover, seed,
       {.exchanges_per_station = options.exchanges_per_station, .num_repairs = options.num_repairs}, progress);

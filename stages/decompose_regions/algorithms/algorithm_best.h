@@ -13,16 +13,16 @@ struct BestOptions {
   // Exchanges of a region for another, per coverable station, while annealing (cover_annealing.h).
   // REQUIRES: >= 0
   int exchanges_per_station = 400;
-  // Neighbourhoods that are covered anew (cover_search.h).  REQUIRES: >= 0
+  // Neighbourhoods that are covered again (cover_search.h).  REQUIRES: >= 0
   int num_repairs = 60;
 };
 
-// Fewer regions: replaces those of `start` by at most as many that leave at most as many coverable stations
-// uncovered, and states a certified lower bound (column_generation.h).  Not in [Sala06], whose §VII asks for
-// it.  Column generation on the linear program of set cover finds regions worth having and the bound; dives
-// and simulated annealing choose among them (cover_search.h).  Time grows with the stations times the regions
-// that meet at one, and with the repairs.  Pure; told to stop, it returns what it has.
-// REQUIRES: `start` is a decomposition of the world; CheckWorld(world) is ok.
+// Finds fewer regions: replaces those of `start` by at most as many, which leave at most as many coverable
+// stations uncovered, and states a certified lower bound (column_generation.h).  Not in [Sala06], whose §VII
+// asks for it.  Column generation on the linear program of set cover finds regions worth having and the
+// bound; dives and simulated annealing choose among them (cover_search.h).  Time grows with the stations
+// times the regions that meet at one, and with the repairs.  Pure; when cancelled it returns the best result
+// so far.  REQUIRES: `start` is a decomposition of the world; CheckWorld(world) is ok.
 Decomposition AlgorithmBest(const World& world, const Decomposition& start, const BestOptions& options,
                             uint64_t seed, Progress& progress);
 

@@ -70,8 +70,10 @@ class Disc {
   int num_open_ = 0;
 };
 
-// [line 2] r = max {t : |{u in U : |intersection of F_w over w in N_t(u) ∩ U| >= k}| >= |U| / 2}.  The
-// intersection only shrinks with t, so each u has a largest t of its own, and r is their (upper) median.
+// [Sala06 Fig. 5 line 2]
+//   r = max {t : |{u in U : |intersection of F_w over w in N_t(u) ∩ U| >= k}| >= |U| / 2}
+// The intersection only shrinks with t, so each u has a largest t of its own, and r is their (upper) median.
+// A disc that has become its whole component grows no more: there the source's t would have no maximum.
 int DiscRadius(const Cover& cover) {
   const ReducedWorld& world = cover.world();
   Disc disc(cover);
@@ -93,22 +95,22 @@ int DiscRadius(const Cover& cover) {
 void AlgorithmC(double alpha, Cover* cover) {
   const ReducedWorld& world = cover->world();
   FeatureChooser chooser(cover);
-  const int radius = DiscRadius(*cover);  // [line 2]
+  const int radius = DiscRadius(*cover);  // [Sala06 Fig. 5 line 2]
   Disc disc(*cover);
-  // [line 3] In the order of the stations, so that discs lie side by side: in random order they leave gaps.
+  // [Sala06 Fig. 5 line 3] In the order of the stations, for discs side by side: random order leaves gaps.
   for (StationIdx station = 0; station < world.num_stations(); ++station) {
     if (!cover->HasOpen()) return;
-    disc.Start(station);  // [line 4] C = N_r(v) ∩ U
+    disc.Start(station);  // [Sala06 Fig. 5 line 4] C = N_r(v) ∩ U
     for (int t = 0; t < radius && disc.Widen(); ++t) {
     }
-    // [line 6] |C| >= alpha |N_r(v)| and |Phi| >= k
+    // [Sala06 Fig. 5 line 6] |C| >= alpha |N_r(v)| and |Phi| >= k
     if (disc.num_open() == 0 || disc.num_open() < alpha * disc.num_stations()) continue;
-    const std::vector<int32_t> common = disc.CommonFeatures();  // [line 5] Phi
+    const std::vector<int32_t> common = disc.CommonFeatures();  // [Sala06 Fig. 5 line 5] Phi
     if (static_cast<int>(common.size()) < world.k) continue;
-    const CoreRegion region = chooser.Choose(&common);       // [lines 7-12]
-    cover->AddComponents(region.features, region.stations);  // [line 13], subject to rho
+    const CoreRegion region = chooser.Choose(&common);       // [Sala06 Fig. 5 lines 7-13]
+    cover->AddComponents(region.features, region.stations);  // [Sala06 Fig. 5 lines 14-15], by rho
   }
-  AlgorithmB1(cover);  // what is left of U
+  AlgorithmB1(cover);  // [Sala06 §V-C] what is left of U
 }
 
 }  // namespace cairn::decompose_regions

@@ -22,11 +22,11 @@ class GrowingRegion {
         common_(world_.num_stations(), 0) {}
 
   CoreRegion Grow(StationIdx start) {
-    // [line 4] R = {v}
+    // [Sala06 Fig. 3 line 4] R = {v}
     phi_.assign(world_.sets[start].begin(), world_.sets[start].end());
     for (const int32_t feature : phi_) in_phi_[feature] = 1;
     Include(start);
-    // [lines 5-14]
+    // [Sala06 Fig. 3 line 5, Fig. 3 line 14] repeat ... until W is empty
     for (StationIdx next = BestOfFrontier(); next >= 0; next = BestOfFrontier()) {
       NarrowPhi(next);
       Include(next);
@@ -40,7 +40,7 @@ class GrowingRegion {
  private:
   enum Role : char { kNone, kFrontier, kInside };
 
-  // R = R u {u}; its neighbours join the frontier.
+  // [Sala06 Fig. 3 line 12] R = R u {u}; its neighbours join the frontier, N_1(R) \ R.
   void Include(StationIdx station) {
     role_[station] = kInside;
     stations_.push_back(station);
@@ -66,16 +66,18 @@ class GrowingRegion {
     for (const int32_t feature : world_.sets[station]) visible_[feature] = 0;
   }
 
-  // [lines 6-11] W = stations of the frontier that share k features with the region, only the open ones if
-  // there are any; of W the one that shares most.  -1 if W is empty.
+  // Of W the station that shares most features with the region, open ones first; -1 if W is empty.
   StationIdx BestOfFrontier() {
+    // [Sala06 Fig. 3 lines 6-7] W = {u in N_1(R) \ R : |F_u ∩ Phi| >= k}; Phi only shrinks, and so does W
     std::erase_if(frontier_, [&](StationIdx w) { return role_[w] != kFrontier || common_[w] < world_.k; });
+    // [Sala06 Fig. 3 line 11] u = argmax |F_w ∩ Phi| over w in W
     StationIdx best = -1;
     for (const StationIdx w : frontier_) {
       if (best < 0 || Key(w) > Key(best)) best = w;
     }
     return best;
   }
+  // [Sala06 Fig. 3 lines 8-9] W = W ∩ U if that is not empty: open stations come first.  Ties at random.
   std::tuple<bool, int, int> Key(StationIdx w) const { return {cover_.IsOpen(w), common_[w], -ranks_[w]}; }
 
   // The k features of Phi that are visible from most stations: neighbouring regions then share some of them.
@@ -117,12 +119,12 @@ std::vector<int32_t> RandomRanks(int num_stations, uint64_t seed) {
 void GrowFromSeeds(const std::vector<StationIdx>& seed_order, uint64_t seed, Cover* cover) {
   const std::vector<int32_t> ranks = RandomRanks(cover->world().num_stations(), seed);
   GrowingRegion growing(*cover, ranks);
-  // [line 2] while U is not empty; [line 3] its first station in the order of the algorithm
+  // [Sala06 Fig. 3 lines 2-3] while U is not empty: its first station in the order of the algorithm
   for (const StationIdx station : seed_order) {
     if (!cover->HasOpen()) return;
     if (!cover->IsOpen(station)) continue;
     const CoreRegion region = growing.Grow(station);
-    // [lines 15-16] U = U \ R; D = D u {R}, subject to rho
+    // [Sala06 Fig. 3 lines 15-16] U = U \ R; D = D u {R}, subject to rho
     cover->Add(region);
   }
 }

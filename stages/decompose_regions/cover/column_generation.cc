@@ -9,15 +9,15 @@ namespace {
 
 // Station values of at most 1 become multiples of this.
 constexpr double kValueUnit = 0x1p-32;
-// A region joins the pool when it is worth this much more than every region in it, relatively; for exact
-// pricing this is also what the bound loses at most.
+// A region joins the pool when its value exceeds that of every region in it by the value's part 1 / this; for
+// exact pricing the bound loses at most this part.
 constexpr int64_t kGreedyMargin = 500, kExactMargin = 20000;
-// Integer covers also use regions that are worth less: this share of the most valuable ones of the pool, the
-// values being changed at random by up to this ratio.
+// Integer covers also use regions of less value: down to this percentage of the most valuable one of the
+// pool, with values changed at random by up to this ratio.
 constexpr int64_t kNearlyPercent = 85;
 constexpr double kValueSpread = 0.2;
 
-// What station values certify, but for the largest value of a region.
+// The certificate of station values, without the largest value of a region.
 struct DualValues {
   StationValues values;  // min(y_v, z), whole numbers
   int64_t covered = 0;   // least total value of the stations that are covered

@@ -22,7 +22,7 @@ struct ColumnGenerationOptions {
 };
 
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
-// the world: solves it over a pool of regions, adds regions of value above 1, again and again [Gilmore and
+// the world: repeatedly solves it over a pool of regions and adds regions of value above 1 [Gilmore and
 // Gomory 1961].
 //
 // The bound.  Let y_v >= 0 be whole numbers, z their largest, core(R) = { v : N_tau(v) inside of R }, M >=
@@ -30,8 +30,7 @@ struct ColumnGenerationOptions {
 // stations uncovered has
 //   |D| M  >=  sum over R in D of y(core(R))          each region is worth at most M
 //          >=  sum of y_v over covered v              each covered station is in the core of some region
-//          >=  (sum of y_v) - H z                     at most H stations, each worth at most z, are not
-//          covered
+//          >=  (sum of y_v) - H z                     at most H stations of at most z are not covered
 // so |D| >= ((sum of y_v) - H z) / M, rounded up.  The values y come from the linear program, scaled and
 // rounded; none of this depends on how well it was solved.  M comes from branch and bound over all regions
 // (RegionPricer::MaxValue).
@@ -50,9 +49,9 @@ class ColumnGeneration {
   void LowerMaxUncovered(int max_uncovered);
   // Certified least number of regions; 0 before Run.
   int lower_bound() const { return lower_bound_; }
-  // Adds regions to the pool that the values of another program over it make worthwhile; returns how many.
+  // Adds regions to the pool that are worthwhile by the values of another program over it; returns how many.
   int Price(const CoverLp& lp);
-  // Adds regions to the pool that the relaxation leaves out by little.
+  // Adds regions to the pool that the relaxation barely leaves out.
   void AddNearlyAsValuable(Random* random);
 
  private:

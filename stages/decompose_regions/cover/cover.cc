@@ -14,7 +14,7 @@ uint64_t HeapEntry(int32_t count, int32_t feature) {
          (std::numeric_limits<uint32_t>::max() - static_cast<uint32_t>(feature));
 }
 
-// Exchanges the largest entry of a heap for a smaller one.
+// Replaces the largest entry of a heap by a smaller one.
 void ReplaceTop(uint64_t entry, std::vector<uint64_t>* heap) {
   size_t hole = 0;
   for (size_t child = 1; child < heap->size(); child = 2 * hole + 1) {
@@ -28,6 +28,7 @@ void ReplaceTop(uint64_t entry, std::vector<uint64_t>* heap) {
 
 }  // namespace
 
+// [Sala06 Fig. 3 line 1, Fig. 4 line 1, Fig. 5 line 1] U = {v : |F_v| >= k}, D = {}
 Cover::Cover(const ReducedWorld& world, int rho, Progress* progress)
     : world_(world),
       rho_(rho),
@@ -85,16 +86,19 @@ void Cover::Close(StationIdx station) {
 
 int Cover::Add(const CoreRegion& region, int rho) {
   int num_gained = 0;
+  // [Sala06 Fig. 3 line 15, Fig. 4 line 10, Fig. 5 line 14] U = U \ R, also where R is not added below
   for (const StationIdx station : region.stations) {
     num_gained += cover_counts_[station] == 0;
     if (open_[station]) Close(station);
   }
-  // B.2 reopens stations: progress is the least number that was open.
+  // B.2 reopens stations: progress is the smallest number of open stations so far.
   if (const int num_closed = world_.num_coverable - num_open_; progress_ && num_closed > num_reported_) {
     progress_->Advance(num_closed - num_reported_);
     num_reported_ = num_closed;
   }
+  // [Sala06 §V-E] R is added only where it covers more than rho stations that no other region covers
   if (num_gained <= rho) return 0;
+  // [Sala06 Fig. 3 line 16, Fig. 4 line 11, Fig. 5 line 15] D = D u {R}
   const int idx = static_cast<int>(regions_.size());
   regions_.push_back(region);
   num_exclusive_.push_back(num_gained);
@@ -129,6 +133,7 @@ void Cover::Drop(int region) {
 }
 
 void DropRedundantRegions(Cover* cover) {
+  // [Sala06 §V-D] mu(R) = min over v in R of |{R' in D : v in R'}|
   const auto min_overlap = [&](int region) {
     int overlap = std::numeric_limits<int>::max();
     for (const StationIdx station : cover->regions()[region].stations) {
@@ -136,11 +141,12 @@ void DropRedundantRegions(Cover* cover) {
     }
     return overlap;
   };
-  // Overlap counts only fall, so an entry of the heap is an upper bound until it is looked at again.
+  // Overlap counts only fall, so an entry of the heap is an upper bound until it is updated.
   std::priority_queue<std::pair<int, int>> candidates;  // mu, -region
   for (int region = 0; region < static_cast<int>(cover->regions().size()); ++region) {
     if (!cover->IsDropped(region)) candidates.emplace(min_overlap(region), -region);
   }
+  // [Sala06 §V-D] the region with the largest mu goes, while that leaves every station covered
   while (!candidates.empty() && candidates.top().first >= 2) {
     const auto [overlap, negative] = candidates.top();
     candidates.pop();

@@ -16,18 +16,18 @@ struct CoreRegion {
 };
 
 // The state that all six algorithms share: the open stations U, the regions D, and how many regions each
-// station has. Invariants: open_counts[f] = |{v in U : f in F_v}|; cover_counts[v] = |{R in D : v in R}|;
+// station has.  Invariants: open_counts[f] = |{v in U : f in F_v}|; cover_counts[v] = |{R in D : v in R}|;
 // num_exclusive of a region = number of its stations that no other region covers.
 class Cover {
  public:
-  // U = { v : |F_v| >= k }, D = {}.  `progress`, if any, advances by the stations that leave U for the first
-  // time.
+  // U = { v : |F_v| >= k }, D = {}.  `progress`, if any, advances by the stations that leave U for the
+  // first time.
   Cover(const ReducedWorld& world, int rho, Progress* progress = nullptr);
 
   const ReducedWorld& world() const { return world_; }
   bool IsOpen(StationIdx station) const { return open_[station] != 0; }
   int num_open() const { return num_open_; }
-  // Whether an algorithm still has something to do: a station is open, and nobody cancelled.
+  // Whether an algorithm still has something to do: a station is open, and it was not cancelled.
   bool HasOpen() const { return num_open_ > 0 && !(progress_ && progress_->Cancelled()); }
   // Number of open stations that see a feature.
   int OpenCount(int32_t feature) const { return open_counts_[feature]; }
@@ -44,7 +44,8 @@ class Cover {
     return finder_.Components(stations);
   }
 
-  // U = U u {v}, U = U \ {v}: for work on a part of the stations.  REQUIRES: coverable; not open, open
+  // U = U u {v}, U = U \ {v}: for work on a part of the stations.
+  // REQUIRES: v is coverable; not open before Open, open before Close
   void Open(StationIdx station);
   void Close(StationIdx station);
 
@@ -84,13 +85,13 @@ class Cover {
 
 // [Sala06 §V-D] While some region can go, drops the one with the largest minimum overlap count
 //   mu(R) = min over v in R of |{R' in D : v in R'}|;
-// mu >= 2 leaves every station covered.  Among equals the one that was added first goes.
+// mu >= 2 leaves every station covered.  Among equals the one that was added first is dropped.
 void DropRedundantRegions(Cover* cover);
 
 // Covers part of every connected set of more than `max_hole` coverable stations that no region covers, until
-// none is left: in such a set, B.1 chooses a region, whatever its size.  REQUIRES: num_open() == 0.  The rule
-// of rho does not bound holes: remainders that were let go one by one can lie side by side.  Returns whether
-// a region was added.
+// none is left: in each such set, B.1 chooses a region, whatever its size.  REQUIRES: num_open() == 0.  The
+// rule of rho does not bound holes: remainders that were dropped one by one can lie side by side.  Returns
+// whether a region was added.
 bool LimitHoles(int max_hole, Cover* cover);
 
 }  // namespace cairn::decompose_regions

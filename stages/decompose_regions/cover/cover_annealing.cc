@@ -6,7 +6,7 @@
 namespace cairn::decompose_regions {
 namespace {
 
-// Temperatures in stations: a move that loses about as many is made now and then.
+// Temperatures in stations: a move that loses about this many is made now and then.
 constexpr double kFirstTemperature = 4, kLastTemperature = 0.5;
 // Share of the regions to exchange that are drawn from those that overlap the new one.
 constexpr double kNearbyRatio = 0.7;

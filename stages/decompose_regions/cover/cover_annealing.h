@@ -18,15 +18,15 @@ class CoverAnnealing {
   // `pool` outlives this object and stays as it is.  `open`: per station, whether it is to be covered.
   CoverAnnealing(const RegionPool& pool, const std::vector<char>& open);
 
-  // Starts from some regions and keeps their number.  Returns the first of the covers with the fewest
-  // uncovered stations that were met.
+  // Starts from some regions and keeps their number.  Returns the first of the covers found with the fewest
+  // uncovered stations.
   std::vector<int> Search(const std::vector<int>& start, int64_t num_exchanges, Random* random);
 
  private:
   void Start(const std::vector<int>& start);
-  // The place of a chosen region that may go for another.
+  // The place of a chosen region that may be replaced by `other`.
   int PlaceToExchange(int other, Random* random) const;
-  // Puts `other` in the place of a chosen region, or leaves it, by chance.
+  // Puts `other` in the place of a chosen region, or does nothing, by chance.
   void Exchange(int place, int other, double temperature, Random* random);
 
   const RegionPool& pool_;

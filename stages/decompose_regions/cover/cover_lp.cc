@@ -6,7 +6,7 @@
 namespace cairn::decompose_regions {
 namespace {
 
-// Share of the step that goes to the dual side; dual values are small beside primal ones.
+// Share of the step that goes to the dual side; dual values are small compared with primal ones.
 constexpr double kDualWeight = 0.15;
 
 }  // namespace

@@ -7,12 +7,12 @@
 namespace cairn::decompose_regions {
 
 // The linear program of covering all but H open stations with few regions of a pool:
-//   min sum of x_R   such that   s_v + sum of x_R over R containing v >= 1,   sum of s_v <= H,   x >= 0,  0
-//   <= s <= 1
+//   min sum of x_R   such that   s_v + sum of x_R over R containing v >= 1   for every station v
+//                                sum of s_v <= H,   x >= 0,   0 <= s <= 1
 // and its dual: max (sum of y_v) - H z such that y(R) <= 1 for every region of the pool, 0 <= y_v <= z.
 // Solved to about a percent by the primal-dual hybrid gradient method with diagonal steps (Pock and Chambolle
-// 2011): its dual values lie in the middle of the optimal ones, so that regions found with them serve better
-// than those of a vertex, and any dual values give a valid bound.  Keeps its iterates between calls; regions
+// 2011): its dual values lie in the middle of the optimal ones, so that regions found with them are better
+// than those from a vertex; any dual values give a valid bound.  Keeps its iterates between calls; regions
 // may join the pool in between.  An iteration costs O(open stations + runs of open stations in regions).
 class CoverLp {
  public:
@@ -22,7 +22,7 @@ class CoverLp {
   // Starts from the dual values of another program over the same pool.
   void StartFrom(const CoverLp& other);
   void Iterate(int num_iterations);
-  // Takes a region into the cover for good: its stations are open no more.
+  // Takes a region into the cover permanently: its stations are no longer open.
   void Fix(int region);
   int num_open() const { return num_open_; }
   int max_uncovered() const { return max_uncovered_; }
@@ -33,8 +33,8 @@ class CoverLp {
   const std::vector<double>& region_values() const { return mean_x_; }   // x_R; 0 where no station is open
 
  private:
-  // Regions with open stations, as runs of open stations, which are numbered 0, 1, ...; remade when either
-  // changed.
+  // Regions with open stations, as runs of open stations, which are numbered 0, 1, ...; rebuilt when
+  // either changes.
   struct OpenRegions {
     struct Entry {
       int region;
@@ -42,7 +42,7 @@ class CoverLp {
       double step;  // of x
     };
     std::vector<StationIdx> stations;  // the open ones
-    std::vector<Entry> entries;        // and one that ends the last one's runs
+    std::vector<Entry> entries;        // plus one that ends the last region's runs
     std::vector<RegionPool::Run> runs;
     std::vector<double> dual_steps;  // per open station
   };

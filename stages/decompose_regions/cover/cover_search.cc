@@ -14,9 +14,9 @@ namespace {
 // A region is fixed together with others if its x is at least this.
 constexpr double kNearlyOne = 0.9;
 constexpr size_t kMaxFixedTogether = 8;
-// Regions of a neighbourhood that is covered anew.
+// Number of regions of a neighbourhood that is covered again.
 constexpr int kMinOpened = 6, kMaxOpened = 20;
-// Times that the pool gets nearly as valuable regions before annealing.
+// Number of times that nearly as valuable regions are added to the pool before annealing.
 constexpr int kNumEnrichments = 2;
 
 class CoverSearch {
@@ -70,7 +70,7 @@ class CoverSearch {
     return cover;
   }
 
-  // Drops the region that covers the fewest stations alone as long as the others suffice.
+  // Drops the region that covers the fewest stations alone, repeatedly, as long as the others suffice.
   void DropSuperfluous(std::vector<int>* cover) const {
     while (!cover->empty()) {
       std::vector<int> fewer = WithoutLeastUseful(*cover);
@@ -79,8 +79,8 @@ class CoverSearch {
     }
   }
 
-  // Exchanges regions so that fewer stations are uncovered (cover_annealing.h), and drops what that makes
-  // superfluous.
+  // Exchanges regions so that fewer stations are uncovered (cover_annealing.h), and drops regions that
+  // become superfluous.
   void Anneal(std::vector<int>* cover, Random* random) {
     const int64_t num_exchanges = int64_t{options_.exchanges_per_station} * wide_.num_coverable;
     if (num_exchanges == 0) return;

@@ -12,14 +12,14 @@ namespace cairn::decompose_regions {
 struct CoverSearchOptions {
   int num_lp_iterations = 60;       // between two fixings
   int exchanges_per_station = 400;  // of regions, per coverable station, while annealing
-  int num_repairs = 60;             // neighbourhoods that are opened and covered anew
+  int num_repairs = 60;             // neighbourhoods that are opened and covered again
 };
 
 // Few regions that cover all but H coverable stations, near the optimum of the linear relaxation: dives
-// (fixes the regions of largest x, solves again, adds regions that the rest makes worthwhile, and so on),
-// then opens the neighbourhood of one station after the other and dives there, the regions elsewhere being
-// kept; what has fewer regions, or as many and fewer uncovered stations, is taken on.  Last it anneals the
-// cover so that few stations are uncovered (cover_annealing.h). `start`: pool indices of regions that cover
+// (fixes the regions of largest x, solves again, adds regions that are worthwhile for the rest, and so on),
+// then opens the neighbourhood of one station after the other and dives there, keeping the regions elsewhere;
+// a cover with fewer regions, or as many and fewer uncovered stations, is accepted.  Last it anneals the
+// cover so that few stations are uncovered (cover_annealing.h).  `start`: pool indices of regions that cover
 // enough.  Returns pool indices, ascending; never more than `start`.
 std::vector<int> SearchCover(ColumnGeneration* generation, const ReducedWorld& wide, std::vector<int> start,
                              uint64_t seed, const CoverSearchOptions& options, Progress& progress);

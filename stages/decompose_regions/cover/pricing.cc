@@ -14,8 +14,8 @@ int64_t RegionPricer::Value(const std::vector<StationIdx>& stations) const {
   return value;
 }
 
-// Features worth more than the threshold, those worth little first: they have few partners, and those worth
-// much are then searched among few.
+// Features worth more than the threshold, those of little value first: they have few partners, and those of
+// large value then have few features left to combine with.
 std::vector<int32_t> RegionPricer::OrderFeatures(int64_t threshold) {
   const int num_features = wide_.areas.size();
   std::vector<int64_t> totals(num_features, 0);
@@ -131,8 +131,8 @@ int64_t RegionPricer::MaxValue(const StationValues& values, int64_t threshold, i
   return max_value_;
 }
 
-// Extends the chosen features by one candidate after the other.  REQUIRES: the candidates are ordered by
-// rank.
+// Extends the chosen features by one candidate after the other.
+// REQUIRES: the candidates are ordered by rank.
 void RegionPricer::Search(const std::vector<StationIdx>& stations, const std::vector<Candidate>& candidates) {
   const size_t num_missing = wide_.k - chosen_.size();
   for (size_t i = 0; i + num_missing <= candidates.size(); ++i) {

@@ -15,15 +15,15 @@ class RegionPricer {
  public:
   explicit RegionPricer(const ReducedWorld& wide);
 
-  // For each feature the region that grows from it greedily, each next feature the one that keeps most of the
-  // value. Appends the cores worth more than `threshold`.
+  // For each feature, the region that grows from it greedily: each next feature is the one that keeps most of
+  // the value.  Appends the cores worth more than `threshold`.
   void Greedy(const StationValues& values, int64_t threshold, std::vector<CoreRegion>* found);
 
   // An upper bound of the value of every region of the world with k common features (CoreFinder): at least
   // `threshold`, and equal to the largest value if that is more and the search was complete.  Branch and
   // bound over sets of features: a set's value is at most that of each of its subsets, and a set grows only
-  // by features that keep more than the threshold.  After `max_work` incidences have been looked at, each
-  // feature left is bounded by its (k - 1)-th best partner. Appends up to `max_found` cores worth more than
+  // by features that keep more than the threshold.  After `max_work` incidences have been read, each feature
+  // left is bounded by its (k - 1)-th best partner.  Appends up to `max_found` cores worth more than
   // the threshold.
   int64_t MaxValue(const StationValues& values, int64_t threshold, int64_t max_work, size_t max_found,
                    std::vector<CoreRegion>* found);

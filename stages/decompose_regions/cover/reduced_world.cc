@@ -25,8 +25,8 @@ class Shrinker {
     }
   }
 
-  // Keeps the stations of which every station within tau hops is in the set.  The border of the graph does
-  // not shrink a set [Sala06 fn 2].
+  // [Sala06 Lemma 4.1] {v in R : N_tau(v) inside of R}: keeps the stations of which every station within tau
+  // hops is in the set.  The border of the graph does not shrink a set [Sala06 fn 2].
   void Shrink(std::vector<StationIdx>* stations, int tau) {
     for (int hop = 0; hop < tau && !stations->empty(); ++hop) {
       for (const StationIdx station : *stations) mark_[station] = 1;
@@ -56,7 +56,8 @@ class Shrinker {
   }
 
   const IndexLists& neighbours_;
-  // Where no station has more than kWidth neighbours: those, and the station itself in the places left over.
+  // Where no station has more than kWidth neighbours: its neighbours, and the station itself in the
+  // remaining places.
   std::vector<std::array<StationIdx, kWidth>> rows_;
   std::vector<char> mark_;
   std::vector<StationIdx> kept_;
@@ -164,6 +165,7 @@ int ComponentFinder::NumComponents(std::span<const StationIdx> stations) {
   return num_components;
 }
 
+// [Sala06 Def. 3.4] A region is connected: each connected part of a set of stations is one by itself.
 std::vector<std::vector<StationIdx>> ComponentFinder::Components(std::span<const StationIdx> stations) {
   std::vector<std::vector<StationIdx>> components;
   if (const int num_components = JoinRuns(stations); num_components == 1) {  // the usual case
@@ -184,6 +186,7 @@ std::vector<std::vector<StationIdx>> ComponentFinder::Components(std::span<const
   return components;
 }
 
+// [Sala06 Def. 3.6, Lemma 4.2] Union of N_tau(v) over v in R, ring by ring.
 std::vector<StationIdx> GrowStations(const IndexLists& neighbours, std::vector<StationIdx> stations,
                                      int tau) {
   size_t begin = 0;
@@ -217,7 +220,7 @@ ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed, Area
   reduced.neighbours = NeighbourLists(world);
   const int num_stations = world.num_stations();
 
-  // [Sala06 §IV] F'_v = intersection of F_w over w in N_tau(v): v stays in a feature's area if all of
+  // [Sala06 Theorem 4.1] F'_v = intersection of F_w over w in N_tau(v): v stays in a feature's area if all of
   // N_tau(v) is in it. (Shrinking the components of an area one by one gives the same stations as shrinking
   // the area.)
   Shrinker shrinker(reduced.neighbours);

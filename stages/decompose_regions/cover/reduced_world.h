@@ -35,8 +35,8 @@ class IndexLists {
   std::vector<int32_t> values_;
 };
 
-// Keeps those of `stations` that are in `area`; the others are appended to `removed`, if it is given.  All
-// ascending.
+// Keeps those of `stations` that are in `area`; the others are appended to `removed`, if it is given.
+// All ascending.
 void KeepCommon(std::span<const StationIdx> area, std::vector<StationIdx>* stations,
                 std::vector<StationIdx>* removed = nullptr);
 // The stations in the areas of all of some features, ascending.  REQUIRES: at least one feature
@@ -44,9 +44,9 @@ std::vector<StationIdx> CommonStations(const IndexLists& areas, std::span<const 
 
 // The 0-overlapping problem that a world is reduced to [Sala06 §IV, Theorem 4.1]:
 //   F'_v = intersection of F_w over w in N_tau(v),
-// which shrinks every feature's area by tau hops; then only coverable stations (|F'_v| >= k, §V-A) stay, and
-// each connected component of an area becomes a feature of its own [§V-C].  Features are in an order drawn
-// from the seed, so that "the first of several equal ones" is a random choice.
+// which shrinks every feature's area by tau hops; then only coverable stations (|F'_v| >= k) stay [Sala06
+// §V-A], and each connected component of an area becomes a feature of its own [Sala06 §V-C].  Features are in
+// an order drawn from the seed, so that "the first of several equal ones" is a random choice.
 struct ReducedWorld {
   int k = 0;
   IndexLists neighbours;             // G
@@ -62,9 +62,9 @@ struct ReducedWorld {
 };
 // When areas are split into components.  kAfterShrinking: every reduced area is connected.  kBeforeShrinking:
 // areas are split as they are and may fall apart when they shrink: then every connected region R whose
-// stations all see k features lies in the whole areas of k reduced features, and the stations it covers, { v
-// : N_tau(v) inside of R }, lie in their shrunk areas, also where these stations are not connected though R
-// is.
+// stations all see k features lies in the whole areas of k reduced features, and the stations it covers,
+// { v : N_tau(v) inside of R }, lie in their shrunk areas, also where these stations are not connected though
+// R is.
 enum class AreaSplit { kAfterShrinking, kBeforeShrinking };
 // O(incidences * degree * tau).
 ReducedWorld ReduceWorld(const World& world, int k, int tau, uint64_t seed,
@@ -81,19 +81,19 @@ class ComponentFinder {
   int NumComponents(std::span<const StationIdx> stations);
 
  private:
-  // Numbers the runs of the set in run_of_, and joins adjacent ones in parents_.  Returns the number of
-  // components.
+  // Numbers the runs of the set in run_of_, and joins adjacent ones in parents_.  Returns the number
+  // of components.
   int JoinRuns(std::span<const StationIdx> stations);
   int32_t Root(int32_t run);
 
-  IndexLists earlier_;                    // neighbours with a smaller number, but for the one right before
+  IndexLists earlier_;                    // neighbours with a smaller number, except the one right before
   std::vector<char> joined_to_previous_;  // an edge joins station s - 1 to s
   std::vector<int32_t> run_of_;           // -1: not in the set
   std::vector<int32_t> parents_;          // of runs: union-find, smaller numbers towards the root
 };
 
 // Stations within tau hops of a set, ascending: the inverse of the reduction, R' = union of N_tau(v)
-// [Theorem 4.2].
+// [Sala06 Theorem 4.2].
 std::vector<StationIdx> GrowStations(const IndexLists& neighbours, std::vector<StationIdx> stations, int tau);
 // Stations whose N_tau lies in a set, ascending.
 std::vector<StationIdx> ShrinkStations(const IndexLists& neighbours, std::vector<StationIdx> stations,

@@ -19,7 +19,7 @@ class RegionPool {
     StationIdx begin, end;
   };
 
-  // False if a region with these stations is there already.
+  // False if the pool already has a region with these stations.
   bool Add(CoreRegion region);
   int size() const { return static_cast<int>(regions_.size()); }
   const CoreRegion& operator[](int region) const { return regions_[region]; }

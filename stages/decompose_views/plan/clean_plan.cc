@@ -25,9 +25,7 @@ struct Wall {
   std::vector<GridPoint> through;  // ends of other walls on it: it bends to go through them
 };
 
-Vec2 Real(const GridPoint& point) { return {static_cast<double>(point.x), static_cast<double>(point.y)}; }
-
-// Cleaning keeps the plan's frame and the list of changes.
+// Cleans a plan; keeps its frame and the list of changes.
 class Cleaner {
  public:
   Cleaner(const InputPlan& input, const CleanPlanOptions& options, const Progress& progress)
@@ -77,10 +75,10 @@ class Cleaner {
     plan.origin = (0.5 * (low + high)).array().round();
     const double reach = 0.5 * (high - low).maxCoeff() + options_.margin_m + 2;
     if (reach / options_.grid_m > static_cast<double>(kMaxGridCoordinate)) {
-      return MakeError(
-          ErrorCode::kUnsupported,
-          "the plan is {:.0f} m across, at most {:.0f} m at a grid of {:g} m: give a coarser --grid-m",
-          (high - low).maxCoeff(), 1.9 * kMaxGridCoordinate * options_.grid_m, options_.grid_m);
+      return MakeError(ErrorCode::kUnsupported,
+                       "the plan is {:.0f} m across, but at most {:.0f} m are possible with a grid of {:g} "
+                       "m; give a coarser --grid-m",
+                       (high - low).maxCoeff(), 1.9 * kMaxGridCoordinate * options_.grid_m, options_.grid_m);
     }
     for (const InputSegment& segment : segments) {
       const Wall wall{Round(segment.start), Round(segment.end), segment.line, {}};
@@ -183,7 +181,7 @@ class Cleaner {
     const double share = (point - start).dot(along) / along.squaredNorm();
     if (share <= 0 || share >= 1) return std::nullopt;
     const Vec2 foot = start + share * along;
-    // Closer than the grid can tell: it lies on the wall as it is.
+    // Closer than the grid's resolution: it already lies on the wall.
     if ((foot - point).cwiseAbs().maxCoeff() <= 0.5) return place;
     return GridPoint{std::llround(foot.x()), std::llround(foot.y())};
   }
@@ -216,7 +214,7 @@ class Cleaner {
   }
 
   Result<NodedSegments> Noded(const std::vector<TaggedSegment>& segments) {
-    CancelOnly progress(progress_);  // a plan's walls alone are few
+    CancelOnly progress(progress_);  // a plan has few walls
     return SegmentNoder(segments).Node(kNumThreads, progress);
   }
 
@@ -244,7 +242,7 @@ class Cleaner {
     return Ok();
   }
 
-  // Vertices that no wall ended at.
+  // Notes vertices at which no wall ended.
   void NoteCrossings(const NodedSegments& noded) {
     std::set<GridPoint> ends;
     for (const Wall& wall : walls_) {
@@ -256,7 +254,7 @@ class Cleaner {
     }
   }
 
-  // Of pieces between the same vertices the one of the first wall.
+  // Keeps, of pieces between the same vertices, the one of the first wall.
   std::vector<PlanPiece> WithoutOverlaps(const NodedSegments& noded, bool note) {
     std::map<std::pair<int32_t, int32_t>, PlanPiece> first;
     for (const NodedEdge& edge : noded.edges) {
@@ -293,8 +291,7 @@ class Cleaner {
     }
   }
 
-  // The rings again, of the cleaned pieces, cannot be told apart where they touch: the rounded ones are
-  // checked.
+  // Rings made from the cleaned pieces would be ambiguous where they touch, so the rounded rings are checked.
   Status CheckCleanedRings() const {
     std::vector<std::vector<Vec2>> rings;
     for (const std::vector<Vec2>& ring : input_.rings) {

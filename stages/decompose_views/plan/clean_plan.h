@@ -27,7 +27,7 @@ enum class PlanChangeKind {
   kNoLength = 0,     // a wall shorter than the grid, left out
   kEndMoved = 1,     // an end of a wall, to an end of another
   kEndOnWall = 2,    // an end of a wall, onto another
-  kDuplicate = 3,    // a wall that is there already, left out
+  kDuplicate = 3,    // a wall that occurred before, left out
   kOverlap = 4,      // a part that two walls share, kept once
   kCrossing = 5,     // a vertex where walls cross or touch
   kPointRemoved = 6  // an end between two walls that continue each other; the walls became one
@@ -37,7 +37,7 @@ const char* PlanChangeName(PlanChangeKind kind);
 // Something of the input that cleaning changed.
 struct PlanChange {
   PlanChangeKind kind{};
-  int line = 0;  // of the input; GeoJSON: the ring's number; 0: of none in particular
+  int line = 0;  // of the input; GeoJSON: the ring's number; 0: not of a single line
   Eigen::Vector2d place = Eigen::Vector2d::Zero();  // metres
   double moved_m = 0;                               // how far, where something was moved
 };
@@ -48,11 +48,10 @@ struct CleanPlanResult {
 };
 
 // Makes walls of a file into a plan whose walls meet at vertices only, and lists everything that was changed.
-// Walls cross where they cross: nothing is prolonged or closed.  A closed plan must be valid as polygons are
-// (simple rings, holes inside, interiors apart), before and after; its walls are then on its rings.
-// Deterministic.  O(n^2) for n walls.
-// Errors: InvalidArgument (options), Corrupt (an invalid polygon: what and where), NoData (no wall is left),
-// Unsupported (extents beyond the grid), Cancelled.
+// Walls are not prolonged, and gaps are not closed.  A closed plan must be valid as polygons are (simple
+// rings, holes inside, interiors apart), before and after; its walls then lie on its rings.  Deterministic.
+// O(n^2) for n walls.  Errors: InvalidArgument (options), Corrupt (an invalid polygon: what and where),
+// NoData (no wall is left), Unsupported (extents beyond the grid), Cancelled.
 Result<CleanPlanResult> CleanPlan(const InputPlan& input, const CleanPlanOptions& options,
                                   const Progress& progress);
 

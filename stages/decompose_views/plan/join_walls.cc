@@ -10,7 +10,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// Pieces in a row: vertices[i] to vertices[i + 1] is pieces[i], turned round where it is marked.
+// Pieces in a row: vertices[i] to vertices[i + 1] is pieces[i], reversed where it is marked.
 struct Chain {
   std::deque<int32_t> vertices;
   std::deque<int32_t> pieces;
@@ -33,7 +33,7 @@ class Joiner {
     JoinedWalls result;
     std::vector<int32_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int32_t>(i);
-    // Walls of one origin first come together, then with others.
+    // Walls of one origin are joined first, then with others.
     std::stable_sort(order.begin(), order.end(),
                      [&](int32_t a, int32_t b) { return pieces_[a].wall < pieces_[b].wall; });
     used_.assign(pieces_.size(), false);

@@ -12,9 +12,9 @@
 namespace cairn::decompose_views {
 namespace {
 
-constexpr int64_t kItemsPerBlock = 4096;
+constexpr int64_t kItemsPerNodingBlock = 4096;
 
-// What is found in one tile: vertices ascending, and which segment passes which.
+// The result of one tile: vertices, ascending, and which segments pass them.
 struct TileNodes {
   struct Visit {
     int32_t segment, vertex;
@@ -87,8 +87,8 @@ class PixelColumns {
   std::vector<std::vector<int>> columns_;
 };
 
-// Visits the crossings of segments in a tile: visit(low, high), the pixels that it may lie in.  False:
-// stopped.
+// Visits the crossings of segments in a tile: visit(low, high) with the pixels that a crossing may lie in.
+// False: stopped.
 template <typename Visit>
 bool VisitCrossings(const std::vector<SubSegment>& segments, const SegmentTiles& tiles, const Tile& tile,
                     const Progress& progress, Visit&& visit) {
@@ -134,7 +134,7 @@ TileNodes NodeTile(const std::vector<SubSegment>& segments, const SegmentTiles& 
     const int32_t segment = tiles.segments[i];
     columns.VisitPassed(segments[segment], [&](int pixel) { nodes.visits.push_back({segment, pixel}); });
   }
-  // Only those that are passed.
+  // Only pixels that segments pass.
   std::vector<int32_t> numbers(hot.size(), -1);
   for (const TileNodes::Visit& visit : nodes.visits) numbers[visit.vertex] = 0;
   for (size_t i = 0; i < hot.size(); ++i) {
@@ -151,18 +151,18 @@ TileNodes NodeTile(const std::vector<SubSegment>& segments, const SegmentTiles& 
 // Calls body(first, end) for blocks of [0, num_items) on threads, and reports them.  False: cancelled.
 template <typename Body>
 bool ForBlocks(int64_t num_items, int num_threads, std::string_view task, Progress& progress, Body&& body) {
-  const int64_t num_blocks = (num_items + kItemsPerBlock - 1) / kItemsPerBlock;
+  const int64_t num_blocks = (num_items + kItemsPerNodingBlock - 1) / kItemsPerNodingBlock;
   progress.Begin(task, num_blocks, "blocks");
   ParallelFor(num_blocks, num_threads, [&](int64_t block) {
     if (progress.Cancelled()) return;
-    body(block * kItemsPerBlock, std::min(num_items, (block + 1) * kItemsPerBlock));
+    body(block * kItemsPerNodingBlock, std::min(num_items, (block + 1) * kItemsPerNodingBlock));
     progress.Advance();
   });
   progress.End();
   return !progress.Cancelled();
 }
 
-// Joins what was found in the tiles.  All steps are short or go by blocks.
+// Joins the results of the tiles.  All steps are short or done in blocks.
 class Joiner {
  public:
   Joiner(const std::vector<SubSegment>& segments, const std::vector<int32_t>& tags, int num_threads,
@@ -192,7 +192,7 @@ class Joiner {
       if (!tile.vertices.empty()) xs.push_back(tile.vertices[tile.vertices.size() / 2].x);
     }
     std::sort(xs.begin(), xs.end());
-    const size_t num_strips = num_vertices / kItemsPerBlock + 1;
+    const size_t num_strips = num_vertices / kItemsPerNodingBlock + 1;
     std::vector<int64_t> strip_starts;  // of all strips but the first
     for (size_t i = 1; i < num_strips && !xs.empty(); ++i)
       strip_starts.push_back(xs[i * xs.size() / num_strips]);
@@ -222,7 +222,7 @@ class Joiner {
     return !progress_.Cancelled();
   }
 
-  // Vertices of each segment, visits_[offsets_[i] .. offsets_[i + 1]); the tiles are let go.
+  // Vertices of each segment, visits_[offsets_[i] .. offsets_[i + 1]); frees the tiles.
   void GatherVisits(std::vector<TileNodes>* tiles) {
     offsets_.assign(segments_.size() + 1, 0);
     for (const TileNodes& tile : *tiles) {
@@ -339,7 +339,7 @@ Result<NodedSegments> SegmentNoder::Node(int num_threads, Progress& progress) co
   int64_t num_vertices = 0;
   for (const TileNodes& tile : nodes) num_vertices += static_cast<int64_t>(tile.vertices.size());
   if (num_vertices > std::numeric_limits<int32_t>::max()) {
-    return MakeError(ErrorCode::kUnsupported, "{} vertices are more than 32 bits number", num_vertices);
+    return MakeError(ErrorCode::kUnsupported, "{} vertices are more than 32 bits can number", num_vertices);
   }
   return Joiner(segments_, tags_, num_threads, progress).Run(&nodes);
 }

@@ -13,7 +13,7 @@
 
 namespace cairn::decompose_views {
 
-// A segment in grid coordinates (real-valued) with whatever its maker wants to find again.
+// A segment in grid coordinates (real-valued) with a tag of the caller's choice.
 struct TaggedSegment {
   Eigen::Vector2d start, end;
   int32_t tag = 0;
@@ -33,19 +33,19 @@ struct NodedSegments {
 
 // Divides segments where they meet, with all vertices rounded to the grid, by snap rounding [Hobby99]: every
 // pixel in which a segment ends or two cross becomes a vertex of all segments that pass it.  No two edges
-// cross, and the order in which edges lie around a vertex is that of the segments, up to edges that become
-// one.
+// cross, and the order in which edges lie around a vertex is that of the segments, up to edges that
+// become one.
 //
-// A pixel's vertex depends on nothing outside of it, so tiles are worked on one by one and fit without seams:
-// progress goes by tiles, and cancelling ends within one.  (GEOS's noder, the tests' oracle, does all at
-// once: ten times the memory, no end in sight until it ends.)
+// A pixel's vertex depends on nothing outside of it, so tiles are processed one by one and fit without seams:
+// progress is reported by tile, and cancelling takes effect within one.  (GEOS's noder, with which the tests
+// compare, does all at once: it takes ten times the memory and cannot report progress.)
 class SegmentNoder {
  public:
   // Keeps no reference.  O(n log n) for n short segments.
   explicit SegmentNoder(const std::vector<TaggedSegment>& segments);
 
-  // How many pairs of segments cross: with each, the graph has a vertex and two edges more, at most.
-  // Takes no memory to speak of.  Errors: Cancelled.
+  // How many pairs of segments cross: each adds at most a vertex and two edges to the graph.  Takes almost no
+  // memory.  Errors: Cancelled.
   Result<int64_t> CountCrossings(int num_threads, Progress& progress) const;
 
   // O((n + I) log(n + I)) for I crossings.  Deterministic for any number of threads.

@@ -64,7 +64,7 @@ class GeoJsonReader {
     return Ok();
   }
 
-  // A plan may also draw what stands in it, and name its rooms: those polygons are not the plan.
+  // A plan may also contain furniture and rooms: those polygons are not the plan's walls.
   static bool IsFreeSpace(const json& object) {
     const auto properties = object.is_object() ? object.find("properties") : object.end();
     if (!object.is_object() || properties == object.end() || !properties->is_object()) return false;
@@ -80,14 +80,14 @@ class GeoJsonReader {
 
   Status ReadRing(const json& points, bool outer) {
     const size_t number = plan.rings.size() + 1;
-    if (!points.is_array()) return Corrupt(what_, "ring {} is no list of points", number);
+    if (!points.is_array()) return Corrupt(what_, "ring {} is not a list of points", number);
     std::vector<Eigen::Vector2d> ring;
     for (const json& point : points) {
       if (!point.is_array() || point.size() < 2 || !point[0].is_number() || !point[1].is_number()) {
         return Corrupt(what_, "ring {}: point {} is not [x, y] in metres", number, ring.size() + 1);
       }
       const Eigen::Vector2d place(point[0].get<double>(), point[1].get<double>());
-      if (!place.allFinite() || place.cwiseAbs().maxCoeff() > kMaxCoordinateM) {
+      if (!(place.array().abs() <= kMaxCoordinateM).all()) {
         return Corrupt(what_, "ring {}: point {} lies beyond {:g} m", number, ring.size() + 1,
                        kMaxCoordinateM);
       }
@@ -95,7 +95,7 @@ class GeoJsonReader {
     }
     if (ring.size() < 4) {
       return Corrupt(what_,
-                     "ring {} has {} points; a closed ring has at least 4, the first again as the last",
+                     "ring {} has {} points; a closed ring has at least 4, the last equal to the first",
                      number, ring.size());
     }
     if (ring.front() != ring.back()) {
@@ -138,13 +138,10 @@ Result<InputPlan> ParseSegments(const std::string& text, const std::string& what
     ++number;
     const std::string_view trimmed = Trim(line);
     if (trimmed.empty() || trimmed[0] == '#') continue;
-    const std::vector<std::string> fields = SplitFields(trimmed, ',');
-    std::array<double, 4> values{};
-    bool ok = fields.size() == 4;
-    for (size_t i = 0; ok && i < 4; ++i) {
-      ok = ParseNumber(fields[i], &values[i]) && std::abs(values[i]) <= kMaxCoordinateM;
-    }
-    if (!ok) {
+    const std::vector<double> values = ParseNumbers(trimmed).value_or(std::vector<double>());
+    const bool is_near =
+        std::all_of(values.begin(), values.end(), [](double v) { return std::abs(v) <= kMaxCoordinateM; });
+    if (values.size() != 4 || !is_near) {
       return Corrupt(what, "line {}: {:?} is not x0,y0,x1,y1 in metres (four finite numbers up to {:g})",
                      number, trimmed.substr(0, 80), kMaxCoordinateM);
     }

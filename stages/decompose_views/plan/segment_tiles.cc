@@ -12,7 +12,7 @@ constexpr int64_t kOne = int64_t{1} << kSubBits, kHalf = kOne / 2;
 // Tiles of fewer segments, or of no more pixels along a side, are not halved.
 constexpr size_t kFewSegments = 32;
 constexpr int64_t kFewPixels = 64;
-// How far off a computed crossing can be, in 2^-kSubBits units: some roundings of doubles at the far end.
+// Largest error of a computed crossing, in 2^-kSubBits units: some roundings of doubles at the far end.
 constexpr double kCrossingError = 64;
 
 // > 0: (x, y) lies left of the segment.
@@ -21,7 +21,7 @@ int Side(const SubSegment& s, int64_t x, int64_t y) {
   return cross > 0 ? 1 : cross < 0 ? -1 : 0;
 }
 
-// Whether a segment comes within a pixel of a tile; now and then true for one that comes a little less near.
+// Whether a segment comes within a pixel of a tile; sometimes also true for one slightly farther away.
 bool MayPass(const SubSegment& s, const GridPoint& low, const GridPoint& high) {
   const int64_t x0 = (low.x - 1) * kOne, x1 = (high.x + 1) * kOne, y0 = (low.y - 1) * kOne,
                 y1 = (high.y + 1) * kOne;

@@ -9,7 +9,7 @@
 
 namespace cairn::decompose_views {
 
-// Segments by the tiles of the plane that they pass: what can be done in each tile alone.
+// Segments by the tiles of the plane that they pass, so that each tile can be processed alone.
 //
 // Coordinates are multiples of 2^-kSubBits grid units, as fine as doubles are at the grid's far end; with
 // them orientations are exact in 128 bits.
@@ -26,8 +26,9 @@ GridPoint PixelOf(int64_t sub_x, int64_t sub_y);
 // Whether a segment passes a pixel.  Exact.
 bool Passes(const SubSegment& segment, const GridPoint& pixel);
 
-// Whether two segments cross, both at their inside.  Exact.  If they do, every pixel that the crossing may
-// lie in, by how exactly it can be computed: one, but for one crossing in about a hundred thousand.
+// Whether two segments cross, both at their inside.  Exact.  If they do, gives every pixel that the crossing
+// may lie in, given the accuracy of the computation: one pixel, except for about one crossing in a
+// hundred thousand.
 bool CrossAt(const SubSegment& a, const SubSegment& b, GridPoint* low, GridPoint* high);
 
 // A rectangle of pixels, x in [low.x, high.x), y in [low.y, high.y), and the segments that may pass one of
@@ -37,8 +38,8 @@ struct Tile {
   int64_t first = 0, last = 0;
 };
 
-// Tiles that cover all segments and are disjoint.  One is halved while that leaves its halves with fewer
-// segments to compare: many segments that meet in one vertex stay together.
+// Tiles that cover all segments and are disjoint.  A tile is halved while its halves have fewer segments to
+// compare: many segments that meet in one vertex stay together.
 struct SegmentTiles {
   std::vector<Tile> tiles;
   std::vector<int32_t> segments;

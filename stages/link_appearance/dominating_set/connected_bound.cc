@@ -18,7 +18,7 @@ namespace {
 constexpr double kTolerance = 1e-3;  // of cuts and of rounding a bound up
 // Cuts of one round, the most violated ones.
 constexpr size_t kMaxCutsPerRound = 400;
-// Rows that do not bind are dropped each time that the bound has risen by so much.
+// Rows that do not bind are dropped each time the bound has risen by this much.
 constexpr double kRiseBetweenCleanups = 0.2;
 
 OsiRowCut Row(const std::vector<int>& columns, const std::vector<double>& values, double low, double high) {
@@ -30,7 +30,7 @@ OsiRowCut Row(const std::vector<int>& columns, const std::vector<double>& values
   return row;
 }
 
-// What enters S is also x(S) - y(arcs within S): the row with fewer entries.
+// The arcs into S also equal x(S) - y(arcs within S): the row with fewer entries is used.
 OsiRowCut RowOf(const TreeColumns& program, const TreeCut& cut) {
   const std::vector<char> inside = NodeMarks(program.num_nodes, cut.nodes);
   std::vector<int> entering, within;
@@ -109,7 +109,7 @@ class StopWhenCancelled : public CbcEventHandler {
   const Progress* progress_;
 };
 
-// Nodes that some smallest set does without: another node's neighbourhood holds theirs.
+// Nodes that some smallest set does not need: another node's neighbourhood contains theirs.
 std::vector<char> FindReplaceable(const AppearanceGraph& graph) {
   std::vector<char> replaceable(graph.num_nodes(), 0);
   std::vector<char> around(graph.num_nodes(), 0);
@@ -150,7 +150,8 @@ class ProgramSolver {
       if (progress_ && progress_->Cancelled()) return;
       const std::vector<OsiRowCut> rows = FindRows(domination_.graph(), program_, lp_.getColSolution());
       if (rows.empty()) return;
-      // Rows that do not bind go once the bound has risen: the same point does not come again.
+      // Rows that do not bind are dropped once the bound has risen, so that the same point does not
+      // occur again.
       if (lp_.getObjValue() > last_cleanup + kRiseBetweenCleanups) {
         DropLooseRows(num_fixed_rows);
         last_cleanup = lp_.getObjValue();
@@ -283,7 +284,7 @@ ConnectedBound BoundConnectedSet(const Domination& domination, const std::vector
       options.lower_bound == "program" ||
       (options.lower_bound == "auto" && graph.num_links() <= options.max_num_program_links);
   if (!has_program || result.lower_bound == static_cast<int>(kept.size())) return result;
-  // The program's sets have two nodes at least.
+  // The program's sets have at least two nodes.
   for (NodeIdx node = 0; node < graph.num_nodes(); ++node) {
     if (domination.Undominated(NodeMarks(graph.num_nodes(), {node})).empty()) {
       result.smaller = {node};

@@ -8,9 +8,9 @@
 
 namespace cairn::link_appearance {
 
-// Lower bound on the size of a connected dominating set, to tell how good a set is.
+// Lower bound on the size of a connected dominating set, which shows how good a set is.
 struct ConnectedBoundOptions {
-  // "counting" (counting_bound.h), "program" (an integer program, too), "none", or "auto": program for
+  // "counting" (counting_bound.h), "program" (an integer program in addition), "none", or "auto": program for
   // components of at most max_num_program_links, else counting.
   std::string lower_bound = "auto";
   // auto: most links of a component that gets a program.  REQUIRES: >= 0
@@ -23,7 +23,7 @@ struct ConnectedBoundOptions {
 
 struct ConnectedBound {
   int lower_bound = 0;           // 0: not computed
-  std::vector<NodeIdx> smaller;  // a smaller set than the given one, where the search met one; ascending
+  std::vector<NodeIdx> smaller;  // a smaller set than the given one, where the search found one; ascending
 };
 
 // Bounds the size of every connected set that meets the demands of a component.  `kept` is such a set: the
@@ -35,16 +35,17 @@ struct ConnectedBound {
 //   y(E(S)) <= x(S) - x_k   for k in S    and no cycle: its links in S are fewer than its nodes in S,
 //   y(E(S)) <= x(S) - 1     for S that holds a node and all its neighbours: D meets it [Simonetti11 §2]
 //   sum of w_uv x_u over neighbours + demand_v x_v >= demand_v                (domination.h)
-//   x(N(v)) >= 1            where one node does not dominate all: D meets N(v), or v's neighbour would be cut
-//   off
+//   x(N(v)) >= 1            where one node does not dominate all: D meets N(v), as otherwise v's neighbour
+//                           would be cut off
 //   x binary, y >= 0.
-// Of the sets S those are used that the linear program's solutions violate (tree_cuts.h), at the root and in
-// the branching tree of CBC.  Links weigh in: two linked nodes dominate their common neighbours twice, so
-// that this bound is well above that of domination or of separating node sets alone.  Where a node suffices
-// of two that count alike (m = 1), one whose neighbours are all dominated by the other is left out.
+// Constraints are added for the sets S that the linear program's solutions violate (tree_cuts.h), at the root
+// and in the branching tree of CBC.  Links matter: two linked nodes dominate their common neighbours twice,
+// so that this bound is well above that of domination or of separating node sets alone.  Where one dominator
+// suffices and all links count alike (m = 1), a node whose neighbours are all neighbours of another one is
+// left out.
 //
-// `progress` (may be null) can cancel it.
-// Every bound that it stops at is valid.  It stops by counts, not by time: same input, same bound.
+// `progress` (may be null) can cancel it.  The bound is valid wherever it stops.  It stops by counts, not by
+// time: same input, same bound.
 ConnectedBound BoundConnectedSet(const Domination& domination, const std::vector<NodeIdx>& kept,
                                  const ConnectedBoundOptions& options, Progress* progress = nullptr);
 

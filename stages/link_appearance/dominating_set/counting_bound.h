@@ -4,8 +4,8 @@
 
 namespace cairn::link_appearance {
 
-// Lower bounds on the size of a connected dominating set of a connected graph that cost next to nothing; the
-// larger one:
+// Lower bounds on the size of a connected dominating set of a connected graph that are cheap to compute;
+// returns the larger one:
 // - every node is to be dominated, and one of d neighbours dominates d + 1: sum over all nodes of
 //   1 / (1 + the most neighbours of a node that dominates it), a solution of the dual of the domination
 //   program;

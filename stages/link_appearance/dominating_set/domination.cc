@@ -6,6 +6,7 @@ namespace cairn::link_appearance {
 
 Domination::Domination(const AppearanceGraph& graph, const DominationOptions& options)
     : graph_(&graph), options_(options), components_(FindComponents(graph)), demands_(graph.num_nodes(), 0) {
+  // [Booij06 §VI: asks for it] weights of links and a parameter for the robustness of the set
   const int64_t wanted = int64_t{options.num_dominators} * options.strong_num_inliers;
   for (const std::vector<NodeIdx>& nodes : components_.nodes) {
     if (static_cast<int>(nodes.size()) < options.min_component_nodes) continue;
@@ -21,6 +22,7 @@ Domination::Domination(const AppearanceGraph& graph, const DominationOptions& op
 }
 
 int64_t Domination::Shortfall(NodeIdx node, const std::vector<char>& kept) const {
+  // [Booij06 eq. 1] u in V' or there is a v in V' with (u, v) in S; here m of them, by weight
   if (kept[node]) return 0;
   int64_t missing = demands_[node];
   for (const AppearanceGraph::Neighbour& n : graph_->Neighbours(node)) {
@@ -38,6 +40,7 @@ std::vector<NodeIdx> Domination::Undominated(const std::vector<char>& kept) cons
   return nodes;
 }
 
+// [Booij06 §IV-A] "the subgraph G' is connected": in each component
 bool Domination::IsConnected(const std::vector<char>& kept) const {
   std::vector<char> reached(kept.size(), 0);
   std::vector<NodeIdx> stack;

@@ -7,7 +7,8 @@
 namespace cairn::link_appearance {
 namespace {
 
-// Count: of what is missing and gained; half the size is twice the nodes in the processor's nearest caches.
+// Count: integer type for shortfalls and gains; with half the size, twice as many nodes fit into the
+// processor's nearest caches.
 template <typename Count>
 class Greedy {
  public:
@@ -27,6 +28,7 @@ class Greedy {
     is_started_[domination_.components().component_of[node]] = 1;
     order_.push_back(node);
     SetMissing(node, 0);
+    // [Booij06 §IV-B step 3] the node turns black, its white neighbours gray
     for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
       if (is_black_[n.node]) continue;
       SetMissing(n.node, std::max<Count>(0, missing_[n.node] - Weight(n)));
@@ -36,9 +38,11 @@ class Greedy {
     }
   }
 
-  // Goes on until every node has what `demands` asks for beside the nodes that are black, or to the target.
+  // Continues until every node has what `demands` requires besides the nodes that are black, or until
+  // the target.
   void Run(const Domination& demands) {
     is_running_ = true;
+    // [Booij06 §IV-B step 1] all nodes white: each misses its demand
     for (NodeIdx node = 0; node < graph_.num_nodes(); ++node) {
       missing_[node] =
           static_cast<Count>(order_.empty() ? demands.Demand(node) : demands.Shortfall(node, is_black_));
@@ -54,23 +58,26 @@ class Greedy {
       if (is_gray_[node] && !is_black_[node]) queue_.push({gains_[node], node});
     }
     QueueStarts();
+    // [Booij06 §IV-B step 5] until no white node is left
     while (!queue_.empty() && order_.size() < target_size_) {
+      // [Booij06 §IV-B step 4] the gray node with the most links to white ones
       const Candidate best = queue_.top();
       queue_.pop();
       if (best.gain > gains_[best.node] && !is_black_[best.node]) {
         queue_.push({gains_[best.node], best.node});  // gains only fall: the queue holds bounds
         continue;
       }
-      // Started from another node meanwhile.
+      // The component was started from another node meanwhile.
       const bool is_old_start =
           !is_gray_[best.node] && is_started_[domination_.components().component_of[best.node]];
       if (is_black_[best.node] || is_old_start) continue;
       if (best.gain == 0) break;
-      Keep(best.node);  // step 3
+      Keep(best.node);
     }
   }
 
   bool IsFull() const { return order_.size() >= target_size_; }
+  // [Booij06 §IV-B step 6] The black nodes.
   std::vector<NodeIdx> TakeOrder() { return std::move(order_); }
 
  private:
@@ -82,7 +89,7 @@ class Greedy {
     }
   };
 
-  // Step 2, for each component without a black node.
+  // [Booij06 §IV-B step 2] The white node with the most neighbours, of each component without a black node.
   void QueueStarts() {
     for (size_t i = 0; i < domination_.components().nodes.size(); ++i) {
       if (is_started_[i]) continue;
@@ -113,7 +120,7 @@ class Greedy {
   const AppearanceGraph& graph_;
   const size_t target_size_;
   std::vector<Count> missing_;
-  std::vector<Count> gains_;  // what a node would give to itself and to its neighbours
+  std::vector<Count> gains_;  // what a node would contribute to itself and to its neighbours
   std::vector<char> is_black_, is_gray_, is_started_;
   bool is_running_ = false;
   std::priority_queue<Candidate> queue_;
@@ -133,7 +140,7 @@ std::vector<NodeIdx> RunGreedy(const Domination& domination, int max_links, int 
     ++more.num_dominators;
     greedy.Run(Domination(domination.graph(), more));
   }
-  // What is left has no neighbour that could be kept for it.
+  // The remaining nodes have no neighbour that could be kept for them.
   for (NodeIdx node = 0; node < num_nodes && !greedy.IsFull(); ++node) {
     if (domination.IsIn(node)) greedy.Keep(node);
   }
@@ -148,7 +155,7 @@ std::vector<NodeIdx> GreedyDominatingSet(const Domination& domination, int targe
   for (NodeIdx node = 0; node < domination.graph().num_nodes(); ++node) {
     max_links = std::max(max_links, domination.graph().NumNeighbours(node));
   }
-  // Links to all neighbours, of the full weight, are the most that is ever counted.
+  // Links to all neighbours, of full weight, are the largest sum that occurs.
   const int64_t most = (int64_t{max_links} + 1) * domination.options().strong_num_inliers;
   return most < std::numeric_limits<int32_t>::max()
              ? RunGreedy<int32_t>(domination, max_links, target_size, start)

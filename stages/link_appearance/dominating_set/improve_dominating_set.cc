@@ -9,7 +9,7 @@
 namespace cairn::link_appearance {
 namespace {
 
-// A set that changes, with what each node still misses.
+// A set that changes, with what each node still lacks.
 class ChangingSet {
  public:
   ChangingSet(const Domination& domination, const std::vector<NodeIdx>& kept)
@@ -27,7 +27,7 @@ class ChangingSet {
   bool Has(NodeIdx node) const { return kept_[node]; }
   const std::vector<NodeIdx>& nodes() const { return nodes_; }
   int64_t total_missing() const { return total_missing_; }
-  // What a node outside of the set would take from total_missing().
+  // By how much a node outside of the set would reduce total_missing().
   int64_t Gain(NodeIdx node) const { return gains_[node]; }
 
   void Add(NodeIdx node) {
@@ -41,7 +41,7 @@ class ChangingSet {
     Count(node, -1);
   }
 
-  // What would be missing more without a kept node.
+  // By how much removing a kept node would increase total_missing().
   int64_t Loss(NodeIdx node) const {
     int64_t loss = std::max<int64_t>(0, domination_.Demand(node) - counted_[node]);
     for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
@@ -156,7 +156,7 @@ class LocalSearch {
   }
 
  private:
-  // Kept nodes in rings around a random one; what lies around them becomes near_.
+  // Takes out kept nodes in rings around a random one; the nodes around them become near_.
   void TakeOut() {
     const int num_kept = static_cast<int>(set_.nodes().size());
     const int num_wanted =
@@ -178,7 +178,7 @@ class LocalSearch {
       for (const AppearanceGraph::Neighbour& n : graph_.Neighbours(node)) {
         if (!is_near_[n.node]) ring_.push_back(n.node);
       }
-      // Which of a ring's nodes go is left to chance.
+      // Which nodes of a ring are taken out is random.
       for (size_t k = ring_.size(); k > 1; --k) {
         std::swap(ring_[k - 1], ring_[random_.UniformInt(0, static_cast<int64_t>(k) - 1)]);
       }
@@ -189,8 +189,8 @@ class LocalSearch {
     }
   }
 
-  // Adds nodes until the set dominates and is connected, or has `max_size` nodes.  Whether it is connected,
-  // and dominates as far as it must.
+  // Adds nodes until the set dominates and is connected, or has `max_size` nodes.  Returns whether it is
+  // connected, and dominates as far as it must.
   bool Repair(size_t max_size) {
     const int64_t unit = domination_.options().strong_num_inliers;
     for (;;) {
@@ -201,7 +201,7 @@ class LocalSearch {
       int64_t best_gain = 0;
       int num_equal = 0;
       for (const NodeIdx node : near_) {
-        // Joining all parts is the most that its links to them can bring.
+        // Joining all parts is the most that its links to them can gain.
         if (set_.Has(node) ||
             set_.Gain(node) + unit * (std::max(1, num_parts) - 1) < std::max<int64_t>(1, best_gain))
           continue;
@@ -244,7 +244,7 @@ class LocalSearch {
     return -1;
   }
 
-  // With a target: any node next to the set, where none gains anything.
+  // With a target size: any node next to the set, where no node gains anything.
   NodeIdx AnyNeighbour() const {
     if (target_size_ < 0) return -1;
     for (const NodeIdx node : near_) {
@@ -256,7 +256,7 @@ class LocalSearch {
     return -1;
   }
 
-  // Drops nodes that are needed neither for what others miss nor for connection, in random order.
+  // Drops nodes that are needed neither to dominate others nor for connection, in random order.
   void Prune() {
     std::vector<NodeIdx> nodes = set_.nodes();
     for (size_t k = nodes.size(); k > 1; --k) {

@@ -9,21 +9,21 @@
 namespace cairn::link_appearance {
 
 struct ImproveOptions {
-  // Tries at making the set smaller, or at a given size better.  REQUIRES: >= 0
+  // Number of tries to make the set smaller or, with a given size, better.  REQUIRES: >= 0
   int num_tries = 5000;
   // Most kept nodes that a try takes out.  REQUIRES: >= 1
   int max_num_taken_out = 8;
 };
 
-// Local search: takes a few neighbouring nodes out of the set, repairs it greedily by what is missing and by
-// the parts that are to be joined [Ruan04's potential], drops what is not needed any more, and keeps the
-// outcome where it is no worse.  `kept`: a connected dominating set (as GreedyDominatingSet's); the result is
-// one of at most as many nodes, ascending.
+// Local search: takes a few neighbouring nodes out of the set, repairs it greedily by the shortfall and by
+// the parts that are to be joined [Ruan04's potential], drops nodes that are no longer needed, and keeps the
+// result where it is no worse.  `kept`: a connected dominating set (as GreedyDominatingSet's); the result has
+// at most as many nodes, ascending.
 //
 // With `target_size` >= 0 `kept` has that many nodes and need not dominate: the result has as many, is
-// connected, and misses no more in all.
-// `progress` (may be null) advances by a try; where it is cancelled, the best set so far comes back.
-// Same set for the same seed.  A try costs O(nodes + links of kept nodes).
+// connected, and its total shortfall is no larger.  `progress` (may be null) advances once per try; when it
+// is cancelled, the best set so far is returned.  Same set for the same seed.  A try costs O(nodes + links of
+// kept nodes).
 std::vector<NodeIdx> ImproveDominatingSet(const Domination& domination, const std::vector<NodeIdx>& kept,
                                           const ImproveOptions& options, uint64_t seed, int target_size = -1,
                                           Progress* progress = nullptr);

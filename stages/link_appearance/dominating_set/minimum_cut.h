@@ -5,22 +5,24 @@
 
 namespace cairn::link_appearance {
 
-// A network with integer capacities and cuts of least capacity between a source and a sink, by Dinic's
-// maximum flow: exact, the same for the same network.  Capacities may be changed between cuts.
+// A network with integer capacities, and its minimum cuts between a source and a sink by Dinic's maximum
+// flow: exact, and the same for the same network.  Capacities may be changed between cuts.
 class CutNetwork {
  public:
   explicit CutNetwork(int num_vertices) : first_edge_(num_vertices, -1) {}
 
-  // Adds an edge with capacities both ways and returns its number; that of the way back is one more.
+  // Adds an edge with capacities in both directions and returns its number; the reverse edge has the
+  // next number.
   int AddEdge(int from, int to, int64_t capacity, int64_t reverse_capacity);
   void SetCapacity(int edge, int64_t capacity) { edges_[edge].capacity = capacity; }
   int64_t Capacity(int edge) const { return edges_[edge].capacity; }
 
   struct Cut {
     int64_t capacity = 0;
-    std::vector<char> is_sink_side;  // per vertex; of several least cuts the one with the fewest vertices
+    std::vector<char> is_sink_side;  // per vertex; of several minimum cuts the one with the fewest vertices
   };
-  // O(vertices^2 edges) at worst.  `enough`: a flow of that much is not increased; the cut has no sides then.
+  // O(vertices^2 edges) at worst.  `enough`: a flow that reaches it is not increased; the cut then has
+  // no sides.
   Cut LeastCut(int source, int sink, int64_t enough);
 
  private:

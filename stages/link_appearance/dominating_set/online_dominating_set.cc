@@ -8,7 +8,7 @@
 namespace cairn::link_appearance {
 namespace {
 
-// Kept nodes that are looked at to see whether the neighbours of one stay connected without it.
+// Number of kept nodes that are searched to find out whether the neighbours of one stay connected without it.
 constexpr size_t kMaxDetourNodes = 2000;
 
 }  // namespace
@@ -21,6 +21,7 @@ NodeIdx OnlineDominatingSet::FindComponent(NodeIdx node) {
   return node;
 }
 
+// [Booij06 §VI: asks for it] "the image dataset is composed incrementally by an exploring robot"
 OnlineDominatingSet::Change OnlineDominatingSet::Add(const std::vector<Neighbour>& links) {
   const NodeIdx node = num_nodes();
   neighbours_.push_back(links);

@@ -6,13 +6,13 @@
 
 namespace cairn::link_appearance {
 
-// A connected dominating set that is kept up while nodes arrive one by one [Booij06 §VI asks for it].
+// A connected dominating set that is kept up while nodes arrive one by one [Booij06 §VI: asks for it].
 //
 // After each arrival the kept nodes of each component are connected and dominate it.  An arrival that joins p
 // components (p = 0: it starts one) keeps at most p + 1 nodes more: none where p = 1 and a neighbour is kept;
 // one neighbour where p = 1 and none is; otherwise itself, and in each component where none of its neighbours
 // is kept, one of these.  Of such neighbours the one with the most links, then inliers, then the smallest
-// number. It drops at most max_num_dropped nodes that the new ones made superfluous.
+// number.  It drops at most max_num_dropped nodes that the new ones made superfluous.
 class OnlineDominatingSet {
  public:
   using Neighbour = AppearanceGraph::Neighbour;
@@ -23,8 +23,8 @@ class OnlineDominatingSet {
 
   explicit OnlineDominatingSet(int max_num_dropped) : max_num_dropped_(max_num_dropped) {}
 
-  // The next node, num_nodes() before the call, with its links to earlier ones, ascending.
-  // O(links around the nodes that change), beside joining components.
+  // The next node, num_nodes() before the call, with its links to earlier ones, ascending.  O(links around
+  // the nodes that change), besides joining components.
   Change Add(const std::vector<Neighbour>& links);
 
   int num_nodes() const { return static_cast<int>(neighbours_.size()); }

@@ -18,6 +18,7 @@ class Restorer {
         if (kept_[i]) continue;
         const NodeIdx j = FindFarNeighbour(i);
         if (j < 0) continue;
+        // [Booij06 §IV-C] i and j join the set, and the pairs are examined again with it
         for (const NodeIdx node : {i, j}) {
           if (!kept_[node]) added.push_back(node);
           kept_[node] = 1;
@@ -36,6 +37,7 @@ class Restorer {
     for (const AppearanceGraph::Neighbour& a : graph_.Neighbours(i)) {
       if (!kept_[a.node]) continue;
       Reach(a.node);
+      // [Booij06 §IV-C] a neighbour of i and one of j with no path over the set of fewer than c links
       if (HasUnreached(i)) return i;
       for (const AppearanceGraph::Neighbour& j : graph_.Neighbours(i)) {
         if (j.node < i || kept_[j.node] || (first >= 0 && j.node >= first)) continue;

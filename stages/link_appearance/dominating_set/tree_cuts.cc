@@ -37,7 +37,7 @@ class TreeNetwork {
     }
   }
 
-  // Sets that hold `targets` and get less than `wanted`.
+  // Sets that contain `targets` and are entered by less than `wanted`.
   std::vector<TreeCut> Separate(const std::vector<NodeIdx>& targets, double wanted, NodeIdx reached,
                                 double tolerance) {
     std::vector<TreeCut> cuts;
@@ -69,7 +69,7 @@ class TreeNetwork {
  private:
   int Root() const { return columns_.num_nodes; }
   int Sink() const { return columns_.num_nodes + 1; }
-  // Link arcs were added in pairs, each as an edge with its way back.
+  // Link arcs were added in pairs, each as an edge and its reverse.
   int EdgeOf(size_t arc) const {
     return static_cast<int>(arc) < columns_.num_link_arcs ? static_cast<int>(arc)
                                                           : root_edges_[arc - columns_.num_link_arcs];

@@ -19,7 +19,7 @@ struct TreeColumns {
   // Arcs 2 e and 2 e + 1 are those of link e, then root arcs; arc a is column num_nodes + a.
   std::vector<Arc> arcs;
   int num_link_arcs = 0;
-  // The node with the fewest neighbours: the tree starts among it and its neighbours.
+  // The node with the fewest neighbours: the tree starts at it or one of its neighbours.
   NodeIdx root_node = 0;
   int size() const { return num_nodes + static_cast<int>(arcs.size()); }
 };
@@ -31,10 +31,10 @@ struct TreeCut {
   double violation = 0;
 };
 
-// Finds the sets S that a point of the program gives too few arcs into: those that hold a node and all its
-// neighbours, which the tree must reach, by minimum cuts from the root; several for a node, with the arcs of
-// those found before taken for full ("nested cuts" [Koch & Martin 1998]).  Where there are none, sets that
-// hold a node which is reached by less than its x.  `columns` in the order of TreeColumns.
+// Finds the sets S that too few arcs of a point of the program enter: those that contain a node and all its
+// neighbours, which the tree must reach, by minimum cuts from the root; several per node, with the arcs of
+// earlier ones treated as saturated ("nested cuts" [Koch & Martin 1998]).  Where there are none, sets that
+// contain a node which is reached by less than its x.  `columns` in the order of TreeColumns.
 std::vector<TreeCut> FindTreeCuts(const AppearanceGraph& graph, const TreeColumns& columns,
                                   const double* values, double tolerance);
 

@@ -8,7 +8,7 @@
 namespace cairn::match_features {
 namespace {
 
-// Rows that a table of features states for each image.
+// Number of rows that a table of features states for each image.
 Result<std::map<ImageId, int64_t>> ReadRowCounts(SQLite::Database& database, const std::string& table) {
   std::map<ImageId, int64_t> counts;
   SQLite::Statement query(database, "SELECT image_id, rows FROM " + table);

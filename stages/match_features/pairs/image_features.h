@@ -28,7 +28,7 @@ struct MatchImage {
 struct MatchImages {
   std::map<CameraId, Camera> cameras;
   std::vector<MatchImage> images;                   // those with features, ascending image_id
-  std::map<std::string, ImageId> without_features;  // those that the database has besides, by name
+  std::map<std::string, ImageId> without_features;  // the others in the database, by name
 
   bool AllPosed() const;
 };
@@ -38,14 +38,14 @@ struct MatchImages {
 // keypoints and descriptors that differ).
 Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* capture);
 
-// The features of one image, as matching and verification read them.
+// The features of one image, in the form that matching and verification use.
 struct ImageFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
   DescriptorMatrix descriptors;
   PackedDescriptors packed;
 
-  // At most what the features of an image take, bytes.
+  // Upper limit of the memory that the features of an image take, bytes.
   static int64_t NumBytes(int num_features);
 };
 

@@ -14,8 +14,8 @@ struct PairList {
 };
 
 // Pairs named in a text file, one "NAME1 NAME2" a line (COLMAP's image pair list; '#' starts a comment, a
-// pair may stand more than once, in either order).  Errors: NotFound (no such file), InvalidArgument (a line
-// that is not two names, or names an image that the database does not have, or one image twice; says the
+// pair may be listed more than once, in either order).  Errors: NotFound (no such file), InvalidArgument (a
+// line that is not two names, or names an image that the database does not have, or one image twice; says the
 // line), NoData (no pair).
 Result<PairList> ReadPairList(const std::string& path, const MatchImages& images);
 

@@ -15,21 +15,21 @@ namespace cairn::match_features {
 struct PredictPairsOptions {
   // Fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
   int min_num_expected_matches;
-  // Rays that differ by more show nothing alike, degrees.  REQUIRES: in (0, 180]
+  // Largest angle between two rays that may show the same thing, degrees.  REQUIRES: in (0, 180]
   double max_ray_angle_deg;
-  // Largest distance of a ray to the epipolar plane of another that shows the same thing, pixels; as wide as
-  // the poses are wrong.  REQUIRES: > 0
+  // Largest distance of a ray to the epipolar plane of another that shows the same thing, pixels; as large as
+  // the errors of the poses.  REQUIRES: > 0
   double max_prior_error_px;
-  // A shorter baseline is none, metres.  REQUIRES: > 0
+  // A shorter baseline counts as zero, metres.  REQUIRES: > 0
   double min_baseline_m;
 };
 
-// Predicts which posed images show the same scene from the pairs that are matched already.  View frusta do
-// not know walls; verified matches do: where a feature f of image i matches one of image k, and that one
-// matches a feature h of image j, f and h most likely show one thing if the stated poses let them: their rays
-// meet in front of both cameras, up to the poses' error, at no more than max_ray_angle.  The matches that
-// images i and j are expected to have are the features of i from which such a chain leads to j.  Chains of
-// two matches, not whole tracks: one wrong match joins two tracks, but makes few chains.
+// Predicts which posed images show the same scene from the pairs that are already matched.  View frusta
+// ignore walls; verified matches do not: where a feature f of image i matches one of image k, and that one
+// matches a feature h of image j, f and h most likely show the same thing if the stated poses allow it: their
+// rays meet in front of both cameras, up to the poses' error, at no more than max_ray_angle.  The matches
+// that images i and j are expected to have are the features of i from which such a chain leads to j.  Chains
+// of two matches, not whole tracks: one wrong match joins two tracks, but makes few chains.
 class PairPredictor {
  public:
   struct View {
@@ -43,10 +43,11 @@ class PairPredictor {
   void Add(int idx1, int idx2, const std::vector<Match>& inliers);
 
   // Pairs (idx1 < idx2, ascending) of enough expected matches that are not in `tried` (ascending).  Same for
-  // any order of the calls of Add and any number of threads.  A later call looks only at pairs that matches
-  // added since the last one lead to: others promise what they did.  REQUIRES of later calls: the same
-  // options, and in `tried` the pairs of the earlier calls.  Cost: sum over features of (matches)^2; later,
-  // of images with such pairs.  Memory: 16 bytes per match and 28 per feature.  Errors: Cancelled.
+  // any order of the calls of Add and any number of threads.  A later call only examines pairs that matches
+  // added since the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls
+  // have the same options, and the pairs of earlier calls in `tried`.  Cost: sum over features of
+  // (matches)^2; later, of images with such pairs.  Memory: 16 bytes per match and 28 per feature.
+  // Errors: Cancelled.
   Result<IndexPairs> Predict(const IndexPairs& tried, const PredictPairsOptions& options, int num_threads,
                              Progress& progress);
 
@@ -56,7 +57,7 @@ class PairPredictor {
     std::vector<uint64_t> begin;
     std::vector<uint32_t> feature;
   };
-  // Of the matches from `first_match` on.
+  // Links of the matches from `first_match` on.
   Links CollectLinks(size_t first_match) const;
   // Later images to which a chain leads that has a match of `new_links`, flags per image.
   std::vector<bool> NewlyLinked(int idx, const Links& links, const Links& new_links) const;

@@ -11,15 +11,16 @@
 namespace cairn::match_features {
 namespace {
 
-// Most descriptors that a tree is grown from here: 13 MB, a few seconds.
+// Largest number of descriptors from which a tree is grown here: 13 MB, a few seconds.
 constexpr int64_t kMaxNumTrainingDescriptors = 100'000;
-// Finer words than the map's: they need not stand for landmarks, only tell images apart.
+// Finer words than the map's: they need not represent landmarks, only distinguish images.
 constexpr GrowVocabularyOptions kTreeOptions = {.descriptors_per_word = 10,
                                                 .min_num_descriptors_to_split = 10};
-// Images whose descriptors are held at a time.
+// Number of images whose descriptors are in memory at a time.
 constexpr int kBlockSize = 64;
 
-// Every n-th descriptor of the images in their order, n such that at most kMaxNumTrainingDescriptors come.
+// Every n-th descriptor of the images in their order, with n such that there are at most
+// kMaxNumTrainingDescriptors.
 Result<DescriptorMatrix> SampleDescriptors(SQLite::Database& database, const MatchImages& images,
                                            int64_t num_descriptors, const Progress& progress) {
   const int64_t step = (num_descriptors + kMaxNumTrainingDescriptors - 1) / kMaxNumTrainingDescriptors;
@@ -87,7 +88,7 @@ Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const Matc
     CAIRN_ASSIGN_OR_RETURN(Vocabulary vocabulary, ReadVocabulary(vocabulary_path));
     if (vocabulary.num_words() > 1) return vocabulary;
     return MakeError(ErrorCode::kNoData,
-                     "{}: a vocabulary of {} word(s) tells no images apart; build it from images with "
+                     "{}: a vocabulary of {} word(s) cannot distinguish images; build it from images with "
                      "features, or leave --vocabulary out: one is then grown from the images at hand",
                      vocabulary_path, vocabulary.num_words());
   }

@@ -47,10 +47,10 @@ class ImageSimilarity {
   std::vector<std::vector<Posting>> inverted_files_;  // per word
 };
 
-// The vocabulary.db at `vocabulary_path`, of which only the tree is used, so that one made from other images
-// serves too.  Empty: a tree grown from an even sample of the descriptors at hand, the same for any number of
-// threads.  Errors: NoData (a vocabulary without words), those of ReadVocabulary, Corrupt, Cancelled; throws
-// SQLite::Exception.
+// The vocabulary.db at `vocabulary_path`, of which only the tree is used, so it may have been made from other
+// images.  Empty: a tree grown from an even sample of the descriptors at hand, the same for any number of
+// threads.  Errors: NoData (a vocabulary without words), those of ReadVocabulary, Corrupt, Cancelled;
+// throws SQLite::Exception.
 Result<Vocabulary> VocabularyForRetrieval(SQLite::Database& database, const MatchImages& images,
                                           const std::string& vocabulary_path, uint64_t seed, int num_threads,
                                           Progress& progress);

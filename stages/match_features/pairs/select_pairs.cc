@@ -15,7 +15,7 @@ constexpr int kGridColumns = 6;
 constexpr int kGridRows = 5;
 constexpr int kNumDepths = 5;
 
-// What of an image tells which others see the same.
+// What the overlap with other images is computed from.
 struct Frustum {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // world frame
   std::vector<Eigen::Vector3d> samples;              // world frame
@@ -43,14 +43,14 @@ Frustum SampleFrustum(const PosedCamera& image, const FrustumOverlapOptions& opt
       }
     }
   }
-  // The third side of a triangle of which the others and the angle between them are as large as may be.
+  // The third side of a triangle whose other sides and the angle between them are as large as allowed.
   const double ratio = options.max_scale_ratio;
   const double cosine = std::cos(RadFromDeg(options.max_view_angle_deg));
   frustum.reach_m = largest_distance_m * std::sqrt(1 + ratio * ratio - 2 * ratio * cosine) * (1 + 1e-9);
   return frustum;
 }
 
-// x², negative where x is: compares cosines without a square root.
+// x² with the sign of x: compares cosines without a square root.
 double SignedSquare(double x) { return x * std::abs(x); }
 
 double Overlap(const Frustum& frustum, const PosedCamera& image2, const Eigen::Vector3d& center2,

@@ -11,21 +11,21 @@
 
 namespace cairn::match_features {
 
-// An image as pair selection sees it.
+// What pair selection reads of an image.
 struct PosedCamera {
   Camera camera;
   Pose cam_from_world;
 };
 
 struct FrustumOverlapOptions {
-  // Distances at which the scene may lie, metres: the ends of the frustum that is sampled.  REQUIRES: 0 <
-  // near < far
+  // Distances at which the scene may lie, metres: the ends of the frustum that is sampled.
+  // REQUIRES: 0 < near < far
   double near_m = 0.6;
   double far_m = 6.0;
-  // Least part of the samples of either frustum that the other camera sees.  REQUIRES: in [0, 1]
+  // Smallest part of the samples of either frustum that the other camera sees.  REQUIRES: in [0, 1]
   double min_overlap_ratio = 0.15;
-  // Largest angle between the two rays to a sample, degrees: SIFT does not match beyond.  REQUIRES: in (0,
-  // 180]
+  // Largest angle between the two rays to a sample, degrees: SIFT does not match beyond.
+  // REQUIRES: in (0, 180]
   double max_view_angle_deg = 60;
   // Largest ratio of the two distances to a sample.  REQUIRES: >= 1
   double max_scale_ratio = 3.5;
@@ -50,16 +50,16 @@ struct OverlapPartner {
 };
 using OverlapRanking = std::vector<std::vector<OverlapPartner>>;  // of each image
 // The images that each image overlaps by min_overlap_ratio in either direction, largest mean overlap first,
-// ties to the smaller index.  O(images^2), but only those within reach of each other take more than a look at
-// their distance.  Errors: Cancelled.
+// ties to the smaller index.  O(images^2), but only the distance is computed for pairs out of reach of each
+// other.  Errors: Cancelled.
 Result<OverlapRanking> RankOverlaps(const std::vector<PosedCamera>& images,
                                     const FrustumOverlapOptions& options, int num_threads,
                                     Progress& progress);
 
 // Each image with all its partners.
 IndexPairs FrustumPairs(const OverlapRanking& ranking);
-// Each image with the `num_best` first of its partners and with `num_spread` at even distances in the ranks
-// of the others: the first may all be of one pass along a path, the others find the passes before and after.
+// Each image with the first `num_best` of its partners and with `num_spread` evenly spaced in the ranks of
+// the others: the first may all be of one pass along a path, the others find the passes before and after.
 IndexPairs FrustumSeeds(const OverlapRanking& ranking, int num_best, int num_spread);
 
 // Pairs (i, j) of which one is among the partners of the other, i < j, ascending, each once.

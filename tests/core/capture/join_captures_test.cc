@@ -216,7 +216,7 @@ TEST_F(JoinCapturesTest, WhatCannotBeJoinedIsRefusedWithTheRemedy) {
   EXPECT_THAT(Refusal({{.name = "a", .root = Path("none")}}, ErrorCode::kNotFound),
               HasSubstr("no such folder"));
   Write("joined/images.txt", "somebody's own");
-  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing tells that cairn made it"));
+  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing shows that cairn made it"));
   EXPECT_EQ(Text("joined/images.txt"), "somebody's own");
 }
 
@@ -226,7 +226,7 @@ TEST_F(JoinCapturesTest, ACaptureThatHasSessionsOfItsOwnIsNotReplaced) {
   Write("joined/queries.txt", "mine");
   fs::create_directories(Path("joined/images"));
   fs::create_directory_symlink(Path("posed"), Path("joined/images/day1"));
-  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing tells that cairn made it"));
+  EXPECT_THAT(Refusal({Session("posed")}), HasSubstr("nothing shows that cairn made it"));
   EXPECT_EQ(Text("joined/queries.txt"), "mine");
   EXPECT_TRUE(fs::is_symlink(Path("joined/images/day1")));
 }
@@ -238,7 +238,7 @@ TEST_F(JoinCapturesTest, SessionListsWithNamesThatAreNoneAreCorrupt) {
   EXPECT_THAT(ReadSessionsText(Path("s/sessions.txt")).error().message,
               HasSubstr("sessions.txt:2: session '../day2'"));
   Write("s/sessions.txt", "day1\nday1\n");
-  EXPECT_THAT(ReadSessionsText(Path("s/sessions.txt")).error().message, HasSubstr("stands twice"));
+  EXPECT_THAT(ReadSessionsText(Path("s/sessions.txt")).error().message, HasSubstr("is listed twice"));
 }
 
 }  // namespace

@@ -248,7 +248,7 @@ TEST_F(ColmapDatabase, WriteAheadLogsAreReadAndNothingIsChanged) {
         "image_id = 2");
     for (const char* suffix : {"", "-wal"})
       fs::copy_file(path_ + suffix, taken + suffix);  // as a crash leaves them
-    // Beside a program that has it open: what it has committed, not what it has not.
+    // While another program has it open: reads what that program has committed, and nothing else.
     writer.exec("BEGIN; UPDATE images SET name = 'uncommitted.png' WHERE image_id = 2");
     auto database = OpenColmapDatabase(path_);
     ASSERT_TRUE(database.ok()) << database.error().message;

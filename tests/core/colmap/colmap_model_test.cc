@@ -194,7 +194,7 @@ TEST_F(ColmapModelTest, ReferencesToWhatIsNotThereAreErrors) {
               HasSubstr("the track of point 40 has keypoint 2 of image 5"));
   EXPECT_THAT(message_of([](ColmapModel& m) { m.images[1].image_id = 3; }),
               HasSubstr("image 3 is listed twice"));
-  EXPECT_THAT(MessageOf("/b"), HasSubstr("no COLMAP model"));
+  EXPECT_THAT(MessageOf("/b"), HasSubstr("not a COLMAP model"));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// A database that somebody else wrote: `sql` says what is in it.
+// A database of another program, made by `sql`.
 class HardenedDatabase : public testing::Test {
  protected:
   HardenedDatabase() : folder_(fmt::format("{}/database_test_{}", testing::TempDir(), getpid())) {
@@ -52,8 +52,7 @@ TEST_F(HardenedDatabase, ViewsAreNotRun) {
   }
 }
 
-// A program's own functions are what a schema would call to do harm: here, of each connection when it is
-// opened.
+// A harmful schema would call the functions of the program: here, of each connection when it is opened.
 TEST_F(HardenedDatabase, FunctionsOfTheProgramAreNotCalledByTheSchema) {
   const auto add_function = [](sqlite3* database, char**, const void*) {
     return sqlite3_create_function(

@@ -69,7 +69,7 @@ class FolderTest : public testing::Test {
     return status.error().message;
   }
 
-  // The number of a process that is no more.
+  // The number of a process that has ended.
   static pid_t DeadProcess() {
     const pid_t child = fork();
     if (child == 0) _exit(0);
@@ -113,7 +113,7 @@ TEST_F(FolderTest, AnEmptyFolderIsFilled) {
 TEST_F(FolderTest, AFolderThatOnlyLooksLikeOneOfOursIsRefused) {
   for (const char* name : {"images.txt", "cameras.txt", "cameras.bin", "frame.json", "sessions.txt"})
     Write(std::string("out/") + name, "somebody's own");
-  EXPECT_THAT(Refusal(), HasSubstr("nothing tells that cairn made it"));
+  EXPECT_THAT(Refusal(), HasSubstr("nothing shows that cairn made it"));
   EXPECT_THAT(Refusal(), HasSubstr("name another folder, or move this one away"));
 }
 
@@ -180,12 +180,12 @@ TEST_F(FolderTest, AManifestThatIsNotWholeTellsNothing) {
        {std::string(), manifest.substr(0, manifest.size() - 1), "x" + manifest, manifest + "what\n",
         manifest + "file 5\n", std::string("cairn folder 2\n") + manifest.substr(15)}) {
     Write("out/.cairn-folder", damaged);
-    EXPECT_THAT(Refusal(), HasSubstr("nothing tells that cairn made it")) << damaged;
+    EXPECT_THAT(Refusal(), HasSubstr("nothing shows that cairn made it")) << damaged;
   }
   fs::remove(Path("out/.cairn-folder"));
   Write("elsewhere/manifest", manifest);
   fs::create_symlink(Path("elsewhere/manifest"), Path("out/.cairn-folder"));
-  EXPECT_THAT(Refusal(), HasSubstr("nothing tells that cairn made it"));
+  EXPECT_THAT(Refusal(), HasSubstr("nothing shows that cairn made it"));
 }
 
 TEST_F(FolderTest, AFolderThatWasNeverFinishedIsRefused) {
@@ -286,7 +286,9 @@ TEST_F(FolderTest, LeftoversOfKilledProcessesGoIfTheyAreOurs) {
   // Killed while it wrote the manifest: before there was one, and when the last was to take its place.
   for (const bool has_manifest : {false, true}) {
     Write(killed + "/.cairn-folder.tmp-12-0123456789abcdef", "cairn fol");
-    if (has_manifest) ASSERT_TRUE(BeginOwnFolder(Path(killed), "a capture").ok());
+    if (has_manifest) {
+      ASSERT_TRUE(BeginOwnFolder(Path(killed), "a capture").ok());
+    }
     ASSERT_TRUE(Replace(has_manifest ? "4" : "5").ok());
     EXPECT_FALSE(fs::exists(Path(killed))) << has_manifest;
   }

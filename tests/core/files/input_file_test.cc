@@ -92,7 +92,7 @@ TEST_F(InputFile, FilesOfAnySizeAreReadWhole) {
   EXPECT_EQ(ReadFile("/proc/kallsyms").value().size(), symbols.size());
 }
 
-// Each of these would wait for ever for somebody who writes to the pipe.
+// Each of these would wait forever for a writer of the pipe.
 TEST_F(InputFile, NoReaderWaitsForAPipe) {
   const std::string pipe = Path("pipe");
   EXPECT_THAT(ReadWorld(pipe).error().message, HasSubstr("is a pipe"));

@@ -26,7 +26,7 @@ TEST(Memory, WorkThatDoesNotFitIsRefusedWithBothNumbers) {
   const Status status = CheckMemory("sorting", 100 << 20, 163);
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message,
-              HasSubstr("sorting takes about 164 MiB of memory, but --memory allows 163;"));
+              HasSubstr("sorting takes about 164 MiB of memory, but --memory allows 163 MiB;"));
 }
 
 TEST(Memory, EstimateFollowsTheFile) {
@@ -37,7 +37,7 @@ TEST(Memory, EstimateFollowsTheFile) {
   ASSERT_FALSE(status.ok());
   EXPECT_THAT(status.error().message, HasSubstr("reading of " + path + " takes about 66 MiB"));
   std::filesystem::remove(path);
-  EXPECT_TRUE(CheckMemoryForFile("reading", path, 2.0, 1).ok());  // whoever reads it says that it is missing
+  EXPECT_TRUE(CheckMemoryForFile("reading", path, 2.0, 1).ok());  // the reader reports that it is missing
 }
 
 TEST(DiskSpace, ShortageIsRefusedBeforeTheWorkWithTheWayAround) {

@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
 
 #include "core/line/program_identity.h"
 #include "core/line/reuse.h"
@@ -105,7 +106,8 @@ TEST_F(ReuseTest, AShardDoesNotReplaceWhatItReads) {
   const auto apply = [&](std::vector<std::string> argv) {
     CLI::App app;
     ReuseArguments arguments;
-    arguments.Add(app, "images");
+    ArgumentParser parser(app);
+    arguments.Add(parser, "images");
     std::reverse(argv.begin(), argv.end());
     app.parse(argv);
     return arguments.Apply(path);

@@ -1,5 +1,5 @@
 // Maps that somebody without the key has changed, given to a reader that requires the key: it refuses them,
-// or reads what was signed.  (MapSeal tests damage; here the file is changed by one who knows SQLite.)
+// or reads what was signed.  (MapSeal tests damage; here the file is changed by an expert in SQLite.)
 #include <functional>
 #include <regex>
 
@@ -297,8 +297,8 @@ void Put(std::string* bytes, size_t place, uint64_t value, int num_bytes) {
   for (int i = num_bytes - 1; i >= 0; --i, value >>= 8) (*bytes)[place + i] = static_cast<char>(value & 0xff);
 }
 
-// An interior page all of whose cells lead to one child.  `record`: what a cell of an index's page has
-// beside.
+// An interior page all of whose cells lead to one child.  `record`: what a cell of an index's page
+// has beside.
 std::string PageOfManyChildren(size_t page_size, size_t begin, uint32_t child, const std::string& record) {
   std::string page(page_size, '\0');
   const size_t header = begin;
@@ -380,7 +380,7 @@ TEST_F(HostileMap, TablesWithoutEndAreRefused) {
 
 // --- Right seals, and contents that unfold
 
-// The signed map with other station blocks, sealed anew.
+// The signed map with other station blocks, sealed again.
 void WriteWithStations(const std::string& signed_path, const std::vector<StationBlock>& stations,
                        const std::string& path) {
   std::vector<BlockContents> blocks;
@@ -395,8 +395,8 @@ void WriteWithStations(const std::string& signed_path, const std::vector<Station
   ASSERT_TRUE(status.ok()) << status.error().message;
 }
 
-// Stations in blocks of 100, each with `num_neighbours` of the next as neighbours: a run is 3 bytes at any
-// length.
+// Stations in blocks of 100, each with `num_neighbours` of the next as neighbours: a run is 3 bytes at
+// any length.
 std::vector<StationBlock> StationBlocks(int num_stations, int num_neighbours) {
   std::vector<StationBlock> blocks;
   for (int first = 0; first < num_stations; first += 100) {
@@ -426,7 +426,7 @@ TEST_F(HostileMap, ListsThatUnfoldToFarMoreThanTheFileAreRefused) {
   const Result<MapRows> many = ReadMapRows(path_);
   ASSERT_FALSE(many.ok());
   EXPECT_EQ(many.error().code, ErrorCode::kCorrupt);
-  EXPECT_THAT(many.error().message, HasSubstr("unfold to more than 64 times its size"));
+  EXPECT_THAT(many.error().message, HasSubstr("decode to more than 64 times its size"));
 }
 
 TEST_F(HostileMap, MoreRegionsThanStationsAreRefusedBeforeTheyAreRead) {
@@ -466,7 +466,7 @@ TEST_F(HostileMap, ModelsOfMoreSightsThanAreSolvedInTimeAreRefused) {
 TEST_F(HostileMap, RegionsOfNoStationAreRefused) {
   MapRows rows = FullRows();
   rows.regions[0].stations.clear();
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("region 0: is of no station"));
+  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("region 0 has no station"));
   rows = FullRows();
   while (rows.regions.size() <= rows.stations.size()) rows.regions.push_back(rows.regions[0]);
   EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("4 regions of 3 stations"));

@@ -274,7 +274,7 @@ TEST(MapFile, VisualMapsReadBackAsTheyWere) {
   EXPECT_EQ(model.sigma, rows.visual_map.landmarks[2][1].sigma);
   ASSERT_TRUE(WriteMapRows(*read, MapPath("visual2.cairn")).ok());
   EXPECT_EQ(*ReadFile(MapPath("visual.cairn")), *ReadFile(MapPath("visual2.cairn")));
-  // Who does not ask for it has the same map as before.
+  // Without this option the map is the same as before.
   rows.visual_map = {};
   ASSERT_TRUE(WriteMapRows(rows, MapPath("without2.cairn")).ok());
   EXPECT_EQ(*ReadFile(MapPath("without.cairn")), *ReadFile(MapPath("without2.cairn")));
@@ -396,7 +396,7 @@ MapRows Rows2_3() {
 TEST(GoldenMap, Version2_3IsRead) {
   const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.3.cairn");
   ASSERT_TRUE(rows.ok()) << rows.error().message;
-  ASSERT_EQ(rows->appearance.size(), 3u);  // image 3 is none of the map's
+  ASSERT_EQ(rows->appearance.size(), 3u);  // image 3 is not in the map
   EXPECT_EQ(rows->appearance[1], (MapAppearanceNode{{1}, true, {{2, 30}}, 0.5, {}}));
   EXPECT_EQ(rows->appearance[0].look_alikes, (std::vector<MapAppearanceNode::LookAlike>{{2, 0.5}}));
   EXPECT_EQ(rows->findings.region_entropies, Rows2_3().findings.region_entropies);

@@ -34,7 +34,7 @@ MapRows ValidRows() {
   return rows;
 }
 
-// What is said of the rows after a change; "" where they are still valid.
+// The message about the rows after a change; "" where they are still valid.
 std::string Refusal(const Change& change) {
   MapRows rows = ValidRows();
   change(rows);
@@ -112,19 +112,19 @@ TEST(MapRows, HeadsThatMakeNoSenseAreRefused) {
               HasSubstr("noise of the stated poses"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.documents = "some"; }), HasSubstr("documents = 'some'"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.floor_from_world.rotation.coeffs() *= 2; }),
-              HasSubstr("a frame's rotation"));
+              HasSubstr("the rotation of a frame"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.camera_from_given.rotation.coeffs() *= 2; }),
-              HasSubstr("a frame's rotation"));
+              HasSubstr("the rotation of a frame"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.camera_from_given.translation.x() = kNan; }),
-              HasSubstr("a frame's rotation"));
+              HasSubstr("the rotation of a frame"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.cameras.push_back(r.cameras.back()); }),
               HasSubstr("is out of order"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.self_test["a"] = kNan; }), HasSubstr("'a' is not finite"));
   EXPECT_THAT(Refusal([](MapRows& r) {
                 r.sessions = {"a", "b", "a"};
               }),
-              HasSubstr("session 'a' stands twice"));
-  EXPECT_THAT(Refusal([](MapRows& r) { r.sessions = {"a/b"}; }), HasSubstr("has no valid name"));
+              HasSubstr("session 'a' is listed twice"));
+  EXPECT_THAT(Refusal([](MapRows& r) { r.sessions = {"a/b"}; }), HasSubstr("the name is not valid"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.frame.unit = "foot"; }), HasSubstr("unit 'foot'"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.frame.anchor = GeodeticPosition{91, 0, 0}; }), HasSubstr("anchor"));
   for (const Change& change : std::vector<Change>{
@@ -144,11 +144,11 @@ TEST(MapRows, ImagesThatMakeNoSenseAreRefused) {
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].camera_id = 99; }),
               HasSubstr("has camera 99, which the map lacks"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].cam_from_world.translation.z() = kNan; }),
-              HasSubstr("pose is none"));
+              HasSubstr("pose is not valid"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].cam_from_world.translation.z() = -2.01e5; }),
-              HasSubstr("pose is none"));
+              HasSubstr("pose is not valid"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].cam_from_world.rotation.coeffs().setZero(); }),
-              HasSubstr("pose is none"));
+              HasSubstr("pose is not valid"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].station = -2; }), HasSubstr("station -2 of 3"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[2].station = 3; }), HasSubstr("station 3 of 3"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.images[0].name = std::string(4097, 'a'); }),
@@ -183,7 +183,7 @@ TEST(MapRows, StationsAndRegionsThatMakeNoSenseAreRefused) {
   EXPECT_THAT(Refusal([](MapRows& r) { r.regions.resize(4, r.regions[0]); }),
               HasSubstr("4 regions of 3 stations"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.regions[1].stations.clear(); }),
-              HasSubstr("region 1: is of no station"));
+              HasSubstr("region 1 has no station"));
   EXPECT_THAT(Refusal([](MapRows& r) {
                 r.regions[1].stations = {2, 1};
               }),

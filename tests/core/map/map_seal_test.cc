@@ -35,7 +35,7 @@ std::string WriteExample(const std::string& name) {
   return InFolder(name);
 }
 
-// Changes a map's tables, and seals what they have become.
+// Changes a map's tables, and seals the changed map.
 void Reseal(const std::string& path, const std::string& sql) {
   Hash root = {};
   {
@@ -79,7 +79,7 @@ TEST(MapSeal, EverySingleFlippedBitIsFound) {
     std::fwrite(flipped.data(), 1, flipped.size(), file);
     std::fclose(file);
     EXPECT_FALSE(Verify(InFolder("flipped.cairn")).ok()) << "bit " << bit;
-    // Whoever does not look at every byte may read it; then it reads what is there.
+    // A reader that does not check every byte may open it; then it reads the bytes that are there.
     const Result<MapRows> rows = ReadMapRows(InFolder("flipped.cairn"));
     EXPECT_TRUE(!rows.ok() || rows->name == "example");
   }
@@ -148,7 +148,7 @@ TEST(MapSeal, EpochIsSignedAndNothingElseChanges) {
   EXPECT_EQ(epoch_of(first), 1U);
   EXPECT_EQ(*SignMap(path, keys.secret_key, later, 41), 41U);
   EXPECT_EQ(epoch_of(later), 41U);
-  // A map that was counted keeps its epoch, and then its bytes, unless it is told another.
+  // A map with an epoch keeps it, and so its bytes, unless another epoch is given.
   EXPECT_EQ(*SignMap(later, keys.secret_key, InFolder("again.cairn")), 41U);
   EXPECT_EQ(*ReadFile(InFolder("again.cairn")), *ReadFile(later));
   EXPECT_EQ(*SignMap(later, keys.secret_key, InFolder("next.cairn"), 42), 42U);
@@ -183,7 +183,7 @@ TEST(MapSeal, NextEpochFollowsASignedMapOfThatNameAndKey) {
   EXPECT_EQ(EpochAfter(last, "example", keys.secret_key).error().code, ErrorCode::kInvalidArgument);
 }
 
-// What it takes for a later map to follow, and the one that is asked for.
+// The conditions for a later map to follow, and the required epoch.
 TEST(MapSeal, OnlyALaterEpochOfTheSameNameFollows) {
   MapHead old;
   old.name = "kitchen";
@@ -217,7 +217,7 @@ TEST(MapSeal, EpochThatIsNoNumberIsRefused) {
   }
 }
 
-// Who signs a map that somebody else made signs what it says, not what it does.
+// Signing a map of unknown origin signs its contents and runs nothing in it.
 TEST(MapSeal, NothingInAMapRunsWhileItIsSigned) {
   const KeyPair keys = MakeKeyPair();
   const std::string path = WriteExample("trigger.cairn");

@@ -28,8 +28,8 @@ inline std::vector<BlockContents> BlocksOf(const MapFile& file) {
   return blocks;
 }
 
-// Writes `map` (a map's bytes) to `path` with these blocks, sealed anew: whoever makes a map can seal any
-// contents.
+// Writes `map` (a map's bytes) to `path` with these blocks, sealed again: the maker of a map can seal
+// any contents.
 inline Status WriteSealedBlocks(const std::string& map, const std::vector<BlockContents>& blocks,
                                 const std::string& path) {
   std::FILE* const file = std::fopen(path.c_str(), "wb");  // WriteFileAtomically waits for the disk

@@ -90,8 +90,7 @@ TEST_F(BuildFolderTest, AFolderWithFilesThatWouldBeOverwrittenIsNoPlaceToBuild) 
   fs::create_directories(paths_.build_dir + "/options");
   ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/lock", "").ok());
   ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/notes.txt", "mine").ok());
-  EXPECT_TRUE(
-      check().ok());  // as a build leaves it that is killed early, beside a file that is nobody's business
+  EXPECT_TRUE(check().ok());  // as an early killed build leaves it, with a file that is not cairn's
   for (const char* name : {"features.db", "capture", "error.json", "config.mk", "world.db.tmp-7"}) {
     ASSERT_TRUE(WriteFileAtomically(paths_.build_dir + "/" + name, "mine").ok());
     const Status status = check();
@@ -123,7 +122,7 @@ TEST_F(BuildFolderTest, PathsThatMakeCannotCarryAreRefusedWithASentence) {
   const Status status = WriteBuildFolder(recipe_, paths_);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(status.error().message, HasSubstr("has a space in its path, which Make cannot carry; rename"));
+  EXPECT_THAT(status.error().message, HasSubstr("has a space in its path, which Make cannot handle; rename"));
   EXPECT_FALSE(fs::exists(folder_ / "my maps"));  // nothing is written first
 }
 

@@ -117,7 +117,7 @@ TEST_F(FolderLockTest, WhoeverComesFirstRemovesStaleTemporariesAndNothingElse) {
     if (std::find(kept.begin(), kept.end(), path) != kept.end()) continue;
     EXPECT_TRUE(path.find(".tmp-") == std::string::npos || path.ends_with("/poses.tmp-13")) << path;
   }
-  // One who joins may not: what is there now is being written.
+  // A process that joins must not remove them: they are being written now.
   const std::string written = Write("a.build/features.db.tmp-6");
   ASSERT_TRUE(Acquire("1@here").ok());
   EXPECT_TRUE(fs::exists(written));

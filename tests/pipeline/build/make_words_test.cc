@@ -74,7 +74,7 @@ TEST_F(MakeWords, WhatMakeOrAShellWouldReadOtherwiseIsRefusedWithASentence) {
           variables.SetPairs("MAP", "the map", {{"a", path}})}) {
       ASSERT_FALSE(status.ok()) << path;
       EXPECT_EQ(status.error().code, ErrorCode::kInvalidArgument);
-      EXPECT_THAT(status.error().message, HasSubstr("in its path, which Make cannot carry; rename"));
+      EXPECT_THAT(status.error().message, HasSubstr("in its path, which Make cannot handle; rename"));
     }
     EXPECT_EQ(variables.MakefileText(), "");  // nothing of it is kept
   }
@@ -97,17 +97,18 @@ TEST_F(MakeWords, LaunchersAreWordsAndNothingElse) {
         "`touch PWNED`", "'a b'", "\"a b\"", "a\\ b", "a #b", "(a)", "a*", "!a", "a?"}) {
     const Status status = variables.SetLauncher("LAUNCH", "--launch", words);
     ASSERT_FALSE(status.ok()) << words;
-    EXPECT_THAT(status.error().message, HasSubstr("write what needs a shell into a script")) << words;
+    EXPECT_THAT(status.error().message, HasSubstr("move what needs a shell into a script")) << words;
   }
 }
 
-// Every variable that map.mk or make itself reads from its environment, where nothing sets it.
+// Every variable that map.mk, machinery.mk or make itself reads from its environment, where nothing sets it.
 TEST(ChildEnvironment, NoVariableOfMakeOrOfTheRulesIsPassedOn) {
   std::set<std::string> variables = {"MAKEFILES", "MAKEFLAGS",      "GNUMAKEFLAGS", "MFLAGS",   "MAKELEVEL",
                                      "MAKE",      "SHELL",          "MAKESHELL",    "BASH_ENV", "ENV",
                                      "IFS",       "CDPATH",         "VPATH",        "SUFFIXES", "RM",
                                      "CC",        "BASH_FUNC_awk%%"};
-  const std::string rules = ReadFile(CAIRN_SOURCE_DIR "/pipeline/build/map.mk").value();
+  const std::string rules = ReadFile(CAIRN_SOURCE_DIR "/pipeline/build/map.mk").value() +
+                            ReadFile(CAIRN_SOURCE_DIR "/pipeline/build/machinery.mk").value();
   const std::regex reference(R"(\$\(([A-Za-z_]+)\)|\n(?:ifdef |ifndef )?([A-Z_]+)(?:\n| [:?+]?=))");
   for (std::sregex_iterator it(rules.begin(), rules.end(), reference), end; it != end; ++it)
     variables.insert((*it)[1].matched ? (*it)[1].str() : (*it)[2].str());

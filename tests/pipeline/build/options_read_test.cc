@@ -35,15 +35,16 @@ void ExpectRefused(const Refusal& refusal) {
 }
 
 TEST(OptionsRead, WhatOtherOptionsTurnOffIsRefused) {
-  const std::vector<std::string> match = {"match-features", "f.db", "-o", "m.db"};
-  const std::vector<std::string> link = {"link-appearance", "m.db", "v.db", "-o", "a.db"};
-  const std::vector<std::string> group = {"group-classes", "m.db", "--capture", "c", "-o", "c.db"};
-  const std::vector<std::string> regions = {"decompose-regions", "w.db", "--classes", "c.db", "-o", "r.db"};
-  const std::vector<std::string> world = {"filter-visibility", "c.db", "-o", "w.db"};
-  const std::vector<std::string> words = {"build-vocabulary", "f.db", "-o", "v.db"};
-  const std::vector<std::string> emit = {"emit-map", "--classes",    "c", "--world", "w", "--regions",
-                                         "r",        "--vocabulary", "v", "--name",  "n", "-o",
-                                         "u.cairn"};
+  const std::vector<std::string> match = {"stage", "match-features", "f.db", "-o", "m.db"};
+  const std::vector<std::string> link = {"stage", "link-appearance", "m.db", "v.db", "-o", "a.db"};
+  const std::vector<std::string> group = {"stage", "group-classes", "m.db", "--capture", "c", "-o", "c.db"};
+  const std::vector<std::string> regions = {"stage", "decompose-regions", "w.db", "--classes", "c.db", "-o",
+                                            "r.db"};
+  const std::vector<std::string> world = {"stage", "filter-visibility", "c.db", "-o", "w.db"};
+  const std::vector<std::string> words = {"stage", "build-vocabulary", "f.db", "-o", "v.db"};
+  const std::vector<std::string> emit = {"stage",     "emit-map", "--classes",    "c", "--world", "w",
+                                         "--regions", "r",        "--vocabulary", "v", "--name",  "n",
+                                         "-o",        "u.cairn"};
   const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
     words.insert(words.end(), more.begin(), more.end());
     return words;
@@ -80,44 +81,46 @@ TEST(OptionsRead, WhatOtherOptionsTurnOffIsRefused) {
 
 TEST(OptionsRead, WhatNeedsAFileThatIsNotGivenIsRefused) {
   for (const Refusal& refusal : std::vector<Refusal>{
-           {{"match-features", "f.db", "-o", "m.db", "--pairs", "frustum", "--vocabulary", "v.db"},
-            "words are for --pairs retrieval, sequence or auto, and --pairs is frustum"},
-           {{"match-features", "f.db", "-o", "m.db", "--pair-list", "p", "--pairs", "exhaustive"},
-            "--pairs: --pair-list says which pairs are matched"},
-           {{"match-features", "f.db", "-o", "m.db", "--pair-list", "p", "--vocabulary", "v.db"},
+           {{"stage", "match-features", "f.db", "-o", "m.db", "--pairs", "frustum", "--vocabulary", "v.db"},
+            "words are used for --pairs retrieval, sequence or auto only, and --pairs is frustum"},
+           {{"stage", "match-features", "f.db", "-o", "m.db", "--pair-list", "p", "--pairs", "exhaustive"},
+            "--pairs: --pair-list gives the pairs"},
+           {{"stage", "match-features", "f.db", "-o", "m.db", "--pair-list", "p", "--vocabulary", "v.db"},
             "the pairs are those of --pair-list"},
-           {{"link-appearance", "m.db", "-o", "a.db", "--score-exponent", "3"},
+           {{"stage", "link-appearance", "m.db", "-o", "a.db", "--score-exponent", "3"},
             "by the words of vocabulary.db"},
-           {{"check-appearance", "m.db", "--capture", "c"}, "poses are for --fuse place"},
-           {{"decompose-regions", "w.db", "-o", "r.db", "--feature-choice", "cover"}, "give --classes"},
-           {{"check-map", "m.cairn", "--capture", "c"}, "give --queries"},
-           {{"check-map", "m.cairn", "--scans", "s.log"}, "give --queries"},
-           {{"check-map", "m.cairn", "--min-localized-ratio", "0.9"}, "give --queries or -o"},
-           {{"check-map", "m.cairn", "--queries", "q", "--scan-x-m", "1"}, "give --scans"},
+           {{"stage", "check-appearance", "m.db", "--capture", "c"}, "poses are used for --fuse place"},
+           {{"stage", "decompose-regions", "w.db", "-o", "r.db", "--feature-choice", "cover"},
+            "give --classes"},
+           {{"check", "m.cairn", "--capture", "c"}, "give --queries"},
+           {{"check", "m.cairn", "--scans", "s.log"}, "give --queries"},
+           {{"check", "m.cairn", "--min-localized-ratio", "0.9"}, "give --queries or -o"},
+           {{"check", "m.cairn", "--queries", "q", "--scan-x-m", "1"}, "give --scans"},
            {{"localize", "m.cairn", "a.png", "--camera", "PINHOLE,2,2,1,1,1,1", "--cameras", "c.txt"},
             "leave one out"},
            {{"localize", "m.cairn", "a.png", "--min-num-votes", "3"}, "give --sequence"},
            {{"localize", "m.cairn", "a.png", "--visual-max-ratio", "0.5"}, "--estimator visual-map or both"},
-           {{"plan-path", "v.db", "--from", "0,0", "--kind", "search", "--to", "1,1"}, "leave --to out"},
-           {{"plan-path", "v.db", "--from", "0,0", "--to", "1,1", "--seen-ratio", "0.5"},
+           {{"plan", "path", "v.db", "--from", "0,0", "--kind", "search", "--to", "1,1"}, "leave --to out"},
+           {{"plan", "path", "v.db", "--from", "0,0", "--to", "1,1", "--seen-ratio", "0.5"},
             "is for --kind search"},
-           {{"explain", "m.cairn", "--build-dir", "b"}, "give --image"},
-           {{"report", "m.cairn", "-o", "r.html", "--print", "--drive", "d.json"}, "--print has no room for"},
+           {{"inspect", "m.cairn", "--build-dir", "b"}, "give --image"},
+           {{"report", "m.cairn", "-o", "r.html", "--print", "--drive", "d.json"}, "--print does not show"},
            {{"clean", "/", "--build-dir", "b"}, "leave one of them out"}}) {
     ExpectRefused(refusal);
   }
 }
 
-// What check-appearance has no use for is no option of it.
+// check-appearance has no options that it does not read.
 TEST(OptionsRead, CheckAppearanceHasOnlyTheOptionsThatItReads) {
   for (const char* option :
        {"--algorithm", "--max-detour-links", "--lower-bound", "--max-num-program-links",
         "--max-num-cut-rounds", "--max-num-branches", "--score-exponent", "--entropy-over",
         "--confusable-score-ratio", "--confusable-distance-m", "--max-num-confusable"}) {
-    ExpectRefused({{"check-appearance", "m.db", option, "1"}, fmt::format("no option '{}'", option)});
+    ExpectRefused(
+        {{"stage", "check-appearance", "m.db", option, "1"}, fmt::format("no option '{}'", option)});
   }
-  ExpectRefused(
-      {{"check-appearance", "m.db", "--num-dominators", "2"}, "where num_kept is not 0, and it is 0"});
+  ExpectRefused({{"stage", "check-appearance", "m.db", "--num-dominators", "2"},
+                 "where num_kept is not 0, and it is 0"});
 }
 
 TEST(OptionsRead, ConditionsNameOptionsOfTheirTableAndValuesThatTheyCanHave) {

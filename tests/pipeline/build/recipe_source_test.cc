@@ -76,12 +76,12 @@ TEST_F(RecipeSourceTest, AnotherRecipeIsNeverWrittenOver) {
   Write("hall_A.toml", "name = \"mine\"\n");
   EXPECT_THAT(
       Message("survey/hall_A"),
-      HasSubstr("hall_A.toml: is there and is not the recipe that compiles survey/hall_A with defaults; "
+      HasSubstr("hall_A.toml: exists and is not the recipe that compiles survey/hall_A with defaults; "
                 "compile it (cairn compile hall_A.toml -o hall_A.cairn), or give another -o"));
   EXPECT_EQ(ReadFile("hall_A.toml").value(), "name = \"mine\"\n");
   fs::remove("hall_A.toml");
   fs::create_symlink("nowhere.toml", "hall_A.toml");  // nor is what a link leads to made
-  EXPECT_THAT(Message("survey/hall_A"), HasSubstr("is there"));
+  EXPECT_THAT(Message("survey/hall_A"), HasSubstr("exists and is not the recipe"));
   EXPECT_FALSE(fs::exists("nowhere.toml"));
 }
 
@@ -97,29 +97,29 @@ TEST_F(RecipeSourceTest, ARecipeStaysWhatItIs) {
 TEST_F(RecipeSourceTest, WhatIsNoRecipeIsNamedAsWhatItIs) {
   EXPECT_THAT(Message("nothing"), HasSubstr("nothing: no such file or folder; compile takes a recipe"));
   EXPECT_THAT(Message("survey/hall_A/images/a.png"),
-              HasSubstr("a.png: an image, no recipe; to compile its folder: cairn compile " +
+              HasSubstr("a.png: an image, not a recipe; to compile its folder: cairn compile " +
                         (folder_ / "survey/hall_A/images").string()));
   ASSERT_TRUE(WriteWorldDatabase(World(), "world.db").ok());
-  EXPECT_THAT(Message("world.db"), HasSubstr("world.db: a database, of COLMAP or of a stage, no recipe"));
+  EXPECT_THAT(Message("world.db"), HasSubstr("world.db: a database of COLMAP or of a stage, not a recipe"));
   SQLite::Database("a.cairn", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE)
       .exec("PRAGMA application_id = 1668443504; PRAGMA user_version = 3000; CREATE TABLE meta (key, value)");
   EXPECT_THAT(Message("a.cairn"), HasSubstr("a.cairn: a compiled map; `cairn inspect` shows it"));
   fs::create_directories("a.build/options");
   Write("a.build/config.mk", "");
-  EXPECT_THAT(Message("a.build"), HasSubstr("the build folder of a map, no capture"));
+  EXPECT_THAT(Message("a.build"), HasSubstr("the build folder of a map, not a capture"));
   fs::create_directories("empty");
   EXPECT_THAT(Message("empty"), HasSubstr("a folder without an image"));
   Write("empty/recipe.toml", "");
-  EXPECT_THAT(Message("empty"), HasSubstr("is empty/recipe.toml the recipe that is meant?"));
+  EXPECT_THAT(Message("empty"), HasSubstr("did you mean the recipe empty/recipe.toml?"));
   EXPECT_THAT(Message("/dev/null"), HasSubstr("neither a file nor a folder"));
   EXPECT_FALSE(fs::exists("empty.toml"));
 }
 
 TEST_F(RecipeSourceTest, NothingIsWrittenWhereTheMapCouldNotBe) {
   EXPECT_THAT(Message("survey/hall_A", "hall.map"), HasSubstr("a map's name ends in .cairn"));
-  EXPECT_THAT(Message("survey/hall_A", "my hall.cairn"), HasSubstr("which Make cannot carry"));
+  EXPECT_THAT(Message("survey/hall_A", "my hall.cairn"), HasSubstr("which Make cannot handle"));
   fs::rename("survey/hall_A", "survey/hall A");
-  EXPECT_THAT(Message("survey/hall A"), HasSubstr("which Make cannot carry"));
+  EXPECT_THAT(Message("survey/hall A"), HasSubstr("which Make cannot handle"));
   for (const auto& entry : fs::directory_iterator(".")) EXPECT_NE(entry.path().extension(), ".toml");
 }
 

@@ -147,7 +147,7 @@ TEST_F(Import, KittiPosesAreOfCameraZeroAndProjectionsShiftTheOthers) {
   Write("poses/03.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 2 3\n");
   EXPECT_THAT(MessageOf(), HasSubstr("03.txt:2: expected the 12 numbers of a 3 x 4 pose"));
   Write("poses/03.txt", "2 0 0 0 0 1 0 0 0 0 1 0\n");
-  EXPECT_THAT(MessageOf(), HasSubstr("03.txt:1: the pose's rotation is none"));
+  EXPECT_THAT(MessageOf(), HasSubstr("03.txt:1: the pose's rotation is not valid"));
 }
 
 TEST_F(Import, EurocComposesTheBodyPoseWithTheCamerasPlaceOnIt) {

@@ -227,9 +227,10 @@ TEST(Advise, NamesTheSmallestMapThatDoesAsMuchOrTheSmallestThatDoesMore) {
   EXPECT_EQ(SizesText({Size(40000, 0.8, 0.8), Size(40000, 0.9, 0.7)}), "");  // does less
   EXPECT_THAT(
       SizesText({Size(60000, 0.9, 0.8), Size(40000, 0.9, 0.8), Size(20000, 0.5, 0.5)}),
-      HasSubstr("Smaller will do: a map of 40 kB ([emit_map] landmarks = \"all\", max_bytes = 40001)"));
+      HasSubstr(
+          "A smaller map is enough: a map of 40 kB ([emit_map] landmarks = \"all\", max_bytes = 40001)"));
   EXPECT_THAT(SizesText({Size(900000, 1, 0.9), Size(300000, 0.95, 0.9), Size(40000, 0.9, 0.8)}),
-              HasSubstr("More can be had: a map of 300 kB"));
+              HasSubstr("A map that localizes more is possible: a map of 300 kB"));
   ParetoPoint every_class = Size(900000, 1, 0.9);
   every_class.max_bytes = 0;
   EXPECT_THAT(SizesText({every_class}), HasSubstr("([emit_map] landmarks = \"all\") localizes"));

@@ -12,8 +12,8 @@
 
 namespace cairn {
 
-// Points in space and a camera on a robot: what the servo gets to see.  Floor frame, z up from the camera's
-// height, metres; nothing hides anything.
+// Points in space and a camera on a robot: the servo's input.  Floor frame, z up from the camera's height,
+// metres; nothing hides anything.
 struct ServoScene {
   std::vector<Eigen::Vector3d> points;
   Camera camera = {.model = CameraModel::kSimplePinhole,

@@ -17,7 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Two wings, 0 to 4 and 5 to 9, that look alike but for their third places, and lead to a hall:
+// Two wings, 0 to 4 and 5 to 9, that look alike except for their third places, and lead to a hall:
 //   0 - 1 - 2 - 3 - 4
 //                     \ 10 - 11
 //   5 - 6 - 7 - 8 - 9 /
@@ -210,7 +210,7 @@ TEST(StartHypotheses, SaysWhyThereIsNone) {
             ErrorCode::kInvalidArgument);
   const PlaceModel without = ModelOf(VisualMemory(WingWords(), kWingLinks));
   EXPECT_THAT(StartHypotheses::Make(without, LookAt(without, 1), 11).error().message,
-              HasSubstr("does not tell how ambiguous"));
+              HasSubstr("does not say how ambiguous"));
   EXPECT_TRUE(StartHypotheses::Make(without, LookAt(without, 1), 11,
                                     {.first_choice = "score", .route = {.weight = "links"}})
                   .ok());

@@ -249,8 +249,8 @@ TEST(InterpretationTree, WhatLiesBehindAWallSpeaksAgainstAPose) {
   EXPECT_LT(in_room(12), in_room(2));
 }
 
-// The complete tree of the same constraints is the oracle: what it puts first, the pairs that fix the pose
-// find.
+// The complete tree of the same constraints is the oracle: what it puts first, the pairs that fix the
+// pose find.
 TEST(InterpretationTree, PairsThatFixThePoseFindWhatTheWholeTreeFinds) {
   const Flat flat;
   int tried = 0, found = 0;
@@ -302,7 +302,7 @@ TEST(InterpretationTree, ASegmentBehindAWallIsNoneOfItsSegments) {
   EXPECT_EQ(WallOf(upright->labels[2]), 1);
 }
 
-// Places along a line, each over so many segments (letters):
+// Places along a line, each over these segments (letters):
 //   0    1    2    3    4    5
 //   aaaaaaaaaaa    aaaaaa
 //        bbbbbbbbbbbbbb

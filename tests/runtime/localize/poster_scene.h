@@ -14,8 +14,8 @@
 
 namespace cairn {
 
-// A wall (the plane x = 3 m) with a poster of random blobs, 4 m wide and 3 m high: real pixels with known
-// geometry.
+// A wall (the plane x = 3 m) with a poster of random blobs, 4 m wide and 3 m high: real pixels with
+// known geometry.
 struct PosterScene {
   cv::Mat poster;  // 1 px = 5 mm
   Camera camera;

@@ -16,51 +16,13 @@
 #include "core/map/map_delta.h"
 #include "core/map/map_file.h"
 #include "runtime/map/map.h"
-#include "tests/runtime/localize/synthetic_room.h"
+#include "tests/runtime/map/update_map_fixture.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-
-// The map of a room, and that of the room after the first of its eight regions was surveyed anew: other
-// landmarks there.
-class UpdateMapTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    SyntheticRoom room = MakeSyntheticRoom(3);
-    ASSERT_TRUE(WriteMapRows(room.rows, Path("old.cairn")).ok());
-    Random random(1);
-    for (const LandmarkIdx landmark : room.rows.regions[0].landmarks) {
-      room.rows.landmarks[landmark].position.x() += random.Normal(0, 0.02);
-      room.rows.descriptors.row(landmark) = RandomDescriptor(random);
-    }
-    room.rows.name = "room, again";
-    ASSERT_TRUE(WriteMapRows(room.rows, Path("new.cairn")).ok());
-  }
-
-  void SetUp() override {
-    for (const char* name : {"made.cairn", "never.cairn", "key.cairn"}) fs::remove(Path(name));
-  }
-
-  static std::string Path(const std::string& name) { return testing::TempDir() + "/update_" + name; }
-
-  // A delta from old.cairn to new.cairn under this name.
-  static std::string WriteDelta(const std::string& name, const std::optional<SecretKey>& key = std::nullopt) {
-    EXPECT_TRUE(WriteFileAtomically(Path(name),
-                                    EncodeMapDelta(*MakeMapDelta(Path("old.cairn"), Path("new.cairn"), key)))
-                    .ok());
-    return Path(name);
-  }
-
-  // A fresh copy of a map under another name.
-  static std::string Copy(const std::string& name, const std::string& copy) {
-    fs::copy_file(Path(name), Path(copy), fs::copy_options::overwrite_existing);
-    fs::remove(PreviousMapPath(Path(copy)));
-    return Path(copy);
-  }
-};
 
 TEST_F(UpdateMapTest, MakesTheSameBytesAndCostsWhatChanged) {
   const std::string delta = WriteDelta("delta");
@@ -117,7 +79,7 @@ TEST_F(UpdateMapTest, TruncatedAndFlippedDeltasMakeNothing) {
   EXPECT_TRUE(refused(""));
   EXPECT_TRUE(refused("What I wrote last night.\n"));
   EXPECT_TRUE(refused(bytes + "x"));
-  // Whoever has a later delta is told so, and who has something else, that it is none.
+  // A delta of a later format and a file that is not a delta have different messages.
   const auto reading = [&](const std::string& text) {
     EXPECT_TRUE(WriteFileAtomically(Path("broken"), text).ok());
     return ReadMapDelta(Path("broken"), std::nullopt).error().message;
@@ -127,8 +89,8 @@ TEST_F(UpdateMapTest, TruncatedAndFlippedDeltasMakeNothing) {
   EXPECT_THAT(reading(later), HasSubstr("a delta of a later format"));
   std::string other = bytes;
   other[14] = 'A';
-  EXPECT_THAT(reading(other), HasSubstr("is no delta of maps"));
-  EXPECT_THAT(reading(bytes.substr(0, 15)), HasSubstr("15 bytes, its head alone has more"));
+  EXPECT_THAT(reading(other), HasSubstr("not a delta of maps"));
+  EXPECT_THAT(reading(bytes.substr(0, 15)), HasSubstr("15 bytes, fewer than its head alone has"));
   // All lengths of the head, and some of the rest.
   for (size_t length = 0; length < 260; ++length) EXPECT_TRUE(refused(bytes.substr(0, length))) << length;
   Random random(1);
@@ -144,13 +106,17 @@ TEST_F(UpdateMapTest, TruncatedAndFlippedDeltasMakeNothing) {
   }
 }
 
-// Somebody who writes deltas by hand can make the hash of the payload right.
+// A delta written by hand can have a correct hash of its payload.
 TEST_F(UpdateMapTest, HostileDeltasAreRefused) {
   const MapDelta good = *MakeMapDelta(Path("old.cairn"), Path("new.cairn"), std::nullopt);
-  const auto code = [&](const std::function<void(MapDelta*)>& change) {
+  using Change = std::function<void(MapDelta*)>;
+  const auto write_changed = [&](const Change& change) {
     MapDelta bad = good;
     change(&bad);
     EXPECT_TRUE(WriteFileAtomically(Path("hostile"), EncodeMapDelta(bad)).ok());
+  };
+  const auto code = [&](const Change& change) {
+    write_changed(change);
     const Status status = ApplyDelta(Path("old.cairn"), Path("hostile"), Path("never.cairn"));
     EXPECT_FALSE(fs::exists(Path("never.cairn")));
     return status.ok() ? ErrorCode{} : status.error().code;
@@ -166,21 +132,19 @@ TEST_F(UpdateMapTest, HostileDeltasAreRefused) {
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 512; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->old_page_size = 3; }), ErrorCode::kCorrupt);
   // A state that no map can have is refused as that, before anything is unfolded.
-  const auto states = [&](const std::function<void(MapDelta*)>& change) {
-    MapDelta bad = good;
-    change(&bad);
-    EXPECT_TRUE(WriteFileAtomically(Path("hostile"), EncodeMapDelta(bad)).ok());
+  const auto states = [&](const Change& change) {
+    write_changed(change);
     const Result<MapDelta> read = ReadMapDelta(Path("hostile"), std::nullopt);
     return read.ok() ? "read" : read.error().message;
   };
-  for (const std::function<void(MapDelta*)>& change : std::vector<std::function<void(MapDelta*)>>{
-           [](MapDelta* delta) { delta->old_num_bytes = 0; },
-           [](MapDelta* delta) { delta->new_num_bytes = 0; },
-           [](MapDelta* delta) { delta->new_num_bytes += 1; },
-           [](MapDelta* delta) { delta->new_page_size = 256; },
-           [](MapDelta* delta) { delta->new_page_size = 131072; },
-           [](MapDelta* delta) { delta->new_page_size = 3000; },
-           [](MapDelta* delta) { delta->new_num_bytes = uint64_t{1} << 40; }})
+  for (const Change& change :
+       std::vector<Change>{[](MapDelta* delta) { delta->old_num_bytes = 0; },
+                           [](MapDelta* delta) { delta->new_num_bytes = 0; },
+                           [](MapDelta* delta) { delta->new_num_bytes += 1; },
+                           [](MapDelta* delta) { delta->new_page_size = 256; },
+                           [](MapDelta* delta) { delta->new_page_size = 131072; },
+                           [](MapDelta* delta) { delta->new_page_size = 3000; },
+                           [](MapDelta* delta) { delta->new_num_bytes = uint64_t{1} << 40; }})
     EXPECT_THAT(states(change), HasSubstr("states a map of"));
   for (const uint32_t page_size : {512u, 65536u})
     EXPECT_EQ(
@@ -334,190 +298,6 @@ TEST_F(UpdateMapTest, NothingBesideTheMapAndThePreviousOneStays) {
   EXPECT_EQ(UpdateMap(map, delta).error().code, ErrorCode::kIo);
   EXPECT_THAT(names(), testing::ElementsAre("robot.cairn", "robot.cairn.previous"));
   EXPECT_EQ(*ReadFile(map), *ReadFile(Path("old.cairn")));
-}
-
-// Signed maps of one key: the room in epochs 3 and 4, and another site's in epoch 9.
-//   1.cairn  2.cairn  other.cairn
-class EpochTest : public UpdateMapTest {
- protected:
-  static void SetUpTestSuite() {
-    UpdateMapTest::SetUpTestSuite();
-    MapRows rows = *ReadMapRows(Path("new.cairn"));
-    rows.name = "room";
-    ASSERT_TRUE(WriteMapRows(rows, Path("newer.cairn")).ok());
-    keys_ = new KeyPair(MakeKeyPair());
-    for (const auto& [from, epoch, to] : {std::tuple("old.cairn", 3, "1.cairn"),
-                                          {"newer.cairn", 4, "2.cairn"},
-                                          {"new.cairn", 9, "other.cairn"}})
-      ASSERT_TRUE(SignMap(Path(from), keys_->secret_key, Path(to), epoch).ok());
-  }
-  static void TearDownTestSuite() { delete keys_; }
-
-  // A signed delta from one map to another, whatever their epochs.
-  static std::string Delta(const std::string& from, const std::string& to, const KeyPair& keys = *keys_) {
-    const Result<MapDelta> delta = MakeMapDelta(Path(from), Path(to), keys.secret_key, true);
-    EXPECT_TRUE(delta.ok()) << delta.error().message;
-    EXPECT_TRUE(WriteFileAtomically(Path("epochs.delta"), EncodeMapDelta(*delta)).ok());
-    return Path("epochs.delta");
-  }
-
-  static ErrorCode CodeOf(const Status& status) { return status.ok() ? ErrorCode{} : status.error().code; }
-  static ErrorCode CodeOf(const Result<bool>& result) {
-    return result.ok() ? ErrorCode{} : result.error().code;
-  }
-
-  static KeyPair* keys_;
-};
-KeyPair* EpochTest::keys_ = nullptr;
-
-TEST_F(EpochTest, LaterMapOfTheNameTakesItsPlace) {
-  const std::string map = Copy("1.cairn", "robot.cairn"), delta = Delta("1.cairn", "2.cairn");
-  EXPECT_TRUE(*UpdateMap(map, delta, {.public_key = keys_->public_key, .name = "room", .min_epoch = 4}));
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("2.cairn")));
-  // Sent twice, it is still asked for what it is.
-  EXPECT_FALSE(*UpdateMap(map, delta, {.public_key = keys_->public_key, .name = "room", .min_epoch = 4}));
-  EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.min_epoch = 5})), ErrorCode::kNotNewer);
-  EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.name = "hall"})), ErrorCode::kOtherMap);
-}
-
-TEST_F(EpochTest, OlderMapIsRefusedUnlessAllowed) {
-  const std::string map = Copy("2.cairn", "robot.cairn"), delta = Delta("2.cairn", "1.cairn");
-  for (const std::optional<PublicKey>& key : {std::optional(keys_->public_key), std::optional<PublicKey>()}) {
-    EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.public_key = key})), ErrorCode::kNotNewer);
-    EXPECT_EQ(CodeOf(ApplyDelta(map, delta, Path("made.cairn"), {.public_key = key})), ErrorCode::kNotNewer);
-  }
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("2.cairn")));
-  EXPECT_FALSE(fs::exists(PreviousMapPath(map)));
-  EXPECT_FALSE(fs::exists(Path("made.cairn")));
-  EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.allow_older = true, .min_epoch = 4})), ErrorCode::kNotNewer);
-  EXPECT_TRUE(ApplyDelta(map, delta, Path("made.cairn"), {.allow_older = true}).ok());
-  EXPECT_TRUE(*UpdateMap(map, delta, {.public_key = keys_->public_key, .allow_older = true}));
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("1.cairn")));
-}
-
-TEST_F(EpochTest, SameEpochWithOtherContentsIsRefused) {
-  ASSERT_TRUE(SignMap(Path("newer.cairn"), keys_->secret_key, Path("fork.cairn"), 3).ok());
-  const std::string map = Copy("1.cairn", "robot.cairn");
-  EXPECT_EQ(CodeOf(UpdateMap(map, Delta("1.cairn", "fork.cairn"))), ErrorCode::kNotNewer);
-}
-
-// "room" to "room, again": whatever the epochs are.
-TEST_F(EpochTest, AnotherMapIsNeverTaken) {
-  const std::string map = Copy("1.cairn", "robot.cairn"), delta = Delta("1.cairn", "new.cairn");
-  for (const bool allow_older : {false, true}) {
-    EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.allow_older = allow_older})), ErrorCode::kOtherMap);
-    EXPECT_EQ(CodeOf(ApplyDelta(map, delta, Path("made.cairn"), {.allow_older = allow_older})),
-              ErrorCode::kOtherMap);
-  }
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("1.cairn")));
-  EXPECT_FALSE(fs::exists(Path("made.cairn")));
-}
-
-TEST_F(EpochTest, DeltaThatRobotsRefuseIsNotMade) {
-  const auto code = [](const std::string& from, const std::string& to, bool allow_older) {
-    const Result<MapDelta> delta = MakeMapDelta(Path(from), Path(to), std::nullopt, allow_older);
-    return delta.ok() ? ErrorCode{} : delta.error().code;
-  };
-  EXPECT_EQ(code("1.cairn", "2.cairn", false), ErrorCode{});
-  EXPECT_EQ(code("2.cairn", "1.cairn", false), ErrorCode::kNotNewer);
-  EXPECT_EQ(code("2.cairn", "1.cairn", true), ErrorCode{});
-  EXPECT_EQ(code("1.cairn", "1.cairn", false), ErrorCode{});
-  EXPECT_EQ(code("1.cairn", "other.cairn", true), ErrorCode::kOtherMap);
-  EXPECT_EQ(code("old.cairn", "other.cairn", false), ErrorCode{});  // not signed: nothing counts
-  EXPECT_EQ(code("2.cairn", "old.cairn", false), ErrorCode{});
-}
-
-// Who requires a key does not count what it has not signed: then the robot's own memory speaks.
-TEST_F(EpochTest, MapInPlaceWithoutTheKeyDoesNotCount) {
-  const KeyPair others = MakeKeyPair();
-  ASSERT_TRUE(SignMap(Path("newer.cairn"), others.secret_key, Path("theirs.cairn"), 100).ok());
-  for (const char* in_place : {"newer.cairn", "theirs.cairn"}) {
-    const std::string map = Copy(in_place, "robot.cairn"), delta = Delta(in_place, "1.cairn");
-    EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.public_key = keys_->public_key, .min_epoch = 4})),
-              ErrorCode::kNotNewer);
-    EXPECT_EQ(CodeOf(UpdateMap(map, delta, {.public_key = keys_->public_key, .name = "hall"})),
-              ErrorCode::kOtherMap);
-    EXPECT_TRUE(
-        UpdateMap(map, delta, {.public_key = keys_->public_key, .name = "room", .min_epoch = 3}).ok());
-  }
-  // Without a required key, whoever signed the map in place is followed.
-  const std::string map = Copy("theirs.cairn", "robot.cairn");
-  EXPECT_EQ(CodeOf(UpdateMap(map, Delta("theirs.cairn", "1.cairn"))), ErrorCode::kNotNewer);
-}
-
-// The head of one delta, the payload or the signature of another: all of one key.
-TEST_F(EpochTest, DeltasPutTogetherOfOthersAreRefused) {
-  ASSERT_TRUE(SignMap(Path("newer.cairn"), keys_->secret_key, Path("3.cairn"), 5).ok());
-  const MapDelta to2 = *MakeMapDelta(Path("1.cairn"), Path("2.cairn"), keys_->secret_key);
-  const MapDelta to3 = *MakeMapDelta(Path("1.cairn"), Path("3.cairn"), keys_->secret_key);
-  const std::string map = Copy("1.cairn", "robot.cairn");
-  const auto code = [&](const std::function<void(MapDelta*)>& mix) {
-    MapDelta mixed = to2;
-    mix(&mixed);
-    EXPECT_TRUE(WriteFileAtomically(Path("mixed"), EncodeMapDelta(mixed)).ok());
-    return CodeOf(UpdateMap(map, Path("mixed"), {.public_key = keys_->public_key}));
-  };
-  EXPECT_EQ(code([&](MapDelta* delta) { delta->payload = to3.payload; }), ErrorCode::kWrongKey);
-  EXPECT_EQ(code([&](MapDelta* delta) { delta->signature = to3.signature; }), ErrorCode::kWrongKey);
-  EXPECT_EQ(code([&](MapDelta* delta) { delta->new_hash = to3.new_hash; }), ErrorCode::kWrongKey);
-  EXPECT_EQ(code([&](MapDelta* delta) { delta->map_name = "hall"; }), ErrorCode::kWrongKey);
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("1.cairn")));
-  EXPECT_EQ(code([](MapDelta*) {}), ErrorCode{});
-}
-
-TEST_F(EpochTest, RollBackGoesBackInTimeButToNoOtherMapOrKey) {
-  const std::string map = Copy("1.cairn", "robot.cairn");
-  const UpdateOptions required = {.public_key = keys_->public_key};
-  ASSERT_TRUE(*UpdateMap(map, Delta("1.cairn", "2.cairn"), required));
-  const auto previous_is = [&](const std::string& name) {
-    fs::remove(PreviousMapPath(map));
-    fs::copy_file(Path(name), PreviousMapPath(map));
-  };
-  previous_is("other.cairn");
-  EXPECT_EQ(CodeOf(RollBackMap(map, required)), ErrorCode::kOtherMap);
-  EXPECT_EQ(CodeOf(RollBackMap(map)), ErrorCode::kOtherMap);
-  const KeyPair others = MakeKeyPair();
-  ASSERT_TRUE(SignMap(Path("old.cairn"), others.secret_key, Path("theirs.cairn"), 3).ok());
-  previous_is("theirs.cairn");
-  EXPECT_EQ(CodeOf(RollBackMap(map, required)), ErrorCode::kWrongKey);
-  previous_is("old.cairn");
-  EXPECT_EQ(CodeOf(RollBackMap(map, required)), ErrorCode::kNotSigned);
-  fs::remove(PreviousMapPath(map));
-  fs::create_symlink(Path("1.cairn"), PreviousMapPath(map));
-  EXPECT_EQ(CodeOf(RollBackMap(map, required)), ErrorCode::kIo);
-  previous_is("1.cairn");
-  EXPECT_EQ(CodeOf(RollBackMap(map, {.public_key = keys_->public_key, .min_epoch = 4})),
-            ErrorCode::kNotNewer);
-  EXPECT_EQ(CodeOf(RollBackMap(map, {.public_key = keys_->public_key, .name = "hall"})),
-            ErrorCode::kOtherMap);
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("2.cairn")));
-  EXPECT_EQ(CodeOf(RollBackMap(map, {.public_key = keys_->public_key, .name = "room", .min_epoch = 3})),
-            ErrorCode{});
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("1.cairn")));
-  EXPECT_EQ(CodeOf(RollBackMap(map, required)), ErrorCode{});  // and forth
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("2.cairn")));
-}
-
-TEST_F(EpochTest, DamagedMapIsNoReasonNotToGoBack) {
-  const std::string map = Copy("1.cairn", "robot.cairn");
-  ASSERT_TRUE(*UpdateMap(map, Delta("1.cairn", "2.cairn")));
-  ASSERT_TRUE(WriteFileAtomically(map, "no map any more").ok());
-  EXPECT_TRUE(RollBackMap(map, {.public_key = keys_->public_key}).ok());
-  EXPECT_EQ(*ReadFile(map), *ReadFile(Path("1.cairn")));
-}
-
-TEST_F(EpochTest, OpeningAsksForNameAndEpoch) {
-  const std::string map = Path("2.cairn");
-  const auto code = [&](const MapOptions& options) {
-    const auto open = Map::Open(map, options);
-    return open.ok() ? ErrorCode{} : open.error().code;
-  };
-  EXPECT_EQ(code({.name = "room", .min_epoch = 4}), ErrorCode{});
-  EXPECT_EQ(code({.public_key = keys_->public_key, .name = "room", .min_epoch = 4}), ErrorCode{});
-  EXPECT_EQ(code({.min_epoch = 5}), ErrorCode::kNotNewer);
-  EXPECT_EQ(code({.name = "hall"}), ErrorCode::kOtherMap);
-  // The signature comes first: what an unsigned map is called says nothing.
-  EXPECT_EQ(code({.public_key = MakeKeyPair().public_key, .name = "hall"}), ErrorCode::kWrongKey);
 }
 
 TEST_F(UpdateMapTest, DeltaIsNotWrittenOver) {

@@ -18,8 +18,8 @@ namespace cairn {
 
 // Paths among walls by brute force, of the walls as they were given: none of the plan's grid, pieces, corners
 // or regions.  What touches is told from what crosses by moving aside: next to every joint stand places a
-// hair from it, several in each of the angles between its walls, and a link between places touches no wall at
-// all.
+// hair from it, several in each of the angles between its walls, and a link between places touches no
+// wall at all.
 class PlanOracle {
  public:
   using Vec2 = Eigen::Vector2d;
@@ -28,7 +28,7 @@ class PlanOracle {
   };
   static constexpr double kHair = 2e-5;  // metres: less than any other distance of these plans
 
-  // The domain is the box around the walls with a margin of one metre.  A wall of no length is none.
+  // The domain is the box around the walls with a margin of one metre.  Walls of no length are left out.
   explicit PlanOracle(const std::vector<Wall>& walls) {
     for (const Wall& wall : walls) {
       text_ += fmt::format("{},{},{},{}\n", wall.start.x(), wall.start.y(), wall.end.x(), wall.end.y());

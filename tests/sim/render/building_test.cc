@@ -30,8 +30,8 @@ bool SamePicture(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0;
 }
 
-// How many wall faces show each texture; panels reach from the floor to the ceiling and are seen from one
-// side.
+// How many wall faces show each texture; panels reach from the floor to the ceiling and are seen from
+// one side.
 std::map<int, int> PanelsPerTexture(const Building& building, const SimulateOptions& options) {
   std::map<int, int> panels;
   std::set<std::pair<double, double>> pillars;

@@ -21,8 +21,8 @@ TEST(Texture, RepeatsItsBorder) {
   EXPECT_FLOAT_EQ(texture.Sample({9, 7}, kNone, kNone), 30);
 }
 
-// A chessboard of single texels and stripes, seen from so far that a pixel covers many texels, are grey: no
-// moire.
+// A chessboard of single texels and stripes, seen from so far that a pixel covers many texels, are grey:
+// no moire.
 TEST(Texture, AveragesWhatIsFinerThanAPixel) {
   cv::Mat board(256, 256, CV_8UC1), stripes(256, 256, CV_8UC1);
   for (int y = 0; y < 256; ++y) {

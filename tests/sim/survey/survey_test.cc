@@ -258,8 +258,8 @@ TEST(TakeImage, AddsWhatIsPlannedAndNothingElse) {
   image.noise = 0, image.gain = 0.8, image.bias = 10;
   EXPECT_NEAR(cv::mean(TakeImage(renderer, image, 1))[0], 0.8 * cv::mean(clean)[0] + 10, 0.1);
 
-  // A turn about the vertical axis blurs across, symmetrically: the horizontal gradient falls, brightness
-  // stays.
+  // A turn about the vertical axis blurs across, symmetrically: the horizontal gradient falls,
+  // brightness stays.
   image.gain = 1, image.bias = 0, image.turn = {0, 8.0 / 320, 0};
   const cv::Mat blurred = TakeImage(renderer, image, 1);
   const auto gradient_x = [](const cv::Mat& m) {

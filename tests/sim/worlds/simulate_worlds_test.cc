@@ -12,8 +12,8 @@ Polygon Box(double min_x, double min_y, double max_x, double max_y) {
   return {{min_x, min_y}, {max_x, min_y}, {max_x, max_y}, {min_x, max_y}};
 }
 
-// A room of 4 m x 3 m around the lattice points (1, 1), (2, 1), (3, 1) and (1, 2), (2, 2), (3, 2) of a 1 m
-// lattice.
+// A room of 4 m x 3 m around the lattice points (1, 1), (2, 1), (3, 1) and (1, 2), (2, 2), (3, 2) of a 1
+// m lattice.
 WorldPlan Room() { return {.perimeter = Box(0.5, 0.5, 3.5, 2.5)}; }
 
 TEST(SampleFloorPlan, StationsAreTheLatticePointsInFreeSpace) {

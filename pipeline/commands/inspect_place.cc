@@ -1,16 +1,14 @@
-#include "pipeline/commands/commands.h"
+#include "pipeline/commands/inspect_place.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/text.h"
 #include "core/blocks/map_rows.h"
 #include "core/files/database.h"
 #include "pipeline/explain/advise.h"
@@ -23,31 +21,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Farther from the origin nothing was surveyed: a slip of the keyboard.
+// Nothing is surveyed farther from the origin, m: a larger number is a typing error.
 constexpr double kFarthestM = 1e7;
-
-struct Arguments {
-  std::string map_path;
-  std::optional<std::string> place;
-  std::optional<std::string> image;
-  std::string build_dir;
-  bool json = false;
-};
 
 Result<AskedPlace> ParsePlace(const std::string& text) {
   AskedPlace place;
-  double heading_deg = 0;
-  char rest = 0;
-  const int num_read = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &place.position.x(), &place.position.y(),
-                                   &heading_deg, &rest);
-  const bool ends_there = num_read == 3 || (num_read == 2 && std::count(text.begin(), text.end(), ',') == 1 &&
-                                            text.find_last_not_of("0123456789.eE+-, ") == std::string::npos);
-  if (!ends_there || !(place.position.cwiseAbs().maxCoeff() < kFarthestM) || !std::isfinite(heading_deg)) {
+  const std::vector<double> numbers = ParseNumbers(text).value_or(std::vector<double>());
+  if (numbers.size() == 2 || numbers.size() == 3) place.position = {numbers[0], numbers[1]};
+  if (numbers.size() < 2 || numbers.size() > 3 || !(place.position.cwiseAbs().maxCoeff() < kFarthestM)) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "--at {}: expected X,Y or X,Y,HEADING in metres and degrees (floor frame), as in 1.5,0.8,90", text);
   }
-  if (num_read == 3) place.heading_deg = heading_deg;
+  if (numbers.size() == 3) place.heading_deg = numbers[2];
   return place;
 }
 
@@ -66,16 +52,15 @@ nlohmann::ordered_json AdviceJson(const std::vector<Advice>& advice) {
 }
 
 // Why the build folder's stages rejected an image; empty: they did not, or there is no such folder.
-Result<std::string> WhyRejected(const Arguments& arguments) {
-  const fs::path folder = arguments.build_dir.empty()
-                              ? fs::path(arguments.map_path).replace_extension(".build")
-                              : fs::path(arguments.build_dir);
+Result<std::string> WhyRejected(const PlaceQuestion& question) {
+  const fs::path folder = question.build_dir.empty() ? fs::path(question.map_path).replace_extension(".build")
+                                                     : fs::path(question.build_dir);
   std::error_code error;
   if (!fs::exists(folder / "features.db", error)) {
-    return arguments.build_dir.empty()
+    return question.build_dir.empty()
                ? fmt::format(
-                     "the build folder, which would tell whether a stage rejected it, is not at {}: "
-                     "--build-dir says where it is",
+                     "the build folder, which would show whether a stage rejected it, is "
+                     "not at {}: name it with --build-dir",
                      folder.string())
                : fmt::format("there is no features.db in {}", folder.string());
   }
@@ -84,30 +69,31 @@ Result<std::string> WhyRejected(const Arguments& arguments) {
   return WithDatabaseErrors(path, [&]() -> Result<std::string> {
     if (HasTable(database, "cairn_rejects")) {
       SQLite::Statement query(database, "SELECT reason FROM cairn_rejects WHERE name = ?");
-      query.bind(1, *arguments.image);
+      query.bind(1, *question.image);
       if (query.executeStep())
         return fmt::format("extract_features rejected it: {}", query.getColumn(0).getString());
     }
     SQLite::Statement query(database, "SELECT count(*) FROM images WHERE name = ?");
-    query.bind(1, *arguments.image);
+    query.bind(1, *question.image);
     query.executeStep();
     if (query.getColumn(0).getInt() > 0)
       return std::string(
           "it has features, but no pose: it is held out for the self-test, or was not registered");
-    return fmt::format("{} does not know it either", path);
+    return fmt::format("{} does not have it either", path);
   });
 }
 
-Status ExplainImage(const Arguments& arguments, const MapRows& rows, const CommandEnvironment& environment) {
+Status ExplainImage(const PlaceQuestion& question, const MapRows& rows,
+                    const CommandEnvironment& environment) {
   const auto image = std::find_if(rows.images.begin(), rows.images.end(),
-                                  [&](const MapImage& row) { return row.name == *arguments.image; });
+                                  [&](const MapImage& row) { return row.name == *question.image; });
   if (image == rows.images.end()) {
-    CAIRN_ASSIGN_OR_RETURN(const std::string why, WhyRejected(arguments));
+    CAIRN_ASSIGN_OR_RETURN(const std::string why, WhyRejected(question));
     return MakeError(ErrorCode::kNotFound, "{}: map '{}' has no survey image '{}' among its {}; {}",
-                     arguments.map_path, rows.name, *arguments.image, rows.images.size(), why);
+                     question.map_path, rows.name, *question.image, rows.images.size(), why);
   }
   const auto index = static_cast<int32_t>(image - rows.images.begin());
-  if (arguments.json) {
+  if (question.json) {
     nlohmann::ordered_json json = ExplainImageJson(rows, index);
     if (image->station >= 0) json["at"] = ExplainStationJson(rows, image->station);
     *environment.out << JsonText(json, 2) << "\n";
@@ -118,11 +104,12 @@ Status ExplainImage(const Arguments& arguments, const MapRows& rows, const Comma
   return Ok();
 }
 
-Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const AskedPlace place, ParsePlace(*arguments.place));
+Status ExplainPlace(const PlaceQuestion& question, const MapRows& rows,
+                    const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const AskedPlace place, ParsePlace(*question.place));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<StationIdx> stations, StationsAt(rows, place));
   const std::vector<Advice> advice = Advise(rows, stations);
-  if (arguments.json) {
+  if (question.json) {
     nlohmann::ordered_json json = {{"stations", nlohmann::ordered_json::array()},
                                    {"advice", AdviceJson(advice)}};
     for (const StationIdx station : stations) json["stations"].push_back(ExplainStationJson(rows, station));
@@ -144,19 +131,20 @@ Status ExplainPlace(const Arguments& arguments, const MapRows& rows, const Comma
   return Ok();
 }
 
-Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
-  if (!arguments.build_dir.empty() && !arguments.image) {
+}  // namespace
+
+Status AnswerPlaceQuestion(const PlaceQuestion& question, const CommandEnvironment& environment) {
+  if (!question.build_dir.empty() && !question.image) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "--build-dir {}: is where --image is looked for among the rejected; give --image, or leave it "
-        "out",
-        arguments.build_dir);
+        "--build-dir {}: is read only to look for a rejected --image; give --image, or leave it out",
+        question.build_dir);
   }
-  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map_path));
-  if (arguments.image) return ExplainImage(arguments, rows, environment);
-  if (arguments.place) return ExplainPlace(arguments, rows, environment);
+  CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(question.map_path));
+  if (question.image) return ExplainImage(question, rows, environment);
+  if (question.place) return ExplainPlace(question, rows, environment);
   const std::vector<Advice> advice = Advise(rows);
-  if (arguments.json) {
+  if (question.json) {
     *environment.out << JsonText({{"advice", AdviceJson(advice)}}, 2) << "\n";
     return Ok();
   }
@@ -165,38 +153,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   *environment.out << fmt::format(
       "map '{}': {} of {} stations are covered by {} regions of k = {}\n{}{}", rows.name, num_covered,
       rows.stations.size(), rows.regions.size(), rows.k,
-      advice.empty() ? "nothing to say against it\n" : "what would help, most important first\n",
+      advice.empty() ? "nothing to improve\n" : "what would help, most important first\n",
       AdviceText(advice));
   return Ok();
-}
-
-}  // namespace
-
-Command ExplainCommand() {
-  auto arguments = std::make_shared<Arguments>();
-  return {
-      .name = "explain",
-      .summary =
-          "Tells why a place is covered by a map or not, what was dropped there, and which images to take "
-          "next",
-      .add_arguments =
-          [arguments](CLI::App& app) {
-            app.add_option("map", arguments->map_path, "Map; without --at or --image: advice on all of it")
-                ->required()
-                ->type_name("MAP");
-            CLI::Option* at = app.add_option("--at", arguments->place,
-                                             "Place, floor frame: metres, degrees counter-clockwise from +x")
-                                  ->type_name("X,Y[,HEADING]");
-            app.add_option("--image", arguments->image, "Survey image, by its name in the capture")
-                ->type_name("NAME")
-                ->excludes(at);
-            app.add_option("--build-dir", arguments->build_dir,
-                           "Build folder, for images that stages rejected [MAP with .build for .cairn]")
-                ->type_name("DIR");
-            app.add_flag("--json", arguments->json, "Print JSON");
-          },
-      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
-  };
 }
 
 }  // namespace cairn::pipeline

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace cairn {
+
+// Order statistics.  They differ where the number of values is even; each is the one that some table was
+// measured with.  REQUIRES of all: not empty.
+
+// The smallest value that at least `part` of them do not exceed (the nearest rank): for an even number,
+// Quantile(values, 0.5) is the lower of the middle two.
+inline double Quantile(std::vector<double> values, double part) {
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(part * static_cast<double>(values.size())));
+  const auto nth = values.begin() + std::clamp<std::ptrdiff_t>(rank - 1, 0, std::ssize(values) - 1);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+// The value below which this many tenths of all, rounded down, lie.  REQUIRES: tenths in [0, 9]
+inline double Decile(std::vector<double> values, int tenths) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() * tenths / 10);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// The middle one; for an even number the upper of the middle two.
+inline double UpperMedian(std::vector<double> values) { return Decile(std::move(values), 5); }
+
+// The middle one; for an even number the mean of the middle two.
+inline double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+}  // namespace cairn

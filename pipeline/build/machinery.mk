@@ -1,0 +1,179 @@
+# What the rules of map.mk stand on; map.mk includes it once per map, after it has named CAIRN_OUTPUTS.  In this order:
+# the recipe's values, the capture's files, stamps and dates, what a rule runs, what it says, shards, captures that are made.
+
+# Stages of one run of make share their build folders; another run is refused.
+ifndef CAIRN_BUILD_SESSION
+CAIRN_BUILD_SESSION := $(shell echo $$PPID@$$(uname -n))
+endif
+export CAIRN_BUILD_SESSION
+
+# ---- The recipe's values
+
+ifdef RECIPE
+# The first target: what `make` without one makes.
+$(MAP):
+CAIRN_MAP := $(MAP)
+# Once per make: a recipe dated in the future would have it start over for ever.
+$(BUILD)/config.mk: CONFIGURE := $(RECIPE) -o $(MAP) --build-dir $(BUILD)
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
+	$(CAIRN) stage configure $(CONFIGURE)
+	touch $@
+endif
+
+# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM;
+# `cairn stage configure` writes it beside the options.
+include $(BUILD)/config.mk
+
+ifdef RECIPE
+# Another program may be dated before it, as installed ones are.
+ifneq ($(PROGRAM),$(shell stat -L -c %s-%Y $(CAIRN)))
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,cairn-missing)
+endif
+# As the including Makefile spells it.
+MAP := $(CAIRN_MAP)
+endif
+$(BUILD)/%: MAP := $(MAP)
+$(BUILD)/%: CAPTURE := $(CAPTURE)
+$(BUILD)/%: POSES := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE))
+$(BUILD)/%: QUERIES := $(QUERIES)
+$(BUILD)/%: NAME := $(NAME)
+$(BUILD)/%: SEED := $(SEED)
+$(BUILD)/%: FLOOR_PLAN := $(FLOOR_PLAN)
+$(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
+
+# ---- The capture's files
+
+# Poses, cameras and frame, read by the stages that know the capture.
+CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt))
+ifneq ($(SESSIONS),)
+# What the joined capture consists of, there or not yet.
+CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)),,cameras.txt images.txt \
+    frame.json $(if $(QUERIES),queries.txt)))
+endif
+# The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
+# removed image changes its folder's date.
+CAPTURE_IMAGES :=
+-include $(BUILD)/images.d
+# Held-out images that exist, with a backslash before what Make would take for more than a name.  Pipes are no files: to
+# read one would wait for ever.  Names that have backslashes themselves, or control characters, are left out: no escaping
+# holds in all of Make.
+QUERY_LIST := $(shell for list in $(wildcard $(QUERIES) $(CAPTURE)/queries.txt); do \
+    [ -f $$list ] && echo $$list && break; done)
+QUERY_IMAGES := $(if $(QUERY_LIST),$(shell awk '/^\#/ || NF < 10 || $$10 ~ /^[-+.0-9eE]+$$/ {next} \
+    {for (i = 1; i < 10; ++i) sub(/^[ \t]*[^ \t]+[ \t]+/, ""); sub(/[ \t\r]+$$/, ""); path = "$(CAPTURE)/images/" $$0} \
+    path !~ /[\\[:cntrl:]]/ {print path}' $(QUERY_LIST) | \
+    while IFS= read -r path; do [ -f "$$path" ] && printf '%s\n' "$$path"; done | sed 's/[ \t:;|*?[\#]/\\&/g'))
+
+# ---- Stamps and dates
+
+CAIRN_OUTPUT_FILES := $(addprefix $(BUILD)/,$(CAIRN_OUTPUTS))
+
+.DELETE_ON_ERROR:
+.PHONY: cairn-missing
+
+# A clock that was ahead has left dates in the future, to which later changes would seem old.
+CAIRN_FUTURE := $(shell find $(BUILD) -maxdepth 2 -type f -newermt '10 seconds' -print \
+    \( -name '*.stamp' -exec touch -d @0 {} \; -o -exec touch {} \; \))
+$(if $(CAIRN_FUTURE),$(warning $(words $(CAIRN_FUTURE)) files of $(BUILD) were dated in the future, $(firstword \
+    $(CAIRN_FUTURE)) the first: is the clock right? What they belong to is made again))
+
+# The default goal of `make -f map.mk`.
+$(MAP): $(BUILD)/map.stamp ;
+
+# Whether an output's date changed is seen after its stamp's rule has run.  Outputs whose last run gave the same bytes
+# are older than their stamps: for them Make has to look even with -n and -q (the '+').
+UNCHANGED := $(shell for output in $(CAIRN_OUTPUT_FILES); do [ $$output.stamp -nt $$output ] && echo $$output; done)
+$(filter-out $(UNCHANGED),$(CAIRN_OUTPUT_FILES)): %: %.stamp ;
+$(UNCHANGED): %: %.stamp
+	+@: # the same bytes as before
+# A stamp without its output says nothing.
+$(foreach output,$(CAIRN_OUTPUT_FILES),$(if $(wildcard $(output)),,$(eval $(output).stamp: cairn-missing)))
+$(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
+
+# ---- What a rule runs
+
+# Changes with the program's bytes, whatever its date.
+PROGRAM_HASH := $(BUILD)/options/program
+# $(call CAIRN_OPTIONS,group_classes): the files whose change runs a stage again, beside what it reads.
+CAIRN_OPTIONS = $(BUILD)/options/$(1).toml $(PROGRAM_HASH)
+# For stages with something random.
+SEED_FILE := $(BUILD)/options/seed
+
+CAIRN_LAUNCH = $(if $(strip $(LAUNCH)),$(CAIRN_RULES)launch $@ $(LAUNCH))
+CAIRN_COMMON = --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) --log-level $(LOG_LEVEL)
+# The stage holds the build folder, leaves X.report.json and then the stamp, with the date at which it began; where it
+# fails, error.json.
+CAIRN_FLAGS = --stamp $@ $(CAIRN_COMMON)
+CAIRN_NO_SPACE_CHECK = $(if $(filter no,$(SPACE_CHECK)),--no-space-check)
+# $(call CAIRN_RUN,group_classes,COMMAND AND INPUTS): the recipe of X.stamp says why it runs and makes X with the options
+# of that name.
+define CAIRN_RUN
+$(CAIRN_WHY)
+$(CAIRN_LAUNCH) $(CAIRN) $(2) --options $(@D)/options/$(1).toml -o $(@:.stamp=) $(CAIRN_FLAGS)
+endef
+
+# ---- What it says
+
+# What changed, of a rule's prerequisites: the first, and how many more.
+CAIRN_CHANGED = $(patsubst $(@D)/%,%,$(patsubst $(CAPTURE)/%,%,$(filter-out cairn-missing $(SHARD_STAMPS),$?)))
+CAIRN_REASON = $(if $(wildcard $@),$(if $(filter cairn-missing,$?),is missing,$(patsubst options/program,the \
+    program,$(firstword $(CAIRN_CHANGED))) changed$(if $(word 2,$(CAIRN_CHANGED)),$(,) $(words $(wordlist \
+    2,$(words $(CAIRN_CHANGED)),$(CAIRN_CHANGED))) more)),not made yet)
+, := ,
+CAIRN_RESULT = $(notdir $(if $(filter map.stamp,$(@F)),$(MAP),$(@:.stamp=)))
+# The names of a capture's images may hold what a terminal takes for a command: its bytes are shown as '?'.
+CAIRN_PRINTABLE = LC_ALL=C sed 's/[\x01-\x1f\x7f]\|\xc2[\x80-\x9f]\|\xe2\x80[\xaa-\xae]\|\xe2\x81[\xa6-\xa9]/?/g'
+CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
+    "run"$(,) "file": "$(CAIRN_RESULT)"$(,) "reason": "$(subst ",\",$(subst \,\\,$(CAIRN_REASON)))"},$(CAIRN_RESULT): \
+    $(CAIRN_REASON)))' | $(CAIRN_PRINTABLE) >&2)
+
+# ---- Shards
+
+# Each takes over what the output's last version and the shards of earlier rounds know, does its share of the
+# rest, and leaves X-ROUND-IofN.db; done, it stays done when others are killed.  Then the stage itself takes all of them
+# over, does what is missing and removes them, and those of an earlier SHARDS.  They are SECONDARY: without them nothing
+# is out of date.
+CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
+# $(call CAIRN_SHARD_STAMPS,X,ROUNDS)
+CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp))
+# $(call CAIRN_SHARD_RULE,X,ROUND,I,COMMAND,EARLIER ROUNDS): COMMAND is the name of a variable
+define CAIRN_SHARD_RULE
+.SECONDARY: $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: SHARD_STAMPS := $(call CAIRN_SHARD_STAMPS,$(1),$(5))
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: PROGRESS := $(if $(filter json,$(PROGRESS)),json,none)
+$(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(lastword $(5))),$(BUILD)/$(1).begun)
+	$$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$(SHARDS) $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
+	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
+endef
+# What the first round waits for: shards of other inputs are gone.
+.SECONDARY: $(BUILD)/features.begun $(BUILD)/matches.begun
+$(BUILD)/features.begun $(BUILD)/matches.begun:
+	rm -f $(@:.begun=)-*of*
+	touch $@
+CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
+CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
+
+# ---- The capture that map.mk makes: simulated, or joined
+
+CAPTURE_STAMP :=
+ifeq ($(SIMULATED),yes)
+CAPTURE_STAMP := $(BUILD)/capture.stamp
+$(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
+endif
+# Lists that stay the same keep their dates.
+ifneq ($(SESSIONS),)
+$(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
+UNCHANGED := $(shell for list in $(CAPTURE_LISTS); do [ $(BUILD)/capture.stamp -nt $$list ] && echo $$list; done)
+$(filter-out $(UNCHANGED),$(CAPTURE_LISTS)): $(BUILD)/capture.stamp ;
+$(UNCHANGED): $(BUILD)/capture.stamp
+	+@: # the same bytes as before
+SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
+SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json,$(SESSION_FOLDERS:%=%/$(list)))) \
+    $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
+$(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
+endif
+# What the stages after matching take poses from.
+POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
+$(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(filter %/frame.json,$(CAPTURE_LISTS)))
+SESSION_LIST := $(filter %/sessions.txt,$(CAPTURE_LISTS))
+$(BUILD)/%: SESSION_LIST := $(SESSION_LIST)
