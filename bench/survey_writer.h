@@ -14,7 +14,7 @@
 
 namespace cairn {
 
-// What a program that invents surveys instead of rendering them makes of an image.
+// The content of an image, for programs that invent surveys instead of rendering them.
 struct InventedImage {
   std::string name;
   Pose cam_from_world;

@@ -1,5 +1,5 @@
-// How far greedy and improved sets are from the least possible size, and what cycle restoration does to
-// paths.
+// How far greedy and improved sets are from the least possible size, and what cycle restoration does
+// to paths.
 
 #include <cstdio>
 #include <ctime>

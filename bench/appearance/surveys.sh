@@ -18,16 +18,16 @@ mkdir -p "$place"
 match() {  # SURVEY OPTION...: $place/SURVEY/capture to matches.db
   survey=$1; shift
   [ -f "$place/$survey/matches.db" ] && return
-  "$cairn" extract-features "$place/$survey/capture" -o "$place/$survey/features.db" --progress none
-  "$cairn" match-features "$place/$survey/features.db" --capture "$place/$survey/capture" "$@" \
+  "$cairn" stage extract-features "$place/$survey/capture" -o "$place/$survey/features.db" --progress none
+  "$cairn" stage match-features "$place/$survey/features.db" --capture "$place/$survey/capture" "$@" \
       -o "$place/$survey/matches.db" --progress none
 }
 check() {  # SURVEY OPTION...
   survey=$1; shift
   echo "$survey, $*"
-  "$cairn" link-appearance "$place/$survey/matches.db" --capture "$place/$survey/capture" --svg "$place/$survey/graph.svg" \
+  "$cairn" stage link-appearance "$place/$survey/matches.db" --capture "$place/$survey/capture" --svg "$place/$survey/graph.svg" \
       -o "$place/$survey/appearance.db" ${FUSE:-}
-  "$cairn" check-appearance "$place/$survey/matches.db" ${FUSE:-} "$@" --progress none
+  "$cairn" stage check-appearance "$place/$survey/matches.db" ${FUSE:-} "$@" --progress none
 }
 
 for survey in ${SURVEYS:-office home kitchen corridor}; do
@@ -35,7 +35,7 @@ for survey in ${SURVEYS:-office home kitchen corridor}; do
   FUSE=
   case $survey in
   office)
-    [ -d "$place/office/capture" ] || "$cairn" simulate --width-m 13 --depth-m 9 --num-rooms 3 --corridor-width-m 2 \
+    [ -d "$place/office/capture" ] || "$cairn" stage simulate --width-m 13 --depth-m 9 --num-rooms 3 --corridor-width-m 2 \
         --num-queries 0 -o "$place/office/capture" --progress none
     match office
     FUSE='--fuse name'
@@ -45,11 +45,11 @@ for survey in ${SURVEYS:-office home kitchen corridor}; do
     if [ ! -d "$place/home/capture" ]; then
       for run in '0 0.242' '1 0.2248'; do
         set -- $run
-        "$cairn" simulate --width-m 9.5 --depth-m 7.5 --num-rooms 2 --corridor-width-m 1.6 --survey driven --run "$1" \
+        "$cairn" stage simulate --width-m 9.5 --depth-m 7.5 --num-rooms 2 --corridor-width-m 1.6 --survey driven --run "$1" \
             --step-m "$2" --camera-model EQUIRECTANGULAR --panorama-width-px 1024 --light-ratio 0.25 --image-noise 3 \
             --num-queries 0 -o "$place/home/run$1" --progress none
       done
-      "$cairn" join-captures run0="$place/home/run0" run1="$place/home/run1" -o "$place/home/capture"
+      "$cairn" join run0="$place/home/run0" run1="$place/home/run1" -o "$place/home/capture"
     fi
     match home
     echo run1/ > "$place/home/held_out"

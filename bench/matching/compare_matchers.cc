@@ -1,7 +1,7 @@
 // Milliseconds and recall of descriptor matchers on the same descriptors, one core: all pairs of the images
 // of a features.db.  All apply COLMAP's tests (ratio 0.8, angle 0.7 rad, each other's best, where the matcher
-// has both directions); recall is the part found of what exact search finds, by an independent matrix
-// product.
+// has both directions); recall is the part found of what exact search finds, by an independent
+// matrix product.
 //
 //   compare_matchers FEATURES.db COLMAP_MATCHES.db COLMAP_MS     prints rows of a Markdown table
 //
@@ -21,7 +21,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/flann.hpp>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/colmap/colmap_database.h"
 #include "core/features/descriptor_matcher.h"
 
@@ -32,7 +32,7 @@ using Floats = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 using FlannIndex = cv::flann::GenericIndex<cvflann::L2<uint8_t>>;
 using Matches = std::vector<Match>;
 
-// As COLMAP builds and asks its trees.
+// As COLMAP builds and queries its trees.
 constexpr int kNumFlannTrees = 4;
 constexpr int kNumFlannChecks = 128;
 
@@ -192,7 +192,7 @@ class Table {
       found.push_back(matcher(pair));
       ms.push_back(CpuMs() - start);
     }
-    return Print(name, Median(ms), found);
+    return Print(name, UpperMedian(ms), found);
   }
 
   bool Print(const std::string& name, double ms, const std::vector<Matches>& found) {

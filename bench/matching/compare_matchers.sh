@@ -36,7 +36,7 @@ awk -F ': *' '/^model name/ {print "processor: " $2; exit}' /proc/cpuinfo
 for num_features in 1000 4000 8000; do
   features=$work/features_$num_features.db
   colmap=$work/colmap_$num_features.db
-  "$build/cairn" extract-features "$work/images" --max-num-features "$num_features" --contrast-threshold 0.005 -o "$features" --progress none >>"$log" 2>&1
+  "$build/cairn" stage extract-features "$work/images" --max-num-features "$num_features" --contrast-threshold 0.005 -o "$features" --progress none >>"$log" 2>&1
   cp "$features" "$colmap"
   matching=$(match "$colmap" --SiftMatching.min_num_inliers 1000000)
   reading=$(match "$colmap" --SiftMatching.min_num_inliers 1000000)

@@ -29,7 +29,7 @@ row() {
   local label=$1 budget=$2 log=$work/memory.log tried
   shift 2
   rm -f "$work/memory.db"
-  /usr/bin/time -o "$log" -f '%M %e' "$cairn" match-features "$features" -o "$work/memory.db" --memory "$budget" \
+  /usr/bin/time -o "$log" -f '%M %e' "$cairn" stage match-features "$features" -o "$work/memory.db" --memory "$budget" \
     --progress none --log-level error "$@" > "$log.txt"
   tried=$(sed -E 's/.* ([0-9]+) pairs tried.*/\1/' "$log.txt")
   echo "$(tail -n 1 "$log") $(sha256sum "$work/memory.db" | cut -c1-12)" |

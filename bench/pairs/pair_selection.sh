@@ -26,7 +26,7 @@ extract() {
   fi
   capture=$data/$1
   [[ -d $capture ]] || { echo "$capture: not here; this capture is no part of the repository" >&2; exit 3; }
-  [[ -f $features ]] || "$cairn" extract-features "$capture" -o "$features" --progress none --log-level error > /dev/null
+  [[ -f $features ]] || "$cairn" stage extract-features "$capture" -o "$features" --progress none --log-level error > /dev/null
 }
 
 # match OUTPUT OPTION...: seconds to OUTPUT.seconds, pairs tried to OUTPUT.tried.
@@ -35,7 +35,7 @@ match() {
   shift
   [[ -f $output ]] && return
   begin=$(date +%s.%N)
-  "$cairn" match-features "$features" "${poses[@]}" -o "$output.new" --progress none --log-level error "$@" > "$output.txt"
+  "$cairn" stage match-features "$features" "${poses[@]}" -o "$output.new" --progress none --log-level error "$@" > "$output.txt"
   end=$(date +%s.%N)
   echo "$begin $end" | awk '{printf "%.0f\n", $2 - $1}' > "$output.seconds"
   sed -E 's/.* ([0-9]+) pairs tried.*/\1/' "$output.txt" > "$output.tried"

@@ -39,15 +39,15 @@ echo "== cairn: $("$cairn" --version)"
 # Step by step for the seconds of each, with the options of the recipe, but all pairs, as COLMAP matches them; then the
 # whole line once more, for its sum, with the pairs that it chooses.
 options=$work/cairn.build/options
-"$cairn" configure "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
-seconds cairn_extract "$cairn" extract-features "$capture" --options "$options/extract_features.toml" \
+"$cairn" stage configure "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
+seconds cairn_extract "$cairn" stage extract-features "$capture" --options "$options/extract_features.toml" \
   -o "$work/features.db" --progress none
-seconds cairn_match "$cairn" match-features "$work/features.db" --capture "$capture" \
+seconds cairn_match "$cairn" stage match-features "$work/features.db" --capture "$capture" \
   --options "$options/match_features.toml" --pairs exhaustive -o "$work/matches.db" --progress none
-seconds cairn_group "$cairn" group-classes "$work/matches.db" --capture "$capture" \
+seconds cairn_group "$cairn" stage group-classes "$work/matches.db" --capture "$capture" \
   --options "$options/group_classes.toml" -o "$work/classes.db" --progress none
 seconds cairn_compile "$cairn" compile "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
-"$cairn" check-map "$work/cairn.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/cairn.txt"
+"$cairn" check "$work/cairn.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/cairn.txt"
 
 echo "== $(colmap help | head -n 1)"
 camera=$(awk '!/^#/ && NF {print; exit}' "$capture/cameras.txt")

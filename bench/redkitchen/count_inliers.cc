@@ -1,9 +1,8 @@
-// Counts the verified matches of two databases under one stated test, whoever verified them, and with which
-// threshold:
-// for each pair of images an essential matrix is fitted to the database's own verified matches (five-point
-// USAC with a fixed seed, then least squares; the same for both), and matches within 1, 2 and 4 pixels of it
-// (Sampson) count. Only pairs with at least 15 of them are summed, and only pairs that both databases could
-// have: the second one lists every pair that it tried, as COLMAP's do.
+// Counts the verified matches of two databases under one stated test, whoever verified them and with which
+// threshold: for each pair of images an essential matrix is fitted to the database's own verified matches
+// (five-point USAC with a fixed seed, then least squares; the same for both), and matches within 1, 2 and 4
+// pixels of it (Sampson) count.  Only pairs with at least 15 of them are summed, and only pairs that both
+// databases could have: the second one lists every pair that it tried, as COLMAP's do.
 //
 //   count_inliers CAIRN_MATCHES.db COLMAP.db
 #include <cstdio>

@@ -24,8 +24,8 @@ struct Sums {
   double fewer_ratio = 0, gap_ratio = 0, seconds = 0, max_seconds = 0;
 };
 
-// Both algorithms on one world.  False if the world cannot be made, or a result breaks a property (says
-// which).
+// Both algorithms on one world.  False if the world cannot be made, or a result breaks a property
+// (says which).
 bool Add(int setting, uint64_t seed, decompose_regions::DecomposeRegionsOptions options, Sums* sums) {
   const Result<World> world = sim::SimulateWorld({.setting = setting}, seed);
   if (!world.ok()) return false;
@@ -64,8 +64,7 @@ void Print(int setting, const Sums& sums) {
   const double n = std::max(1, sums.num_worlds);
   fmt::print(
       "| {} | {} | {:.1f} | {:.1f} | {:.1f} % | {:.1f} | {:.1f} | {:.1f} % | {:.0f} / {:.0f} | {:.0f} / "
-      "{:.0f} | "
-      "{:.1f} ({:.1f}) |\n",
+      "{:.0f} | {:.1f} ({:.1f}) |\n",
       setting, sums.num_worlds, sums.b2_regions / n, sums.best_regions / n, 100 * sums.fewer_ratio / n,
       sums.lower_bound / n, sums.counted_bound / n, 100 * sums.gap_ratio / n, sums.b2_uncovered / n,
       sums.best_uncovered / n, sums.b2_hole / n, sums.best_hole / n, sums.seconds / n, sums.max_seconds);

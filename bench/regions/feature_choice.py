@@ -25,7 +25,7 @@ def mean(values):
 
 
 def config(build):
-    """CAPTURE and QUERIES as `cairn configure` wrote them."""
+    """CAPTURE and QUERIES as `cairn stage configure` wrote them."""
     lines = (line.split(" := ", 1) for line in (build / "config.mk").read_text().splitlines() if " := " in line)
     values = {name: value.strip() for name, value in lines}
     return values["CAPTURE"], values.get("QUERIES") or values["CAPTURE"] + "/queries.txt"
@@ -39,17 +39,17 @@ def localize(arguments, k, choice, work):
     report = landmarks.with_suffix(".json")
     options = [item for pair in arguments.set for item in ("--" + pair.split("=")[0].replace("_", "-"), pair.split("=")[1])]
     for command in (
-        [cairn, "decompose-regions", build / "world.db", "--classes", build / "classes.db",
+        [cairn, "stage", "decompose-regions", build / "world.db", "--classes", build / "classes.db",
          "--options", build / "options/decompose_regions.toml", "--algorithm", arguments.algorithm, "--k", k,
          "--feature-choice", choice, *options, "-o", regions],
-        [cairn, "emit-map", "--classes", build / "classes.db", "--world", build / "world.db",
+        [cairn, "stage", "emit-map", "--classes", build / "classes.db", "--world", build / "world.db",
          "--vocabulary", build / "vocabulary.db", "--regions", regions, "--name", landmarks.stem,
          "--landmarks", "regions", "-o", landmarks],
     ):
         subprocess.run([str(word) for word in command] + ["--progress", "none", "--log-level", "error"], check=True,
                        stdout=subprocess.DEVNULL)
     with report.open("w") as file:
-        subprocess.run([str(word) for word in (cairn, "check-map", landmarks, "--capture", capture, "--queries",
+        subprocess.run([str(word) for word in (cairn, "check", landmarks, "--capture", capture, "--queries",
                                                arguments.queries or queries, "--json", "--progress", "none")],
                        check=True, stdout=file)
     result = json.loads(report.read_text())

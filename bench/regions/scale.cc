@@ -3,8 +3,8 @@
 //
 // First, worlds of about 5,000 stations in memory, many times each: milliseconds of processor time.  Then
 // large worlds of the same density, 100 features visible from a station: each is written as world.db, and a
-// process of its own reads it and decomposes it, so that its peak of memory is that of the program. Exponent:
-// of processor seconds (reading included) from the smallest to the largest world.
+// process of its own reads it and decomposes it, so that its peak of memory is that of the program.
+// Exponent: of processor seconds (reading included) from the smallest to the largest world.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// Tables II and III of [Sala06]: the six algorithms on random worlds of the four settings, beside the
+// [Sala06 Table II, Table III] The six algorithms on random worlds of the four settings, beside the
 // source's figures.
 //
 //   regions_tables --worlds 300
@@ -23,7 +23,7 @@ namespace cairn {
 namespace {
 
 constexpr std::array kAlgorithms = {"a1", "a2", "a3", "b1", "b2", "c"};
-// [Sala06 Table II, Table III], by setting and algorithm.
+// The source's, by setting and algorithm.
 constexpr double kSourceRegions[4][6] = {{173.81, 156.96, 154.97, 127.76, 112.63, 140.10},
                                          {59.30, 56.45, 54.72, 44.74, 42.10, 44.17},
                                          {112.40, 100.46, 98.97, 82.11, 73.08, 82.29},
@@ -121,6 +121,7 @@ void Print(int setting, const std::vector<WorldRow>& rows) {
   };
   const auto num_regions = mean(&Means::num_regions);
   line("regions", num_regions);
+  // [Sala06 Table II, Table III]
   line("  source (Table II)", [&](size_t a) { return kSourceRegions[setting - 1][a]; });
   line("  over B.2", [&](size_t a) { return num_regions(a) / num_regions(4); });
   line("  over B.2, source",

@@ -1,6 +1,5 @@
-// Flips single bits of a map, one after the other, and opens it:  flip_bits MAP NUM_FLIPS
-// Counts flips that `cairn verify`'s checks do not find (there must be none), and what the loader says to
-// each.
+// Flips single bits of a map, one after the other, and opens it:  flip_bits MAP NUM_FLIPS Counts flips that
+// `cairn verify`'s checks do not find (there must be none), and the loader's message for each.
 #include <cstdio>
 #include <cstdlib>
 #include <map>

@@ -2,9 +2,9 @@
 //   large_map make MAP NUM_ROOMS                   about 190 kB a room, 8 regions each; signed, with the key
 //                                                  MAP.key
 //   large_map make MAP NUM_ROOMS NUM_NEW same-tree|new-tree
-//                                                  so many rooms surveyed anew: other landmarks, and fewer;
-//                                                  with the tree of the map without new rooms, or one grown
-//                                                  anew
+//                                                  this many rooms surveyed again: other landmarks, and
+//                                                  fewer; with the tree of the map without new rooms, or a
+//                                                  new one
 //   large_map query MAP NUM_QUERIES BUDGET_MIB    opening time, memory, fixes; every query in another room
 #include <chrono>
 #include <cstdio>
@@ -87,7 +87,7 @@ void AddRoom(int room_number, bool is_new, MapRows* rows) {
   }
 }
 
-// The descriptors of all rooms before any was surveyed anew.
+// The descriptors of all rooms before any was surveyed again.
 DescriptorMatrix OldDescriptors(int num_rooms) {
   DescriptorMatrix descriptors(static_cast<Eigen::Index>(num_rooms) * kLandmarksPerRoom, kDescriptorDim);
   for (int room = 0; room < num_rooms; ++room)

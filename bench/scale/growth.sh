@@ -26,7 +26,7 @@ stage() {
   shift 2
   output=${*: -1}
   rm -f "$output"
-  /usr/bin/time -o "$log" -f '%e %U %S %M' "$cairn" "$name" --progress none --log-level error "$@" >&2
+  /usr/bin/time -o "$log" -f '%e %U %S %M' "$cairn" stage "$name" --progress none --log-level error "$@" >&2
   tail -n 1 "$log" | awk -v n="$num_images" -v s="$name" -v b="$(stat -c %s "$output")" \
       '{printf "%d\t%s\t%.1f\t%.1f\t%d\t%d\n", n, s, $1, $2 + $3, $4, b}' >> "$rows"
 }

@@ -75,7 +75,7 @@ double Percentile(std::vector<double> values, double share) {
   return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// One panel per heading asked for: ways from the starts with it; arrows in the outcome's colour.
+// One panel per start heading: paths from the starts with it; arrows in the outcome's colour.
 std::string Draw(const std::vector<Run>& runs) {
   constexpr double kPxPerM = 52, kLowX = -4.4, kHighX = 2.1, kHighY = 2.0;
   constexpr double kWidth = (kHighX - kLowX) * kPxPerM, kHeight = 2 * kHighY * kPxPerM;

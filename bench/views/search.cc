@@ -52,7 +52,7 @@ double Seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// What fits of the simulated points would have.
+// Sets the standard deviations that fits to the simulated points would have.
 void SetSigmas(std::vector<ScanSegment>* segments) {
   constexpr double kSigma = 0.02;
   for (ScanSegment& segment : *segments) {
@@ -90,6 +90,7 @@ Sample TryPlace(const ViewSearchIndex& index, const FaceLocator& locator, bool n
     options.fix_pose_early = false;
     options.max_num_nodes = 1e8;
   }
+  // [Simsarian96 §3] nodes of both searches at a random place
   const auto run = [&](const char* search, bool first, int growth) {
     options.search = search;
     options.first_only = first;

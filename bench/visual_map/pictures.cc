@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/picture/svg.h"
 
 namespace cairn {
@@ -19,9 +19,9 @@ constexpr double kGapPx = 20;
 constexpr int kFontPx = 15;
 // A posterior's shades go down to 1e-8: each is a tenth as likely.
 constexpr int kNumShades = 8;
-// How much longer than the floor's scale error arrows may be drawn.
+// Factors by which error arrows may be longer than the floor's scale.
 constexpr std::array<double, 7> kEnlargements = {100, 50, 20, 10, 5, 2, 1};
-// What nine in ten arrows, and all, are at most as long as, drawn.
+// Maximum lengths, as drawn, of nine in ten arrows and of all arrows.
 constexpr double kLongArrowM = 0.4, kLongestArrowM = 1.5;
 constexpr double kArrowHeadPx = 7;
 
@@ -200,6 +200,7 @@ void AddErrorLegend(double enlargement, FloorPicture* picture) {
 
 }  // namespace
 
+// [Sala06 Fig. 15]
 std::string PosteriorSvg(const std::string& title, const VisualMap& map, const VisualPose& pose,
                          const Eigen::Vector2d& truth) {
   FloorPicture picture(map, {truth, pose.position}, title);
@@ -223,6 +224,7 @@ std::string PosteriorSvg(const std::string& title, const VisualMap& map, const V
   return picture.Finish();
 }
 
+// [Sala06 Fig. 16]
 std::string ErrorSvg(const std::string& title, const VisualMap& map, const std::vector<ErrorArrow>& arrows) {
   std::vector<Eigen::Vector2d> truths;
   for (const ErrorArrow& arrow : arrows) truths.push_back(arrow.truth);

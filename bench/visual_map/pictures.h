@@ -10,8 +10,8 @@
 namespace cairn {
 
 // p(x | z) over the survey's places for one image [Sala06 Fig. 15]: the darker, the likelier, tenfold less
-// being one step lighter; a cross where the image was taken, a circle at the maximum.  Axes in metres, and a
-// legend.
+// being one step lighter; a cross where the image was taken, a circle at the maximum.  Axes in metres, and
+// a legend.
 std::string PosteriorSvg(const std::string& title, const VisualMap& map, const VisualPose& pose,
                          const Eigen::Vector2d& truth);
 

@@ -1,5 +1,5 @@
-// The source's experiment on maps of one survey [Sala06 §VI-C, Tables V and VI]: held-out images localized by
-// the visual map, and by PnP with the same landmarks and features.  The first map is the one of all features:
+// The source's experiment on maps of one survey [Sala06 Table V, Table VI]: held-out images localized by the
+// visual map, and by PnP with the same landmarks and features.  The first map is the one of all features:
 // divergences are from its posteriors.
 #include <algorithm>
 #include <cstdio>
@@ -15,7 +15,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "bench/visual_map/pictures.h"
-#include "core/base/deciles.h"
+#include "core/base/quantiles.h"
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
 #include "core/files/file.h"
@@ -60,7 +60,7 @@ double Deviation(const std::vector<double>& values) {
 }
 
 double MedianOrNan(const std::vector<double>& values) {
-  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : Median(values);
+  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : UpperMedian(values);
 }
 
 struct TestImage {
@@ -73,8 +73,8 @@ struct TestImage {
   double feature_seconds = 0;
 };
 
-// How far a point lies out of the convex hull of others, metres; below zero within: the most that any
-// direction has it beyond them all.
+// How far a point lies outside the convex hull of others, metres; below zero inside: the maximum over all
+// directions of its distance beyond them all.
 double MetresOutOfHull(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& at) {
   double out_m = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < 720; ++i) {
@@ -125,8 +125,8 @@ struct Row {
   std::vector<double> pnp_cm, pnp_seconds;
 };
 
-// Of the squares of three normal numbers the sum is below this in 997 of 1000 cases, as one lies within 3
-// sigma.
+// Of the squares of three normal numbers the sum is below this in 997 of 1000 cases, as one lies
+// within 3 sigma.
 constexpr double kThreeSigma = 14.16;
 
 double SquaredMahalanobis(const TestImage& test, const VisualPose& pose) {
@@ -171,6 +171,7 @@ Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
   return Ok();
 }
 
+// [Sala06 Table V, Table VI]
 void PrintRow(const Row& row) {
   const std::string divergence =
       row.divergences.empty()
@@ -205,11 +206,8 @@ void PrintErrors(const std::string& name, const VisualMap& map) {
 
 void PrintPose(const Row& row, const TestImage& test, const VisualMap& map, const VisualPose& pose) {
   fmt::print(stderr,
-             "{} {} {}: {} of {} possible, {} matched; spread {:.2f}; {:.2f} m out, found "
-             "{:.2f}; {:.1f} cm "
-             "{:.2f} deg sd {:.1f} cm NEES "
-             "{:.1f}; higher "
-             "{:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}\n",
+             "{} {} {}: {} of {} possible, {} matched; spread {:.2f}; {:.2f} m out, found {:.2f}; {:.1f} cm "
+             "{:.2f} deg sd {:.1f} cm NEES {:.1f}; higher {:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}\n",
              row.name, test.name, test.is_inside() ? "inside" : "outside", pose.num_agreeing,
              pose.num_possible, pose.num_matches, pose.spread_ratio, test.out_m,
              MetresOutOfHull(map.places(), pose.position), 100 * (pose.position - test.truth.position).norm(),
@@ -272,6 +270,7 @@ Status Run(const Arguments& arguments) {
       row.search_seconds.push_back(CpuSeconds() - start);
       row.seconds.push_back(test.feature_seconds + row.search_seconds.back());
       if (!reference.empty() && test.is_inside()) {
+        // [Sala06 Table VI]
         row.divergences.push_back(
             PosteriorDivergence(pose, reference[poses.size()], arguments.uniform_weight));
       }
@@ -313,7 +312,8 @@ int main(int argc, char** argv) {
                                               cairn::DescribeOptions(&arguments.estimate_options)}) {
     options.insert(options.end(), of_visual.begin(), of_visual.end());
   }
-  arguments.option_arguments.Add(app, options);
+  cairn::ArgumentParser parser(app);
+  arguments.option_arguments.Add(parser, options);
   CLI11_PARSE(app, argc, argv);
   const cairn::Status status = cairn::Run(arguments);
   if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());

@@ -9,7 +9,7 @@ cairn=$1 tables=$2 build=$3 capture=$4 out=$5
 shift 5
 mkdir -p "$out"
 emit() {
-  "$cairn" emit-map --classes "$build/classes.db" --world "$build/world.db" --vocabulary "$build/vocabulary.db" \
+  "$cairn" stage emit-map --classes "$build/classes.db" --world "$build/world.db" --vocabulary "$build/vocabulary.db" \
     --regions "$1" --name "$2" --visual-map true -o "$out/$2.cairn" --log-level error --progress none > /dev/null
   "$cairn" inspect "$out/$2.cairn" --svg "$out/regions_$2.svg" > /dev/null
 }
@@ -28,7 +28,7 @@ maps=$out/all.cairn
 for k in ${K:-10 4}; do
   for tau in ${TAU:-0 1}; do
     name=k${k}_tau${tau}
-    "$cairn" decompose-regions "$build/world.db" --classes "$build/classes.db" --algorithm "${ALGORITHM:-b2}" \
+    "$cairn" stage decompose-regions "$build/world.db" --classes "$build/classes.db" --algorithm "${ALGORITHM:-b2}" \
       --k $k --tau $tau --rho "${RHO:-3}" -o "$out/$name.db" --log-level error --progress none > "$out/$name.txt"
     emit "$out/$name.db" $name
     maps="$maps $out/$name.cairn"

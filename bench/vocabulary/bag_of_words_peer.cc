@@ -136,7 +136,7 @@ void BagOfWordsPeer::AddDocuments(const std::vector<const DescriptorMatrix*>& do
   std::vector<Bag> bags;
   std::vector<int> num_documents_with(num_words_, 0);
   for (const DescriptorMatrix* descriptors : documents) {
-    bags.push_back(Transform(*descriptors));  // counts, but for a factor
+    bags.push_back(Transform(*descriptors));  // counts, except for a factor
     for (const auto& [word, weight] : bags.back()) ++num_documents_with[word];
   }
   for (const int number : num_documents_with) {

@@ -201,7 +201,7 @@ class Retrieval {
     return answers;
   }
 
-  // Means over the draws, in images.
+  // [Mariottini11 Fig. 5] Means over the draws, in images.
   Figures Measure(const Vocabulary& vocabulary, int count, int num_verified) const {
     const int num_draws = count == 0 ? 1 : arguments_.num_draws;
     Figures sums;
