@@ -15,7 +15,10 @@ import pathlib
 import re
 import sys
 
-SHARED = ("core", "runtime", "sim", "stages", "pipeline")
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from rooms import PARTS  # noqa: E402
+
 APART = ("tests", "bench")  # programs of their own, a folder each
 
 LITERALS = re.compile(
@@ -149,7 +152,7 @@ def main():
             for name, line in definitions(path.read_text(encoding="utf-8")):
                 into[name].append(f"{path.relative_to(root)}:{line}")
 
-    for folder in SHARED:
+    for folder in PARTS:
         read(root / folder, places)
     twice = {name: where for name, where in places.items() if len(where) > 1 and not is_main(name)}
     num_checked = len(places)
