@@ -61,7 +61,7 @@ deps-all:  ## Install those for tests, benchmarks, packages, Python and ROS, too
 demo: program  ## Render a survey, compile its map, ask where held-out images were taken, draw the floor, write the report
 	@CAIRN=$(CAIRN) scripts/demo
 
-tables: program  ## The tables of the README: the demo's maps and the kitchen's, images of other places
+tables: program  ## Localize held-out images and images of other places in three maps of the demo and of the kitchen
 	@CAIRN=$(CAIRN) DATA=$(DATA) scripts/tables
 
 test: whole  ## Build all and run all tests

@@ -1,7 +1,7 @@
-# What the rules of map.mk stand on; map.mk includes it once per map, after it has named CAIRN_OUTPUTS.  In this order:
-# the recipe's values, the capture's files, stamps and dates, what a rule runs, what it says, shards, captures that are made.
+# What the rules of map.mk use.  map.mk includes it once per map, after it has set CAIRN_OUTPUTS.  In this order: the
+# recipe's values, the capture's files, stamps and dates, what a rule runs, what it says, shards, captures that are made.
 
-# Stages of one run of make share their build folders; another run is refused.
+# Stages of one run of make may work in the same build folder; a second run of make is refused.
 ifndef CAIRN_BUILD_SESSION
 CAIRN_BUILD_SESSION := $(shell echo $$PPID@$$(uname -n))
 endif
@@ -13,23 +13,24 @@ ifdef RECIPE
 # The first target: what `make` without one makes.
 $(MAP):
 CAIRN_MAP := $(MAP)
-# Once per make: a recipe dated in the future would have it start over for ever.
+# Once per run: make restarts when an included file is made again, and with a recipe dated in the future it would restart
+# without end.
 $(BUILD)/config.mk: CONFIGURE := $(RECIPE) -o $(MAP) --build-dir $(BUILD)
 $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	$(CAIRN) stage configure $(CONFIGURE)
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM;
-# `cairn stage configure` writes it beside the options.
+# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN,
+# VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
-# Another program may be dated before it, as installed ones are.
+# Another program may have an older date than config.mk, as installed ones have: size and date are compared.
 ifneq ($(PROGRAM),$(shell stat -L -c %s-%Y $(CAIRN)))
 $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,cairn-missing)
 endif
-# As the including Makefile spells it.
+# The map's path as the including Makefile spells it.
 MAP := $(CAIRN_MAP)
 endif
 $(BUILD)/%: MAP := $(MAP)
@@ -46,7 +47,7 @@ $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
 # Poses, cameras and frame, read by the stages that know the capture.
 CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt))
 ifneq ($(SESSIONS),)
-# What the joined capture consists of, there or not yet.
+# The files of the joined capture, whether they exist yet or not.
 CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)),,cameras.txt images.txt \
     frame.json $(if $(QUERIES),queries.txt)))
 endif
@@ -54,9 +55,9 @@ endif
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
 -include $(BUILD)/images.d
-# Held-out images that exist, with a backslash before what Make would take for more than a name.  Pipes are no files: to
-# read one would wait for ever.  Names that have backslashes themselves, or control characters, are left out: no escaping
-# holds in all of Make.
+# Held-out images that exist, with a backslash before each character that is special to Make.  Only regular files are
+# read: a pipe would block.  Names with backslashes or control characters are left out, because no way of escaping them
+# works everywhere in Make.
 QUERY_LIST := $(shell for list in $(wildcard $(QUERIES) $(CAPTURE)/queries.txt); do \
     [ -f $$list ] && echo $$list && break; done)
 QUERY_IMAGES := $(if $(QUERY_LIST),$(shell awk '/^\#/ || NF < 10 || $$10 ~ /^[-+.0-9eE]+$$/ {next} \
@@ -71,7 +72,8 @@ CAIRN_OUTPUT_FILES := $(addprefix $(BUILD)/,$(CAIRN_OUTPUTS))
 .DELETE_ON_ERROR:
 .PHONY: cairn-missing
 
-# A clock that was ahead has left dates in the future, to which later changes would seem old.
+# Files dated in the future, from a clock that was ahead, would hide later changes: they get the date of now, their stamps
+# that of 1970.
 CAIRN_FUTURE := $(shell find $(BUILD) -maxdepth 2 -type f -newermt '10 seconds' -print \
     \( -name '*.stamp' -exec touch -d @0 {} \; -o -exec touch {} \; \))
 $(if $(CAIRN_FUTURE),$(warning $(words $(CAIRN_FUTURE)) files of $(BUILD) were dated in the future, $(firstword \
@@ -80,33 +82,33 @@ $(if $(CAIRN_FUTURE),$(warning $(words $(CAIRN_FUTURE)) files of $(BUILD) were d
 # The default goal of `make -f map.mk`.
 $(MAP): $(BUILD)/map.stamp ;
 
-# Whether an output's date changed is seen after its stamp's rule has run.  Outputs whose last run gave the same bytes
-# are older than their stamps: for them Make has to look even with -n and -q (the '+').
+# Whether an output's date changed is known only after its stamp's rule has run.  An output whose last run gave the same
+# bytes is older than its stamp; the '+' has Make compare its date again even with -n and -q.
 UNCHANGED := $(shell for output in $(CAIRN_OUTPUT_FILES); do [ $$output.stamp -nt $$output ] && echo $$output; done)
 $(filter-out $(UNCHANGED),$(CAIRN_OUTPUT_FILES)): %: %.stamp ;
 $(UNCHANGED): %: %.stamp
 	+@: # the same bytes as before
-# A stamp without its output says nothing.
+# A stamp without its output does not count.
 $(foreach output,$(CAIRN_OUTPUT_FILES),$(if $(wildcard $(output)),,$(eval $(output).stamp: cairn-missing)))
 $(if $(wildcard $(MAP)),,$(eval $(BUILD)/map.stamp: cairn-missing))
 
 # ---- What a rule runs
 
-# Changes with the program's bytes, whatever its date.
+# This file changes when the program's bytes change, whatever the program's date.
 PROGRAM_HASH := $(BUILD)/options/program
-# $(call CAIRN_OPTIONS,group_classes): the files whose change runs a stage again, beside what it reads.
+# $(call CAIRN_OPTIONS,group_classes): the files, beside a stage's inputs, whose change runs the stage again.
 CAIRN_OPTIONS = $(BUILD)/options/$(1).toml $(PROGRAM_HASH)
-# For stages with something random.
+# For stages that draw random numbers.
 SEED_FILE := $(BUILD)/options/seed
 
 CAIRN_LAUNCH = $(if $(strip $(LAUNCH)),$(CAIRN_RULES)launch $@ $(LAUNCH))
 CAIRN_COMMON = --seed $(SEED) --threads $(THREADS) $(addprefix --memory ,$(MEMORY)) --progress $(PROGRESS) --log-level $(LOG_LEVEL)
-# The stage holds the build folder, leaves X.report.json and then the stamp, with the date at which it began; where it
-# fails, error.json.
+# The stage locks the build folder and writes X.report.json, then the stamp with the date at which it began; if it fails,
+# error.json.
 CAIRN_FLAGS = --stamp $@ $(CAIRN_COMMON)
 CAIRN_NO_SPACE_CHECK = $(if $(filter no,$(SPACE_CHECK)),--no-space-check)
-# $(call CAIRN_RUN,group_classes,COMMAND AND INPUTS): the recipe of X.stamp says why it runs and makes X with the options
-# of that name.
+# $(call CAIRN_RUN,group_classes,COMMAND AND INPUTS): a recipe for X.stamp that prints why it runs, then makes X with the
+# options of that name.
 define CAIRN_RUN
 $(CAIRN_WHY)
 $(CAIRN_LAUNCH) $(CAIRN) $(2) --options $(@D)/options/$(1).toml -o $(@:.stamp=) $(CAIRN_FLAGS)
@@ -114,14 +116,14 @@ endef
 
 # ---- What it says
 
-# What changed, of a rule's prerequisites: the first, and how many more.
+# Which prerequisites of a rule changed: the first, and how many more.
 CAIRN_CHANGED = $(patsubst $(@D)/%,%,$(patsubst $(CAPTURE)/%,%,$(filter-out cairn-missing $(SHARD_STAMPS),$?)))
 CAIRN_REASON = $(if $(wildcard $@),$(if $(filter cairn-missing,$?),is missing,$(patsubst options/program,the \
     program,$(firstword $(CAIRN_CHANGED))) changed$(if $(word 2,$(CAIRN_CHANGED)),$(,) $(words $(wordlist \
     2,$(words $(CAIRN_CHANGED)),$(CAIRN_CHANGED))) more)),not made yet)
 , := ,
 CAIRN_RESULT = $(notdir $(if $(filter map.stamp,$(@F)),$(MAP),$(@:.stamp=)))
-# The names of a capture's images may hold what a terminal takes for a command: its bytes are shown as '?'.
+# An image's name may contain control sequences of terminals: their bytes are printed as '?'.
 CAIRN_PRINTABLE = LC_ALL=C sed 's/[\x01-\x1f\x7f]\|\xc2[\x80-\x9f]\|\xe2\x80[\xaa-\xae]\|\xe2\x81[\xa6-\xa9]/?/g'
 CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if $(filter json,$(PROGRESS)),{"event": \
     "run"$(,) "file": "$(CAIRN_RESULT)"$(,) "reason": "$(subst ",\",$(subst \,\\,$(CAIRN_REASON)))"},$(CAIRN_RESULT): \
@@ -129,10 +131,10 @@ CAIRN_WHY = $(if $(filter none,$(PROGRESS)),,@printf '%s\n' '$(subst ','\'',$(if
 
 # ---- Shards
 
-# Each takes over what the output's last version and the shards of earlier rounds know, does its share of the
-# rest, and leaves X-ROUND-IofN.db; done, it stays done when others are killed.  Then the stage itself takes all of them
-# over, does what is missing and removes them, and those of an earlier SHARDS.  They are SECONDARY: without them nothing
-# is out of date.
+# Each shard takes over results from the output's last version and from the shards of earlier rounds, computes its share
+# of the rest and writes X-ROUND-IofN.db.  A finished shard stays when others are killed.  Then the stage itself takes over
+# all shards, computes what is missing and removes them, with those of an earlier SHARDS.  They are SECONDARY: a missing
+# shard makes nothing out of date.
 CAIRN_SHARD_NUMBERS := $(if $(filter-out 0 1,$(SHARDS)),$(shell seq $(SHARDS)))
 # $(call CAIRN_SHARD_STAMPS,X,ROUNDS)
 CAIRN_SHARD_STAMPS = $(foreach round,$(2),$(CAIRN_SHARD_NUMBERS:%=$(BUILD)/$(1)-$(round)-%of$(SHARDS).stamp))
@@ -145,7 +147,7 @@ $(BUILD)/$(1)-$(2)-$(3)of$(SHARDS).stamp: $(or $(call CAIRN_SHARD_STAMPS,$(1),$(
 	$$(CAIRN_LAUNCH) $$(CAIRN) $$($(4)) --shard $(3)/$(SHARDS) $$(addprefix --reuse ,$$(wildcard $$(@D)/$(1).db)) \
 	    $$(CAIRN_REUSE_SHARDS) -o $$(@:.stamp=.db) $$(CAIRN_FLAGS)
 endef
-# What the first round waits for: shards of other inputs are gone.
+# Prerequisites of the first round: they remove shards of earlier inputs.
 .SECONDARY: $(BUILD)/features.begun $(BUILD)/matches.begun
 $(BUILD)/features.begun $(BUILD)/matches.begun:
 	rm -f $(@:.begun=)-*of*
@@ -160,7 +162,7 @@ ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
 endif
-# Lists that stay the same keep their dates.
+# Lists whose contents stay the same keep their dates.
 ifneq ($(SESSIONS),)
 $(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
 UNCHANGED := $(shell for list in $(CAPTURE_LISTS); do [ $(BUILD)/capture.stamp -nt $$list ] && echo $$list; done)
@@ -172,7 +174,7 @@ SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt fr
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
 endif
-# What the stages after matching take poses from.
+# Where the stages after matching read poses.
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))
 $(BUILD)/%: FRAME := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses/frame.json,$(filter %/frame.json,$(CAPTURE_LISTS)))
 SESSION_LIST := $(filter %/sessions.txt,$(CAPTURE_LISTS))
