@@ -121,6 +121,6 @@ Answer MapLocalizer::Locate(const Image& image) {
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }
 int64_t MapLocalizer::num_landmarks() const { return state_->map->num_landmarks(); }
-int64_t MapLocalizer::num_kept_bytes() const { return state_->map->cache().num_bytes(); }
+int64_t MapLocalizer::num_kept_bytes() const { return state_->map->num_kept_bytes(); }
 
 }  // namespace cairn_ros

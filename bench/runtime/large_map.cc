@@ -17,6 +17,7 @@
 #include "core/seal/map_seal.h"
 #include "core/vocabulary/grow_vocabulary.h"
 #include "runtime/localize/localizer.h"
+#include "runtime/map/block_cache.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
 #include "tests/runtime/localize/synthetic_room.h"

@@ -16,12 +16,14 @@
 
 #include "bench/visual_map/pictures.h"
 #include "core/base/quantiles.h"
+#include "core/blocks/map_blocks.h"
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
 #include "core/files/file.h"
 #include "core/geometry/floor_pose.h"
 #include "core/line/command.h"
 #include "runtime/localize/localizer.h"
+#include "runtime/localize/measurement.h"
 #include "runtime/visual_map/visual_estimate.h"
 
 namespace cairn {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,8 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/ids.h"
 #include "core/blocks/map_findings.h"
-#include "core/camera/camera.h"
-#include "core/capture/capture_frame.h"
+#include "core/blocks/map_head.h"
 #include "core/features/features.h"
 #include "core/geometry/pose.h"
 #include "core/plan/views.h"
@@ -21,8 +19,6 @@
 #include "core/world/visual_map.h"
 
 namespace cairn {
-
-using LandmarkIdx = int32_t;
 
 // The contents of a map file as plain values, the same for writers and readers.  schemas/FORMAT.md says what
 // each means on disk.
@@ -79,53 +75,6 @@ struct MapAppearanceNode {
   friend bool operator==(const MapAppearanceNode&, const MapAppearanceNode&) = default;
 };
 
-// What a map says of itself as a whole.
-struct MapHead {
-  std::string name;
-  std::string writer;  // program and version, "cairn 0.1.0"
-  // Of the processor that extracted the features: with another set the last bits may differ.
-  std::string instruction_set;
-  uint64_t seed = 0;    // of the compilation
-  bool sealed = false;  // checked, with its self-test figures
-  // Counts the releases of a map of this name: a robot takes only a map with a later epoch than its own
-  // (docs/updates.md).  0: not counted.
-  uint64_t epoch = 0;
-  // Hash of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4
-  // or earlier.
-  std::string findings_hash;
-  // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
-  std::string landmark_choice = "regions";
-  // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
-  std::string documents = "all";
-  // How the regions were made.
-  std::string algorithm;
-  int k = 0;
-  int tau = 0;
-  int rho = 0;
-  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable
-  // stations uncovered; nothing where none is known.
-  std::optional<int> lower_bound;
-  int uncovered_limit = 0;
-  std::map<std::string, std::string> stage_options;  // stage -> TOML
-  std::map<std::string, std::string> input_hashes;   // file -> XXH3
-  std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map
-
-  // What the world frame's coordinates mean: their unit, and where on the Earth they are.
-  CaptureFrame frame;
-  // The surveys that the map is made from, if there are several: the image SESSION/NAME belongs to
-  // one of them.
-  std::vector<std::string> sessions;
-  Pose floor_from_world;
-  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up
-  // to noise.
-  Pose camera_from_given;
-  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
-  double stated_pose_sigma_m = 0;
-  double stated_pose_sigma_deg = 0;
-
-  std::vector<Camera> cameras;  // ascending camera_id
-};
-
 struct MapRows : MapHead {
   std::vector<MapImage> images;  // ascending image_id
   std::vector<MapStation> stations;
@@ -154,12 +103,15 @@ inline constexpr int kMaxNameBytes = 4096;
 // Errors: InvalidArgument, naming the element: an index or id that refers to nothing, a list that is not
 // strictly ascending, a number that is not finite, an invalid rotation, sizes that differ.
 Status CheckMapRows(const MapRows& rows);
-// The same for the head alone.
-Status CheckMapHead(const MapHead& head);
 
 // The surveys that see each landmark: positions in `sessions`, ascending.  Empty lists where the map is of
 // one survey.  O(observations).
 std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows);
+
+// Distinct landmarks that the images taken at each station see.
+std::vector<int> LandmarksSeenAt(const MapRows& rows);
+// The same, of landmarks whose entry in `counts` is not 0 only.
+std::vector<int> LandmarksSeenAt(const MapRows& rows, const std::vector<char>& counts);
 
 // Writes a map file, unsigned.  Same rows, same bytes.  Errors: InvalidArgument (CheckMapRows), Io,
 // DiskFull, ReadOnly.

@@ -11,7 +11,7 @@
 
 #include "core/files/database.h"
 #include "core/map/map_findings_tables.h"
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 #include "core/map/map_tables.h"
 
 namespace cairn {

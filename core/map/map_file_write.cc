@@ -5,7 +5,7 @@
 #include "core/blocks/map_rows.h"
 #include "core/files/database.h"
 #include "core/map/map_findings_tables.h"
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 #include "core/map/map_tables.h"
 #include "core/seal/map_seal.h"
 #include "schemas/0002_map_sql.h"

@@ -5,7 +5,7 @@
 #include "core/base/blob.h"
 #include "core/blocks/map_codes.h"
 #include "core/files/database.h"
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 
 namespace cairn {
 namespace {

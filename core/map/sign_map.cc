@@ -5,7 +5,7 @@
 #include "core/files/database.h"
 #include "core/files/replacement.h"
 #include "core/map/map_file.h"
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 #include "core/map/map_tables.h"
 #include "core/seal/map_seal.h"
 

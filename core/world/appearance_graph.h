@@ -8,9 +8,6 @@
 
 namespace cairn {
 
-// A node of the appearance graph: an image, or several taken at one place (fuse_images.h).
-using NodeIdx = int32_t;
-
 // Two nodes between which the local space can be reconstructed [Booij06 §III: S_ij = 1], node1 < node2.
 struct AppearanceLink {
   NodeIdx node1 = 0;

@@ -6,7 +6,7 @@
 #include "core/capture/image_file.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 #include "pipeline/build/make_words.h"
 #include "pipeline/build/recipe.h"
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/text.h"
+#include "core/blocks/map_rows.h"
 #include "core/files/file.h"
 #include "core/geometry/pose.h"
 #include "pipeline/program/json_text.h"

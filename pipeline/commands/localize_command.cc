@@ -22,6 +22,7 @@
 #include "core/files/file.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
+#include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 
 namespace cairn::pipeline {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/blocks/map_rows.h"
 #include "core/geometry/floor_pose.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/drive/route.h"

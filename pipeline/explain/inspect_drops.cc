@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/blocks/landmarks_seen.h"
+#include "core/blocks/map_rows.h"
 #include "pipeline/explain/station_text.h"
 
 namespace cairn::pipeline {

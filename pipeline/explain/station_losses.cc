@@ -1,6 +1,6 @@
 #include "pipeline/explain/station_losses.h"
 
-#include "core/blocks/landmarks_seen.h"
+#include "core/blocks/map_rows.h"
 
 namespace cairn::pipeline {
 

@@ -15,6 +15,7 @@
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/handles.h"
 #include "runtime/localize/localizer.h"
+#include "runtime/localize/measurement.h"
 #include "runtime/map/update_map.h"
 #include "runtime/visual_map/visual_estimate.h"
 #include "runtime/visual_map/visual_map.h"
@@ -299,7 +300,7 @@ int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* descript
     cairn_map_description said = CAIRN_MAP_DESCRIPTION_INIT;
     said.num_landmarks = open->num_landmarks();
     said.num_images = open->num_images();
-    said.num_regions = open->directory().Count(BlockKind::kRegions);
+    said.num_regions = open->num_regions();
     said.has_visual_map = open->has_visual_map();
     said.is_metric = open->head().frame.unit == "metre";
     CopyText(open->head().name, said.name);

@@ -8,6 +8,7 @@
 #include "core/vocabulary/document_scores.h"
 #include "core/vocabulary/rerank_places.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/map/appearance_map.h"
 #include "runtime/map/map.h"
 
 namespace cairn {

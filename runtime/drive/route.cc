@@ -5,6 +5,12 @@
 #include <queue>
 #include <tuple>
 
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_rows.h"
+#include "core/world/appearance_graph.h"
+#include "runtime/map/appearance_map.h"
+#include "runtime/map/map.h"
+
 namespace cairn {
 namespace {
 

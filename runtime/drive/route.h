@@ -6,10 +6,13 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/ids.h"
 #include "core/options/options.h"
-#include "runtime/map/map.h"
 
 namespace cairn {
+
+class Map;             // runtime/map/map.h
+struct AppearanceMap;  // runtime/map/appearance_map.h
 
 struct RouteOptions {
   // The cost of a link, summed over a way: "links": 1 each; "matches": 1 / verified inliers, as in the

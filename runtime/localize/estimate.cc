@@ -8,6 +8,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "core/base/random.h"
+#include "runtime/localize/refine.h"
 
 namespace cairn {
 namespace {

@@ -5,22 +5,10 @@
 #include <vector>
 
 #include "core/geometry/pose.h"
-#include "core/options/options.h"
+#include "runtime/localize/localizer_options.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/refine.h"
 
 namespace cairn {
-
-struct EstimateOptions {
-  // Largest reprojection error of an inlier, px.  REQUIRES: > 0
-  double max_error_px = 6;
-  // Probability of drawing one sample of inliers only, at the inlier ratio found so far.  REQUIRES: in (0, 1)
-  double confidence = 0.9999;
-  // REQUIRES: >= 1
-  int min_num_ransac_iterations = 64;
-  int max_num_ransac_iterations = 3000;
-};
-OptionTable DescribeOptions(EstimateOptions* options);
 
 struct PoseEstimate {
   Pose cam_from_world;

@@ -8,6 +8,16 @@
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_rows.h"
+#include "runtime/localize/accept.h"
+#include "runtime/localize/estimate.h"
+#include "runtime/localize/match.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
+#include "runtime/localize/retrieve.h"
+#include "runtime/map/appearance_map.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {

@@ -2,74 +2,24 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
 
 #include "core/base/error.h"
-#include "core/features/sift.h"
-#include "runtime/localize/accept.h"
-#include "runtime/localize/estimate.h"
-#include "runtime/localize/match.h"
-#include "runtime/localize/measurement.h"
-#include "runtime/localize/refine.h"
-#include "runtime/localize/retrieve.h"
+#include "core/base/ids.h"
+#include "core/camera/camera.h"
+#include "core/features/features.h"
+#include "runtime/localize/localization.h"
+#include "runtime/localize/localizer_options.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
 
-// The options of every piece of localization, in the order in which they act.
-struct LocalizerOptions {
-  SiftOptions sift;
-  MeasurementOptions measurement;
-  RetrieveOptions retrieve;
-  MatchOptions match;
-  EstimateOptions estimate;
-  RefineOptions refine;
-  AcceptOptions accept;
-  // Landmarks to match first: of the candidates' regions, or of the candidate images themselves; "auto":
-  // regions, unless the map keeps landmarks that no region has.
-  std::string first_landmarks = "auto";
-  // A fix with at least this many inliers found without the pose is taken at once; with fewer, the other sets
-  // of landmarks are tried too, and the fix with the most inliers counts: look-alikes give
-  // few.  REQUIRES: >= 0
-  int sure_num_unguided_inliers = 20;
-  // Where the map knows that the place of a fix looks like others that lie elsewhere [Mariottini11 §V], try
-  // these too, unless a prior excludes them: the fix is withheld as long as one of them explains the image
-  // nearly as well (max_second_pose_ratio).
-  bool exclude_look_alikes = true;
-  // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
-  bool fall_back_to_all = true;
-  int fall_back_max_num_landmarks = 200000;
-};
-OptionTable DescribeOptions(LocalizerOptions* options);
-
-// Where landmarks to match came from.
-enum class Scope { kPrior, kRegions, kImages, kAll, kTrack };
-const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all", "track"
-
-// A fix, or the reason for none.
-struct Localization {
-  NoFix reason = NoFix::kNoCandidates;
-  std::string message;  // why there is no fix: found and needed
-  bool has_fix() const { return reason == NoFix::kNone; }
-
-  // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given
-  // is applied).
-  Pose cam_from_world;
-  // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
-  // (Exp(rotation), translation) * cam_from_world.
-  Matrix6d covariance = Matrix6d::Identity();
-  RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
-  Scope scope = Scope::kAll;
-
-  int num_features = 0;
-  int num_matches = 0;              // without knowing the pose
-  int num_unguided_inliers = 0;     // of them
-  int num_inliers = 0;              // in all
-  std::vector<ImageId> candidates;  // survey images, most alike first
-};
+struct Correspondence;  // runtime/localize/measurement.h, with the next two
+struct PoseMeasurement;
+struct Query;
+struct PoseEstimate;  // runtime/localize/estimate.h
 
 // Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "core/blocks/map_blocks.h"
 #include "core/camera/pixel_ray.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"

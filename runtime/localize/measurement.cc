@@ -3,6 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/blocks/map_rows.h"
+#include "runtime/map/landmark_set.h"
+
 namespace cairn {
 namespace {
 

@@ -5,23 +5,15 @@
 
 #include <Eigen/Core>
 
-#include "core/blocks/map_rows.h"
+#include "core/base/ids.h"
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
-#include "core/options/options.h"
-#include "runtime/map/landmark_set.h"
+#include "runtime/localize/localizer_options.h"
 
 namespace cairn {
 
-struct MeasurementOptions {
-  // Standard deviation of a small keypoint's position, px.  REQUIRES: > 0
-  double keypoint_sigma_px = 0.5;
-  // Growth of that standard deviation with the keypoint's scale (sigma, px): they add as squares.
-  // REQUIRES: >= 0
-  double keypoint_sigma_per_scale = 0.2;
-};
-OptionTable DescribeOptions(MeasurementOptions* options);
+struct LandmarkSet;  // runtime/map/landmark_set.h
 
 // A keypoint of the query as a ray: the rest of localization needs no camera model, to first order.
 struct QueryRay {

@@ -6,33 +6,13 @@
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
-#include "core/options/options.h"
+#include "runtime/localize/localization.h"
+#include "runtime/localize/localizer_options.h"
 #include "runtime/localize/measurement.h"
 
 namespace cairn {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-struct RefineOptions {
-  // Whitened residual (standard deviations) from which a measurement loses weight (Cauchy's loss).
-  // REQUIRES: > 0
-  double robust_scale = 2.5;
-  // Most Levenberg-Marquardt steps.  REQUIRES: >= 1
-  int max_num_refine_iterations = 20;
-  // Squared whitened residual, over the estimated noise, up to which a measurement is an inlier: chi-square
-  // of 2 degrees of freedom at 99 %.  REQUIRES: > 0
-  double inlier_chi_square = 9.21;
-  // Factor on the reported covariance: errors of neighbouring keypoints and landmarks are correlated, which
-  // the normal matrix ignores.  Measured on the demo, where it brings the normalised error squared from 10.7
-  // to its 6 degrees of freedom.  REQUIRES: > 0
-  double covariance_scale = 1.8;
-  // Errors that more landmarks do not average out (survey poses, intrinsics): added to the covariance of the
-  // camera's place, m, and of its rotation, degrees, as standard deviations per axis.  REQUIRES: >= 0
-  double systematic_sigma_m = 0;
-  double systematic_sigma_deg = 0;
-};
-OptionTable DescribeOptions(RefineOptions* options);
 
 // exp of a perturbation xi = (rotation in rad, translation in m), applied from the left:
 // cam_from_world' = (Exp(rotation), translation) * cam_from_world.

@@ -6,6 +6,10 @@
 #include <utility>
 
 #include "core/base/no_throw.h"
+#include "runtime/localize/match.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/retrieve.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 

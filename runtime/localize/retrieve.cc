@@ -5,6 +5,10 @@
 #include <map>
 #include <utility>
 
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_rows.h"
+#include "runtime/map/landmark_set.h"
+
 namespace cairn {
 namespace {
 

@@ -2,39 +2,12 @@
 
 #include <vector>
 
-#include "core/geometry/pose.h"
-#include "core/options/options.h"
+#include "runtime/localize/localization.h"
+#include "runtime/localize/localizer_options.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
-
-struct RetrieveOptions {
-  // Most candidate images.  REQUIRES: >= 1
-  int max_num_candidates = 20;
-  // Candidates score at least this part of the best one's score [Mariottini11 fn 4: a percentage of the
-  // maximum, not given]. REQUIRES: in [0, 1]
-  double min_score_ratio = 0.3;
-  // Without a vocabulary: largest angle between a descriptor and the landmark that is its word, radians.
-  // REQUIRES: > 0
-  double max_word_angle_rad = 0.8;
-  // And largest ratio of that angle to the one of the second nearest landmark.  REQUIRES: in (0, 1]
-  double max_word_ratio = 0.95;
-  // Most regions whose landmarks are matched first.  REQUIRES: >= 1
-  int max_num_regions = 12;
-  // With a prior: survey images within this distance and angle of it (beyond 3 of its standard deviations)
-  // are candidates.  REQUIRES: >= 0
-  double prior_distance_m = 3;
-  double prior_angle_deg = 45;
-};
-OptionTable DescribeOptions(RetrieveOptions* options);
-
-// Where the camera is believed to be: in the frame in which poses are reported.
-struct PosePrior {
-  Pose cam_from_world;
-  double sigma_m = 1;     // of its place, per axis
-  double sigma_deg = 10;  // of its rotation
-};
 
 // A survey image that may show what the query shows.
 struct Candidate {

@@ -3,9 +3,13 @@
 #include <cmath>
 #include <functional>
 
+#include "core/blocks/map_blocks.h"
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
+#include "core/vocabulary/vocabulary_tree.h"
 #include "runtime/localize/retrieve.h"
+#include "runtime/map/appearance_map.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {

@@ -10,7 +10,15 @@
 #include <fmt/ranges.h>
 
 #include "core/base/no_throw.h"
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_layout.h"
+#include "core/blocks/map_rows.h"
 #include "core/map/map_epoch.h"
+#include "core/map/map_file.h"
+#include "core/plan/views.h"
+#include "runtime/map/appearance_map.h"
+#include "runtime/map/block_cache.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
@@ -39,75 +47,115 @@ int64_t NumBytes(const AppearanceMap& appearance) {
 
 }  // namespace
 
+// Where an open map's blocks come from, and those that are kept.
+struct Map::Store {
+  MapHead head;
+  MapDirectory directory;
+  // One of the two.
+  std::optional<MapFile> file;
+  std::unique_ptr<const MapRows> rows;
+  std::unique_ptr<const MapLayout> layout;
+  BlockCache cache;
+
+  Store(MapFile opened, int64_t memory_budget_bytes)
+      : head(opened.head()),
+        directory(opened.directory()),
+        file(std::move(opened)),
+        cache(memory_budget_bytes) {}
+  explicit Store(MapRows given)
+      : head(given),
+        rows(std::make_unique<const MapRows>(std::move(given))),
+        layout(std::make_unique<const MapLayout>(*rows)),
+        cache(std::numeric_limits<int64_t>::max()) {
+    for (const BlockEntry& entry : layout->entries()) directory.Add(entry);
+  }
+
+  template <typename Block>
+  using Decoder = Result<Block>(std::string_view bytes, const BlockEntry& entry,
+                                const MapDirectory& directory, const std::string& what);
+  // From the cache; else decoded from the file, or made of the rows.
+  template <typename Block, typename Make>
+  Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
+                                            const Make& make);
+
+  Status AddAmbiguity(AppearanceMap* appearance);
+};
+
 Result<std::shared_ptr<const Map>> Map::Open(const std::string& path, const MapOptions& options) {
   return WithoutExceptions(path.c_str(), [&]() -> Result<std::shared_ptr<const Map>> {
     CAIRN_ASSIGN_OR_RETURN(MapFile file, MapFile::Open(path, {.public_key = options.public_key}));
     CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), path, options.name, options.min_epoch));
-    return std::shared_ptr<const Map>(new Map(std::move(file), options.memory_budget_bytes));
+    return std::shared_ptr<const Map>(
+        new Map(std::make_unique<Store>(std::move(file), options.memory_budget_bytes)));
   });
 }
 
 Result<std::shared_ptr<const Map>> Map::FromRows(MapRows rows) {
   return WithoutExceptions("map", [&]() -> Result<std::shared_ptr<const Map>> {
     CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
-    return std::shared_ptr<const Map>(new Map(std::move(rows)));
+    return std::shared_ptr<const Map>(new Map(std::make_unique<Store>(std::move(rows))));
   });
 }
 
-Map::Map(MapFile file, int64_t memory_budget_bytes)
-    : head_(file.head()), directory_(file.directory()), file_(std::move(file)), cache_(memory_budget_bytes) {}
+Map::Map(std::unique_ptr<Store> store) : store_(std::move(store)) {}
+Map::~Map() = default;
 
-Map::Map(MapRows rows) : head_(rows), cache_(std::numeric_limits<int64_t>::max()) {
-  rows_ = std::make_unique<const MapRows>(std::move(rows));
-  layout_ = std::make_unique<const MapLayout>(*rows_);
-  for (const BlockEntry& entry : layout_->entries()) directory_.Add(entry);
-}
+const MapHead& Map::head() const { return store_->head; }
+const MapDirectory& Map::directory() const { return store_->directory; }
+const BlockCache& Map::cache() const { return store_->cache; }
+int64_t Map::num_landmarks() const { return directory().Count(BlockKind::kLandmarks); }
+int64_t Map::num_images() const { return directory().Count(BlockKind::kImages); }
+int64_t Map::num_regions() const { return directory().Count(BlockKind::kRegions); }
+int64_t Map::num_kept_bytes() const { return cache().num_bytes(); }
+bool Map::has_words() const { return directory().Count(BlockKind::kVocabularyTree) > 0; }
+bool Map::has_views() const { return directory().Count(BlockKind::kViewRegions) > 0; }
+bool Map::has_visual_map() const { return directory().NumBlocks(BlockKind::kLandmarkModels) > 0; }
 
 template <typename Block, typename Make>
-Result<std::shared_ptr<const Block>> Map::Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
-                                               const Make& make) const {
-  const int64_t block = directory_.Block(kind, ordinal);
-  if (auto found = cache_.Find(block)) return std::static_pointer_cast<const Block>(found);
-  const BlockEntry& entry = directory_.blocks()[block];
+Result<std::shared_ptr<const Block>> Map::Store::Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
+                                                      const Make& make) {
+  const int64_t block = directory.Block(kind, ordinal);
+  if (auto found = cache.Find(block)) return std::static_pointer_cast<const Block>(found);
+  const BlockEntry& entry = directory.blocks()[block];
   std::shared_ptr<const Block> loaded;
-  if (file_) {
-    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, file_->ReadBlock(block));
-    CAIRN_ASSIGN_OR_RETURN(Block decoded, decode(bytes, entry, directory_, file_->NameOf(block)));
+  if (file) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string bytes, file->ReadBlock(block));
+    CAIRN_ASSIGN_OR_RETURN(Block decoded, decode(bytes, entry, directory, file->NameOf(block)));
     loaded = std::make_shared<const Block>(std::move(decoded));
   } else {
-    loaded = std::make_shared<const Block>(std::invoke(make, *layout_, entry));
+    loaded = std::make_shared<const Block>(std::invoke(make, *layout, entry));
   }
   const int64_t num_bytes = NumBytes(*loaded);
-  return std::static_pointer_cast<const Block>(cache_.Insert(block, std::move(loaded), num_bytes));
+  return std::static_pointer_cast<const Block>(cache.Insert(block, std::move(loaded), num_bytes));
 }
 
 Result<std::shared_ptr<const LandmarkBlock>> Map::Landmarks(int64_t ordinal) const {
-  return Load(BlockKind::kLandmarks, ordinal, DecodeLandmarkBlock, &MapLayout::MakeLandmarkBlock);
+  return store_->Load(BlockKind::kLandmarks, ordinal, DecodeLandmarkBlock, &MapLayout::MakeLandmarkBlock);
 }
 
 Result<std::shared_ptr<const ImageBlock>> Map::Images(int64_t ordinal) const {
-  return Load(BlockKind::kImages, ordinal, DecodeImageBlock, &MapLayout::MakeImageBlock);
+  return store_->Load(BlockKind::kImages, ordinal, DecodeImageBlock, &MapLayout::MakeImageBlock);
 }
 
 Result<std::shared_ptr<const StationBlock>> Map::Stations(int64_t ordinal) const {
-  return Load(BlockKind::kStations, ordinal, DecodeStationBlock, &MapLayout::MakeStationBlock);
+  return store_->Load(BlockKind::kStations, ordinal, DecodeStationBlock, &MapLayout::MakeStationBlock);
 }
 
 Result<std::shared_ptr<const RegionBlock>> Map::Regions(int64_t ordinal) const {
-  return Load(BlockKind::kRegions, ordinal, DecodeRegionBlock, &MapLayout::MakeRegionBlock);
+  return store_->Load(BlockKind::kRegions, ordinal, DecodeRegionBlock, &MapLayout::MakeRegionBlock);
 }
 
 Result<std::shared_ptr<const WordBlock>> Map::Words(int64_t ordinal) const {
-  return Load(BlockKind::kWords, ordinal, DecodeWordBlock, &MapLayout::MakeWordBlock);
+  return store_->Load(BlockKind::kWords, ordinal, DecodeWordBlock, &MapLayout::MakeWordBlock);
 }
 
 Result<std::shared_ptr<const Vocabulary>> Map::VocabularyTree() const {
-  return Load(BlockKind::kVocabularyTree, 0, DecodeVocabularyTree,
-              [&](const auto&, const auto&) { return rows_->vocabulary; });
+  return store_->Load(BlockKind::kVocabularyTree, 0, DecodeVocabularyTree,
+                      [&](const auto&, const auto&) { return store_->rows->vocabulary; });
 }
 
 Result<std::shared_ptr<const std::vector<float>>> Map::DocumentNorms() const {
-  return Load<std::vector<float>>(
+  return store_->Load<std::vector<float>>(
       BlockKind::kDocumentNorms, 0,
       [](std::string_view bytes, const BlockEntry& entry, const MapDirectory&, const std::string& what) {
         return DecodeDocumentNorms(bytes, entry, what);
@@ -116,19 +164,21 @@ Result<std::shared_ptr<const std::vector<float>>> Map::DocumentNorms() const {
 }
 
 Result<std::shared_ptr<const AppearanceMap>> Map::Appearance() const {
-  if (auto found = cache_.Find(kWholeAppearance)) return std::static_pointer_cast<const AppearanceMap>(found);
+  if (auto found = store_->cache.Find(kWholeAppearance))
+    return std::static_pointer_cast<const AppearanceMap>(found);
   auto appearance = std::make_shared<AppearanceMap>();
   appearance->node_of_image.assign(num_images(), -1);
   std::vector<AppearanceLink> links;
-  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kAppearance); ++ordinal) {
-    CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kAppearance, ordinal, DecodeAppearanceBlock,
-                                                  &MapLayout::MakeAppearanceBlock));
+  for (int64_t ordinal = 0; ordinal < store_->directory.NumBlocks(BlockKind::kAppearance); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block,
+                           store_->Load(BlockKind::kAppearance, ordinal, DecodeAppearanceBlock,
+                                        &MapLayout::MakeAppearanceBlock));
     for (const MapAppearanceNode& node : block->nodes) {
       const auto node_idx = static_cast<NodeIdx>(appearance->is_kept.size());
       for (const int32_t image : node.images) {
         if (appearance->node_of_image[image] >= 0) {
-          return MakeError(ErrorCode::kCorrupt, "map '{}': image {} is of two appearance nodes", head_.name,
-                           image);
+          return MakeError(ErrorCode::kCorrupt, "map '{}': image {} is of two appearance nodes",
+                           store_->head.name, image);
         }
         appearance->node_of_image[image] = node_idx;
       }
@@ -140,14 +190,14 @@ Result<std::shared_ptr<const AppearanceMap>> Map::Appearance() const {
     }
   }
   appearance->graph = AppearanceGraph(static_cast<int>(appearance->is_kept.size()), std::move(links));
-  CAIRN_RETURN_IF_ERROR(AddAmbiguity(appearance.get()));
+  CAIRN_RETURN_IF_ERROR(store_->AddAmbiguity(appearance.get()));
   const int64_t num_bytes = NumBytes(*appearance);
   return std::static_pointer_cast<const AppearanceMap>(
-      cache_.Insert(kWholeAppearance, std::move(appearance), num_bytes));
+      store_->cache.Insert(kWholeAppearance, std::move(appearance), num_bytes));
 }
 
-Status Map::AddAmbiguity(AppearanceMap* appearance) const {
-  const int64_t num_blocks = directory_.NumBlocks(BlockKind::kAmbiguity);
+Status Map::Store::AddAmbiguity(AppearanceMap* appearance) {
+  const int64_t num_blocks = directory.NumBlocks(BlockKind::kAmbiguity);
   for (int64_t ordinal = 0; ordinal < num_blocks; ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kAmbiguity, ordinal, DecodeAmbiguityBlock,
                                                   &MapLayout::MakeAmbiguityBlock));
@@ -157,7 +207,7 @@ Status Map::AddAmbiguity(AppearanceMap* appearance) const {
     }
   }
   if (num_blocks > 0 && appearance->entropy.size() != appearance->is_kept.size()) {
-    return MakeError(ErrorCode::kCorrupt, "map '{}': entropies of {} appearance nodes of {}", head_.name,
+    return MakeError(ErrorCode::kCorrupt, "map '{}': entropies of {} appearance nodes of {}", head.name,
                      appearance->entropy.size(), appearance->is_kept.size());
   }
   CompleteLookAlikes(&appearance->look_alikes);
@@ -165,27 +215,29 @@ Status Map::AddAmbiguity(AppearanceMap* appearance) const {
 }
 
 Result<std::shared_ptr<const Views>> Map::FloorViews() const {
-  if (auto found = cache_.Find(kWholeViews)) return std::static_pointer_cast<const Views>(found);
+  if (auto found = store_->cache.Find(kWholeViews)) return std::static_pointer_cast<const Views>(found);
   if (!has_views()) {
     return MakeError(
         ErrorCode::kNotFound,
         "map '{}' has no floor plan; name one in its recipe ([[capture]] floor_plan) and compile "
         "it again",
-        head_.name);
+        store_->head.name);
   }
   auto views = std::make_shared<Views>();
-  CAIRN_ASSIGN_OR_RETURN(const auto plan, Load(BlockKind::kFloorPlan, 0, DecodeFloorPlan,
-                                               [&](const auto&, const auto&) { return rows_->views.plan; }));
+  CAIRN_ASSIGN_OR_RETURN(const auto plan,
+                         store_->Load(BlockKind::kFloorPlan, 0, DecodeFloorPlan,
+                                      [&](const auto&, const auto&) { return store_->rows->views.plan; }));
   views->plan = *plan;
   int64_t num_bytes = NumBytes(*plan);
-  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kViewRegions); ++ordinal) {
-    CAIRN_ASSIGN_OR_RETURN(
-        const auto block, Load(BlockKind::kViewRegions, ordinal, DecodeViewBlock, &MapLayout::MakeViewBlock));
-    CAIRN_RETURN_IF_ERROR(AppendRegions(*block, "map '" + head_.name + "'", views.get()));
+  for (int64_t ordinal = 0; ordinal < store_->directory.NumBlocks(BlockKind::kViewRegions); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, store_->Load(BlockKind::kViewRegions, ordinal, DecodeViewBlock,
+                                                          &MapLayout::MakeViewBlock));
+    CAIRN_RETURN_IF_ERROR(AppendRegions(*block, "map '" + store_->head.name + "'", views.get()));
     num_bytes += NumBytes(*block);
   }
-  CAIRN_RETURN_IF_ERROR(CheckViews(*views, "map '" + head_.name + "'"));
-  return std::static_pointer_cast<const Views>(cache_.Insert(kWholeViews, std::move(views), num_bytes));
+  CAIRN_RETURN_IF_ERROR(CheckViews(*views, "map '" + store_->head.name + "'"));
+  return std::static_pointer_cast<const Views>(
+      store_->cache.Insert(kWholeViews, std::move(views), num_bytes));
 }
 
 Result<VisualMapData> Map::LandmarkModels() const {
@@ -193,19 +245,24 @@ Result<VisualMapData> Map::LandmarkModels() const {
     return MakeError(ErrorCode::kNotFound,
                      "map '{}' has no visual map; set [emit_map] visual_map = true in its recipe and compile "
                      "it again",
-                     head_.name);
+                     store_->head.name);
   }
   VisualMapData models;
-  for (int64_t ordinal = 0; ordinal < directory_.NumBlocks(BlockKind::kLandmarkModels); ++ordinal) {
-    CAIRN_ASSIGN_OR_RETURN(const auto block, Load(BlockKind::kLandmarkModels, ordinal, DecodeVisualBlock,
-                                                  &MapLayout::MakeVisualBlock));
-    CAIRN_RETURN_IF_ERROR(AppendModels(*block, "map '" + head_.name + "'", &models));
+  for (int64_t ordinal = 0; ordinal < store_->directory.NumBlocks(BlockKind::kLandmarkModels); ++ordinal) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, store_->Load(BlockKind::kLandmarkModels, ordinal,
+                                                          DecodeVisualBlock, &MapLayout::MakeVisualBlock));
+    CAIRN_RETURN_IF_ERROR(AppendModels(*block, "map '" + store_->head.name + "'", &models));
   }
   return models;
 }
 
+Result<std::string> Map::ImageName(int64_t image) const {
+  CAIRN_ASSIGN_OR_RETURN(const auto found, Image(image));
+  return found->name;
+}
+
 Result<std::shared_ptr<const MapImage>> Map::Image(int64_t image) const {
-  CAIRN_ASSIGN_OR_RETURN(const auto block, Images(directory_.OrdinalOf(BlockKind::kImages, image)));
+  CAIRN_ASSIGN_OR_RETURN(const auto block, Images(store_->directory.OrdinalOf(BlockKind::kImages, image)));
   return std::shared_ptr<const MapImage>(block, &block->images[image - block->first]);
 }
 
@@ -219,7 +276,7 @@ Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> 
   for (size_t i = 0; i < set->idx.size(); ++i) {
     const LandmarkIdx landmark = set->idx[i];
     if (!block || landmark >= block->first + static_cast<int64_t>(block->landmarks.size())) {
-      CAIRN_ASSIGN_OR_RETURN(block, Landmarks(directory_.OrdinalOf(BlockKind::kLandmarks, landmark)));
+      CAIRN_ASSIGN_OR_RETURN(block, Landmarks(store_->directory.OrdinalOf(BlockKind::kLandmarks, landmark)));
     }
     set->landmarks.push_back(block->landmarks[landmark - block->first]);
     set->descriptors.row(static_cast<Eigen::Index>(i)) = block->descriptors.row(landmark - block->first);
@@ -229,19 +286,21 @@ Result<std::shared_ptr<const LandmarkSet>> Map::Gather(std::vector<LandmarkIdx> 
 }
 
 Result<std::shared_ptr<const LandmarkSet>> Map::AllLandmarks() const {
-  if (auto found = cache_.Find(kAllLandmarks)) return std::static_pointer_cast<const LandmarkSet>(found);
+  if (auto found = store_->cache.Find(kAllLandmarks))
+    return std::static_pointer_cast<const LandmarkSet>(found);
   std::vector<LandmarkIdx> landmarks(num_landmarks());
   std::iota(landmarks.begin(), landmarks.end(), 0);
   CAIRN_ASSIGN_OR_RETURN(auto set, Gather(std::move(landmarks), true));
   const int64_t num_bytes = NumBytes(*set);
-  return std::static_pointer_cast<const LandmarkSet>(cache_.Insert(kAllLandmarks, std::move(set), num_bytes));
+  return std::static_pointer_cast<const LandmarkSet>(
+      store_->cache.Insert(kAllLandmarks, std::move(set), num_bytes));
 }
 
 Result<Camera> Map::CameraForSize(int width, int height) const {
   const Camera* found = nullptr;
   int num_found = 0;
   std::set<std::string> sizes;
-  for (const Camera& camera : head_.cameras) {
+  for (const Camera& camera : store_->head.cameras) {
     if (sizes.size() < kMaxNumSizesNamed) sizes.insert(fmt::format("{} x {}", camera.width, camera.height));
     if (camera.width != width || camera.height != height) continue;
     found = &camera;
@@ -250,7 +309,7 @@ Result<Camera> Map::CameraForSize(int width, int height) const {
   if (num_found == 1) return *found;
   return MakeError(ErrorCode::kNotFound,
                    "{} cameras of map '{}' take images of {} x {} px (its cameras: {}); give the camera",
-                   num_found, head_.name, width, height, fmt::join(sizes, ", "));
+                   num_found, store_->head.name, width, height, fmt::join(sizes, ", "));
 }
 
 }  // namespace cairn

@@ -3,31 +3,31 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/blocks/map_layout.h"
-#include "core/blocks/map_rows.h"
-#include "core/map/map_file.h"
-#include "core/plan/views.h"
-#include "core/world/appearance_graph.h"
-#include "runtime/map/block_cache.h"
-#include "runtime/map/landmark_set.h"
+#include "core/base/ids.h"
+#include "core/blocks/map_head.h"
+#include "core/camera/camera.h"
+#include "core/seal/signing_key.h"
 
 namespace cairn {
 
-// The appearance graph of a map's images, for finding ways from one to another (runtime/drive/route.h).
-struct AppearanceMap {
-  AppearanceGraph graph;                          // links with a kept node at one end
-  std::vector<std::vector<int32_t>> node_images;  // per node, indices of images, ascending
-  std::vector<char> is_kept;                      // per node
-  std::vector<NodeIdx> node_of_image;             // per image of the map; -1: in no node
-  int num_kept_images = 0;
-  // How well each node's place can be told from others; empty where the map does not say.
-  std::vector<double> entropy;                                         // nats
-  std::vector<std::vector<MapAppearanceNode::LookAlike>> look_alikes;  // both ways, ascending by node
-};
+// Contents of a map.  A robot that only asks where it is needs none of them.
+class BlockCache;      // runtime/map/block_cache.h
+class MapDirectory;    // core/blocks/map_blocks.h, with the blocks
+struct AppearanceMap;  // runtime/map/appearance_map.h
+struct ImageBlock;
+struct LandmarkBlock;
+struct LandmarkSet;  // runtime/map/landmark_set.h
+struct MapImage;     // core/blocks/map_rows.h
+struct MapRows;
+struct RegionBlock;
+struct StationBlock;
+struct Views;          // core/plan/views.h
+struct VisualMapData;  // core/world/visual_map.h
+struct Vocabulary;     // core/vocabulary/vocabulary_tree.h
+struct WordBlock;
 
 struct MapOptions {
   // Largest size of the loaded parts of a map that are kept for later queries.  The parts that a query is
@@ -53,13 +53,16 @@ class Map {
   // A map that was never a file: its numbers are not rounded.  Errors: InvalidArgument (CheckMapRows).
   static Result<std::shared_ptr<const Map>> FromRows(MapRows rows);
 
-  const MapHead& head() const { return head_; }
+  ~Map();
+
+  const MapHead& head() const;
   // Blocks and numbers of landmarks, images, ...
-  const MapDirectory& directory() const { return directory_; }
-  int64_t num_landmarks() const { return directory_.Count(BlockKind::kLandmarks); }
-  int64_t num_images() const { return directory_.Count(BlockKind::kImages); }
+  const MapDirectory& directory() const;
+  int64_t num_landmarks() const;
+  int64_t num_images() const;
+  int64_t num_regions() const;
   // Without words, every landmark is its own: they are few enough to be searched one by one.
-  bool has_words() const { return directory_.Count(BlockKind::kVocabularyTree) > 0; }
+  bool has_words() const;
 
   // The camera of the survey with this image size.  Errors: NotFound when no camera or more than one has it;
   // lists the available sizes.
@@ -81,47 +84,34 @@ class Map {
   Result<std::shared_ptr<const AppearanceMap>> Appearance() const;
 
   // Whether there is a floor plan.
-  bool has_views() const { return directory_.Count(BlockKind::kViewRegions) > 0; }
+  bool has_views() const;
   // The whole floor plan and its view-invariant regions, floor frame.  Kept like a block.  Errors: NotFound
   // where the map has none; Corrupt.
   Result<std::shared_ptr<const Views>> FloorViews() const;
 
   // Whether there is a visual map (runtime/visual_map/visual_map.h).
-  bool has_visual_map() const { return directory_.NumBlocks(BlockKind::kLandmarkModels) > 0; }
+  bool has_visual_map() const;
   // The models of all landmarks; their images are in range.  Not kept in the cache: the caller turns them
   // into a VisualMap.  Errors: NotFound where the map has none; Corrupt.
   Result<VisualMapData> LandmarkModels() const;
 
-  // An image by its index.
+  // The name of an image by its index; the image itself.  Errors: as Images.
+  Result<std::string> ImageName(int64_t image) const;
   Result<std::shared_ptr<const MapImage>> Image(int64_t image) const;
   // These landmarks (ascending), packed for matching if asked.
   Result<std::shared_ptr<const LandmarkSet>> Gather(std::vector<LandmarkIdx> landmarks, bool packed) const;
   // All landmarks, packed.  Kept like a block.
   Result<std::shared_ptr<const LandmarkSet>> AllLandmarks() const;
 
-  // The blocks that are kept at the moment.
-  const BlockCache& cache() const { return cache_; }
+  // The blocks that are kept at the moment, and their size.
+  const BlockCache& cache() const;
+  int64_t num_kept_bytes() const;
 
  private:
-  explicit Map(MapFile file, int64_t memory_budget_bytes);
-  explicit Map(MapRows rows);
-  template <typename Block>
-  using Decoder = Result<Block>(std::string_view bytes, const BlockEntry& entry,
-                                const MapDirectory& directory, const std::string& what);
-  // From the cache; else decoded from the file, or made of the rows.
-  template <typename Block, typename Make>
-  Result<std::shared_ptr<const Block>> Load(BlockKind kind, int64_t ordinal, Decoder<Block>* decode,
-                                            const Make& make) const;
+  struct Store;
+  explicit Map(std::unique_ptr<Store> store);
 
-  Status AddAmbiguity(AppearanceMap* appearance) const;
-
-  MapHead head_;
-  MapDirectory directory_;
-  // One of the two.
-  std::optional<MapFile> file_;
-  std::unique_ptr<const MapRows> rows_;
-  std::unique_ptr<const MapLayout> layout_;
-  mutable BlockCache cache_;
+  std::unique_ptr<Store> store_;
 };
 
 }  // namespace cairn

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/seal/map_seal.h"
+#include "core/seal/signing_key.h"
 
 namespace cairn {
 

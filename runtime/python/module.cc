@@ -1,6 +1,7 @@
 // The Python module's native part, cairn._cairn: what runtime/python/cairn/__init__.py makes public.
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -171,8 +172,7 @@ void BindMap(py::module_& module) {
       .def_property_readonly("epoch", [](const PyMap& self) { return self.map->head().epoch; })
       .def_property_readonly("num_landmarks", [](const PyMap& self) { return self.map->num_landmarks(); })
       .def_property_readonly("num_images", [](const PyMap& self) { return self.map->num_images(); })
-      .def_property_readonly(
-          "num_regions", [](const PyMap& self) { return self.map->directory().Count(BlockKind::kRegions); })
+      .def_property_readonly("num_regions", [](const PyMap& self) { return self.map->num_regions(); })
       .def_property_readonly("is_metric",
                              [](const PyMap& self) { return self.map->head().frame.unit == "metre"; })
       .def("__repr__", [](const PyMap& self) {

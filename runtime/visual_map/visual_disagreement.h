@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "core/geometry/pose.h"
-#include "runtime/localize/localizer.h"
+#include "runtime/localize/localization.h"
 #include "runtime/visual_map/visual_estimate.h"
 
 namespace cairn {

@@ -8,10 +8,15 @@
 
 #include "core/base/no_throw.h"
 #include "core/base/quantiles.h"
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_rows.h"
 #include "core/camera/camera_turn.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/floor_pose.h"
 #include "core/world/visual_map.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/landmark_set.h"
+#include "runtime/map/map.h"
 
 namespace cairn {
 namespace {

@@ -6,13 +6,16 @@
 #include <Eigen/Core>
 
 #include "core/base/error.h"
+#include "core/base/ids.h"
 #include "core/options/options.h"
 #include "core/world/landmark_model.h"
 #include "core/world/visual_map.h"
-#include "runtime/localize/measurement.h"
-#include "runtime/map/map.h"
 
 namespace cairn {
+
+class Map;           // runtime/map/map.h
+struct LandmarkSet;  // runtime/map/landmark_set.h
+struct Query;        // runtime/localize/measurement.h
 
 // Localization without 3-D points and without a calibration [Sala06 §VI-C: after Sim & Dudek]: the visual map
 // has, for every landmark and heading, a model of its place and size in the image as a function of the

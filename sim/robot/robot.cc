@@ -4,9 +4,11 @@
 #include <cmath>
 
 #include "core/base/random.h"
+#include "core/blocks/map_rows.h"
 #include "core/features/descriptor_matcher.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
+#include "runtime/map/landmark_set.h"
 #include "sim/survey/survey.h"
 
 namespace cairn::sim {

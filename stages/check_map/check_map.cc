@@ -11,6 +11,7 @@
 #include "core/base/quantiles.h"
 #include "core/capture/image_file.h"
 #include "core/features/sift.h"
+#include "runtime/localize/refine.h"
 
 namespace cairn::check_map {
 namespace {

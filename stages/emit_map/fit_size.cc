@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include "core/blocks/landmarks_seen.h"
+#include "core/blocks/map_rows.h"
 #include "stages/emit_map/choose_landmarks.h"
 
 namespace cairn::emit_map {

@@ -6,6 +6,11 @@
 #include <gtest/gtest.h>
 
 #include "core/files/file.h"
+#include "core/seal/map_seal.h"
+#include "runtime/localize/accept.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/refine.h"
+#include "runtime/map/block_cache.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/localize/retrieve.h"
+#include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/map/map.h"
 #include "runtime/visual_map/visual_disagreement.h"
 #include "stages/emit_map/model_landmarks.h"
 #include "tests/runtime/visual_map/visual_room.h"

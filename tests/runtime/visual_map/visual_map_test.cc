@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "core/base/quantiles.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
 #include "runtime/visual_map/visual_estimate.h"
 #include "runtime/visual_map/visual_search.h"
 #include "stages/emit_map/learn_visual_errors.h"

@@ -1,4 +1,4 @@
-#include "core/map/map_head.h"
+#include "core/map/map_head_tables.h"
 
 #include <array>
 

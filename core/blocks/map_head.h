@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/camera/camera.h"
+#include "core/capture/capture_frame.h"
+#include "core/geometry/pose.h"
+
+namespace cairn {
+
+// What a map says of itself as a whole.
+struct MapHead {
+  std::string name;
+  std::string writer;  // program and version, "cairn 0.1.0"
+  // Of the processor that extracted the features: with another set the last bits may differ.
+  std::string instruction_set;
+  uint64_t seed = 0;    // of the compilation
+  bool sealed = false;  // checked, with its self-test figures
+  // Counts the releases of a map of this name: a robot takes only a map with a later epoch than its own
+  // (docs/updates.md).  0: not counted.
+  uint64_t epoch = 0;
+  // Hash of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4
+  // or earlier.
+  std::string findings_hash;
+  // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
+  std::string landmark_choice = "regions";
+  // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
+  std::string documents = "all";
+  // How the regions were made.
+  std::string algorithm;
+  int k = 0;
+  int tau = 0;
+  int rho = 0;
+  // Certified least number of regions of any decomposition that leaves at most `uncovered_limit` coverable
+  // stations uncovered; nothing where none is known.
+  std::optional<int> lower_bound;
+  int uncovered_limit = 0;
+  std::map<std::string, std::string> stage_options;  // stage -> TOML
+  std::map<std::string, std::string> input_hashes;   // file -> XXH3
+  std::map<std::string, double> self_test;           // figure -> value; empty in an unsealed map
+
+  // What the world frame's coordinates mean: their unit, and where on the Earth they are.
+  CaptureFrame frame;
+  // The surveys that the map is made from, if there are several: the image SESSION/NAME belongs to
+  // one of them.
+  std::vector<std::string> sessions;
+  Pose floor_from_world;
+  // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up
+  // to noise.
+  Pose camera_from_given;
+  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
+  double stated_pose_sigma_m = 0;
+  double stated_pose_sigma_deg = 0;
+
+  std::vector<Camera> cameras;  // ascending camera_id
+};
+
+// As CheckMapRows (core/blocks/map_rows.h), of the head alone.
+Status CheckMapHead(const MapHead& head);
+
+}  // namespace cairn

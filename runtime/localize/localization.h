@@ -1,0 +1,64 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/ids.h"
+#include "core/geometry/pose.h"
+
+namespace cairn {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// Where the camera is believed to be: in the frame in which poses are reported.
+struct PosePrior {
+  Pose cam_from_world;
+  double sigma_m = 1;     // of its place, per axis
+  double sigma_deg = 10;  // of its rotation
+};
+
+// Why there is no fix.
+enum class NoFix {
+  kNone,            // there is one
+  kTooFewFeatures,  // blank, dark or blurred image
+  kNoCandidates,    // nothing in the map looks like it
+  kTooFewMatches,   // few landmarks recognised
+  kNoPose,          // the matches agree on no pose
+  kTooFewInliers,   // too few of them do
+  kPoorSpread,      // they lie close together in the image
+  kUncertain,       // they leave the pose too uncertain
+  kFarFromSurvey,   // they put the camera where nobody surveyed
+  kAmbiguous,       // another pose is nearly as good
+};
+// Stable lower-case name ("too_few_matches"); "none" for kNone.
+const char* NoFixName(NoFix reason);
+
+// Where landmarks to match came from.
+enum class Scope { kPrior, kRegions, kImages, kAll, kTrack };
+const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all", "track"
+
+// A fix, or the reason for none.
+struct Localization {
+  NoFix reason = NoFix::kNoCandidates;
+  std::string message;  // why there is no fix: found and needed
+  bool has_fix() const { return reason == NoFix::kNone; }
+
+  // With a fix.  The pose is in the frame in which the capture states poses (the map's camera_from_given
+  // is applied).
+  Pose cam_from_world;
+  // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
+  // (Exp(rotation), translation) * cam_from_world.
+  Matrix6d covariance = Matrix6d::Identity();
+  RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
+  Scope scope = Scope::kAll;
+
+  int num_features = 0;
+  int num_matches = 0;              // without knowing the pose
+  int num_unguided_inliers = 0;     // of them
+  int num_inliers = 0;              // in all
+  std::vector<ImageId> candidates;  // survey images, most alike first
+};
+
+}  // namespace cairn
