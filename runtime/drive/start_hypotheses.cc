@@ -181,7 +181,8 @@ StartHypotheses::Belief StartHypotheses::Predict(const Belief& belief) {
   Belief predicted;
   for (const auto& [node, probability] : belief) {
     const std::vector<NodeIdx>& reach = Reach(node);
-    // [Mariottini11 eq. 4] sum over X_0 of p(X_1 | X_0), uniform over the nodes within reach
+    // [Mariottini11 eq. 4] p(X_1 | X_0), uniform over the nodes within reach; what comes to X_1 from several
+    // nodes adds up, and the source's sum, over X_1, is in Normalise
     for (const NodeIdx next : reach) predicted[next] += probability / static_cast<double>(reach.size());
   }
   return predicted;
@@ -239,13 +240,14 @@ void StartHypotheses::Normalise() {
   double sum = 0;
   std::vector<double> sums;
   for (const Belief& belief : beliefs_) {
+    // [Mariottini11 eq. 4] the sum over X_1; after T images over X_T, as the sums before it have been taken
     double of_hypothesis = 0;
     for (const auto& [node, probability] : belief) of_hypothesis += probability;
     sums.push_back(of_hypothesis);
     sum += of_hypothesis;
   }
   for (size_t i = 0; i < beliefs_.size(); ++i) {
-    // [Mariottini11 eq. 3] p(X_0 | Z_0:T), up to the factor that the sum over the starts gives
+    // [Mariottini11 eq. 3] p(X_0 | Z_0:T): the source leaves out the factor that makes the sum over X_0 one
     hypotheses_[i].posterior = sums[i] / sum;
     for (auto& [node, probability] : beliefs_[i]) probability /= sum;
   }

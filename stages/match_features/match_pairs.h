@@ -18,7 +18,7 @@ struct MatchPairsOptions {
   // Largest memory that the features of images may take at a time, MiB: features beyond it are read again
   // when they are needed.  Two images are always held.  REQUIRES: >= 1
   int memory_budget_mib = 1024;
-  DescriptorMatcherOptions matcher;
+  DescriptorMatcherOptions matcher;  // has the defaults of max_ratio and max_angle_rad
   VerifyPairOptions verification;
 };
 // Without memory_budget_mib, which changes no result, like the number of threads.

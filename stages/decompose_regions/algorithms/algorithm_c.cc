@@ -73,7 +73,8 @@ class Disc {
 // [Sala06 Fig. 5 line 2]
 //   r = max {t : |{u in U : |intersection of F_w over w in N_t(u) ∩ U| >= k}| >= |U| / 2}
 // The intersection only shrinks with t, so each u has a largest t of its own, and r is their (upper) median.
-// A disc that has become its whole component grows no more: there the source's t would have no maximum.
+// Differs: a disc that has become its whole component grows no more and counts with that radius; there the
+// source's t would have no maximum.
 int DiscRadius(const Cover& cover) {
   const ReducedWorld& world = cover.world();
   Disc disc(cover);
