@@ -23,7 +23,7 @@ PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev lib
 # instructions, an ARM compiler and an emulator.
 PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-static
 
-SOURCES = $(shell git ls-files '*.h' '*.cc' '*.c')
+SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
 .PHONY: all help program whole deps deps-all demo tables test bench maps compile install deb format format-check tidy docs clean

@@ -120,7 +120,8 @@ Error StageError(const BuildPaths& paths) {
     return MakeError(failure->code, "stage {} failed; {} was not written", failure->stage, paths.map);
   return MakeError(
       ErrorCode::kFailed,
-      "a stage was killed before it could report why (out of memory? see --memory); {} was not written",
+      "make stopped before a stage could report why: a stage was killed (out of memory? see --memory), or a "
+      "rule failed as make says above; {} was not written",
       paths.map);
 }
 

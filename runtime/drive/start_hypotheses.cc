@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -166,15 +168,15 @@ const std::vector<NodeIdx>& StartHypotheses::Reach(NodeIdx node) {
   return reach_[node] = WithinReach(model_->appearance().graph, node, options_.reach_links);
 }
 
-double StartHypotheses::Likelihood(const std::vector<double>& seen, NodeIdx node,
-                                   const std::vector<NodeIdx>& bins) {
+double StartHypotheses::LogLikelihood(const std::vector<double>& seen, NodeIdx node,
+                                      const std::vector<NodeIdx>& bins) {
   auto found = expected_.find(node);
   if (found == expected_.end()) found = expected_.emplace(node, model_->Expected(node)).first;
   // [Mariottini11 eq. 6] J between what is seen, h, and what is expected at the node, h'
   const double divergence = JeffreyDivergence(
       seen, bins.empty() ? found->second : Restrict(found->second, bins), options_.uniform_ratio);
-  // [Mariottini11 eq. 8] p(Z | X) = exp(-J^2 / 2) / sqrt(2 pi)
-  return std::exp(-divergence * divergence / 2) / std::sqrt(2 * std::numbers::pi);
+  // [Mariottini11 eq. 8] p(Z | X) = exp(-J^2 / 2) / sqrt(2 pi), as its logarithm
+  return -divergence * divergence / 2 - 0.5 * std::log(2 * std::numbers::pi);
 }
 
 StartHypotheses::Belief StartHypotheses::Predict(const Belief& belief) {
@@ -198,15 +200,23 @@ HypothesisVerdict StartHypotheses::Observe(const PlaceScores& image) {
   std::vector<NodeIdx> bins;  // none: all
   if (options_.compared_nodes == "reachable") bins.assign(reachable.begin(), reachable.end());
   const std::vector<double> seen = bins.empty() ? image.probabilities : Restrict(image.probabilities, bins);
-  std::map<NodeIdx, double> likelihood;
+  std::map<NodeIdx, double> log_likelihood;
+  double largest = -std::numeric_limits<double>::infinity();
   double reachable_ratio = 0;
   for (const NodeIdx node : reachable) {
-    likelihood[node] = Likelihood(seen, node, bins);
+    log_likelihood[node] = LogLikelihood(seen, node, bins);
     reachable_ratio += image.probabilities[node];
   }
+  for (const Belief& belief : beliefs_) {
+    for (const auto& [node, probability] : belief) {
+      if (probability > 0) largest = std::max(largest, log_likelihood[node]);
+    }
+  }
   for (Belief& belief : beliefs_) {
-    // [Mariottini11 eq. 5] times p(Z_1 | X_1): image by image as they come, not recursively from the last
-    for (auto& [node, probability] : belief) probability *= likelihood[node];
+    // [Mariottini11 eq. 5] times p(Z_1 | X_1): image by image as they come, not recursively from the last.
+    // Relative to the largest, since distributions that share nothing have likelihoods below the smallest
+    // double.
+    for (auto& [node, probability] : belief) probability *= std::exp(log_likelihood[node] - largest);
   }
   Normalise();
   ++num_images_;

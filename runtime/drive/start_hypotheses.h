@@ -99,7 +99,7 @@ class StartHypotheses {
   using Belief = std::map<NodeIdx, double>;  // sums to the hypothesis's posterior
   const std::vector<NodeIdx>& Reach(NodeIdx node);
   // `seen`: an image's probabilities of `bins`; without bins, of all nodes.
-  double Likelihood(const std::vector<double>& seen, NodeIdx node, const std::vector<NodeIdx>& bins);
+  double LogLikelihood(const std::vector<double>& seen, NodeIdx node, const std::vector<NodeIdx>& bins);
   Belief Predict(const Belief& belief);
   void Normalise();
 

@@ -149,6 +149,19 @@ double SumOverWays(const PlaceModel& model, const std::vector<PlaceScores>& imag
   return sum / num_reached;
 }
 
+TEST(StartHypotheses, AnImageThatSharesNothingWithAnyPlaceWithinReachLeavesPosteriorsFinite) {
+  const PlaceModel model = ModelOf(Wings());
+  StartHypotheses starts =
+      *StartHypotheses::Make(model, LookAt(model, 6), 11, {.uniform_ratio = 1e-9, .min_reachable_ratio = 0});
+  EXPECT_EQ(starts.Observe(LookAt(model, 11)), HypothesisVerdict::kFollow);
+  EXPECT_NEAR(starts.hypotheses()[0].posterior, 0.5, 1e-6);
+  EXPECT_NEAR(starts.hypotheses()[1].posterior, 0.5, 1e-6);
+  // Of the start that is refuted nothing is left, however well it explains the image.
+  ASSERT_TRUE(starts.Refute());
+  EXPECT_EQ(starts.Observe(LookAt(model, 2)), HypothesisVerdict::kFollow);
+  EXPECT_EQ(starts.hypotheses()[1].posterior, 1);
+}
+
 TEST(StartHypotheses, PosteriorIsTheSumOverAllWays) {
   Random random(5);
   std::vector<std::vector<WordIdx>> words(10);
