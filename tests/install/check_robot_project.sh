@@ -35,3 +35,28 @@ cc -std=c11 -Wall -Wextra -Werror -pedantic where.c -o where_c $(pkg-config --cf
 expect ./where_c
 c++ -std=c++20 where.cc -o where_cc $(pkg-config --cflags --libs cairn-runtime)
 expect ./where_cc
+
+# Every header that is installed, together, and calls whose types come from several of them; no more than fit on a screen.
+headers=$(cd "$root/include/cairn" && find . -name '*.h' | sed 's,^\./,,' | LC_ALL=C sort -r)
+if [ "$(echo "$headers" | wc -l)" -gt 45 ]; then
+  echo "more headers are installed than fit on a screen:" $headers >&2
+  exit 1
+fi
+{
+  echo "$headers" | sed 's,.*,#include "&",'
+  cat << 'END'
+int main(int, char** argv) {
+  const auto map = cairn::Map::Open(argv[1]);
+  if (!map.ok()) return 1;
+  const auto name = (*map)->ImageName(0);
+  const auto route = cairn::PlanRoute(**map, 0, 0);
+  const auto visual = cairn::VisualMap::Load(**map);
+  const auto query = cairn::Localizer(*map).QueryFromImage(cv::Mat(), (*map)->head().cameras[0]);
+  if (visual.ok() && query.ok()) (void)(*visual)->Match(*query);
+  const auto rolled = cairn::RollBackMap("none.cairn");
+  return !name.ok() || name->empty() || (*map)->num_regions() != 0 || (*map)->num_kept_bytes() <= 0 || route.ok() || rolled.ok();
+}
+END
+} > every_header.cc
+c++ -std=c++20 every_header.cc -o every_header $(pkg-config --cflags --libs cairn-runtime)
+./every_header "$poster/poster.cairn"
