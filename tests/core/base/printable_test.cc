@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/picture/svg.h"
 
 namespace cairn {
 namespace {
@@ -51,14 +50,6 @@ TEST(Printable, ControlCharactersOfNamesAreSeen) {
   EXPECT_FALSE(HasControlCharacter(""));
   for (const char c : {'\0', '\n', '\r', '\t', '\x1b', '\x1f', '\x7f'})
     EXPECT_TRUE(HasControlCharacter(std::string("a") + c + "b")) << int{c};
-}
-
-TEST(Svg, TextIsWhatXmlCanHold) {
-  EXPECT_EQ(EscapeXml("<h2 a=\"b\" c='d'>&</h2>"),
-            "&lt;h2 a=&quot;b&quot; c=&#39;d&#39;&gt;&amp;&lt;/h2&gt;");
-  EXPECT_EQ(EscapeXml("a\x01\x1b\xffz"), "a\ufffd\ufffd\ufffdz");
-  EXPECT_EQ(EscapeXml("\xef\xbf\xbe\xef\xbf\xbf"), "\ufffd\ufffd");  // U+FFFE, U+FFFF
-  EXPECT_EQ(EscapeXml("\t\n\r Küche \xef\xbf\xbd"), "\t\n\r Küche \ufffd");
 }
 
 }  // namespace
