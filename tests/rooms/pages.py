@@ -21,6 +21,7 @@ from summary import anchor_of, read_rows, with_table  # noqa: E402
 
 START = "docs/README.md"
 REACHED = ("docs", "schemas", "bench")
+REFERENCE_OF_OPTIONS = "docs/recipe.md"  # written by the program
 LOG = "CHANGELOG.md"  # a list of changes is nobody's way to a page
 SOURCES = (*PARTS, "ros", "bench")
 
@@ -124,11 +125,43 @@ def table_faults(root):
     return found
 
 
+def rows_of(text):
+    """Cells of a page's table rows, with the cells of their table's first row."""
+    first = None
+    for line in text.split("\n"):
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] if line.startswith("|") else None
+        if cells and first:
+            yield first, cells
+        first = cells and (first or cells)
+
+
+def default_faults(root, pages):
+    """Defaults that a page's table states and that are not those of the option's name in the reference of recipes."""
+    reference = root / REFERENCE_OF_OPTIONS
+    if not reference.is_file():
+        return []
+    defaults = collections.defaultdict(set)
+    for first, cells in rows_of(reference.read_text(encoding="utf-8")):
+        if first[:2] == ["key", "default"] and len(cells) > 1:
+            defaults[cells[0].strip("`")].add(cells[1].strip("`'"))
+    found = []
+    for page in pages:
+        for first, cells in rows_of((root / page).read_text(encoding="utf-8")):
+            if page == REFERENCE_OF_OPTIONS or not first[0].startswith("option") or first[1:2] != ["default"]:
+                continue
+            names = [name.lstrip("-").replace("-", "_") for name in re.findall(r"`([^`]+)`", cells[0])]
+            stated = [default.strip("` '") for default in cells[1].split(", ")]
+            for name, default in zip(names, stated):
+                if name in defaults and default not in defaults[name]:
+                    found.append(f"{page}: says that the default of {name} is {default}, but it is {' or '.join(sorted(defaults[name]))}")
+    return found
+
+
 def faults(root):
     """Sentences, one for each fault."""
     pages = pages_of(root)
     found, leads_to = link_faults(root, pages)
-    return found + reach_faults(pages, leads_to) + name_faults(root) + table_faults(root)
+    return found + reach_faults(pages, leads_to) + name_faults(root) + table_faults(root) + default_faults(root, pages)
 
 
 def main():

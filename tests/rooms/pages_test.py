@@ -51,6 +51,21 @@ class Pages(unittest.TestCase):
     def test_a_tree_in_order_has_none(self):
         self.assertEqual(self.faults_with({}), [])
 
+    def test_defaults_that_are_not_the_programs_are_found(self):
+        reference = "# Recipes\n[map](map.md)\n\n| key | default | range |\n|---|---|---|\n| `k` | `40` | at least 1 |\n| `choice` | `'auto'` | |\n"
+        page = "# Map\n\n## What it is, in short\n![picture](map.svg) [recipes](recipe.md)\n\n"
+        order = tree()["docs/README.md"].replace("[next]", "[recipe](recipe.md) [next]")
+
+        def found(rows, head="| option of `cairn plan` | default | |"):
+            return self.faults_with({"docs/recipe.md": reference, "docs/README.md": order, "docs/map.md": f"{page}{head}\n|---|---|---|\n{rows}"})
+
+        self.assertEqual(found("| `k` | 40 | |\n| `--choice`, `other` | auto, 7 | |\n| words | 3 | |\n"), [])
+        self.assertEqual(found("| `k` | 41 | |\n"), ["docs/map.md: says that the default of k is 41, but it is 40"])
+        self.assertEqual(found("| `other`, `--choice` | 40, none | |\n"),
+                         ["docs/map.md: says that the default of choice is none, but it is auto"])
+        self.assertEqual(found("| `k` | 41 | |\n", "| figure | default | |"), [])
+        self.assertEqual(found("| `k` | 40 | |\n\ntext\n\n| a | b |\n|---|---|\n| `k` | 41 |\n"), [])
+
     def test_links_to_nothing_are_found(self):
         self.assertEqual(self.fault_of("docs/map.md", "# Map\n## What it is, in short\n[gone](gone.md)\n"),
                          "docs/map.md: the link gone.md leads to nothing")
