@@ -14,8 +14,7 @@ using StationIdx = int32_t;
 using FeatureIdx = int32_t;  // feature of a world instance
 using RegionIdx = int32_t;
 using LandmarkIdx = int32_t;  // landmark of a map
-using NodeIdx =
-    int32_t;  // node of an appearance graph: an image, or several taken at one place (fuse_images.h)
+using NodeIdx = int32_t;      // node of an appearance graph: an image, or several taken at one place
 
 inline constexpr ImageId kInvalidImageId = std::numeric_limits<ImageId>::max();
 inline constexpr ClassId kInvalidClassId = std::numeric_limits<ClassId>::max();

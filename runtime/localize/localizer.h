@@ -16,10 +16,11 @@
 
 namespace cairn {
 
-struct Correspondence;  // runtime/localize/measurement.h, with the next two
-struct PoseMeasurement;
+// runtime/localize/measurement.h and estimate.h:
 struct Query;
-struct PoseEstimate;  // runtime/localize/estimate.h
+struct Correspondence;
+struct PoseMeasurement;
+struct PoseEstimate;
 
 // Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {

@@ -13,21 +13,24 @@
 
 namespace cairn {
 
-// Contents of a map.  A robot that only asks where it is needs none of them.
-class BlockCache;      // runtime/map/block_cache.h
-class MapDirectory;    // core/blocks/map_blocks.h, with the blocks
-struct AppearanceMap;  // runtime/map/appearance_map.h
-struct ImageBlock;
+// Contents of a map, which a robot that only asks where it is need not know.  core/blocks/map_blocks.h:
+class MapDirectory;
 struct LandmarkBlock;
-struct LandmarkSet;  // runtime/map/landmark_set.h
-struct MapImage;     // core/blocks/map_rows.h
-struct MapRows;
-struct RegionBlock;
+struct ImageBlock;
 struct StationBlock;
-struct Views;          // core/plan/views.h
-struct VisualMapData;  // core/world/visual_map.h
-struct Vocabulary;     // core/vocabulary/vocabulary_tree.h
+struct RegionBlock;
 struct WordBlock;
+// core/blocks/map_rows.h:
+struct MapRows;
+struct MapImage;
+// core/plan/views.h, core/vocabulary/vocabulary_tree.h, core/world/visual_map.h:
+struct Views;
+struct Vocabulary;
+struct VisualMapData;
+// Beside this header:
+class BlockCache;
+struct AppearanceMap;
+struct LandmarkSet;
 
 struct MapOptions {
   // Largest size of the loaded parts of a map that are kept for later queries.  The parts that a query is
