@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/line/memory.h"
 #include "core/line/program_version.h"
 #include "tests/pipeline/program/run_words.h"
 
@@ -45,6 +46,14 @@ TEST(Program, UnknownCommandsAndOptionsNameTheNearest) {
             "cairn stage: no option '--frobnicate'; see cairn stage --help\n");
   EXPECT_THAT(message({}), HasSubstr("cairn: give a command; see cairn --help"));
   EXPECT_THAT(message({"--frobnicate"}), HasSubstr("see cairn --help"));
+}
+
+TEST(Program, AWordTooManyIsNotTakenForAnOption) {
+  EXPECT_EQ(RunStage({"stage", "extra", "--frobnicate"}, Nothing).err,
+            "cairn stage: no option '--frobnicate'; see cairn stage --help\n");
+  const Outcome outcome = RunStage({"stage", "extra"}, Nothing);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("no option")));
 }
 
 // An unknown option is reported before a missing one.
@@ -91,6 +100,45 @@ std::vector<Command> Families(std::string* done, std::string* text) {
   return {check,
           {.name = "plan", .summary = "Plans", .subcommands = {locate, command("path", "Find a way")}},
           manual};
+}
+
+TEST(Program, MemoryIsWhatIsGivenElseTheMachines) {
+  int64_t memory_mib = 0;
+  bool is_given = false;
+  const auto run = [&](const std::vector<std::string>& words) {
+    return RunStage(words, [&](const CommandEnvironment& environment) -> Status {
+      memory_mib = environment.memory_mib;
+      is_given = environment.memory_given;
+      return Ok();
+    });
+  };
+  EXPECT_EQ(run({"stage", "--memory", "1"}).exit_code, 0);
+  EXPECT_EQ(memory_mib, 1);
+  EXPECT_TRUE(is_given);
+  EXPECT_EQ(run({"stage"}).exit_code, 0);
+  EXPECT_EQ(memory_mib, DefaultMemoryMib());
+  EXPECT_FALSE(is_given);
+}
+
+TEST(Program, LongHelpGoesOnBelowItselfAtTheSameColumnAndFillsItsLines) {
+  std::string text;
+  // Of 70 characters: a line of 100 is full.
+  const std::string line = "aaaa bbbb cccc dddd eeee ffff gggg hhhh iiii jjjj kkkk llll mmmm nnnnn";
+  const std::string words = line + " " + line + " oooo";
+  const Command command = {.name = "check",
+                           .summary = "Checks",
+                           .add_arguments =
+                               [&](ArgumentParser& parser) {
+                                 parser.Add("--short", text, words).Type("WORD");
+                                 parser.Add("--much-longer-than-the-column", text, words).Type("WORD");
+                               },
+                           .run = Nothing};
+  const std::string help = RunWords({command}, {"check", "--help"}).out;
+  const std::string column(30, ' ');
+  EXPECT_THAT(help, HasSubstr("  --short WORD                " + line + "\n" + column + line + "\n" + column +
+                              "oooo\n"));
+  EXPECT_THAT(help, HasSubstr("  --much-longer-than-the-column WORD\n" + column + line + "\n" + column +
+                              line + "\n" + column + "oooo\n"));
 }
 
 TEST(Program, HelpOfAListSaysOnceThatItIsOne) {

@@ -183,6 +183,14 @@ TEST_F(StampTest, ReportAlsoGoesToAGivenFileWithoutAnyStamp) {
   EXPECT_EQ(nlohmann::json::parse(ReadFile(Path("mine.json")).value())["stage"], "stage");
 }
 
+TEST_F(StampTest, ReportGoesToTheGivenFileAlsoBesideAStamp) {
+  const Outcome outcome =
+      RunStage({"stage", "--stamp", Path("x.db.stamp"), "--report", Path("mine.json")}, Nothing);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(ReadFile(Path("mine.json")).value())["stage"], "stage");
+  EXPECT_FALSE(fs::exists(Path("x.db.report.json")));
+}
+
 TEST_F(StampTest, StageOfAnotherBuildIsRefusedWithTheOthersName) {
   const auto lock = FolderLock::Acquire(folder_.string(), "4711@elsewhere");
   ASSERT_TRUE(lock.ok()) << lock.error().message;
