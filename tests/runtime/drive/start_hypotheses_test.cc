@@ -152,7 +152,8 @@ double SumOverWays(const PlaceModel& model, const std::vector<PlaceScores>& imag
 TEST(StartHypotheses, AnImageThatSharesNothingWithAnyPlaceWithinReachLeavesPosteriorsFinite) {
   const PlaceModel model = ModelOf(Wings());
   StartHypotheses starts = *StartHypotheses::Make(
-      model, LookAt(model, 6), 11, {.reach_links = 1, .uniform_ratio = 1e-9, .min_reachable_ratio = 0});
+      model, LookAt(model, 6), 11,
+      {.reach_links = 1, .compared_nodes = "all", .uniform_ratio = 1e-9, .min_reachable_ratio = 0});
   EXPECT_EQ(starts.Observe(LookAt(model, 11)), HypothesisVerdict::kFollow);
   EXPECT_NEAR(starts.hypotheses()[0].posterior, 0.5, 1e-6);
   EXPECT_NEAR(starts.hypotheses()[1].posterior, 0.5, 1e-6);
