@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/blocks/map_rows.h"
+#include "core/blocks/map_head.h"
 #include "core/files/database.h"
 #include "core/map/map_tables.h"
 

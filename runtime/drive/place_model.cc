@@ -5,7 +5,6 @@
 #include "core/base/no_throw.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
-#include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
 
 namespace cairn {

@@ -10,8 +10,7 @@
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
-#include "stages/emit_map/emit_map.h"
-#include "tests/core/map/example.h"
+#include "tests/core/map/full_rows.h"
 #include "tests/core/map/sealed_blocks.h"
 
 namespace cairn {
@@ -28,31 +27,6 @@ void WriteBytes(const std::string& path, const std::string& bytes) {
   std::FILE* const file = std::fopen(path.c_str(), "wb");
   ASSERT_EQ(std::fwrite(bytes.data(), 1, bytes.size(), file), bytes.size());
   std::fclose(file);
-}
-
-// A map with rows in every table and a block of every kind.
-MapRows FullRows() {
-  const EmitExample example = MakeEmitExample();
-  MapRows rows = *emit_map::EmitMap(
-      example.classes, example.world, example.decomposition, example.vocabulary,
-      {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"}, &example.appearance);
-  EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), &rows).ok());
-  rows.visual_map = MakeExampleVisualMap();
-  rows.name = "example";
-  rows.writer = "cairn test";
-  rows.sessions = {"day1", "day2"};
-  rows.stage_options = {{"emit_map", "k = 3\n"}, {"check_map", "x = 1\n"}};
-  rows.input_hashes = {{"world.db", "0123"}, {"classes.db", "4567"}};
-  rows.self_test = {{"num_localized", 3}, {"num_queries", 4}};
-  rows.camera_from_given.translation = {0.1, -0.2, 0.3};
-  Camera camera = rows.cameras[0];
-  camera.camera_id = 9;
-  camera.width = 300;
-  rows.cameras.push_back(camera);
-  rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
-                                     {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
-  rows.findings.drops = {{44, "decompose_regions", "station", "left_over", "not covered", 200, {0, 200, 1}}};
-  return rows;
 }
 
 std::string PoseText(const Pose& pose) {
@@ -376,100 +350,6 @@ TEST_F(HostileMap, TablesWithoutEndAreRefused) {
       EXPECT_THAT(file.error().message, HasSubstr("hostile.cairn")) << table;
     }
   }
-}
-
-// --- Right seals, and contents that unfold
-
-// The signed map with other station blocks, sealed again.
-void WriteWithStations(const std::string& signed_path, const std::vector<StationBlock>& stations,
-                       const std::string& path) {
-  std::vector<BlockContents> blocks;
-  for (const StationBlock& block : stations) {
-    blocks.push_back(
-        {BlockKind::kStations, static_cast<uint32_t>(block.stations.size()), EncodeBlock(block)});
-  }
-  for (BlockContents& block : BlocksOf(*MapFile::Open(signed_path, {}))) {
-    if (block.kind != BlockKind::kStations) blocks.push_back(std::move(block));
-  }
-  const Status status = WriteSealedBlocks(*ReadFile(signed_path), blocks, path);
-  ASSERT_TRUE(status.ok()) << status.error().message;
-}
-
-// Stations in blocks of 100, each with `num_neighbours` of the next as neighbours: a run is 3 bytes at
-// any length.
-std::vector<StationBlock> StationBlocks(int num_stations, int num_neighbours) {
-  std::vector<StationBlock> blocks;
-  for (int first = 0; first < num_stations; first += 100) {
-    StationBlock& block = blocks.emplace_back();
-    block.first = first;
-    for (int i = first; i < first + 100; ++i) {
-      block.stations.emplace_back();
-      std::vector<StationIdx>& neighbours = block.neighbours.emplace_back();
-      for (int other = i + 1; other < std::min(num_stations, i + 1 + num_neighbours); ++other)
-        neighbours.push_back(other);
-      block.regions.push_back(i == 0 ? std::vector<RegionIdx>{0, 1} : std::vector<RegionIdx>{});
-    }
-  }
-  return blocks;
-}
-
-TEST_F(HostileMap, ListsThatUnfoldToFarMoreThanTheFileAreRefused) {
-  MapRows rows = FullRows();
-  rows.findings = {};  // they count stations
-  const std::string base = InFolder("base.cairn");
-  ASSERT_TRUE(WriteMapRows(rows, base).ok());
-  WriteWithStations(base, StationBlocks(10'000, 4), path_);
-  const Result<MapRows> few = ReadMapRows(path_);
-  ASSERT_TRUE(few.ok()) << few.error().message;
-  EXPECT_EQ(few->station_edges.size(), 39'990u);
-  WriteWithStations(base, StationBlocks(10'000, 10'000), path_);  // 50 million edges in 240 kB
-  const Result<MapRows> many = ReadMapRows(path_);
-  ASSERT_FALSE(many.ok());
-  EXPECT_EQ(many.error().code, ErrorCode::kCorrupt);
-  EXPECT_THAT(many.error().message, HasSubstr("decode to more than 64 times its size"));
-}
-
-TEST_F(HostileMap, MoreRegionsThanStationsAreRefusedBeforeTheyAreRead) {
-  MapDirectory directory;
-  directory.Add(
-      {.kind = static_cast<uint8_t>(BlockKind::kStations), .first = 0, .count = 2, .num_bytes = 20});
-  directory.Add({.kind = static_cast<uint8_t>(BlockKind::kRegions), .first = 0, .count = 3, .num_bytes = 20});
-  EXPECT_THAT(MapDirectory::Decode(directory.Encode(), 100).error().message,
-              HasSubstr("3 regions of 2 stations"));
-}
-
-TEST_F(HostileMap, SessionsAreBounded) {
-  MapRows rows = FullRows();
-  rows.sessions.resize(1001);
-  for (size_t i = 0; i < rows.sessions.size(); ++i) rows.sessions[i] = "day" + std::to_string(i);
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("1001 sessions, at most 1000"));
-  rows.sessions.pop_back();
-  EXPECT_TRUE(WriteMapRows(rows, path_).ok());
-}
-
-TEST_F(HostileMap, ModelsOfMoreSightsThanAreSolvedInTimeAreRefused) {
-  MapRows rows = FullRows();
-  HeadingModel& model = rows.visual_map.landmarks[0][0];
-  const MapImage image = rows.images.back();
-  while (rows.images.size() < 513) {
-    rows.images.push_back(image);
-    rows.images.back().image_id = rows.images[rows.images.size() - 2].image_id + 1;
-    rows.images.back().landmarks.clear();
-  }
-  model.sights.clear();
-  for (int32_t i = 0; i < 513; ++i) model.sights.push_back({i, {100, 50, 1}});
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("513 sights, expected 3 to 512"));
-  model.sights.pop_back();
-  EXPECT_TRUE(WriteMapRows(rows, path_).ok()) << WriteMapRows(rows, path_).error().message;
-}
-
-TEST_F(HostileMap, RegionsOfNoStationAreRefused) {
-  MapRows rows = FullRows();
-  rows.regions[0].stations.clear();
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("region 0 has no station"));
-  rows = FullRows();
-  while (rows.regions.size() <= rows.stations.size()) rows.regions.push_back(rows.regions[0]);
-  EXPECT_THAT(WriteMapRows(rows, path_).error().message, HasSubstr("4 regions of 3 stations"));
 }
 
 }  // namespace

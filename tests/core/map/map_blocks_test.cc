@@ -21,7 +21,8 @@ MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
   MapRows rows =
       *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                         {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1}, &example.appearance);
+                         {.landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1},
+                         &example.appearance);
   rows.views = MakeExampleViews();
   rows.visual_map = MakeExampleVisualMap();
   return rows;

@@ -19,7 +19,8 @@ using testing::HasSubstr;
 
 MapRows ExampleRows() {
   const EmitExample example = MakeEmitExample();
-  const emit_map::EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  const emit_map::EmitMapOptions options{
+      .landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
   MapRows rows =
       *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   rows.name = "example";
@@ -201,9 +202,12 @@ TEST(MapFile, TablesOfTooFewColumnsAreRefused) {
 
 TEST(MapFile, SparseMapsReadBackAsTheyWere) {
   const EmitExample example = MakeEmitExample();
-  MapRows rows = *emit_map::EmitMap(
-      example.classes, example.world, example.decomposition, example.vocabulary,
-      {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"}, &example.appearance);
+  MapRows rows = *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                    {.landmarks = "regions",
+                                     .min_num_landmarks_for_words = 0,
+                                     .landmarks_per_word = 1,
+                                     .documents = "kept"},
+                                    &example.appearance);
   ASSERT_TRUE(WriteMapRows(rows, MapPath("sparse.cairn")).ok());
   const Result<MapRows> read = ReadMapRows(MapPath("sparse.cairn"));
   ASSERT_TRUE(read.ok()) << read.error().message;
@@ -385,7 +389,7 @@ TEST(GoldenMap, Version2_2IsRead) {
 MapRows Rows2_3() {
   const EmitExample example = MakeEmitExample();
   MapRows rows = *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                                    {.words = "survey"}, &example.appearance);
+                                    {.landmarks = "regions", .words = "survey"}, &example.appearance);
   rows.name = "example";
   rows.writer = "cairn test";
   EXPECT_TRUE(emit_map::AddViews(MakeExampleViews(), &rows).ok());

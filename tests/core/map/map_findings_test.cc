@@ -20,7 +20,8 @@ using testing::HasSubstr;
 // Two regions, three stations.
 MapRows RowsWithFindings() {
   const EmitExample example = MakeEmitExample();
-  const emit_map::EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  const emit_map::EmitMapOptions options{
+      .landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
   MapRows rows =
       *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},

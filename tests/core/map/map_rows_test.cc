@@ -21,8 +21,8 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // Three images, stations and appearance nodes, the first of which is kept and linked to both others.
 MapRows ValidRows() {
   const EmitExample example = MakeEmitExample();
-  MapRows rows =
-      *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {});
+  MapRows rows = *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                    {.landmarks = "regions"});
   rows.vocabulary = {};
   rows.appearance = {{.images = {0},
                       .is_kept = true,

@@ -27,8 +27,9 @@ std::string InFolder(const std::string& name) { return testing::TempDir() + "/" 
 // A map of the example under this name.
 std::string WriteExample(const std::string& name) {
   const EmitExample example = MakeEmitExample();
-  MapRows rows = *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                                    {.min_num_landmarks_for_words = 0, .landmarks_per_word = 1});
+  MapRows rows =
+      *emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                         {.landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1});
   rows.name = "example";
   rows.writer = "cairn test";
   EXPECT_TRUE(WriteMapRows(rows, InFolder(name)).ok());
