@@ -27,7 +27,8 @@ struct MapHead {
   // Hash of the tables of findings, hexadecimal; written by WriteMapRows.  Empty: a map of format 2.4
   // or earlier.
   std::string findings_hash;
-  // Whether classes that no region keeps are landmarks too ("all") or not ("regions").
+  // Which classes are landmarks: those that regions keep ("regions"), the fewest with which images are
+  // localized as with all ("fewest"), or "all".
   std::string landmark_choice = "regions";
   // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
   std::string documents = "all";

@@ -54,6 +54,8 @@ constexpr DropReasonEntry kReasons[] = {
      "it is coverable, but no region covers it: rho, or what the algorithm leaves"},
     {DropReason::kOverBudget, "emit_map", DropKind::kFeature, "over_budget",
      "max_bytes leaves no room for it, and others serve the survey's images better"},
+    {DropReason::kNotNeeded, "emit_map", DropKind::kFeature, "not_needed",
+     "left-out survey images are localized as well without it"},
 };
 
 }  // namespace

@@ -39,6 +39,7 @@ enum class DropReason : int {
   kLeftOver = 44,
   // emit_map
   kOverBudget = 50,
+  kNotNeeded = 51,
 };
 
 // What is dropped, and so what is counted.

@@ -43,8 +43,10 @@ std::string DropsText(const MapRows& rows, int max_num_stations) {
     text += fmt::format("  {:<18} {:<20} {:>9} {:<9} {}\n", drop.stage, drop.name, drop.num_dropped,
                         drop.kind + (drop.num_dropped == 1 ? "" : "s"), drop.text);
   }
-  if (rows.landmark_choice == "all")
-    text += "  (landmarks = all: features without a region are landmarks all the same)\n";
+  if (rows.landmark_choice != "regions") {
+    text += fmt::format("  (landmarks = {}: features without a region can be landmarks all the same)\n",
+                        rows.landmark_choice);
+  }
   const std::vector<int> num_seen = LandmarksSeenAt(rows);
   std::vector<size_t> order(num_seen.size());
   std::iota(order.begin(), order.end(), 0);

@@ -291,7 +291,7 @@ Result<std::vector<Localizer::Attempt>> Localizer::MakeAttempts(const Query& que
   CAIRN_ASSIGN_OR_RETURN(auto of_regions, LandmarksOfRegions(*map_, regions));
   CAIRN_ASSIGN_OR_RETURN(auto of_images, LandmarksOfImages(*map_, ImagesOf(candidates)));
   const bool images_first = options_.first_landmarks == "images" ||
-                            (options_.first_landmarks == "auto" && map_->head().landmark_choice == "all");
+                            (options_.first_landmarks == "auto" && map_->head().landmark_choice != "regions");
   if (images_first) add(Scope::kImages, of_images);
   add(Scope::kRegions, std::move(of_regions));
   add(Scope::kImages, std::move(of_images));

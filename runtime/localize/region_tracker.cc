@@ -117,7 +117,7 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
     regions.resize(options_.max_num_neighbour_regions);
   if (region_ >= 0) regions.push_back(region_);
   CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> landmarks, LandmarksOfRegions(*map_, regions));
-  if (map_->head().landmark_choice == "all") {  // most landmarks belong to no region
+  if (map_->head().landmark_choice != "regions") {  // most landmarks belong to no region
     std::vector<int32_t> images;
     for (const Candidate& candidate : near) images.push_back(candidate.image);
     CAIRN_ASSIGN_OR_RETURN(const auto of_images, LandmarksOfImages(*map_, images));

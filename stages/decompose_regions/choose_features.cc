@@ -10,7 +10,7 @@
 #include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
 #include "stages/decompose_regions/cover/reduced_world.h"
-#include "stages/decompose_regions/pose_information.h"
+#include "stages/decompose_regions/observed_sights.h"
 
 namespace cairn::decompose_regions {
 namespace {
@@ -66,7 +66,7 @@ class Chooser {
         options_(options),
         sets_(VisibilitySets(world)),
         is_landmark_(world.num_features(), 0),
-        information_(classes.images.size(), options) {}
+        information_(classes.images.size(), options.rough_sigma_m, options.rough_sigma_deg) {}
 
   // As many features as the region has, those that add most first.
   Result<std::vector<FeatureIdx>> Choose(size_t num_features, ShrinkingRegion* region) {
@@ -95,7 +95,7 @@ class Chooser {
 
  private:
   double Gain(const Candidate& candidate) const {
-    return is_landmark_[candidate.feature] ? 0 : information_.Gain(candidate.sights);
+    return is_landmark_[candidate.feature] ? 0 : information_.DeterminantGain(candidate.sights);
   }
 
   // The features that all of these stations see, ascending.
@@ -145,7 +145,7 @@ class Chooser {
       const double distinctiveness =
           angle * angle / (angle * angle + options_.confusion_angle_rad * options_.confusion_angle_rad);
       CAIRN_ASSIGN_OR_RETURN(std::vector<SightInformation> sights,
-                             SightsOf(*feature_classes[i], distinctiveness, classes_, options_));
+                             ObservedSights(*feature_classes[i], distinctiveness, classes_, options_));
       candidates.push_back({common[i], std::move(sights)});
     }
     return candidates;

@@ -142,13 +142,13 @@ Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, M
   return Ok();
 }
 
-// Adds the classes that a limit of bytes keeps out to those that earlier stages dropped.
+// Adds the classes that are left out of those that may be kept to what earlier stages dropped.
 std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<char>& may_keep,
-                                     const std::vector<char>& keep) {
+                                     const std::vector<char>& keep, DropReason reason) {
   std::vector<DroppedItem> dropped = inputs.dropped;
   for (size_t i = 0; i < keep.size(); ++i) {
     if (may_keep[i] != 0 && keep[i] == 0)
-      dropped.push_back({.reason = DropReason::kOverBudget, .item_id = inputs.classes.classes[i].class_id});
+      dropped.push_back({.reason = reason, .item_id = inputs.classes.classes[i].class_id});
   }
   return dropped;
 }
@@ -177,32 +177,43 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
   return rows;
 }
 
-std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, int max_bytes) {
+std::string RecallText(const FittedSize& fitted) {
+  if (fitted.trial_of_all.num_tried == 0) return "no survey image was left out to try it on";
+  return fmt::format(
+      "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
+      "everything",
+      fitted.trial.num_tried, fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
+      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM());
+}
+
+std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const EmitMapOptions& options) {
+  if (options.max_bytes == 0) {
+    return fmt::format("emit_map: the fewest landmarks: {} bits a descriptor value; {}\n",
+                       fitted.descriptor_bits, RecallText(fitted));
+  }
   const SizeGuarantee guarantee = GuaranteeOf(rows);
-  const std::string recall =
-      fitted.trial.num_tried == 0
-          ? std::string("everything fits")
-          : fmt::format("recall {:.1f} % of {} left-out survey images, {:.1f} % with everything",
-                        100 * fitted.trial.RightRatio(), fitted.trial.num_tried,
-                        100 * fitted.trial_of_all.RightRatio());
   return fmt::format(
       "emit_map: at most {} bytes: {} bits a descriptor value; at least {} common landmarks in every region; "
       "{} of {} stations see fewer than k = {}; {}\n",
-      max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks, guarantee.num_stations_below_k,
-      rows.stations.size(), rows.k, recall);
+      options.max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks,
+      guarantee.num_stations_below_k, rows.stations.size(), rows.k,
+      fitted.trial_of_all.num_tried == 0 ? "everything fits" : RecallText(fitted));
 }
 
-// The rows of the best map within max_bytes, and its guarantees.
-Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& arguments, const Inputs& inputs,
-                                                       const CommandEnvironment& environment) {
+// The rows of the map with the landmarks that trials choose, and what they found.
+Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& arguments, const Inputs& inputs,
+                                                        const CommandEnvironment& environment) {
+  EmitMapOptions options = arguments.options;
   if (arguments.matches_path.empty()) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "emit_map: max_bytes needs --matches: landmarks are chosen by the features of the survey's images");
+        "emit_map: {} needs --matches: landmarks are chosen by the features of the survey's images; "
+        "landmarks = \"all\" and \"regions\" without max_bytes do not",
+        options.max_bytes > 0 ? "max_bytes" : "landmarks = \"fewest\"");
   }
-  EmitMapOptions options = arguments.options;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep, KeptClasses(inputs.classes, inputs.parts.world,
                                                                        inputs.parts.decomposition, options));
+  const DropReason reason = options.max_bytes > 0 ? DropReason::kOverBudget : DropReason::kNotNeeded;
   const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
                             int descriptor_bits) -> Result<MapRows> {
     options.descriptor_bits = descriptor_bits;
@@ -211,18 +222,23 @@ Result<std::pair<MapRows, std::string>> MakeRowsWithin(const Arguments& argument
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                            MakeRows(inputs, classes, is_whole ? inputs.parts : PartsOf(classes, inputs.parts),
                                     options, &keep, environment.num_threads));
-    if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep), inputs, &rows));
+    if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep, reason), inputs, &rows));
     return rows;
   };
   const FitSizeOptions fit_options{.max_bytes = options.max_bytes,
                                    .descriptor_bits = options.descriptor_bits,
-                                   .limits = {options.left_out_max_error_m, options.left_out_max_error_deg}};
+                                   .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},
+                                   .min_recall_ratio = options.min_recall_ratio,
+                                   .max_error_ratio = options.max_error_ratio};
   CAIRN_ASSIGN_OR_RETURN(
       const FittedSize fitted,
-      FitSize(inputs.classes, may_keep, arguments.matches_path, emit, fit_options,
-              TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress));
+      options.max_bytes > 0
+          ? FitSize(inputs.classes, may_keep, arguments.matches_path, emit, fit_options,
+                    TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress)
+          : ChooseFewest(inputs.classes, arguments.matches_path, emit, fit_options, environment.num_threads,
+                         *environment.progress));
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits));
-  std::string text = GuaranteeText(rows, fitted, arguments.options.max_bytes);
+  std::string text = GuaranteeText(rows, fitted, arguments.options);
   return std::pair(std::move(rows), std::move(text));
 }
 
@@ -233,8 +249,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
   MapRows rows;
   std::string guarantee;
-  if (arguments.options.max_bytes > 0) {
-    CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsWithin(arguments, inputs, environment));
+  if (arguments.options.max_bytes > 0 || arguments.options.landmarks == "fewest") {
+    CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsByTrial(arguments, inputs, environment));
   } else {
     CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.parts, arguments.options, nullptr,
                                           environment.num_threads));

@@ -87,7 +87,7 @@ std::vector<char> MarkKept(size_t num_classes, const std::vector<std::vector<siz
 }
 
 // The classes that `keep` marks in the order in which the map stores them.
-std::vector<size_t> OrderLandmarks(const Classes& classes,
+std::vector<size_t> StoredOrder(const Classes& classes,
                                    const std::vector<std::vector<size_t>>& classes_of_regions,
                                    const std::vector<char>& keep) {
   std::vector<RegionIdx> first_region(classes.classes.size(), kNoRegion);
@@ -249,8 +249,9 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
   OptionTable table = {
       {.name = "landmarks",
        .value = &options->landmarks,
-       .help = "classes that become landmarks: those that regions keep, or all",
-       .choices = {"regions", "all"}},
+       .help = "classes that become landmarks: the fewest that localize left-out survey images as all do, "
+               "those that regions keep, or all",
+       .choices = {"fewest", "regions", "all"}},
       {.name = "max_bytes",
        .value = &options->max_bytes,
        .help = "most bytes of the sealed map, which keeps the landmarks with which left-out survey images "
@@ -258,16 +259,25 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .min = 0},
       {.name = "left_out_max_error_m",
        .value = &options->left_out_max_error_m,
-       .help =
-           "with max_bytes: a left-out survey image counts as localized within this distance of its place, m",
+       .help = "choosing landmarks: a left-out survey image counts as localized within this distance of its "
+               "place, m",
        .min = 1e-6},
       {.name = "left_out_max_error_deg",
        .value = &options->left_out_max_error_deg,
-       .help = "with max_bytes: and within this angle of its rotation, degrees",
+       .help = "choosing landmarks: and within this angle of its rotation, degrees",
        .min = 1e-6},
+      {.name = "min_recall_ratio",
+       .value = &options->min_recall_ratio,
+       .help = "fewest landmarks: part of the left-out images that all localize that must stay localized",
+       .min = 0,
+       .max = 1},
+      {.name = "max_error_ratio",
+       .value = &options->max_error_ratio,
+       .help = "fewest landmarks: largest growth of the median error of left-out images",
+       .min = 1},
       {.name = "descriptor_bits",
        .value = &options->descriptor_bits,
-       .help = "bits in which a value of a landmark's descriptor is stored; 8: unchanged",
+       .help = "most bits in which a value of a landmark's descriptor is stored; 8: unchanged",
        .min = 1,
        .max = 8},
       {.name = "min_num_landmarks_for_words",
@@ -304,7 +314,7 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",
        .min = 0}};
-  AddCondition({"max_bytes", {"not 0"}}, {"left_out_max_error_m", "left_out_max_error_deg"}, &table);
+  AddCondition({"landmarks", {"fewest"}}, {"min_recall_ratio", "max_error_ratio"}, &table);
   AddCondition({"visual_map", {"true"}}, {"max_num_sights", "bad_model_px"}, &table);
   return table;
 }
@@ -319,13 +329,18 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
         ErrorCode::kInvalidArgument,
         "emit_map: words = \"survey\" with documents = \"kept\"; one of them must be the default");
   }
+  if (options.landmarks == "fewest" && keep == nullptr) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "emit_map: landmarks = \"fewest\", but it is not said which these are");
+  }
   CAIRN_ASSIGN_OR_RETURN(auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
-  std::vector<char> kept = MarkKept(classes.classes.size(), classes_of_regions, options.landmarks == "all");
+  std::vector<char> kept =
+      MarkKept(classes.classes.size(), classes_of_regions, options.landmarks != "regions");
   if (keep != nullptr) {
     kept = *keep;
     classes_of_regions = CommonClasses(classes, world, decomposition, kept);
   }
-  const std::vector<size_t> order = OrderLandmarks(classes, classes_of_regions, kept);
+  const std::vector<size_t> order = StoredOrder(classes, classes_of_regions, kept);
   if (order.empty()) {
     return MakeError(
         ErrorCode::kNoData,

@@ -19,19 +19,26 @@ namespace cairn::emit_map {
 // Puts together what a robot needs to localize: the landmarks that the regions keep, the regions and survey
 // images in which each of them is seen, and the visual words that lead from a view to survey images.  Before:
 // group_classes, filter_visibility, decompose_regions, build_vocabulary.  After: check_map.  A landmark is a
-// feature class that some region keeps ([Sala06 §III]); option "all" keeps every class as a landmark while
-// the regions stay as they are: a map for comparison.
+// feature class that a robot needs to be localized as if it had them all, or one that some region keeps
+// ([Sala06 §III]).
 struct EmitMapOptions {
-  // "regions": the classes that regions keep; "all": every class.
-  std::string landmarks = "regions";
-  // Most bytes of the sealed map, 0: no limit.  Of the classes that become landmarks, the map keeps those
-  // with which left-out survey images are localized best (fit_size.h).  REQUIRES: >= 0
+  // "fewest": the fewest with which left-out survey images are localized as with all (ChooseFewest in
+  // fit_size.h); "regions": the classes that regions keep; "all": every class.
+  std::string landmarks = "fewest";
+  // Most bytes of the sealed map, 0: no limit.  Of the classes that could become landmarks ("fewest": of
+  // all), the map keeps those with which left-out survey images are localized best (fit_size.h).
+  // REQUIRES: >= 0
   int max_bytes = 0;
   // A left-out image counts as localized within this distance of its place, metres (the map's units where
   // they are arbitrary), and this angle of its rotation, degrees.  REQUIRES: > 0
   double left_out_max_error_m = 0.1;
   double left_out_max_error_deg = 5;
-  // Bits in which a value of a landmark's descriptor is stored; 8: unchanged.  REQUIRES: in [1, 8]
+  // "fewest": of the left-out images that all landmarks localize, the part that must stay localized, and the
+  // largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
+  double min_recall_ratio = 0.99;
+  double max_error_ratio = 1.5;
+  // Bits in which a value of a landmark's descriptor is stored; 8: unchanged.  "fewest" and max_bytes take
+  // fewer where that serves them.  REQUIRES: in [1, 8]
   int descriptor_bits = 5;
   // A map with at least this many landmarks gets a vocabulary; in a smaller one every landmark is its own
   // word.  REQUIRES: >= 0
@@ -63,7 +70,8 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // marks the classes that may be landmarks; a region then has all of them that can be seen from all of its
 // stations.  The result has no name, seed, options or hashes: those are the caller's.  Pure.
 // O(observations).  Errors: InvalidArgument (inputs that do not belong together: a region's feature, a
-// feature's class or a station's image does not exist; documents = "kept" without kept images), NoData (no
+// feature's class or a station's image does not exist; documents = "kept" without kept images; landmarks =
+// "fewest" without `keep`: which these are is found by trials, fit_size.h), NoData (no
 // class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,

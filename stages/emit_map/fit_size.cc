@@ -4,27 +4,28 @@
 #include <array>
 #include <filesystem>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include "core/blocks/map_rows.h"
-#include "stages/emit_map/choose_landmarks.h"
+#include "core/promise/landmark_order.h"
 
 namespace cairn::emit_map {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Numbers of landmarks per image that are aimed at (OrderByUse).
-constexpr std::array<double, 3> kEnough = {20, 8, 50};
 constexpr std::array<int, 4> kBits = {5, 4, 3, 2};
-// Fewer bits, and other numbers than the first, must be better by this much: with few bits, other things look
-// like landmarks.
+// Fewer bits must be better by this much: with few bits, other things look like landmarks.
 constexpr double kClearMargin = 0.03;
 // The search for a size ends at this part of the limit.
 constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
 // Placeholders for figures of the self-test, which are added later: more than check_map has, with
 // longer names.
+// ChooseFewest tries numbers of landmarks that grow by this factor.
+constexpr double kLadderFactor = 1.2;
+constexpr double kFewestLandmarks = 50;
 constexpr int kNumFigures = 30;
 constexpr size_t kFigureNameBytes = 26;
 constexpr size_t kCheckMapOptionsBytes = 2048;
@@ -131,8 +132,80 @@ std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
 
 // Whether more images are localized, or as many by a clearly wider margin.
 bool IsBetter(const LeftOutTrial& a, const LeftOutTrial& b) {
-  if (a.num_right != b.num_right) return a.num_right > b.num_right;
-  return a.mean_margin > b.mean_margin + kClearMargin;
+  if (a.NumRight() != b.NumRight()) return a.NumRight() > b.NumRight();
+  return a.MeanMargin() > b.MeanMargin() + kClearMargin;
+}
+
+std::vector<size_t> OrderOf(const Classes& classes, const std::vector<size_t>& pool, int num_threads) {
+  return OrderLandmarks(classes, LearnMatches(classes, {}, num_threads), pool, {}, num_threads);
+}
+
+// Parts of the survey, each with the order of its classes, and maps of them.
+class Trials {
+ public:
+  static Result<Trials> Make(const Classes& classes, const std::vector<char>& may_keep,
+                             const std::string& matches_path, const EmitKept& emit,
+                             const FitSizeOptions& options, int num_threads) {
+    Trials trials(emit, options, num_threads);
+    CAIRN_ASSIGN_OR_RETURN(const auto rounds, ChooseLeftOut(classes, options.max_num_left_out));
+    for (const LeftOutImages& round : rounds) {
+      CAIRN_ASSIGN_OR_RETURN(LeftOutSurvey survey, LeaveOutImages(classes, matches_path, round));
+      std::vector<size_t> order = OrderOf(survey.classes, PoolIn(survey, classes, may_keep), num_threads);
+      trials.parts_.push_back({std::move(survey), std::move(order)});
+    }
+    return trials;
+  }
+
+  // Maps of the first n classes in this many bits a descriptor value; none where a part has no class at all.
+  Result<LeftOutTrial> Try(size_t n, int bits) const {
+    LeftOutTrial sum;
+    for (const Part& part : parts_) {
+      if (part.order.empty()) {
+        sum.num_tried += static_cast<int>(part.survey.images.size());
+        continue;
+      }
+      CAIRN_ASSIGN_OR_RETURN(
+          MapRows rows, emit_(part.survey.classes,
+                              SizeFitter::FirstOf(part.order, n, part.survey.classes.classes.size()), bits));
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, TryLeftOutImages(std::move(rows), part.survey.images,
+                                                                        options_.limits, num_threads_));
+      sum.Add(trial);
+    }
+    return sum;
+  }
+
+ private:
+  struct Part {
+    LeftOutSurvey survey;
+    std::vector<size_t> order;
+  };
+
+  Trials(const EmitKept& emit, const FitSizeOptions& options, int num_threads)
+      : emit_(emit), options_(options), num_threads_(num_threads) {}
+
+  const EmitKept& emit_;
+  const FitSizeOptions& options_;
+  int num_threads_;
+  std::vector<Part> parts_;
+};
+
+// Ascending numbers of bits, the last of which is the most that may be used.
+std::vector<int> FewestBitsFirst(int most) {
+  std::vector<int> bits;
+  for (const int fewer : {2, 3}) {
+    if (fewer < most) bits.push_back(fewer);
+  }
+  bits.push_back(most);
+  return bits;
+}
+
+// Numbers of landmarks to try, ascending; the last is all.
+std::vector<size_t> Ladder(size_t num_classes) {
+  std::vector<size_t> sizes;
+  for (double size = kFewestLandmarks; size < static_cast<double>(num_classes); size *= kLadderFactor)
+    sizes.push_back(static_cast<size_t>(size));
+  sizes.push_back(num_classes);
+  return sizes;
 }
 
 }  // namespace
@@ -149,12 +222,11 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   }
   bits_tried.insert(bits_tried.begin(), options.descriptor_bits);
 
-  // How many landmarks fit, by bits: it hardly depends on which ones.
-  const std::vector<size_t> usual_order = OrderByUse(classes, pool, kEnough[0], num_threads);
+  const std::vector<size_t> order = OrderOf(classes, pool, num_threads);
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
   for (const int bits : bits_tried) {
-    CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, usual_order, bits, &num_bytes));
+    CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, order, bits, &num_bytes));
     num_that_fit.push_back(n);
     if (n == pool.size()) break;  // all fit: no reason for fewer bits
   }
@@ -173,44 +245,78 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
     return fitted;
   }
 
-  CAIRN_ASSIGN_OR_RETURN(const LeftOutSurvey survey,
-                         LeaveOutImages(classes, matches_path, options.max_num_left_out));
-  const std::vector<size_t> survey_pool = PoolIn(survey, classes, may_keep);
-  const auto try_first = [&](const std::vector<size_t>& order, size_t n, int bits) -> Result<LeftOutTrial> {
-    // Where no class is left without the left-out images, a map of the rest is no test.
-    if (order.empty()) return LeftOutTrial{.num_tried = static_cast<int>(survey.images.size())};
-    CAIRN_ASSIGN_OR_RETURN(
-        MapRows rows,
-        emit(survey.classes, SizeFitter::FirstOf(order, n, survey.classes.classes.size()), bits));
-    return TryLeftOutImages(std::move(rows), survey.images, options.limits, num_threads);
-  };
-  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all,
-                         try_first(survey_pool, survey_pool.size(), options.descriptor_bits));
-  double best_enough = kEnough[0];
-  progress.Begin("trying what to keep", static_cast<int64_t>(kEnough.size() * num_that_fit.size()), "maps");
-  bool is_first = true;
-  std::vector<std::vector<size_t>> orders;
-  for (const double enough : kEnough)
-    orders.push_back(OrderByUse(survey.classes, survey_pool, enough, num_threads));
+  CAIRN_ASSIGN_OR_RETURN(const Trials trials,
+                         Trials::Make(classes, may_keep, matches_path, emit, options, num_threads));
+  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, trials.Try(pool.size(), options.descriptor_bits));
+  progress.Begin("trying what to keep", static_cast<int64_t>(num_that_fit.size()), "maps");
+  size_t best = num_that_fit.size();
   for (size_t i = 0; i < num_that_fit.size(); ++i) {
-    for (size_t k = 0; k < kEnough.size(); ++k) {
-      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
-      progress.Advance();
-      if (num_that_fit[i] == 0) continue;
-      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, try_first(orders[k], num_that_fit[i], bits_tried[i]));
-      if (!is_first && !IsBetter(trial, fitted.trial)) continue;
-      is_first = false;
-      fitted.trial = trial;
-      fitted.descriptor_bits = bits_tried[i];
-      best_enough = kEnough[k];
-    }
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
+    progress.Advance();
+    if (num_that_fit[i] == 0) continue;
+    CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, trials.Try(num_that_fit[i], bits_tried[i]));
+    if (best < num_that_fit.size() && !IsBetter(trial, fitted.trial)) continue;
+    best = i;
+    fitted.trial = trial;
+    fitted.descriptor_bits = bits_tried[i];
   }
   progress.End();
-  const std::vector<size_t> order =
-      best_enough == kEnough[0] ? usual_order : OrderByUse(classes, pool, best_enough, num_threads);
   CAIRN_ASSIGN_OR_RETURN(const size_t n,
                          fitter.MostThatFit(classes, order, fitted.descriptor_bits, &fitted.num_bytes));
   fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
+  return fitted;
+}
+
+Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& matches_path, const EmitKept& emit,
+                                const FitSizeOptions& options, int num_threads, Progress& progress) {
+  FittedSize fitted{.keep = std::vector<char>(classes.classes.size(), 1),
+                    .descriptor_bits = options.descriptor_bits};
+  progress.Begin("trying how few landmarks will do", 1, "choices");
+  const Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, emit, options, num_threads);
+  if (!trials.ok()) {
+    if (trials.error().code != ErrorCode::kNoData) return trials.error();
+    progress.End();
+    return fitted;
+  }
+  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, trials->Try(classes.classes.size(), options.descriptor_bits));
+  fitted.trial = fitted.trial_of_all;
+  if (fitted.trial_of_all.NumRight() < kMinNumRight) {
+    progress.End();
+    return fitted;
+  }
+  const auto will_do = [&](const LeftOutTrial& trial) {
+    return trial.NumRight() >= options.min_recall_ratio * fitted.trial_of_all.NumRight() &&
+           trial.MedianErrorM() <= options.max_error_ratio * fitted.trial_of_all.MedianErrorM();
+  };
+  const std::vector<size_t> sizes = Ladder(classes.classes.size());
+  size_t num_kept = classes.classes.size();
+  for (const int bits : FewestBitsFirst(options.descriptor_bits)) {
+    // All of them in the most bits will do.  More landmarks hardly ever do worse: the fewest by bisection.
+    size_t too_few = 0, enough = sizes.size() - 1;  // below `too_few` none will do
+    if (bits < options.descriptor_bits) {
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, trials->Try(sizes.back(), bits));
+      if (!will_do(trial)) continue;
+      fitted.trial = trial;
+    }
+    while (too_few < enough) {
+      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
+      const size_t middle = (too_few + enough) / 2;
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, trials->Try(sizes[middle], bits));
+      if (will_do(trial)) {
+        enough = middle;
+        fitted.trial = trial;
+      } else {
+        too_few = middle + 1;
+      }
+    }
+    num_kept = sizes[enough];
+    fitted.descriptor_bits = bits;
+    break;
+  }
+  std::vector<size_t> all(classes.classes.size());
+  std::iota(all.begin(), all.end(), size_t{0});
+  fitted.keep = SizeFitter::FirstOf(OrderOf(classes, all, num_threads), num_kept, classes.classes.size());
+  progress.End();
   return fitted;
 }
 

@@ -14,16 +14,18 @@
 
 namespace cairn::emit_map {
 
-// Chooses what a map of limited size keeps: which classes, and how many bits of their descriptors, so that as
-// many survey images that are left out of the map as possible are localized, and then as accurately as
-// possible.  Candidates are the first classes of OrderByUse for few or many landmarks per image, and fewer
-// bits for more landmarks; each is tried on left-out images (leave_out_images.h), and the best one is made
-// from the whole survey.
+// Chooses which classes a map keeps, and how many bits of their descriptors, by trying maps of a part of the
+// survey on survey images that are left out (leave_out_images.h).  Candidates are the first classes of
+// OrderLandmarks (core/promise/landmark_order.h); what is chosen is then made from the whole survey.
 struct FitSizeOptions {
   int64_t max_bytes = 0;    // of the sealed map's file
   int descriptor_bits = 5;  // at most
-  int max_num_left_out = 60;
+  size_t max_num_left_out = 48;
   LeftOutLimits limits;
+  // ChooseFewest: of the left-out images that the map of everything localizes, the part that must stay
+  // localized, and the largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
+  double min_recall_ratio = 0.99;
+  double max_error_ratio = 1.5;
 };
 
 // Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these) and
@@ -37,19 +39,29 @@ inline constexpr const char* kLeastPossible = "the least possible is";
 struct FittedSize {
   std::vector<char> keep;  // per class
   int descriptor_bits = 0;
-  int64_t num_bytes = 0;  // including space for the self-test
+  int64_t num_bytes = 0;  // FitSize: including space for the self-test
   // Trials on the left-out images: of this choice, and of the map of everything that may be kept.  No trials
   // are made where everything fits.
   LeftOutTrial trial, trial_of_all;
 };
 
-// `may_keep`: per class, whether the map would keep it without a limit.  `scratch_path`: where a file can be
-// written to measure its size; it is removed.  Errors: InvalidArgument when not even a map of one landmark
-// fits (states the smallest possible size, and what takes it); those of LeaveOutImages and `emit`; Cancelled.
+// The largest choice within max_bytes, with as many bits as localize most left-out images, and then with most
+// inliers.  `may_keep`: per class, whether the map would keep it without a limit.  `scratch_path`: where a
+// file can be written to measure its size; it is removed.  Errors: InvalidArgument when not even a map of one
+// landmark fits (states the smallest possible size, and what takes it); those of LeaveOutImages and `emit`;
+// Cancelled.
 Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_keep,
                            const std::string& matches_path, const EmitKept& emit,
                            const FitSizeOptions& options, const std::string& scratch_path, int num_threads,
                            Progress& progress);
+
+// The fewest landmarks with which left-out images are localized as often and nearly as well as with all of
+// them (min_recall_ratio, max_error_ratio), in the fewest bits that allow it.  All, untried, where the survey
+// is too small to try anything: fewer than twelve images, or fewer than `kMinNumRight` left-out ones that the
+// map of everything localizes.  Errors: those of LeaveOutImages and `emit`; Cancelled.
+inline constexpr int kMinNumRight = 8;
+Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& matches_path, const EmitKept& emit,
+                                const FitSizeOptions& options, int num_threads, Progress& progress);
 
 // The guarantees of a map: the smallest number of common landmarks of any region, and the stations that see
 // fewer than k.

@@ -2,21 +2,20 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 #include <unordered_map>
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
 #include "core/colmap/colmap_database.h"
+#include "core/promise/view_distance.h"
 #include "runtime/localize/localizer.h"
 
 namespace cairn::emit_map {
 namespace {
 
-constexpr size_t kMinNumSurveyImages = 12;  // of which a run of four is left out
-constexpr size_t kRunLength = 4;
-constexpr size_t kMinStep = 4;
+constexpr size_t kMinNumSurveyImages = 12;
+constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 constexpr int kPlentyOfInliers = 50;
 constexpr size_t kMinNumObservations = 2;
 
@@ -89,27 +88,56 @@ void LeaveOutNodes(const std::set<ImageId>& images, Appearance* appearance) {
 
 }  // namespace
 
-Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
-                                     int max_num_images) {
-  if (classes.images.size() < kMinNumSurveyImages) {
+Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images) {
+  const size_t num_images = classes.images.size();
+  if (num_images < kMinNumSurveyImages) {
     return MakeError(ErrorCode::kNoData,
-                     "emit_map: max_bytes chooses landmarks by leaving survey images out, but there are only "
-                     "{}; at least {} are needed",
-                     classes.images.size(), kMinNumSurveyImages);
+                     "emit_map: landmarks are chosen by leaving survey images out, but there are only {}; at "
+                     "least {} are needed",
+                     num_images, kMinNumSurveyImages);
   }
+  const ViewDistance distance(classes, {});
+  const size_t step = (num_images + max_num_images - 1) / max_num_images;
+  std::vector<std::set<size_t>> left_out;
+  std::vector<LeftOutImages> rounds;
+  for (size_t tried = step / 2; tried < num_images; tried += step) {
+    std::set<size_t> view;
+    for (size_t image = 0; image < num_images; ++image) {
+      if (image == tried || distance.Squared(tried, image) < 1) view.insert(image);
+    }
+    size_t round = 0;
+    for (; round < rounds.size(); ++round) {
+      std::set<size_t> both = left_out[round];
+      both.insert(view.begin(), view.end());
+      if (kMinNumLeft * both.size() > num_images) continue;
+      left_out[round] = std::move(both);
+      break;
+    }
+    if (round == kMaxNumRounds) continue;
+    if (round == rounds.size()) {
+      if (kMinNumLeft * view.size() > num_images) continue;  // the whole survey is about one view
+      rounds.emplace_back();
+      left_out.push_back(std::move(view));
+    }
+    rounds[round].tried.push_back(tried);
+  }
+  for (size_t round = 0; round < rounds.size(); ++round)
+    rounds[round].left_out.assign(left_out[round].begin(), left_out[round].end());
+  return rounds;
+}
+
+Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
+                                     const LeftOutImages& which) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<LeftOutSurvey> {
     LeftOutSurvey survey;
     survey.classes = classes;
     std::map<CameraId, const Camera*> cameras;
     for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
-    const size_t most = static_cast<size_t>(max_num_images);
-    const size_t step = std::max(kMinStep, (classes.images.size() + most - 1) / most);
     std::set<ImageId> left_out;
-    for (size_t i = 0; i < classes.images.size(); ++i) {
-      if (i / kRunLength % step != step / 2) continue;
+    for (const size_t i : which.left_out) left_out.insert(classes.images[i].image_id);
+    for (const size_t i : which.tried) {
       const SurveyImage& image = classes.images[i];
-      left_out.insert(image.image_id);
       TrialImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
       CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id));
       survey.images.push_back(std::move(row));
@@ -147,6 +175,20 @@ SurveyParts PartsOf(const Classes& classes, SurveyParts parts) {
   return parts;
 }
 
+void LeftOutTrial::Add(const LeftOutTrial& other) {
+  num_tried += other.num_tried;
+  errors_m.insert(errors_m.end(), other.errors_m.begin(), other.errors_m.end());
+  num_inliers.insert(num_inliers.end(), other.num_inliers.begin(), other.num_inliers.end());
+}
+
+double LeftOutTrial::MeanMargin() const {
+  double sum = 0;
+  for (const int num : num_inliers) sum += std::min(num, kPlentyOfInliers);
+  return sum / std::max(1, kPlentyOfInliers * num_tried);
+}
+
+double LeftOutTrial::MedianErrorM() const { return errors_m.empty() ? 0 : UpperMedian(errors_m); }
+
 Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads) {
   // Fixes are in the frame of the stated poses; the true ones here are the map's own.
@@ -166,16 +208,16 @@ Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage
     const double error_deg = RotationErrorDeg(found->cam_from_world, images[i].cam_from_world);
     if (error_m <= limits.max_error_m && error_deg <= limits.max_error_deg) {
       error_of[i] = error_m;
-      num_inliers[i] = std::min(found->num_inliers, kPlentyOfInliers);
+      num_inliers[i] = found->num_inliers;
     }
   });
   for (const Status& status : statuses) CAIRN_RETURN_IF_ERROR(status);
   LeftOutTrial trial{.num_tried = static_cast<int>(images.size())};
-  trial.mean_margin = std::accumulate(num_inliers.begin(), num_inliers.end(), 0.0) /
-                      std::max<double>(1, kPlentyOfInliers * static_cast<double>(images.size()));
-  std::erase_if(error_of, [](double error) { return error < 0; });
-  trial.num_right = static_cast<int>(error_of.size());
-  if (!error_of.empty()) trial.median_error_m = UpperMedian(std::move(error_of));
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (error_of[i] < 0) continue;
+    trial.errors_m.push_back(error_of[i]);
+    trial.num_inliers.push_back(num_inliers[i]);
+  }
   return trial;
 }
 

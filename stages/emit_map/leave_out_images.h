@@ -21,6 +21,21 @@ struct TrialImage {
   Features features;
 };
 
+// Which images are left out of the survey together, and which of them a map of the rest is tried on.
+// Positions in Classes::images, ascending.
+struct LeftOutImages {
+  std::vector<size_t> left_out;
+  std::vector<size_t> tried;
+};
+
+// With every image that is tried goes all that a robot's image is not as near as, the images of its view
+// (core/promise/view_distance.h): images taken one after the other see the same things, and single left-out
+// images were found to be too easy.  At most about `max_num_images` are tried, spread over the survey, in as
+// many rounds as it takes to leave out no more than one image in four at a time; at most `kMaxNumRounds`.
+// Errors: NoData (fewer than twelve survey images).
+inline constexpr size_t kMaxNumRounds = 6;
+Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images);
+
 // The survey without some of its images, so that a map can be tried on these before any held-out
 // image is used.
 struct LeftOutSurvey {
@@ -28,13 +43,11 @@ struct LeftOutSurvey {
   std::vector<TrialImage> images;
 };
 
-// Leaves out every n-th run of four images, at most about `max_num_images` and at most one image in four:
-// images taken one after the other see the same things, and a robot stands between surveyed places, not at an
-// image.  The descriptors of classes that they saw are computed from the other images alone; positions are
-// kept (one ray of many).  `matches_path`: matches.db, for the features.  Errors: those of
-// OpenColmapDatabase; NoData (fewer than twelve survey images).
+// The descriptors of classes that the left-out images saw are computed from the other images alone; positions
+// are kept (one ray of many).  `matches_path`: matches.db, for the features.  Errors: those of
+// OpenColmapDatabase.
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,
-                                     int max_num_images);
+                                     const LeftOutImages& which);
 
 // What a map is made of besides its classes, all of one survey.
 struct SurveyParts {
@@ -48,14 +61,19 @@ struct SurveyParts {
 // left out, for which their neighbours are kept.  Stations, areas and regions stay.  O(parts).
 SurveyParts PartsOf(const Classes& classes, SurveyParts parts);
 
-// The result of a map on the left-out images.
+// The result of maps on left-out images.
 struct LeftOutTrial {
   int num_tried = 0;
-  int num_right = 0;       // localized within the limits
-  double mean_margin = 0;  // over all images: inliers of those localized right, at most 50, over 50; else 0
-  double median_error_m = 0;  // of those localized right; 0 where there are none
+  // Of images localized within the limits: metres, and inliers.
+  std::vector<double> errors_m;
+  std::vector<int> num_inliers;
 
-  double RightRatio() const { return num_tried > 0 ? static_cast<double>(num_right) / num_tried : 0; }
+  void Add(const LeftOutTrial& other);
+  int NumRight() const { return static_cast<int>(errors_m.size()); }
+  double RightRatio() const { return num_tried > 0 ? static_cast<double>(NumRight()) / num_tried : 0; }
+  // Over all images: inliers of those localized right, at most 50, over 50; else 0.
+  double MeanMargin() const;
+  double MedianErrorM() const;  // 0 where there are none
 };
 struct LeftOutLimits {
   double max_error_m = 0.1;

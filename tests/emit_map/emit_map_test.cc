@@ -23,6 +23,20 @@ std::vector<ClassId> ClassIds(const MapRows& rows) {
   return ids;
 }
 
+TEST(EmitMap, FewestLandmarksHaveToBeNamed) {
+  const EmitExample example = MakeEmitExample();
+  const auto rows = EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {});
+  ASSERT_FALSE(rows.ok());
+  EXPECT_EQ(rows.error().code, ErrorCode::kInvalidArgument);
+  std::vector<char> keep(example.classes.classes.size(), 0);
+  keep[1] = 1;
+  const MapRows named =
+      *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {}, nullptr, &keep);
+  EXPECT_EQ(named.landmark_choice, "fewest");
+  ASSERT_EQ(named.landmarks.size(), 1U);
+  EXPECT_EQ(named.landmarks[0].class_id, example.classes.classes[1].class_id);
+}
+
 TEST(EmitMap, KeepsTheClassesOfRegionsOrderedByFirstRegion) {
   const Result<MapRows> rows = Emit(MakeEmitExample());
   ASSERT_TRUE(rows.ok()) << rows.error().message;
@@ -65,7 +79,8 @@ TEST(EmitMap, VocabularyKeepsTheWordsOfLandmarksOnly) {
   // All landmarks fall to the first of the two words, so that the other is left out; images 1, 2 and 4 see
   // landmarks {2}, {0, 1, 2} and {0, 1}.
   const EmitExample example = MakeEmitExample();
-  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
+  const EmitMapOptions options{
+      .landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1};
   const MapRows rows =
       *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(1, 2, 4));
@@ -77,7 +92,8 @@ TEST(EmitMap, VocabularyKeepsTheWordsOfLandmarksOnly) {
 
 TEST(EmitMap, WordsAreNotSplitBelowTheirNumberOfLandmarks) {
   const EmitExample example = MakeEmitExample();
-  const EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 3};
+  const EmitMapOptions options{
+      .landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 3};
   const MapRows rows =
       *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, options);
   EXPECT_EQ(rows.vocabulary.nodes.size(), 1u);  // the root is the only word
@@ -86,8 +102,8 @@ TEST(EmitMap, WordsAreNotSplitBelowTheirNumberOfLandmarks) {
 
 TEST(EmitMap, AppearanceKeepsLinksOfKeptImagesAndLeavesOutOthers) {
   const EmitExample example = MakeEmitExample();
-  const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
-                                &example.appearance);
+  const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                                {.landmarks = "regions"}, &example.appearance);
   // Image 3 has no pose; the others are images 0 to 2 of the map.
   using Link = MapAppearanceNode::Link;
   ASSERT_EQ(rows.appearance.size(), 3u);
@@ -99,28 +115,28 @@ TEST(EmitMap, AppearanceKeepsLinksOfKeptImagesAndLeavesOutOthers) {
 TEST(EmitMap, RegionsHaveTheMeanEntropyOfTheirStationsImages) {
   EmitExample example = MakeEmitExample();
   // Stations 0, 1, 2 have images 1, 2, 4 with 0.25, 0.5 and 1; the regions stations 1, 2 and 0, 1.
-  EXPECT_THAT(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
-                      &example.appearance)
+  EXPECT_THAT(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                      {.landmarks = "regions"}, &example.appearance)
                   ->findings.region_entropies,
               ElementsAre(RegionEntropy{0, 0.75}, RegionEntropy{1, 0.375}));
   for (AppearanceNode& node : example.appearance.nodes) node.entropy = std::nullopt;
   example.appearance.confusable.clear();
-  EXPECT_TRUE(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary, {},
-                      &example.appearance)
+  EXPECT_TRUE(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
+                      {.landmarks = "regions"}, &example.appearance)
                   ->findings.region_entropies.empty());
 }
 
 TEST(EmitMap, SurveyWordsCountAllFeaturesOfTheMapsImages) {
   const EmitExample example = MakeEmitExample();
   const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                                {.words = "survey"}, &example.appearance);
+                                {.landmarks = "regions", .words = "survey"}, &example.appearance);
   // Image 3 is not in the map; the documents are images 1, 2, 4.
   EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(1, 2, 4));
   EXPECT_THAT(rows.vocabulary.inverted_files[0], ElementsAre(Posting{0, 2}));
   EXPECT_THAT(rows.vocabulary.inverted_files[1], ElementsAre(Posting{2, 1}));
   EXPECT_EQ(rows.vocabulary.nodes.size(), 3u);
   EXPECT_EQ(EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                    {.words = "survey", .documents = "kept"}, &example.appearance)
+                    {.landmarks = "regions", .words = "survey", .documents = "kept"}, &example.appearance)
                 .error()
                 .code,
             ErrorCode::kInvalidArgument);
@@ -128,7 +144,8 @@ TEST(EmitMap, SurveyWordsCountAllFeaturesOfTheMapsImages) {
 
 TEST(EmitMap, KeptDocumentsAloneHavePostings) {
   const EmitExample example = MakeEmitExample();
-  EmitMapOptions options{.min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"};
+  EmitMapOptions options{
+      .landmarks = "regions", .min_num_landmarks_for_words = 0, .landmarks_per_word = 1, .documents = "kept"};
   const MapRows rows = *EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
                                 options, &example.appearance);
   EXPECT_THAT(rows.vocabulary.document_ids, ElementsAre(2));

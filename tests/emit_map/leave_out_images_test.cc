@@ -1,10 +1,14 @@
 #include "stages/emit_map/leave_out_images.h"
 
+#include <algorithm>
+#include <set>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
+#include "tests/core/promise/wall_survey.h"
 
 namespace cairn::emit_map {
 namespace {
@@ -80,6 +84,59 @@ TEST(PartsOf, NeighboursOfAKeptPlaceWithoutImagesAreKept) {
   EXPECT_THAT(parts.appearance->Kept(), ElementsAre(1));
   parts = PartsOf(Without(example, 1), {.world = example.world, .decomposition = example.decomposition});
   EXPECT_FALSE(parts.appearance.has_value());
+}
+
+// Cameras in a row that look at a wall `depth` away: what is within a tenth of that is one view.
+Classes Row(int num_images, double spacing, double depth) {
+  Classes classes = WallSurvey(num_images, spacing);
+  AddClass({0, 0, depth}, {1}, 3, &classes);
+  return classes;
+}
+
+TEST(ChooseLeftOut, ImagesOfTheTriedOnesViewGoWithThem) {
+  const auto rounds = ChooseLeftOut(Row(100, 0.1, 2.5), 5);  // a view: 0.25 m, two images either side
+  ASSERT_TRUE(rounds.ok());
+  ASSERT_EQ(rounds->size(), 1U);
+  EXPECT_THAT((*rounds)[0].tried, ElementsAre(10, 30, 50, 70, 90));
+  EXPECT_THAT((*rounds)[0].left_out, ElementsAre(8, 9, 10, 11, 12, 28, 29, 30, 31, 32, 48, 49, 50, 51, 52, 68,
+                                                 69, 70, 71, 72, 88, 89, 90, 91, 92));
+}
+
+TEST(ChooseLeftOut, OneImageInFourAtATimeInAtMostSixRounds) {
+  const auto rounds = ChooseLeftOut(Row(40, 0.1, 4.95), 40);  // nine images a view, ten at a time
+  ASSERT_TRUE(rounds.ok());
+  EXPECT_EQ(rounds->size(), kMaxNumRounds);
+  std::set<size_t> tried;
+  for (const LeftOutImages& round : *rounds) {
+    EXPECT_LE(round.left_out.size(), 10U);
+    EXPECT_TRUE(
+        std::includes(round.left_out.begin(), round.left_out.end(), round.tried.begin(), round.tried.end()));
+    for (const size_t image : round.tried) EXPECT_TRUE(tried.insert(image).second);
+  }
+  EXPECT_GE(tried.size(), 12U);
+}
+
+TEST(ChooseLeftOut, SurveysOfOneViewTryNothingAndSmallOnesAreRefused) {
+  const auto one_view = ChooseLeftOut(Row(20, 0.01, 2), 5);
+  ASSERT_TRUE(one_view.ok());
+  EXPECT_THAT(*one_view, IsEmpty());
+  EXPECT_TRUE(ChooseLeftOut(Row(12, 1, 2), 5).ok());
+  const auto few = ChooseLeftOut(Row(11, 1, 2), 5);
+  ASSERT_FALSE(few.ok());
+  EXPECT_EQ(few.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(few.error().message, testing::HasSubstr("there are only 11; at least 12"));
+}
+
+TEST(LeftOutTrial, SumsUpAndCountsFiftyInliersAtMost) {
+  LeftOutTrial trial{.num_tried = 3, .errors_m = {0.3, 0.1}, .num_inliers = {20, 80}};
+  trial.Add({.num_tried = 1, .errors_m = {0.2}, .num_inliers = {30}});
+  EXPECT_EQ(trial.NumRight(), 3);
+  EXPECT_DOUBLE_EQ(trial.RightRatio(), 0.75);
+  EXPECT_DOUBLE_EQ(trial.MedianErrorM(), 0.2);
+  EXPECT_DOUBLE_EQ(trial.MeanMargin(), 0.5);  // (20 + 50 + 0 + 30) / 200
+  EXPECT_EQ(LeftOutTrial().RightRatio(), 0);
+  EXPECT_EQ(LeftOutTrial().MedianErrorM(), 0);
+  EXPECT_EQ(LeftOutTrial().MeanMargin(), 0);
 }
 
 }  // namespace

@@ -63,6 +63,53 @@ TEST_F(MapSize, SameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(*ReadFile(Path("again.build/unsealed.cairn")), *ReadFile(Path("small.build/unsealed.cairn")));
 }
 
+TEST_F(MapSize, FewestLandmarksLocalizeLeftOutImagesAsAllDo) {
+  WriteTinyRecipe(Path("fewest.toml"));
+  ReplaceInFile(Path("fewest.toml"), "landmarks = \"all\"", "landmarks = \"fewest\"");
+  fs::copy(Path("tiny.build"), Path("fewest.build"), fs::copy_options::recursive);
+  const ProgramRun run = Run("cairn compile fewest.toml -o fewest.cairn && cat fewest.report.json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("the fewest landmarks: "));
+  EXPECT_THAT(run.out, HasSubstr("left-out survey images"));
+  const json fewest = json::parse(Run("cairn inspect fewest.cairn --json").out);
+  const json whole = json::parse(Run("cairn inspect tiny.cairn --json").out);
+  EXPECT_EQ(fewest["landmarks"], "fewest");
+  EXPECT_LT(fewest["num_landmarks"], whole["num_landmarks"]);
+  int64_t num_not_needed = 0;
+  for (const json& drop : fewest["dropped"]) {
+    if (drop["name"] == "not_needed") num_not_needed = drop["num_dropped"];
+  }
+  EXPECT_EQ(num_not_needed, whole["num_landmarks"].get<int64_t>() - fewest["num_landmarks"].get<int64_t>());
+  EXPECT_THAT(Run("cairn inspect fewest.cairn").out, HasSubstr("landmarks = fewest"));
+
+  // Stricter: all that all landmarks localize, and no larger error.
+  std::ofstream(Path("fewest.toml"), std::ios::app) << "max_error_ratio = 1\nmin_recall_ratio = 1\n";
+  const ProgramRun strict = Run("cairn compile fewest.toml -o strict.cairn --build-dir fewest.build");
+  ASSERT_EQ(strict.exit_code, 0) << strict.err;
+  EXPECT_GT(json::parse(Run("cairn inspect strict.cairn --json").out)["num_landmarks"],
+            fewest["num_landmarks"]);
+}
+
+TEST_F(MapSize, FewestLandmarksAreTheSameForAnyNumberOfThreads) {
+  const std::string emit =
+      "cd tiny.build && cairn stage emit-map --matches matches.db --classes classes.db --world world.db "
+      "--regions regions.db --vocabulary vocabulary.db --name t --landmarks fewest --progress none";
+  ASSERT_EQ(Run(emit + " --threads 1 -o ../one.cairn").exit_code, 0);
+  ASSERT_EQ(Run(emit + " --threads 3 -o ../three.cairn").exit_code, 0);
+  EXPECT_EQ(*ReadFile(Path("one.cairn")), *ReadFile(Path("three.cairn")));
+}
+
+TEST_F(MapSize, LandmarksCannotBeChosenWithoutTheSurveysFeatures) {
+  const std::string emit =
+      "cd tiny.build && cairn stage emit-map --classes classes.db --world world.db --regions regions.db "
+      "--vocabulary vocabulary.db --name t -o ../none.cairn ";
+  const ProgramRun run = Run(emit);
+  EXPECT_EQ(run.exit_code, static_cast<int>(ErrorCode::kInvalidArgument));
+  EXPECT_THAT(run.err, HasSubstr("landmarks = \"fewest\" needs --matches"));
+  EXPECT_THAT(Run(emit + "--landmarks all --max-bytes 90000").err, HasSubstr("max_bytes needs --matches"));
+  EXPECT_EQ(Run(emit + "--landmarks regions").exit_code, 0);
+}
+
 TEST_F(MapSize, BudgetThatNothingMeetsSaysTheLeastPossible) {
   WriteTinyRecipe(Path("none.toml"), "max_bytes = 3000\n");
   fs::copy(Path("small.build"), Path("none.build"), fs::copy_options::recursive);

@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
   const EmitExample example = MakeEmitExample();
   for (const int min_num_landmarks_for_words : {0, 100}) {
     auto rows = emit_map::EmitMap(example.classes, example.world, example.decomposition, example.vocabulary,
-                                  {.min_num_landmarks_for_words = min_num_landmarks_for_words,
+                                  {.landmarks = "regions",
+                                   .min_num_landmarks_for_words = min_num_landmarks_for_words,
                                    .landmarks_per_word = 1,
                                    .documents = "kept"},
                                   &example.appearance);

@@ -1,8 +1,8 @@
 // The stages: what comes into each, what goes on, and what is dropped and why.
 function stageSteps() {
   const dropsOf = stage => data.drops.filter(drop => drop.stage === stage && drop.kind === 'feature').sort((a, b) => b.num - a.num);
-  // A map of all landmarks passes the filter and the regions by.
-  const isOfRegions = data.landmark_choice !== 'all';
+  // Maps whose landmarks are not those of regions pass the filter and the regions by.
+  const isOfRegions = data.landmark_choice === 'regions';
   const stages = [['group_classes', 'tracks', 'matches of several images that are chained to one feature'],
     ['filter_visibility', 'classes', terms.class], ['decompose_regions', 'visible', 'classes that a robot can expect to see again'],
     ['emit_map', ...(isOfRegions ? ['kept', 'classes that some region keeps'] : ['classes', terms.class])]].filter(([stage]) => isOfRegions || !['filter_visibility', 'decompose_regions'].includes(stage));

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/promise/expected_matches.h"
+#include "core/world/feature_class.h"
+
+namespace cairn {
+
+struct LandmarkOrderOptions {
+  // As many matches as a robot needs to be localized for certain.  REQUIRES: > 0
+  double enough_matches = 10;
+  // Standard deviation of a small keypoint's position, px, and its growth with the keypoint's scale; these
+  // and the class's reprojection error add as squares.  REQUIRES: > 0, >= 0
+  double keypoint_sigma_px = 0.5;
+  double keypoint_sigma_per_scale = 0.2;
+};
+
+// Orders classes so that, for any n, the first n of them serve robots in the survey's views best: a small map
+// keeps these.  Adds the one next that adds most to
+//
+//   sum over views v of  e (1 - exp(-m_v / e)) - log tr C_v,      e = enough_matches
+//
+// m_v = sum of the probabilities that the chosen ones are matched; C_v = covariance of the camera's place
+// by these matches (pose_information.h).  The first term is what it takes to be localized at all: each
+// further match counts less, so that no view is left with few while others have many.  The second is how
+// well: it goes on counting where there are enough, and prefers landmarks that are near, small, well
+// triangulated and seen in many directions.
+//
+// `pool`: positions in classes.classes, ascending; the result has each once.  Ties: the smaller position.
+// Same result for any number of threads.  The first term is submodular, the second nearly: an earlier gain is
+// taken for a bound, so that now and then a gain that grew is overlooked for a while.
+std::vector<size_t> OrderLandmarks(const Classes& classes, const ExpectedMatches& matches,
+                                   const std::vector<size_t>& pool, const LandmarkOrderOptions& options,
+                                   int num_threads);
+
+}  // namespace cairn
