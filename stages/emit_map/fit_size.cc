@@ -189,14 +189,11 @@ class Trials {
   std::vector<Part> parts_;
 };
 
-// Ascending numbers of bits, the last of which is the most that may be used.
+// Ascending numbers of bits, the last of which is the most that may be used.  With two, wrong poses found as
+// many landmarks by their looks as right ones: a kitchen image was placed 1.2 m off with 39 inliers.
 std::vector<int> FewestBitsFirst(int most) {
-  std::vector<int> bits;
-  for (const int fewer : {2, 3}) {
-    if (fewer < most) bits.push_back(fewer);
-  }
-  bits.push_back(most);
-  return bits;
+  constexpr int kFewestBits = 3;
+  return most > kFewestBits ? std::vector<int>{kFewestBits, most} : std::vector<int>{most};
 }
 
 // Numbers of landmarks to try, ascending; the last is all.
