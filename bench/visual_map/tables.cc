@@ -249,14 +249,15 @@ void PrintErrors(const std::string& name, const VisualMap& map) {
 void PrintPose(const Row& row, const TestImage& test, const VisualMap& map, const VisualPose& pose) {
   fmt::print(stderr,
              "{} {} {}: {} of {} possible, {} matched; spread {:.2f}; {:.2f} m out, found {:.2f}; {:.1f} cm "
-             "{:.2f} deg sd {:.1f} cm NEES {:.1f}; higher {:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}\n",
+             "{:.2f} deg sd {:.1f} cm NEES {:.1f}; higher {:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}; "
+             "likeliest place {:.1f} cm off\n",
              row.name, test.name, test.is_inside() ? "inside" : "outside", pose.num_agreeing,
              pose.num_possible, pose.num_matches, pose.spread_ratio, test.out_m,
              MetresOutOfHull(map.places(), pose.position), 100 * (pose.position - test.truth.position).norm(),
              AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg),
              100 * std::sqrt(pose.covariance.topLeftCorner<2, 2>().trace()), SquaredMahalanobis(test, pose),
              pose.higher_m, pose.elsewhere, row.divergences.empty() ? 0 : row.divergences.back(),
-             VisualFlagName(pose.flag));
+             VisualFlagName(pose.flag), row.lattice_cm.back());
 }
 
 Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,

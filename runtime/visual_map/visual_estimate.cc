@@ -20,7 +20,8 @@
 namespace cairn {
 namespace {
 
-// Maxima that are refined, and how far around one its points lie.
+// Maxima that are refined, and how far around one its points lie; on the lattice wider ones are left as they
+// are.
 constexpr int kNumRefined = 3;
 constexpr double kReachSpacings = 1.5;
 // Points per three standard deviations around the maximum that share out its probability.
@@ -30,9 +31,6 @@ constexpr int kSpreadSteps = 7;
 constexpr double kUnsureSpacings = 0.25;
 // How much of the uniform distribution a posterior with a flag gets.
 constexpr double kFlaggedUniform = 0.5;
-// Standard deviation, in spacings of the survey, below which a maximum is sharper than the points of the
-// search can show.
-constexpr double kSharpSpacings = 0.5;
 // The prior of "elsewhere" where it is no possibility; it is divided out.
 constexpr double kNoElsewhere = 1e-9;
 
@@ -77,10 +75,10 @@ class Estimator {
     search_.Run();
     const int num_landmarks = NumLandmarks();
     std::vector<DensityMaximum> maxima;
-    if (num_landmarks >= 2) maxima = RefineMaxima(kSharpSpacings * map_.spacing_m());
+    if (num_landmarks >= 2) maxima = RefineMaxima(kReachSpacings * map_.spacing_m());
     const auto refined = Best(maxima);
     Normalise(&pose);
-    if (refined && WidthM(*refined) < kSharpSpacings * map_.spacing_m()) SpreadAround(*refined, &pose);
+    if (refined && WidthM(*refined) < kReachSpacings * map_.spacing_m()) SpreadAround(*refined, &pose);
     const double sum = std::accumulate(pose.at_place.begin(), pose.at_place.end(), 0.0);
     for (double& share : pose.at_place) share /= sum;
     return {.at_place = std::move(pose.at_place), .num_matches = num_landmarks};
