@@ -26,7 +26,7 @@ PACKAGES_OPTIONAL := librsvg2-bin libsimde-dev g++-aarch64-linux-gnu qemu-user-s
 SOURCES = $(shell git ls-files --cached --others --exclude-standard '*.h' '*.cc' '*.c' | sort -u | xargs ls 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all help program whole deps deps-all demo tables test bench maps compile install deb format format-check tidy docs clean
+.PHONY: all help program whole deps deps-all demo tables test bench reproduce maps compile install deb format format-check tidy docs clean
 # Targets run one after the other, whatever MAKEFLAGS says; the steps inside them run in parallel.
 .NOTPARALLEL:
 
@@ -71,6 +71,13 @@ bench: whole  ## Build and run the benchmarks
 	@cmake --preset $(PRESET) -DCAIRN_BUILD_BENCHMARKS=ON
 	@cmake --build build/$(PRESET)
 	@scripts/run_benchmarks build/$(PRESET)
+
+# Worlds of each setting (the source: 300).
+WORLDS ?= 300
+reproduce: deps-all build/$(PRESET)/build.ninja  ## Write the tables and figures of Sala06 beside the source's to build/reproduce; WORLDS=N [300]
+	@cmake --preset $(PRESET) -DCAIRN_BUILD_BENCHMARKS=ON
+	@cmake --build build/$(PRESET) --target cairn regions_tables survey_areas visual_map_tables
+	@bench/reproduce.py build/$(PRESET) build/reproduce --worlds $(WORLDS)
 
 maps: program  ## Compile every recipe under maps/ whose capture is here
 	@CAIRN=$(CAIRN) scripts/compile_maps maps

@@ -5,6 +5,7 @@
 //
 // Worlds are seeds 0, 1, ... of simulate-worlds with its default densities.
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/parallel.h"
+#include "core/files/file.h"
 #include "sim/worlds/simulate_worlds.h"
 #include "stages/decompose_regions/check_regions.h"
 #include "stages/decompose_regions/cover/reduced_world.h"
@@ -43,6 +45,7 @@ struct Means {
 };
 
 struct WorldRow {
+  uint64_t seed = 0;
   double num_stations = 0, num_visible = 0, num_coverable = 0;
   std::array<Means, kAlgorithms.size()> means;
 };
@@ -73,7 +76,7 @@ Means Measure(const World& world, const decompose_regions::IndexLists& neighbour
 
 WorldRow RunWorld(const sim::SimulateWorldsOptions& simulation,
                   decompose_regions::DecomposeRegionsOptions options, uint64_t seed) {
-  WorldRow row;
+  WorldRow row{.seed = seed};
   const Result<World> world = sim::SimulateWorld(simulation, seed);
   if (!world.ok()) return row;
   const decompose_regions::IndexLists neighbours = decompose_regions::NeighbourLists(*world);
@@ -101,6 +104,39 @@ double ErrorOfDifference(const std::vector<WorldRow>& rows, size_t a, size_t b) 
   const double variance = Mean(rows, [&](const WorldRow& r) { return std::pow(difference(r) - mean, 2); });
   return std::sqrt(variance / static_cast<double>(rows.size()));
 }
+
+// A line for each world and algorithm, for programs.
+constexpr char kCsvHead[] =
+    "setting,seed,algorithm,stations,coverable,visible,regions,stations_a_region,grown,landmarks,uncovered,"
+    "largest_hole,milliseconds,source_regions,source_stations_a_region\n";
+std::string CsvLines(int setting, const std::vector<WorldRow>& rows) {
+  std::string csv;
+  for (const WorldRow& row : rows) {
+    for (size_t a = 0; a < kAlgorithms.size(); ++a) {
+      const Means& m = row.means[a];
+      csv += fmt::format("{},{},{},{},{},{:.3f},{},{:.3f},{:.3f},{},{},{},{:.1f},{},{}\n", setting, row.seed,
+                         kAlgorithms[a], row.num_stations, row.num_coverable, row.num_visible, m.num_regions,
+                         m.core_poses, m.grown_poses, m.num_landmarks, m.num_uncovered, m.largest_hole,
+                         m.milliseconds, kSourceRegions[setting - 1][a], kSourcePoses[setting - 1][a]);
+    }
+  }
+  return csv;
+}
+
+// Worlds that are done, on stderr: a line for each tenth.
+class WorldCounter {
+ public:
+  WorldCounter(int setting, int num_worlds) : setting_(setting), num_worlds_(num_worlds) {}
+  void Advance() {
+    const int done = ++num_done_;
+    if (10 * done / num_worlds_ != 10 * (done - 1) / num_worlds_)
+      fmt::print(stderr, "setting {}: {} of {} worlds\n", setting_, done, num_worlds_);
+  }
+
+ private:
+  const int setting_, num_worlds_;
+  std::atomic<int> num_done_ = 0;
+};
 
 void Print(int setting, const std::vector<WorldRow>& rows) {
   fmt::print(
@@ -168,16 +204,23 @@ int main(int argc, char** argv) {
                              {"--area-scale", &simulation.area_scale}}) {
     app.add_option(name, *value)->capture_default_str();
   }
+  std::string csv_path, csv = cairn::kCsvHead;
+  app.add_option("--csv", csv_path, "File for a line of each world and algorithm");
   app.add_option("--num-features", simulation.num_features, "0: the setting's")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   fmt::print("k = {}, tau = {}, rho = {}, alpha = {}\n", options.k, options.tau, options.rho, options.alpha);
   for (const int setting : settings) {
     simulation.setting = setting;
     std::vector<cairn::WorldRow> rows(num_worlds);
+    cairn::WorldCounter counter(setting, num_worlds);
     cairn::ParallelFor(num_worlds, num_threads, [&](int64_t i) {
       rows[i] = cairn::RunWorld(simulation, options, seed + static_cast<uint64_t>(i));
+      counter.Advance();
     });
     cairn::Print(setting, rows);
+    csv += cairn::CsvLines(setting, rows);
   }
-  return 0;
+  const cairn::Status status = csv_path.empty() ? cairn::Ok() : cairn::WriteFileAtomically(csv_path, csv);
+  if (!status.ok()) std::fprintf(stderr, "%s\n", status.error().message.c_str());
+  return status.ok() ? 0 : 1;
 }

@@ -1,6 +1,10 @@
 // The source's experiment on maps of one survey [Sala06 Table V, Table VI]: held-out images localized by the
 // visual map, and by PnP with the same landmarks and features.  The first map is the one of all features:
 // divergences are from its posteriors.
+//
+// As the source counts: the likeliest place of the lattice, of all images, whatever this project thinks of
+// them, and divergences of the posteriors over the lattice.  Ours beside it: fixes, which have no flag, and
+// divergences of the posteriors that a robot gets, with "elsewhere" and with what flags do to them.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
@@ -24,6 +28,7 @@
 #include "core/line/command.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/visual_map/lattice_posterior.h"
 #include "runtime/visual_map/visual_estimate.h"
 
 namespace cairn {
@@ -34,6 +39,7 @@ struct Arguments {
   std::vector<std::string> maps;
   std::string queries;
   std::string pictures;
+  std::string csv;
   SiftOptions sift{.max_num_features = 450};
   double uniform_weight = 0.1;
   VisualMapOptions map_options;
@@ -120,7 +126,9 @@ struct Row {
   double megabytes = 0, model_bytes = 0;
   int num_fixes = 0, num_wrong = 0, num_flagged_outside = 0, num_honest_outside = 0, num_outside = 0,
       num_inside = 0;
-  std::vector<double> lattice_cm;  // of the likeliest place of the survey, as the source's estimate
+  // As the source counts, of all images; the second divergence is that of all features' map from this one.
+  std::vector<double> lattice_cm, lattice_divergences, reverse_divergences;
+  int num_without_match = 0;
   std::vector<double> errors_cm, all_errors_cm, errors_deg, seconds, search_seconds, divergences, nees,
       matches;
   int num_pnp = 0, num_pnp_wrong = 0;
@@ -138,7 +146,7 @@ double SquaredMahalanobis(const TestImage& test, const VisualPose& pose) {
   return error.dot(pose.covariance.ldlt().solve(error));
 }
 
-void AddVisual(const TestImage& test, const VisualMap& map, const VisualPose& pose, Row* row) {
+void AddVisual(const TestImage& test, const VisualPose& pose, Row* row) {
   const double error_cm = 100 * (pose.position - test.truth.position).norm();
   if (!test.is_inside()) {
     ++row->num_outside;
@@ -151,14 +159,24 @@ void AddVisual(const TestImage& test, const VisualMap& map, const VisualPose& po
   ++row->num_inside;
   row->all_errors_cm.push_back(error_cm);
   row->matches.push_back(pose.num_agreeing);
-  const auto likeliest = std::max_element(pose.at_place.begin(), pose.at_place.end()) - pose.at_place.begin();
-  row->lattice_cm.push_back(100 * (map.places()[likeliest] - test.truth.position).norm());
   if (pose.flag != VisualFlag::kNone) return;
   ++row->num_fixes;
   row->num_wrong += error_cm > 100 ? 1 : 0;
   row->errors_cm.push_back(error_cm);
   row->errors_deg.push_back(AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg));
   row->nees.push_back(SquaredMahalanobis(test, pose));
+}
+
+// [Sala06 Table V] "the mean distance between the maximum-likelihood pose estimate and ground truth"
+void AddLattice(const TestImage& test, const VisualMap& map, const LatticePosterior& posterior,
+                const LatticePosterior* of_all, double uniform_weight, Row* row) {
+  row->num_without_match += posterior.num_matches == 0 ? 1 : 0;
+  row->lattice_cm.push_back(
+      100 * (map.places()[LikeliestPlace(map, posterior.at_place)] - test.truth.position).norm());
+  if (!of_all) return;
+  // [Sala06 Table VI] D = sum of p_d log(p_d / p_all)
+  row->lattice_divergences.push_back(KlDivergence(posterior.at_place, of_all->at_place, uniform_weight));
+  row->reverse_divergences.push_back(KlDivergence(of_all->at_place, posterior.at_place, uniform_weight));
 }
 
 Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
@@ -173,21 +191,43 @@ Status AddPnp(const TestImage& test, Localizer* localizer, Row* row) {
   return Ok();
 }
 
+std::string MeanText(const std::vector<double>& values) {
+  return values.empty() ? "–" : fmt::format("{:.3f} ± {:.3f}", Mean(values), Deviation(values));
+}
+
 // [Sala06 Table V, Table VI]
 void PrintRow(const Row& row) {
-  const std::string divergence =
-      row.divergences.empty()
-          ? "–"
-          : fmt::format("{:.3f} ± {:.3f}", Mean(row.divergences), Deviation(row.divergences));
   fmt::print(
-      "| {} | {} | {:.2f} | {:.0f} | {} of {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | "
+      "| {} | {} | {:.2f} | {:.1f} of {} | {} | {} | {:.0f} | {} of {} | {} | {:.1f} | {:.1f} | {:.1f} | "
+      "{:.2f} | {:.3f} | "
       "{:.4f} | {} | "
       "{:.2f} | {:.0f} | {} of {} | {} | {} | {:.1f} | {:.1f} | {:.3f} |\n",
-      row.name, row.num_landmarks, row.megabytes, row.model_bytes, row.num_fixes, row.num_inside,
-      row.num_wrong, Mean(row.errors_cm), MedianOrNan(row.errors_cm), Mean(row.all_errors_cm),
-      Mean(row.lattice_cm), MedianOrNan(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds),
-      divergence, Mean(row.nees), Mean(row.matches), row.num_flagged_outside, row.num_outside,
-      row.num_honest_outside, row.num_pnp, Mean(row.pnp_cm), MedianOrNan(row.pnp_cm), Mean(row.pnp_seconds));
+      row.name, row.num_landmarks, row.megabytes, Mean(row.lattice_cm), row.lattice_cm.size(),
+      MeanText(row.lattice_divergences), MeanText(row.reverse_divergences), row.model_bytes, row.num_fixes,
+      row.num_inside, row.num_wrong, Mean(row.errors_cm), MedianOrNan(row.errors_cm), Mean(row.all_errors_cm),
+      MedianOrNan(row.errors_deg), Mean(row.seconds), Mean(row.search_seconds), MeanText(row.divergences),
+      Mean(row.nees), Mean(row.matches), row.num_flagged_outside, row.num_outside, row.num_honest_outside,
+      row.num_pnp, Mean(row.pnp_cm), MedianOrNan(row.pnp_cm), Mean(row.pnp_seconds));
+}
+
+constexpr char kCsvHead[] =
+    "map,landmarks,megabytes,queries,without_match,lattice_mean_cm,lattice_median_cm,kl_mean,kl_sd,kl_"
+    "reverse_"
+    "mean,kl_reverse_sd,seconds,fixes,inside,fix_mean_cm,flagged_too_mean_cm,over_1_m,our_kl_mean,our_kl_"
+    "sd\n";
+
+// The same for programs; nothing where a column has no value.
+std::string CsvLine(const Row& row) {
+  const auto number = [](double value) { return std::isnan(value) ? "" : fmt::format("{:.6g}", value); };
+  const auto mean_and_deviation = [&](const std::vector<double>& values) {
+    return values.empty() ? "," : number(Mean(values)) + "," + number(Deviation(values));
+  };
+  return fmt::format("{},{},{:.3f},{},{},{},{},{},{},{:.4f},{},{},{},{},{},{}\n", row.name, row.num_landmarks,
+                     row.megabytes, row.lattice_cm.size(), row.num_without_match,
+                     number(Mean(row.lattice_cm)), number(MedianOrNan(row.lattice_cm)),
+                     mean_and_deviation(row.lattice_divergences), mean_and_deviation(row.reverse_divergences),
+                     Mean(row.seconds), row.num_fixes, row.num_inside, number(Mean(row.errors_cm)),
+                     number(Mean(row.all_errors_cm)), row.num_wrong, mean_and_deviation(row.divergences));
 }
 
 // What the map says about how good it is.
@@ -209,14 +249,15 @@ void PrintErrors(const std::string& name, const VisualMap& map) {
 void PrintPose(const Row& row, const TestImage& test, const VisualMap& map, const VisualPose& pose) {
   fmt::print(stderr,
              "{} {} {}: {} of {} possible, {} matched; spread {:.2f}; {:.2f} m out, found {:.2f}; {:.1f} cm "
-             "{:.2f} deg sd {:.1f} cm NEES {:.1f}; higher {:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}\n",
+             "{:.2f} deg sd {:.1f} cm NEES {:.1f}; higher {:.3f} m; elsewhere {:.2g}; KL {:.2f}; {}; "
+             "likeliest place {:.1f} cm off\n",
              row.name, test.name, test.is_inside() ? "inside" : "outside", pose.num_agreeing,
              pose.num_possible, pose.num_matches, pose.spread_ratio, test.out_m,
              MetresOutOfHull(map.places(), pose.position), 100 * (pose.position - test.truth.position).norm(),
              AngleBetweenDeg(pose.heading_deg, test.truth.heading_deg),
              100 * std::sqrt(pose.covariance.topLeftCorner<2, 2>().trace()), SquaredMahalanobis(test, pose),
              pose.higher_m, pose.elsewhere, row.divergences.empty() ? 0 : row.divergences.back(),
-             VisualFlagName(pose.flag));
+             VisualFlagName(pose.flag), row.lattice_cm.back());
 }
 
 Status DrawPictures(const Arguments& arguments, const std::string& map_name, const VisualMap& map,
@@ -242,15 +283,18 @@ Status Run(const Arguments& arguments) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   cv::setNumThreads(1);
   fmt::print(
-      "| map | landmarks | MB | bytes a model | fixes | > 1 m | mean error (cm) | median | mean, flagged too "
-      "| likeliest place, mean "
-      "| median (deg) | s a pose | without features | KL mean ± sd | NEES (3) | agreeing | outside: flagged "
+      "| map | landmarks | MB | likeliest place, mean (cm) | KL from all, mean ± sd | KL of all from it "
+      "| bytes a model | fixes | > 1 m | mean error (cm) | median | mean, flagged too "
+      "| median (deg) | s a pose | without features | our KL, mean ± sd | NEES (3) | agreeing | outside: "
+      "flagged "
       "| or within 3 sigma | "
       "PnP fixes | mean (cm) | "
       "median | s a pose |\n|---|{}\n",
-      "--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+      "--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
   std::vector<TestImage> images;
   std::vector<VisualPose> reference;
+  std::vector<LatticePosterior> lattice_reference;
+  std::string csv = kCsvHead;
   for (const std::string& path : arguments.maps) {
     CAIRN_ASSIGN_OR_RETURN(const auto map, Map::Open(path));
     CAIRN_ASSIGN_OR_RETURN(const auto visual, VisualMap::Load(*map, arguments.map_options));
@@ -271,13 +315,17 @@ Status Run(const Arguments& arguments) {
                              EstimateVisualPose(*visual, seen, arguments.estimate_options));
       row.search_seconds.push_back(CpuSeconds() - start);
       row.seconds.push_back(test.feature_seconds + row.search_seconds.back());
+      CAIRN_ASSIGN_OR_RETURN(LatticePosterior lattice,
+                             PosteriorOnLattice(*visual, seen, arguments.estimate_options));
+      const LatticePosterior* of_all = reference.empty() ? nullptr : &lattice_reference[poses.size()];
+      AddLattice(test, *visual, lattice, of_all, arguments.uniform_weight, &row);
+      if (reference.empty()) lattice_reference.push_back(std::move(lattice));
       if (!reference.empty() && test.is_inside()) {
-        // [Sala06 Table VI]
         row.divergences.push_back(
             PosteriorDivergence(pose, reference[poses.size()], arguments.uniform_weight));
       }
       if (arguments.print_all) PrintPose(row, test, *visual, pose);
-      AddVisual(test, *visual, pose, &row);
+      AddVisual(test, pose, &row);
       poses.push_back(pose);
       CAIRN_RETURN_IF_ERROR(AddPnp(test, &localizer, &row));
     }
@@ -292,8 +340,10 @@ Status Run(const Arguments& arguments) {
     }
     PrintErrors(row.name, *visual);
     PrintRow(row);
+    std::fflush(stdout);
+    csv += CsvLine(row);
   }
-  return Ok();
+  return arguments.csv.empty() ? Ok() : WriteFileAtomically(arguments.csv, csv);
 }
 
 }  // namespace
@@ -306,6 +356,7 @@ int main(int argc, char** argv) {
   app.add_option("maps", arguments.maps, "Maps with a visual map; the first: of all features")->required();
   app.add_option("--queries", arguments.queries, "Held-out images [the capture's queries.txt]");
   app.add_option("--pictures", arguments.pictures, "Folder for pictures of posteriors and errors");
+  app.add_option("--csv", arguments.csv, "File for the table as comma-separated values");
   app.add_option("--uniform-weight", arguments.uniform_weight, "Mixed into posteriors before KL")
       ->capture_default_str();
   app.add_flag("--print-all", arguments.print_all, "A line per image and map on stderr");

@@ -13,13 +13,15 @@
 #include "core/base/no_throw.h"
 #include "core/geometry/pose.h"
 #include "core/vocabulary/document_scores.h"
+#include "runtime/visual_map/lattice_posterior.h"
 #include "runtime/visual_map/visual_refine.h"
 #include "runtime/visual_map/visual_search.h"
 
 namespace cairn {
 namespace {
 
-// Maxima that are refined, and how far around one its points lie.
+// Maxima that are refined, and how far around one its points lie; on the lattice wider ones are left as they
+// are.
 constexpr int kNumRefined = 3;
 constexpr double kReachSpacings = 1.5;
 // Points per three standard deviations around the maximum that share out its probability.
@@ -29,6 +31,8 @@ constexpr int kSpreadSteps = 7;
 constexpr double kUnsureSpacings = 0.25;
 // How much of the uniform distribution a posterior with a flag gets.
 constexpr double kFlaggedUniform = 0.5;
+// The prior of "elsewhere" where it is no possibility; it is divided out.
+constexpr double kNoElsewhere = 1e-9;
 
 class Estimator {
  public:
@@ -63,6 +67,21 @@ class Estimator {
     SpreadAround(*refined, &pose);
     FillPose(*refined, &pose);
     return Judge(*refined, std::move(pose));
+  }
+
+  // [Sala06 §VI-C] p(x | z) over the places alone, and no pose
+  LatticePosterior RunOnLattice() {
+    VisualPose pose;
+    search_.Run();
+    const int num_landmarks = NumLandmarks();
+    std::vector<DensityMaximum> maxima;
+    if (num_landmarks >= 2) maxima = RefineMaxima(kReachSpacings * map_.spacing_m());
+    const auto refined = Best(maxima);
+    Normalise(&pose);
+    if (refined && WidthM(*refined) < kReachSpacings * map_.spacing_m()) SpreadAround(*refined, &pose);
+    const double sum = std::accumulate(pose.at_place.begin(), pose.at_place.end(), 0.0);
+    for (double& share : pose.at_place) share /= sum;
+    return {.at_place = std::move(pose.at_place), .num_matches = num_landmarks};
   }
 
  private:
@@ -104,8 +123,9 @@ class Estimator {
 
   // The most likely maxima, each refined from the best point around it; their masses are those of the search,
   // or Laplace's approximation of the maximum itself where that is larger: points lie too far apart for
-  // sharp maxima.
-  std::vector<DensityMaximum> RefineMaxima() {
+  // sharp maxima.  Those wider than `max_width_m` are left to the search: its points resolve them, and
+  // Laplace's approximation of a maximum that the matches hardly determine reaches beyond the survey.
+  std::vector<DensityMaximum> RefineMaxima(double max_width_m = std::numeric_limits<double>::infinity()) {
     const std::vector<VisualHypothesis>& hypotheses = search_.hypotheses();
     std::vector<size_t> order(hypotheses.size() - search_.first_point());
     std::iota(order.begin(), order.end(), search_.first_point());
@@ -126,9 +146,15 @@ class Estimator {
       tried.push_back(place);
       if (auto refined = RefineFromNearest(hypotheses[i])) maxima.push_back(std::move(*refined));
     }
-    for (const DensityMaximum& refined : maxima)
-      search_.AddMissingMass(PointAt(refined), kReachSpacings * map_.spacing_m());
+    for (const DensityMaximum& refined : maxima) {
+      if (WidthM(refined) < max_width_m)
+        search_.AddMissingMass(PointAt(refined), kReachSpacings * map_.spacing_m());
+    }
     return maxima;
+  }
+  // Standard deviation of the place, in any direction.
+  static double WidthM(const DensityMaximum& maximum) {
+    return std::sqrt(maximum.covariance.topLeftCorner<2, 2>().trace());
   }
 
   VisualHypothesis PointAt(const DensityMaximum& refined) const {
@@ -344,16 +370,7 @@ class Estimator {
   double log_sum_ = 0;
 };
 
-Status CheckInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
-                  const VisualEstimateOptions& options, const std::vector<double>& prior) {
-  VisualEstimateOptions checked = options;
-  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  for (const SeenLandmark& match : seen) {
-    if (match.landmark < 0 || match.landmark >= map.num_landmarks() || !match.seen.allFinite()) {
-      return MakeError(ErrorCode::kInvalidArgument, "visual map: a match of landmark {} of {} is not valid",
-                       match.landmark, map.num_landmarks());
-    }
-  }
+Status CheckPrior(const VisualMap& map, const std::vector<double>& prior) {
   if (prior.empty()) return Ok();
   double sum = 0;
   bool is_valid = prior.size() == map.places().size();
@@ -381,22 +398,29 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
                                       const VisualEstimateOptions& options,
                                       const std::vector<double>& prior) {
   return WithoutExceptions("visual map", [&]() -> Result<VisualPose> {
-    CAIRN_RETURN_IF_ERROR(CheckInput(map, seen, options, prior));
+    CAIRN_RETURN_IF_ERROR(CheckVisualInput(map, seen, options));
+    CAIRN_RETURN_IF_ERROR(CheckPrior(map, prior));
     return Estimator(map, seen, options, prior).Run();
   });
 }
 
+Result<LatticePosterior> PosteriorOnLattice(const VisualMap& map, const std::vector<SeenLandmark>& seen,
+                                            const VisualEstimateOptions& options) {
+  return WithoutExceptions("visual map", [&]() -> Result<LatticePosterior> {
+    CAIRN_RETURN_IF_ERROR(CheckVisualInput(map, seen, options));
+    VisualEstimateOptions without_elsewhere = options;
+    without_elsewhere.elsewhere_ratio = kNoElsewhere;
+    return Estimator(map, seen, without_elsewhere, {}).RunOnLattice();
+  });
+}
+
 double PosteriorDivergence(const VisualPose& p, const VisualPose& q, double uniform_weight) {
-  const auto count = static_cast<double>(p.at_place.size() + 1);
-  // [Sala06 §VI-C] "we mixed a uniform distribution with a small weight with each distribution"
-  const auto mixed = [&](double share) { return (1 - uniform_weight) * share + uniform_weight / count; };
-  // [Sala06 §VI-C] D = sum over x of p(x) log(p(x) / q(x)), in nats
-  const auto part = [&](double of_p, double of_q) {
-    return mixed(of_p) > 0 ? mixed(of_p) * std::log(mixed(of_p) / mixed(of_q)) : 0.0;
+  const auto with_elsewhere = [](const VisualPose& pose) {
+    std::vector<double> shares = pose.at_place;
+    shares.push_back(pose.elsewhere);
+    return shares;
   };
-  double divergence = part(p.elsewhere, q.elsewhere);
-  for (size_t i = 0; i < p.at_place.size(); ++i) divergence += part(p.at_place[i], q.at_place[i]);
-  return divergence;
+  return KlDivergence(with_elsewhere(p), with_elsewhere(q), uniform_weight);
 }
 
 }  // namespace cairn

@@ -107,8 +107,22 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
                                       const VisualEstimateOptions& options = {},
                                       const std::vector<double>& prior = {});
 
-// Kullback-Leibler divergence of p from q, nats, after mixing `uniform_weight` of the uniform distribution
-// into both [Sala06 §VI-C]; of two posteriors over the same places, with "elsewhere".
+// p(x | z) over the survey's places as the source has it [Sala06 §VI-C]:
+//   p(x | z) ~ p(z | x) p(x)   with p(x) uniform over the places, and nothing beside them:
+// no "elsewhere", no flags, so that every image has an estimate (LikeliestPlace of
+// runtime/visual_map/lattice_posterior.h), also one without a match.  For comparisons with the source; a
+// robot takes EstimateVisualPose, which says when not to believe it.
+struct LatticePosterior {
+  std::vector<double> at_place;  // per place of the map; sums to 1
+  int num_matches = 0;           // landmarks
+};
+// `options`: of the likelihood; elsewhere_ratio and the limits of flags are not used.  O(matches * places).
+// Errors: as EstimateVisualPose.
+Result<LatticePosterior> PosteriorOnLattice(const VisualMap& map, const std::vector<SeenLandmark>& seen,
+                                            const VisualEstimateOptions& options = {});
+
+// KlDivergence (runtime/visual_map/lattice_posterior.h) of two posteriors over the same places, with
+// "elsewhere" as one place more, and with what flags do to them: not the source's, which knows neither.
 double PosteriorDivergence(const VisualPose& p, const VisualPose& q, double uniform_weight);
 
 }  // namespace cairn

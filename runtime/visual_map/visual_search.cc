@@ -17,6 +17,19 @@ constexpr int kNumTurnSteps = 3;
 
 }  // namespace
 
+Status CheckVisualInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
+                        const VisualEstimateOptions& options) {
+  VisualEstimateOptions checked = options;
+  CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  for (const SeenLandmark& match : seen) {
+    if (match.landmark < 0 || match.landmark >= map.num_landmarks() || !match.seen.allFinite()) {
+      return MakeError(ErrorCode::kInvalidArgument, "visual map: a match of landmark {} of {} is not valid",
+                       match.landmark, map.num_landmarks());
+    }
+  }
+  return Ok();
+}
+
 VisualSearch::VisualSearch(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                            const VisualEstimateOptions& options, const std::vector<double>& log_prior)
     : map_(map), seen_(seen), options_(options), log_prior_(log_prior) {

@@ -26,6 +26,10 @@ struct VisualTerm {
   const VisualMap::AtPlace* at;
 };
 
+// Errors: InvalidArgument (a landmark that does not exist, a number that is not finite, a bad option).
+Status CheckVisualInput(const VisualMap& map, const std::vector<SeenLandmark>& seen,
+                        const VisualEstimateOptions& options);
+
 // How well every place and heading of a visual map explains an image, and points around the best ones: the
 // parts of p(x | z) of runtime/visual_map/visual_estimate.h.
 class VisualSearch {
