@@ -7,7 +7,7 @@
 #include "stages/decompose_regions/cover/core_finder.h"
 #include "stages/decompose_regions/cover/counting_bound.h"
 #include "stages/decompose_regions/cover/cover_annealing.h"
-#include "stages/decompose_regions/cover/pricing.h"
+#include "stages/decompose_regions/cover/exact_pricing.h"
 #include "stages/decompose_regions/decompose_regions.h"
 #include "tests/decompose_regions/all_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
@@ -128,7 +128,7 @@ TEST(LowerBound, RegionMayCoverStationsThatAreNotConnected) {
   }
 }
 
-TEST(RegionPricer, FindsTheMostValuableRegionOfAll) {
+TEST(ExactPricer, FindsTheMostValuableRegionOfAll) {
   for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
     const World world = SmallWorld(seed);
     const ReducedWorld wide = ReduceWorld(world, KOf(seed), TauOf(seed), seed, AreaSplit::kBeforeShrinking);
@@ -144,9 +144,9 @@ TEST(RegionPricer, FindsTheMostValuableRegionOfAll) {
       for (int v = 0; v < 9; ++v) value += cover >> v & 1 ? values[v] : 0;
       most = std::max(most, value);
     }
-    RegionPricer pricer(wide);
+    ExactPricer pricer(wide);
     std::vector<CoreRegion> found;
-    EXPECT_EQ(pricer.MaxValue(values, 0, 1000000, 1000, &found), most) << "seed " << seed;
+    EXPECT_EQ(pricer.MaxValue(values, 0, 1000000, &found), most) << "seed " << seed;
     int64_t most_found = 0;
     for (const CoreRegion& region : found) {
       int64_t value = 0;
@@ -156,9 +156,9 @@ TEST(RegionPricer, FindsTheMostValuableRegionOfAll) {
     EXPECT_EQ(most_found, most) << "seed " << seed;
     // Cut short it still is an upper bound.
     for (const int64_t max_work : {0, 10, 30, 100}) {
-      EXPECT_GE(pricer.MaxValue(values, 0, max_work, 1000, &found), most) << "seed " << seed;
+      EXPECT_GE(pricer.MaxValue(values, 0, max_work, &found), most) << "seed " << seed;
     }
-    EXPECT_GE(pricer.MaxValue(values, most / 2, 1000000, 1000, &found), most) << "seed " << seed;
+    EXPECT_GE(pricer.MaxValue(values, most / 2, 1000000, &found), most) << "seed " << seed;
   }
 }
 
