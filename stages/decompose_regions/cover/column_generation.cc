@@ -118,12 +118,15 @@ void ColumnGeneration::LowerMaxUncovered(int max_uncovered) {
 
 void ColumnGeneration::RunExactRounds() {
   const int64_t max_work = options_.max_work_ratio * wide_.areas.num_values();
+  int64_t total_work = 0;
   for (int round = 0; round < options_.num_exact_rounds; ++round) {
+    if (total_work > options_.max_total_work_ratio * wide_.areas.num_values()) break;
     lp_.Iterate(options_.num_exact_iterations);
     const DualValues dual = RoundedDual(lp_.station_values(), pool_, max_uncovered_);
     std::vector<CoreRegion> found;
     const int64_t max_value =
         exact_pricer_.MaxValue(dual.values, dual.most + dual.most / kExactMargin, max_work, &found);
+    total_work += exact_pricer_.work();
     lower_bound_ = std::max(lower_bound_, CeilRatio(dual.covered, max_value));
     // Regions that join the pool only lower its optimum.
     const bool is_tight = CeilRatio(dual.covered, dual.most) <= lower_bound_;

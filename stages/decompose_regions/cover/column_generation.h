@@ -19,7 +19,9 @@ struct ColumnGenerationOptions {
   int num_exact_iterations = 1000;  // of the linear program, between two exact pricings
   int min_new_regions = 20;         // a round adds at most this many regions, or the following share of the
   double max_new_ratio = 0.125;     // coverable stations if that is more
-  int64_t max_work_ratio = 2000;    // of the incidences that one exact pricing looks at to those of the world
+  // Steps of exact pricing for each incidence of the world: of one pricing before it settles for a weaker
+  // bound, and of all pricings for one number of uncovered stations.
+  int64_t max_work_ratio = 2000, max_total_work_ratio = 10000;
 };
 
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of

@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kBitsInWord = 64;
 // When the work is spent, the threshold rises by its part 1 / this, for a part 1 / this of the work.
-constexpr int64_t kRaise = 16;
+constexpr int64_t kRaise = 32;
 
 // Calls `visit` with the index of each bit of words[i] & mask[i].
 template <typename Visitor>
@@ -42,16 +42,18 @@ int64_t ExactPricer::MaxValue(const StationValues& values, int64_t threshold, in
                               std::vector<CoreRegion>* found) {
   values_ = &values;
   least_ = threshold_ = threshold;
+  work_ = 0;
   work_left_ = max_work;
   more_work_ = max_work / kRaise;
   int64_t max_value = threshold;
-  KeepLive();
   was_anchor_.assign(wide_.num_stations(), 0);
+  KeepLive();
   for (const StationIdx anchor : AnchorOrder()) {
     anchor_ = anchor;
     best_ = {};
     threshold_ = least_;
-    Search(RootOf(anchor));
+    const std::vector<StationIdx> sharing = Sharing(anchor);
+    if (TotalValue(anchor, sharing) > threshold_) Search(Root(anchor, sharing));
     was_anchor_[anchor] = 1;
     max_value = std::max(max_value, threshold_);
     if (!best_.stations.empty()) found->push_back(std::move(best_));
@@ -77,8 +79,8 @@ void ExactPricer::KeepLive() {
   live_sets_ = live_areas_.Transposed(wide_.num_stations());
 }
 
-// Sets num_shared_ and sharing_ to the stations that share features with the anchor, itself included.
-void ExactPricer::CountShared(StationIdx anchor) {
+// Stations that share k features with the anchor and were no anchors yet, itself excluded, ascending.
+std::vector<StationIdx> ExactPricer::Sharing(StationIdx anchor) {
   sharing_.clear();
   for (const int32_t feature : live_sets_[anchor]) {
     for (const StationIdx station : live_areas_[feature]) {
@@ -86,6 +88,21 @@ void ExactPricer::CountShared(StationIdx anchor) {
     }
     Spend(static_cast<int64_t>(live_areas_[feature].size()));
   }
+  std::vector<StationIdx> stations;
+  for (const StationIdx station : sharing_) {
+    if (num_shared_[station] >= wide_.k && !was_anchor_[station] && station != anchor)
+      stations.push_back(station);
+    num_shared_[station] = 0;
+  }
+  std::sort(stations.begin(), stations.end());
+  return stations;
+}
+
+// Value of the anchor and other stations.
+int64_t ExactPricer::TotalValue(StationIdx anchor, const std::vector<StationIdx>& others) const {
+  int64_t value = (*values_)[anchor];
+  for (const StationIdx station : others) value += (*values_)[station];
+  return value;
 }
 
 // Anchors of little value around them first: their regions are soon ruled out, and the others then have fewer
@@ -94,12 +111,7 @@ std::vector<StationIdx> ExactPricer::AnchorOrder() {
   std::vector<std::pair<int64_t, StationIdx>> order;
   for (StationIdx anchor = 0; anchor < wide_.num_stations(); ++anchor) {
     if (static_cast<int>(live_sets_[anchor].size()) < wide_.k) continue;
-    CountShared(anchor);
-    int64_t value = 0;
-    for (const StationIdx station : sharing_) {
-      if (num_shared_[station] >= wide_.k) value += (*values_)[station];
-      num_shared_[station] = 0;
-    }
+    const int64_t value = TotalValue(anchor, Sharing(anchor));
     if (value > threshold_) order.emplace_back(value, anchor);
   }
   std::sort(order.begin(), order.end());
@@ -108,9 +120,10 @@ std::vector<StationIdx> ExactPricer::AnchorOrder() {
   return anchors;
 }
 
-ExactPricer::Node ExactPricer::RootOf(StationIdx anchor) {
+ExactPricer::Node ExactPricer::Root(StationIdx anchor, const std::vector<StationIdx>& stations) {
   const auto features = live_sets_[anchor];
   num_words_ = features.size() / kBitsInWord + 1;
+  losses_.assign(features.size(), 0);
   Node root;
   root.features.assign(num_words_, 0);
   root.num_features = static_cast<int>(features.size());
@@ -120,12 +133,7 @@ ExactPricer::Node ExactPricer::RootOf(StationIdx anchor) {
   }
   root.covered = (*values_)[anchor];
   missing_.clear();
-  CountShared(anchor);
-  std::sort(sharing_.begin(), sharing_.end());
-  for (const StationIdx station : sharing_) {
-    const bool is_open = num_shared_[station] >= wide_.k && !was_anchor_[station] && station != anchor;
-    num_shared_[station] = 0;
-    if (!is_open) continue;
+  for (const StationIdx station : stations) {
     root.open.push_back({(*values_)[station], static_cast<int32_t>(root.open.size()), 0});
     const size_t first_word = missing_.size();
     missing_.insert(missing_.end(), root.features.begin(), root.features.end());
@@ -137,12 +145,12 @@ ExactPricer::Node ExactPricer::RootOf(StationIdx anchor) {
     Spend(static_cast<int64_t>(live_sets_[station].size()));
   }
   for (const int32_t feature : features) local_[feature] = -1;
-  losses_.assign(features.size(), 0);
   return root;
 }
 
 // After the work is spent, regions of a somewhat larger value are no longer told from each other.
 void ExactPricer::Spend(int64_t work) {
+  work_ += work;
   work_left_ -= work;
   if (work_left_ > 0) return;
   least_ += least_ / kRaise + 1;

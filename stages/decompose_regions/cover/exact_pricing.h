@@ -25,11 +25,13 @@ class ExactPricer {
 
   // An upper bound of the value of every region of the world with k common features (CoreFinder): at least
   // `threshold`, and equal to the largest value if that is more and the search was complete.  After
-  // `max_work` steps the threshold rises by a sixteenth, and again and again after each further sixteenth of
+  // `max_work` steps the threshold rises by a 32nd, and again and again after each further 32nd of
   // `max_work`.  Appends for each anchor the most valuable core found, if it is worth more than the
   // threshold.
   int64_t MaxValue(const StationValues& values, int64_t threshold, int64_t max_work,
                    std::vector<CoreRegion>* found);
+  // Steps of the last call.
+  int64_t work() const { return work_; }
 
  private:
   // The anchor's features are numbered 0, 1, ... here, and sets of them are bits of words.
@@ -49,8 +51,9 @@ class ExactPricer {
 
   void KeepLive();
   std::vector<StationIdx> AnchorOrder();
-  void CountShared(StationIdx anchor);
-  Node RootOf(StationIdx anchor);
+  std::vector<StationIdx> Sharing(StationIdx anchor);
+  int64_t TotalValue(StationIdx anchor, const std::vector<StationIdx>& others) const;
+  Node Root(StationIdx anchor, const std::vector<StationIdx>& stations);
   void Search(Node node);
   bool Narrow(Node* node);
   bool DropFeatures(Node* node);
@@ -71,7 +74,7 @@ class ExactPricer {
   std::vector<char> was_anchor_;       // per station
   int64_t least_ = 0;                  // the threshold of all anchors
   int64_t threshold_ = 0;              // of this anchor: its best region so far, if that is more
-  int64_t work_left_ = 0, more_work_ = 0;
+  int64_t work_ = 0, work_left_ = 0, more_work_ = 0;
   // Of the anchor.
   StationIdx anchor_ = 0;
   CoreRegion best_;
