@@ -189,8 +189,8 @@ TEST(ExactPricer, FindsTheMostValuableRegionOfManyFeatures) {
     ExpectExact(SmallWorld(seed, 13), 5 + static_cast<int>(seed % 5), static_cast<int>(seed / 30 % 2), seed);
 }
 
-//   0 1 2 3 4    70 features are seen from 0 1 2, 70 from 2 3 4 and one from all: with k = 71 two stations
-//                in the middle are worth nothing together, with k = 72 no region is left but station 2.
+//   0 1 2 3 4    One feature is seen from all, 70 from 0 1 2 and 70 from 2 3 4.  With k = 2 to 71 the three
+//                stations on the right are the most valuable region, with k = 72 station 2 is the only one.
 TEST(ExactPricer, TellsMoreFeaturesApartThanAWordHasBits) {
   std::vector<std::vector<std::string>> features = {{"#####"}};
   for (int i = 0; i < 70; ++i) {
@@ -203,6 +203,46 @@ TEST(ExactPricer, TellsMoreFeaturesApartThanAWordHasBits) {
     const ReducedWorld wide = ReduceWorld(world, k, 0, 0, AreaSplit::kBeforeShrinking);
     std::vector<CoreRegion> found;
     EXPECT_EQ(ExactPricer(wide).MaxValue(values, 0, 1000000, &found), most) << k;
+  }
+}
+
+//        nnn      From a niche n no feature is seen, so with tau = 1 no station x of the two corridors is
+//   oooooxxxooo   coverable, but a region may pass through the corridor whose features are all in it.
+//   oooLo   oRo
+//   oooooxxxooo
+//        nnn
+TEST(ExactPricer, ChoosesFeaturesThatHoldARegionTogether) {
+  const std::vector<std::string> stations = {".....nnn...", "ooooooooooo", "ooooo...ooo", "ooooooooooo",
+                                             ".....nnn..."};
+  const std::vector<std::string> lower = {"...........", "#####...###", "#####...###", "###########",
+                                          "..........."};
+  const std::vector<std::string> upper = {"...........", "###########", "#####...###", "#####...###",
+                                          "..........."};
+  // Seen in both corridors, but from the fewest stations.
+  const std::vector<std::string> both = {"...........", "..#########", "..###...###", "..#########",
+                                         "..........."};
+  const StationIdx left = 3 + 11 + 3, right = 3 + 11 + 6;  // L and R
+  struct Case {
+    int k, num_each, num_both;
+    int64_t most;
+  };
+  // k features of one corridor and both hold L and R together; those of different corridors do not.
+  for (const auto& [k, num_each, num_both, most] :
+       {Case{2, 1, 1, 2}, Case{3, 1, 1, 1}, Case{3, 2, 1, 2}, Case{4, 2, 2, 2}, Case{5, 2, 2, 1}}) {
+    std::vector<std::vector<std::string>> features;
+    for (int i = 0; i < num_each; ++i) features.insert(features.end(), {lower, upper});
+    for (int i = 0; i < num_both; ++i) features.push_back(both);
+    const World world = AsciiWorld(stations, features);
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+      const ReducedWorld wide = ReduceWorld(world, k, 1, seed, AreaSplit::kBeforeShrinking);
+      StationValues values(world.num_stations(), 0);
+      values[left] = values[right] = 1;
+      std::vector<CoreRegion> found;
+      EXPECT_EQ(ExactPricer(wide).MaxValue(values, 0, 1000000, &found), most) << k << " seed " << seed;
+      ASSERT_FALSE(found.empty());
+      EXPECT_EQ(ValueOf(found[0].stations, values), most);
+      EXPECT_EQ(found[0].features.size(), k);
+    }
   }
 }
 
