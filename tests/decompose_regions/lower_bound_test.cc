@@ -7,7 +7,7 @@
 #include "stages/decompose_regions/cover/core_finder.h"
 #include "stages/decompose_regions/cover/counting_bound.h"
 #include "stages/decompose_regions/cover/cover_annealing.h"
-#include "stages/decompose_regions/cover/pricing.h"
+#include "stages/decompose_regions/cover/exact_pricing.h"
 #include "stages/decompose_regions/decompose_regions.h"
 #include "tests/decompose_regions/all_regions.h"
 #include "tests/decompose_regions/ascii_world.h"
@@ -35,15 +35,14 @@ std::vector<std::pair<StationIdx, StationIdx>> Edges(int shape, Random* random) 
   return {edges.begin(), edges.end()};
 }
 
-// Nine stations and seven features whose areas are intervals of station numbers with or without holes,
-// or anything.
-World SmallWorld(uint64_t seed) {
+// Nine stations and features whose areas are intervals of station numbers with or without holes, or anything.
+World SmallWorld(uint64_t seed, int num_features = 7) {
   Random random(MixSeed(7, seed));
   World world;
   for (int v = 0; v < 9; ++v) world.positions.emplace_back(v % 3, v / 3);
   world.edges = Edges(static_cast<int>(seed % 6), &random);
   const double density = random.Uniform(0.5, 1.0);
-  for (int feature = 0; feature < 7; ++feature) {
+  for (int feature = 0; feature < num_features; ++feature) {
     std::vector<StationIdx>& area = world.areas.emplace_back();
     const int64_t first = random.UniformInt(-4, 5), last = first + random.UniformInt(3, 9);
     for (StationIdx v = 0; v < 9; ++v) {
@@ -95,21 +94,26 @@ TEST(LowerBound, NeverExceedsTheOptimumNorTheRegions) {
   EXPECT_GE(num_tight, num_best * 80 / 100) << num_best;
 }
 
+// Bounds against the oracle for every number of uncovered stations.
+void ExpectBounds(const World& world, int k, int tau, uint64_t seed) {
+  const AllRegions all(world, k, tau);
+  Result<Decomposition> result =
+      DecomposeRegions(world, {.algorithm = "b2", .k = k, .tau = tau, .rho = 0}, seed);
+  if (!result.ok()) return;
+  const ReducedWorld reduced = ReduceWorld(world, k, tau, seed);
+  const int num_coverable = static_cast<int>(CoverableStations(world, k, tau).size());
+  for (int max_uncovered = 0; max_uncovered <= num_coverable; ++max_uncovered) {
+    result->uncovered.assign(max_uncovered, 0);
+    const int optimum = all.Fewest(max_uncovered);
+    ASSERT_LE(CertifiedLowerBound(world, *result), optimum) << "seed " << seed;
+    ASSERT_LE(CountingBound(reduced, max_uncovered), optimum) << "seed " << seed;
+  }
+}
+
 TEST(LowerBound, HoldsForEveryNumberOfUncoveredStations) {
   for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
-    const World world = SmallWorld(seed);
-    const AllRegions all(world, KOf(seed), TauOf(seed));
-    const DecomposeRegionsOptions options{.algorithm = "b2", .k = KOf(seed), .tau = TauOf(seed), .rho = 0};
-    Result<Decomposition> result = DecomposeRegions(world, options, seed);
-    if (!result.ok()) continue;
-    const ReducedWorld reduced = ReduceWorld(world, options.k, options.tau, seed);
-    const int num_coverable = static_cast<int>(CoverableStations(world, options.k, options.tau).size());
-    for (int max_uncovered = 0; max_uncovered <= num_coverable; ++max_uncovered) {
-      result->uncovered.assign(max_uncovered, 0);
-      const int optimum = all.Fewest(max_uncovered);
-      ASSERT_LE(CertifiedLowerBound(world, *result), optimum) << "seed " << seed;
-      ASSERT_LE(CountingBound(reduced, max_uncovered), optimum) << "seed " << seed;
-    }
+    ExpectBounds(SmallWorld(seed), KOf(seed), TauOf(seed), seed);
+    if (seed % 4 == 0) ExpectBounds(SmallWorld(seed, 13), 5 + static_cast<int>(seed / 4 % 5), 0, seed);
   }
 }
 
@@ -128,38 +132,134 @@ TEST(LowerBound, RegionMayCoverStationsThatAreNotConnected) {
   }
 }
 
-TEST(RegionPricer, FindsTheMostValuableRegionOfAll) {
-  for (uint64_t seed = 0; seed < kNumWorlds; ++seed) {
-    const World world = SmallWorld(seed);
-    const ReducedWorld wide = ReduceWorld(world, KOf(seed), TauOf(seed), seed, AreaSplit::kBeforeShrinking);
-    Random random(seed);
-    StationValues values(9, 0);
-    for (StationIdx v = 0; v < 9; ++v) {
-      if (wide.coverable[v]) values[v] = random.UniformInt(0, 5);
-    }
-    const AllRegions all(world, KOf(seed), TauOf(seed));
-    int64_t most = 0;
-    for (const uint32_t cover : all.covers()) {
-      int64_t value = 0;
-      for (int v = 0; v < 9; ++v) value += cover >> v & 1 ? values[v] : 0;
-      most = std::max(most, value);
-    }
-    RegionPricer pricer(wide);
-    std::vector<CoreRegion> found;
-    EXPECT_EQ(pricer.MaxValue(values, 0, 1000000, 1000, &found), most) << "seed " << seed;
-    int64_t most_found = 0;
-    for (const CoreRegion& region : found) {
-      int64_t value = 0;
-      for (const StationIdx station : region.stations) value += values[station];
-      most_found = std::max(most_found, value);
-    }
-    EXPECT_EQ(most_found, most) << "seed " << seed;
-    // Cut short it still is an upper bound.
-    for (const int64_t max_work : {0, 10, 30, 100}) {
-      EXPECT_GE(pricer.MaxValue(values, 0, max_work, 1000, &found), most) << "seed " << seed;
-    }
-    EXPECT_GE(pricer.MaxValue(values, most / 2, 1000000, 1000, &found), most) << "seed " << seed;
+int64_t ValueOf(const std::vector<StationIdx>& stations, const StationValues& values) {
+  int64_t value = 0;
+  for (const StationIdx station : stations) value += values[station];
+  return value;
+}
+
+// Exact pricing against the oracle, with values drawn from the seed.
+void ExpectExact(const World& world, int k, int tau, uint64_t seed) {
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  const ReducedWorld wide = ReduceWorld(world, k, tau, seed, AreaSplit::kBeforeShrinking);
+  Random random(seed);
+  StationValues values(9, 0);
+  for (StationIdx v = 0; v < 9; ++v) {
+    if (wide.coverable[v]) values[v] = random.UniformInt(0, 5);
   }
+  const AllRegions all(world, k, tau);
+  int64_t most = 0;
+  for (const uint32_t cover : all.covers()) {
+    int64_t value = 0;
+    for (int v = 0; v < 9; ++v) value += cover >> v & 1 ? values[v] : 0;
+    most = std::max(most, value);
+  }
+  ExactPricer pricer(wide);
+  std::vector<CoreRegion> found;
+  EXPECT_EQ(pricer.MaxValue(values, 0, 1000000, &found), most);
+  int64_t most_found = 0;
+  for (const CoreRegion& region : found) {
+    most_found = std::max(most_found, ValueOf(region.stations, values));
+    uint32_t cover = 0;
+    for (const StationIdx station : region.stations) cover |= uint32_t{1} << station;
+    EXPECT_EQ(all.covers().count(cover), 1);
+    EXPECT_EQ(region.features.size(), k);
+  }
+  EXPECT_EQ(most_found, most);
+  // A threshold just below the largest value finds it, the value itself finds nothing.
+  for (const int64_t threshold : {most - 1, most, most + 1}) {
+    if (threshold < 0) continue;
+    found.clear();
+    EXPECT_EQ(pricer.MaxValue(values, threshold, 1000000, &found), std::max(most, threshold));
+    EXPECT_EQ(found.empty(), threshold >= most);
+  }
+  // Cut short it still is an upper bound.
+  for (const int64_t max_work : {0, 10, 30, 100}) {
+    EXPECT_GE(pricer.MaxValue(values, 0, max_work, &found), most);
+  }
+}
+
+TEST(ExactPricer, FindsTheMostValuableRegionOfAll) {
+  for (uint64_t seed = 0; seed < kNumWorlds; ++seed)
+    ExpectExact(SmallWorld(seed), KOf(seed), TauOf(seed), seed);
+}
+
+TEST(ExactPricer, FindsTheMostValuableRegionOfManyFeatures) {
+  for (uint64_t seed = 0; seed < 300; ++seed)
+    ExpectExact(SmallWorld(seed, 13), 5 + static_cast<int>(seed % 5), static_cast<int>(seed / 30 % 2), seed);
+}
+
+//   0 1 2 3 4    One feature is seen from all, 70 from 0 1 2 and 70 from 2 3 4.  With k = 2 to 71 the three
+//                stations on the right are the most valuable region, with k = 72 station 2 is the only one.
+TEST(ExactPricer, TellsMoreFeaturesApartThanAWordHasBits) {
+  std::vector<std::vector<std::string>> features = {{"#####"}};
+  for (int i = 0; i < 70; ++i) {
+    features.push_back({"###.."});
+    features.push_back({"..###"});
+  }
+  const World world = AsciiWorld({"ooooo"}, features);
+  const StationValues values = {1, 2, 4, 8, 16};
+  for (const auto& [k, most] : {std::pair(1, 31), std::pair(2, 28), std::pair(71, 28), std::pair(72, 4)}) {
+    const ReducedWorld wide = ReduceWorld(world, k, 0, 0, AreaSplit::kBeforeShrinking);
+    std::vector<CoreRegion> found;
+    EXPECT_EQ(ExactPricer(wide).MaxValue(values, 0, 1000000, &found), most) << k;
+  }
+}
+
+//        nnn      From a niche n no feature is seen, so with tau = 1 no station x of the two corridors is
+//   oooooxxxooo   coverable, but a region may pass through the corridor whose features are all in it.
+//   oooLo   oRo
+//   oooooxxxooo
+//        nnn
+TEST(ExactPricer, ChoosesFeaturesThatHoldARegionTogether) {
+  const std::vector<std::string> stations = {".....nnn...", "ooooooooooo", "ooooo...ooo", "ooooooooooo",
+                                             ".....nnn..."};
+  const std::vector<std::string> lower = {"...........", "#####...###", "#####...###", "###########",
+                                          "..........."};
+  const std::vector<std::string> upper = {"...........", "###########", "#####...###", "#####...###",
+                                          "..........."};
+  // Seen in both corridors, but from the fewest stations.
+  const std::vector<std::string> both = {"...........", "..#########", "..###...###", "..#########",
+                                         "..........."};
+  const StationIdx left = 3 + 11 + 3, right = 3 + 11 + 6;  // L and R
+  struct Case {
+    int k, num_each, num_both;
+    int64_t most;
+  };
+  // k features of one corridor and both hold L and R together; those of different corridors do not.
+  for (const auto& [k, num_each, num_both, most] :
+       {Case{2, 1, 1, 2}, Case{3, 1, 1, 1}, Case{3, 2, 1, 2}, Case{4, 2, 2, 2}, Case{5, 2, 2, 1}}) {
+    std::vector<std::vector<std::string>> features;
+    for (int i = 0; i < num_each; ++i) features.insert(features.end(), {lower, upper});
+    for (int i = 0; i < num_both; ++i) features.push_back(both);
+    const World world = AsciiWorld(stations, features);
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+      const ReducedWorld wide = ReduceWorld(world, k, 1, seed, AreaSplit::kBeforeShrinking);
+      StationValues values(world.num_stations(), 0);
+      values[left] = values[right] = 1;
+      std::vector<CoreRegion> found;
+      EXPECT_EQ(ExactPricer(wide).MaxValue(values, 0, 1000000, &found), most) << k << " seed " << seed;
+      ASSERT_FALSE(found.empty());
+      EXPECT_EQ(ValueOf(found[0].stations, values), most);
+      EXPECT_EQ(found[0].features.size(), k);
+    }
+  }
+}
+
+// With k = 40 a region can give up few of a station's features; the bound must not be cut short there.
+TEST(LowerBound, IsNearTheRegionsWhenManyFeaturesMustBeSeen) {
+  int num_regions = 0, lower_bound = 0;
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    const World world = RandomWorld(22, 18, 260, false, seed);
+    for (const int k : {10, 40}) {
+      const Result<Decomposition> best =
+          DecomposeRegions(world, {.algorithm = "best", .k = k, .tau = 1, .rho = 3}, seed);
+      ASSERT_TRUE(best.ok());
+      num_regions += static_cast<int>(best->regions.size());
+      lower_bound += *best->lower_bound;
+    }
+  }
+  EXPECT_LE(num_regions, lower_bound * 1.1) << lower_bound;
 }
 
 TEST(Best, NeedsNoMoreRegionsThanB2AndLeavesNoMoreUncovered) {

@@ -11,7 +11,7 @@ namespace {
 constexpr double kValueUnit = 0x1p-32;
 // A region joins the pool when its value exceeds that of every region in it by the value's part 1 / this; for
 // exact pricing the bound loses at most this part.
-constexpr int64_t kGreedyMargin = 500, kExactMargin = 20000;
+constexpr int64_t kGreedyMargin = 500, kExactMargin = 5000;
 // Integer covers also use regions of less value: down to this percentage of the most valuable one of the
 // pool, with values changed at random by up to this ratio.
 constexpr int64_t kNearlyPercent = 85;
@@ -64,6 +64,7 @@ ColumnGeneration::ColumnGeneration(const ReducedWorld& wide, int max_uncovered,
       max_new_regions_(
           std::max(options.min_new_regions, static_cast<int>(options.max_new_ratio * wide.num_coverable))),
       pricer_(wide),
+      exact_pricer_(wide),
       lp_(pool_, wide.coverable, max_uncovered) {}
 
 int ColumnGeneration::AddMostValuable(const StationValues& values, std::vector<CoreRegion> found) {
@@ -117,14 +118,19 @@ void ColumnGeneration::LowerMaxUncovered(int max_uncovered) {
 
 void ColumnGeneration::RunExactRounds() {
   const int64_t max_work = options_.max_work_ratio * wide_.areas.num_values();
+  int64_t total_work = 0;
   for (int round = 0; round < options_.num_exact_rounds; ++round) {
+    if (total_work > options_.max_total_work_ratio * wide_.areas.num_values()) break;
     lp_.Iterate(options_.num_exact_iterations);
     const DualValues dual = RoundedDual(lp_.station_values(), pool_, max_uncovered_);
     std::vector<CoreRegion> found;
-    const int64_t max_value = pricer_.MaxValue(dual.values, dual.most + dual.most / kExactMargin, max_work,
-                                               max_new_regions_, &found);
+    const int64_t max_value =
+        exact_pricer_.MaxValue(dual.values, dual.most + dual.most / kExactMargin, max_work, &found);
+    total_work += exact_pricer_.work();
     lower_bound_ = std::max(lower_bound_, CeilRatio(dual.covered, max_value));
-    if (AddMostValuable(dual.values, std::move(found)) == 0) break;
+    // Regions that join the pool only lower its optimum.
+    const bool is_tight = CeilRatio(dual.covered, dual.most) <= lower_bound_;
+    if (AddMostValuable(dual.values, std::move(found)) == 0 || is_tight) break;
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/base/random.h"
 #include "stages/decompose_regions/cover/cover_lp.h"
+#include "stages/decompose_regions/cover/exact_pricing.h"
 #include "stages/decompose_regions/cover/pricing.h"
 #include "stages/decompose_regions/cover/region_pool.h"
 
@@ -18,7 +19,9 @@ struct ColumnGenerationOptions {
   int num_exact_iterations = 1000;  // of the linear program, between two exact pricings
   int min_new_regions = 20;         // a round adds at most this many regions, or the following share of the
   double max_new_ratio = 0.125;     // coverable stations if that is more
-  int64_t max_work_ratio = 200;     // of the incidences that one exact pricing looks at to those of the world
+  // Steps of exact pricing for each incidence of the world: of one pricing before it settles for a weaker
+  // bound, and of all pricings for one number of uncovered stations.
+  int64_t max_work_ratio = 2000, max_total_work_ratio = 10000;
 };
 
 // The linear relaxation of covering all but H coverable stations with the fewest regions, over all regions of
@@ -33,7 +36,7 @@ struct ColumnGenerationOptions {
 //          >=  (sum of y_v) - H z                     at most H stations of at most z are not covered
 // so |D| >= ((sum of y_v) - H z) / M, rounded up.  The values y come from the linear program, scaled and
 // rounded; none of this depends on how well it was solved.  M comes from branch and bound over all regions
-// (RegionPricer::MaxValue).
+// (ExactPricer::MaxValue).
 class ColumnGeneration {
  public:
   // `wide` outlives this object; reduced with AreaSplit::kBeforeShrinking.
@@ -64,6 +67,7 @@ class ColumnGeneration {
   const int max_new_regions_;
   RegionPool pool_;
   RegionPricer pricer_;
+  ExactPricer exact_pricer_;
   CoverLp lp_;
   int lower_bound_ = 0;
 };
