@@ -99,8 +99,10 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   }
   if (!arguments.is_sequence) {
     RegionTrackerOptions of_tracker;
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        NamesOf(DescribeOptions(&of_tracker)), "is for frames in order; give --sequence, or leave it out"));
+    for (const OptionTable& table : {DescribeOptions(&of_tracker), DescribeOptions(&of_tracker.votes)}) {
+      CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+          NamesOf(table), "is for frames in order; give --sequence, or leave it out"));
+    }
   }
   if (arguments.estimator == "pnp") {
     VisualMapOptions of_map;
@@ -207,6 +209,7 @@ nlohmann::ordered_json PnpJson(const Answer& answer) {
   json["num_matches"] = found.num_matches;
   json["num_inliers"] = found.num_inliers;
   json["candidates"] = found.candidates;
+  if (!found.voted_regions.empty()) json["voted_regions"] = found.voted_regions;
   return json;
 }
 
@@ -353,6 +356,8 @@ Command LocalizeCommand() {
             OptionTable options = DescribeOptions(&arguments->options);
             const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
             options.insert(options.end(), of_tracker.begin(), of_tracker.end());
+            const OptionTable of_votes = DescribeOptions(&arguments->tracker_options.votes);
+            options.insert(options.end(), of_votes.begin(), of_votes.end());
             for (const OptionTable& of_visual : {DescribeOptions(&arguments->visual_options),
                                                  DescribeOptions(&arguments->estimate_options)}) {
               options.insert(options.end(), of_visual.begin(), of_visual.end());
