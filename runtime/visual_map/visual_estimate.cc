@@ -382,7 +382,10 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
                                       const std::vector<double>& prior) {
   return WithoutExceptions("visual map", [&]() -> Result<VisualPose> {
     CAIRN_RETURN_IF_ERROR(CheckInput(map, seen, options, prior));
-    return Estimator(map, seen, options, prior).Run();
+    std::vector<LandmarkIdx> landmarks;
+    for (const SeenLandmark& match : seen) landmarks.push_back(match.landmark);
+    CAIRN_ASSIGN_OR_RETURN(const auto loaded, map.With(landmarks));
+    return Estimator(*loaded, seen, options, prior).Run();
   });
 }
 
