@@ -233,9 +233,11 @@ std::string CsvLine(const Row& row) {
 // What the map says about how good it is.
 void PrintErrors(const std::string& name, const VisualMap& map) {
   std::vector<double> px, octaves;
-  for (const VisualMap::Model& model : map.models()) {
-    px.push_back(model.sigma.head<2>().norm());
-    octaves.push_back(model.sigma.z());
+  for (LandmarkIdx landmark = 0; landmark < map.num_landmarks(); ++landmark) {
+    for (const VisualMap::Model& model : map.ModelsOf(landmark)) {
+      px.push_back(model.sigma.head<2>().norm());
+      octaves.push_back(model.sigma.z());
+    }
   }
   fmt::print(
       stderr,

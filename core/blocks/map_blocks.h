@@ -196,8 +196,10 @@ Result<std::vector<float>> DecodeDocumentNorms(std::string_view bytes, const Blo
 // Errors: Corrupt where they do not follow one another.
 Status AppendRegions(const ViewBlock& block, const std::string& what, Views* views);
 
-// Puts the models of a block after those that `visual_map` has.  Errors: Corrupt where their camera or
-// headings differ.
+// Errors: Corrupt where a block's camera, headings and errors are not those of another one's models.
+Status CheckSameSurvey(const VisualBlock& block, const VisualMapData& other, const std::string& what);
+
+// Puts the models of a block after those that `visual_map` has.  Errors: as CheckSameSurvey.
 Status AppendModels(const VisualBlock& block, const std::string& what, VisualMapData* visual_map);
 
 // Approximate memory that a decoded block takes, bytes.

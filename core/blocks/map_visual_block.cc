@@ -211,15 +211,21 @@ Result<VisualBlock> DecodeVisualBlock(std::string_view bytes, const BlockEntry& 
   return block;
 }
 
+Status CheckSameSurvey(const VisualBlock& block, const VisualMapData& other, const std::string& what) {
+  if (other.camera_id == block.part.camera_id && other.focal_px == block.part.focal_px &&
+      other.errors == block.part.errors && other.headings_deg == block.part.headings_deg)
+    return Ok();
+  return Corrupt(what, "its camera and headings are not those of the block before");
+}
+
 Status AppendModels(const VisualBlock& block, const std::string& what, VisualMapData* visual_map) {
   if (visual_map->landmarks.empty()) {
     visual_map->camera_id = block.part.camera_id;
     visual_map->focal_px = block.part.focal_px;
     visual_map->errors = block.part.errors;
     visual_map->headings_deg = block.part.headings_deg;
-  } else if (visual_map->camera_id != block.part.camera_id || visual_map->focal_px != block.part.focal_px ||
-             visual_map->errors != block.part.errors || visual_map->headings_deg != block.part.headings_deg) {
-    return Corrupt(what, "its camera and headings are not those of the block before");
+  } else {
+    CAIRN_RETURN_IF_ERROR(CheckSameSurvey(block, *visual_map, what));
   }
   visual_map->landmarks.insert(visual_map->landmarks.end(), block.part.landmarks.begin(),
                                block.part.landmarks.end());

@@ -20,6 +20,7 @@
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/image_list.h"
 #include "core/files/file.h"
+#include "pipeline/commands/odometry.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/localize/measurement.h"
@@ -36,11 +37,14 @@ struct LocalizeArguments {
   std::string camera;
   std::string cameras_path;
   bool is_sequence = false;
+  std::string odometry_path;
   std::string estimator = "pnp";
   LocalizerOptions options;
   VisualMapOptions visual_options;
   VisualEstimateOptions estimate_options;
-  RegionTrackerOptions tracker_options;
+  RegionTrackerOptions tracker_options;  // its votes are the visual map's too
+  VisualTrackerOptions visual_tracker_options;
+  VisualFilterOptions filter_options;
   OptionArguments option_arguments;
 };
 
@@ -49,7 +53,7 @@ struct Answer {
   std::string image;
   CameraId camera_id = 0;
   Result<Localization> localization = Error{};
-  std::optional<Result<VisualPose>> visual;
+  std::optional<Result<TrackedVisualPose>> visual;
   std::optional<Disagreement> disagreement;  // where both have a fix
 };
 
@@ -91,33 +95,53 @@ class CameraChoice {
   std::map<CameraId, Camera> cameras_;
 };
 
-// Refuses options that only another estimator or a sequence reads.
+// Refuses options that only another estimator, a sequence or odometry reads.
 Status CheckWhatIsRead(const LocalizeArguments& arguments) {
   if (!arguments.camera.empty() && !arguments.cameras_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--camera is the camera of all images, --cameras has one for each size; leave one out");
   }
-  if (!arguments.is_sequence) {
-    RegionTrackerOptions of_tracker;
-    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        NamesOf(DescribeOptions(&of_tracker)), "is for frames in order; give --sequence, or leave it out"));
-  }
+  VoteOptions of_vote;
+  RegionTrackerOptions of_tracker;
+  VisualMapOptions of_map;
+  VisualEstimateOptions of_estimate;
+  VisualTrackerOptions of_visual_tracker;
+  VisualFilterOptions of_filter;
+  const auto refuse = [&](const std::vector<OptionTable>& tables, const char* why) -> Status {
+    for (const OptionTable& table : tables)
+      CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(NamesOf(table), why));
+    return Ok();
+  };
   if (arguments.estimator == "pnp") {
-    VisualMapOptions of_map;
-    VisualEstimateOptions of_estimate;
-    for (const OptionTable& table : {DescribeOptions(&of_map), DescribeOptions(&of_estimate)}) {
-      CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-          NamesOf(table), "is for --estimator visual-map or both; give one of them, or leave it out"));
-    }
+    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_map), DescribeOptions(&of_estimate),
+                                  DescribeOptions(&of_visual_tracker), DescribeOptions(&of_filter)},
+                                 "is for --estimator visual-map or both; give one of them, or leave it out"));
+    if (!arguments.odometry_path.empty())
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--odometry is for --estimator visual-map or both; give one of them, or leave it out");
   }
-  return Ok();
+  if (!arguments.is_sequence) {
+    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_vote), DescribeOptions(&of_tracker),
+                                  DescribeOptions(&of_visual_tracker), DescribeOptions(&of_filter)},
+                                 "is for frames in order; give --sequence, or leave it out"));
+    if (!arguments.odometry_path.empty())
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--odometry is for frames in order; give --sequence, or leave it out");
+    return Ok();
+  }
+  if (arguments.estimator == "visual-map") {
+    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_tracker)},
+                                 "is for --estimator pnp or both; give one of them, or leave it out"));
+  }
+  return arguments.odometry_path.empty()
+             ? arguments.option_arguments.RefuseGiven(
+                   {"odometry_way_ratio", "odometry_turn_ratio", "odometry_sigma_m", "odometry_sigma_deg"},
+                   "is the error of odometry; give --odometry, or leave it out")
+             : arguments.option_arguments.RefuseGiven({"unknown_way_sigma_m", "unknown_turn_sigma_deg"},
+                                                      "is for frames without odometry; leave it out");
 }
 
 Status CheckEstimator(const LocalizeArguments& arguments) {
-  if (arguments.estimator != "pnp" && arguments.is_sequence) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--sequence follows a camera by --estimator pnp; leave one of them out");
-  }
   if (arguments.estimator == "visual-map" && !arguments.output_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
@@ -126,30 +150,61 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
   return Ok();
 }
 
+// What follows a camera from frame to frame; none where there is no sequence.
+struct Trackers {
+  std::optional<RegionTracker> in_space;
+  std::optional<VisualTracker> on_floor;
+  std::optional<Odometry> odometry;
+
+  static Result<Trackers> Make(const LocalizeArguments& arguments, const std::shared_ptr<const Map>& map) {
+    Trackers trackers;
+    if (!arguments.is_sequence) return trackers;
+    if (arguments.estimator != "visual-map")
+      trackers.in_space.emplace(map, arguments.options, arguments.tracker_options);
+    if (arguments.estimator == "pnp") return trackers;
+    VisualTrackerOptions options = arguments.visual_tracker_options;
+    options.votes = arguments.tracker_options.votes;
+    CAIRN_ASSIGN_OR_RETURN(trackers.on_floor,
+                           VisualTracker::Make(map, arguments.visual_options, options,
+                                               arguments.filter_options, arguments.estimate_options));
+    if (!arguments.odometry_path.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(trackers.odometry, Odometry::Read(arguments.odometry_path));
+    }
+    return trackers;
+  }
+};
+
 // By the visual map and, with --estimator both, by PnP too.
 Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>& map, const VisualMap& visual,
-                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
+                     const CameraChoice& cameras, const LocalizeArguments& arguments, Trackers* trackers) {
   Answer answer{.image = image};
-  const auto locate = [&]() -> Result<VisualPose> {
+  const auto locate = [&]() -> Result<TrackedVisualPose> {
+    if (trackers->odometry) {  // it drove, whether or not this image can be read
+      CAIRN_RETURN_IF_ERROR(trackers->odometry->MoveToNext(image, &*trackers->on_floor));
+    }
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
     const Localizer localizer(map, arguments.options);
     CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
-    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(query));
-    if (arguments.estimator == "both") {
+    if (trackers->in_space) {
+      CAIRN_ASSIGN_OR_RETURN(answer.localization, trackers->in_space->TrackFeatures(query.features, camera));
+    } else if (arguments.estimator == "both") {
       CAIRN_ASSIGN_OR_RETURN(answer.localization, localizer.LocalizeQuery(query, std::nullopt));
     }
-    return EstimateVisualPose(visual, seen, arguments.estimate_options);
+    if (trackers->on_floor) return trackers->on_floor->See(query);
+    CAIRN_ASSIGN_OR_RETURN(const auto seen, visual.Match(query));
+    CAIRN_ASSIGN_OR_RETURN(VisualPose pose, EstimateVisualPose(visual, seen, arguments.estimate_options));
+    return TrackedVisualPose{std::move(pose)};
   };
   answer.visual = locate();
   if (!answer.visual->ok()) {
     answer.localization = answer.visual->error();
   } else if (arguments.estimator == "visual-map") {
     answer.localization = Localization();  // none in space
-  } else if (answer.localization->has_fix() && (*answer.visual)->flag == VisualFlag::kNone) {
+  } else if (answer.localization->has_fix() && (*answer.visual)->pose.flag == VisualFlag::kNone) {
     answer.disagreement =
-        Compare(FloorFixOf(*answer.localization, map->head().floor_from_world), **answer.visual);
+        Compare(FloorFixOf(*answer.localization, map->head().floor_from_world), (*answer.visual)->pose);
   }
   return answer;
 }
@@ -207,19 +262,22 @@ nlohmann::ordered_json PnpJson(const Answer& answer) {
   json["num_matches"] = found.num_matches;
   json["num_inliers"] = found.num_inliers;
   json["candidates"] = found.candidates;
+  if (!found.voted_regions.empty()) json["voted_regions"] = found.voted_regions;
   return json;
 }
 
-nlohmann::ordered_json AnswerJson(const Answer& answer, const std::string& estimator) {
+nlohmann::ordered_json AnswerJson(const Answer& answer, const LocalizeArguments& arguments) {
   if (!answer.visual) return PnpJson(answer);
   if (!answer.visual->ok()) return ErrorJson(answer.image, answer.visual->error());
-  if (estimator == "visual-map") {
+  const nlohmann::ordered_json on_floor =
+      arguments.is_sequence ? TrackedJson(**answer.visual) : VisualJson((*answer.visual)->pose);
+  if (arguments.estimator == "visual-map") {
     nlohmann::ordered_json json = {{"image", answer.image}};
-    json.update(VisualJson(**answer.visual));
+    json.update(on_floor);
     return json;
   }
   nlohmann::ordered_json json = PnpJson(answer);
-  json["visual_map"] = VisualJson(**answer.visual);
+  json["visual_map"] = on_floor;
   if (answer.disagreement) json["disagreement"] = DisagreementJson(*answer.disagreement);
   return json;
 }
@@ -274,7 +332,7 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   std::shared_ptr<const VisualMap> visual;
   if (arguments.estimator != "pnp") {
-    CAIRN_ASSIGN_OR_RETURN(visual, VisualMap::Load(*map, arguments.visual_options));
+    CAIRN_ASSIGN_OR_RETURN(visual, VisualMap::Open(map, arguments.visual_options));
   }
   CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras, CameraChoice::Make(arguments, map));
   CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments));
@@ -282,20 +340,21 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   std::vector<CaptureImage> poses;
   std::optional<Error> first_error;
   int num_images = 0, num_failed = 0, num_places = 0;
-  RegionTracker tracker(map, arguments.options, arguments.tracker_options);
+  CAIRN_ASSIGN_OR_RETURN(Trackers trackers, Trackers::Make(arguments, map));
   const size_t batch_size =
       arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
-      answers[i] = visual                  ? LocateByViews(batch[i], map, *visual, cameras, arguments)
-                   : arguments.is_sequence ? TrackImage(batch[i], cameras, &tracker)
+      answers[i] = visual ? LocateByViews(batch[i], map, *visual, cameras, arguments, &trackers)
+                   : arguments.is_sequence ? TrackImage(batch[i], cameras, &*trackers.in_space)
                                            : LocalizeImage(batch[i], map, cameras, arguments.options);
     });
     for (const Answer& answer : answers) {
-      *environment.out << JsonText(AnswerJson(answer, arguments.estimator)) << "\n" << std::flush;
+      *environment.out << JsonText(AnswerJson(answer, arguments)) << "\n" << std::flush;
       ++num_images;
-      if (answer.visual && answer.visual->ok() && (*answer.visual)->flag == VisualFlag::kNone) ++num_places;
+      if (answer.visual && answer.visual->ok() && (*answer.visual)->pose.flag == VisualFlag::kNone)
+        ++num_places;
       if (!answer.localization.ok()) {
         ++num_failed;
         if (!first_error) first_error = answer.localization.error();
@@ -317,7 +376,7 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   if (arguments.estimator != "visual-map")
     spdlog::info("{} of {} images localized", poses.size(), num_images);
   if (visual) spdlog::info("{} of {} images localized by the visual map", num_places, num_images);
-  if (!first_error) return Ok();
+  if (!first_error) return trackers.odometry ? trackers.odometry->CheckAllRead() : Ok();
   return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
                    num_images, first_error->message);
 }
@@ -345,17 +404,24 @@ Command LocalizeCommand() {
             parser.AddFlag("--sequence", arguments->is_sequence,
                            "The images are frames in order: follow the camera from one to the next");
             parser
+                .Add("--odometry", arguments->odometry_path,
+                     "With --sequence and a visual map: a line for each image, how the robot drove since the "
+                     "one before: metres ahead, metres to the left, degrees turned to the left")
+                .Type("FILE");
+            parser
                 .Add("--estimator", arguments->estimator,
                      "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
                      "how landmarks look from each place (the map needs a visual map); both: and how far "
                      "they disagree [pnp]")
                 .OneOf({"pnp", "visual-map", "both"});
             OptionTable options = DescribeOptions(&arguments->options);
-            const OptionTable of_tracker = DescribeOptions(&arguments->tracker_options);
-            options.insert(options.end(), of_tracker.begin(), of_tracker.end());
-            for (const OptionTable& of_visual : {DescribeOptions(&arguments->visual_options),
-                                                 DescribeOptions(&arguments->estimate_options)}) {
-              options.insert(options.end(), of_visual.begin(), of_visual.end());
+            for (const OptionTable& more :
+                 {DescribeOptions(&arguments->tracker_options),
+                  DescribeOptions(&arguments->tracker_options.votes),
+                  DescribeOptions(&arguments->visual_options), DescribeOptions(&arguments->estimate_options),
+                  DescribeOptions(&arguments->visual_tracker_options),
+                  DescribeOptions(&arguments->filter_options)}) {
+              options.insert(options.end(), more.begin(), more.end());
             }
             arguments->option_arguments.Add(
                 parser, options,

@@ -20,6 +20,13 @@ nlohmann::ordered_json VisualJson(const VisualPose& pose) {
   return json;
 }
 
+nlohmann::ordered_json TrackedJson(const TrackedVisualPose& found) {
+  nlohmann::ordered_json json = VisualJson(found.pose);
+  json["scope"] = ScopeName(found.scope);
+  json["regions"] = found.regions;
+  return json;
+}
+
 nlohmann::ordered_json DisagreementJson(const Disagreement& disagreement) {
   return {{"distance_m", disagreement.distance_m},
           {"angle_deg", disagreement.angle_deg},

@@ -390,7 +390,7 @@ int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* i
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     if (!used->visual) {
-      CAIRN_ASSIGN_OR_RETURN(used->visual, VisualMap::Load(*used->map));
+      CAIRN_ASSIGN_OR_RETURN(used->visual, VisualMap::Open(used->map));
     }
     CAIRN_ASSIGN_OR_RETURN(const Query query, used->localizer->QueryFromImage(grey, chosen));
     CAIRN_ASSIGN_OR_RETURN(const auto seen, used->visual->Match(query));

@@ -36,8 +36,8 @@ enum class NoFix {
 const char* NoFixName(NoFix reason);
 
 // Where landmarks to match came from.
-enum class Scope { kPrior, kRegions, kImages, kAll, kTrack };
-const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all", "track"
+enum class Scope { kPrior, kRegions, kImages, kAll, kTrack, kVotes };
+const char* ScopeName(Scope scope);  // "prior", "regions", "images", "all", "track", "votes"
 
 // A fix, or the reason for none.
 struct Localization {
@@ -59,6 +59,8 @@ struct Localization {
   int num_unguided_inliers = 0;     // of them
   int num_inliers = 0;              // in all
   std::vector<ImageId> candidates;  // survey images, most alike first
+  // RegionTracker, lost: regions with enough of their landmarks in view, most first.
+  std::vector<RegionIdx> voted_regions;
 };
 
 }  // namespace cairn

@@ -15,6 +15,7 @@
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
+#include "runtime/localize/region_votes.h"
 #include "runtime/localize/retrieve.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
@@ -103,6 +104,8 @@ const char* ScopeName(Scope scope) {
       return "all";
     case Scope::kTrack:
       return "track";
+    case Scope::kVotes:
+      return "votes";
   }
   return "all";
 }
@@ -196,8 +199,19 @@ Result<Localization> Localizer::LocalizeQuery(const Query& query,
     none.num_features = num_features;
     return none;
   }
+  return LocalizeBetter(query, prior, Failure(NoFix::kNoCandidates, "no survey image looks like it"));
+}
+
+Result<Localization> Localizer::LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const {
+  CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, {Scope::kVotes, std::move(voted)}));
+  if (localization.has_fix() && localization.num_unguided_inliers >= options_.sure_num_unguided_inliers)
+    return Answer(query, std::nullopt, std::move(localization));
+  return LocalizeBetter(query, std::nullopt, std::move(localization));
+}
+
+Result<Localization> Localizer::LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
+                                               Localization best) const {
   std::vector<ImageId> candidate_ids;
-  Localization best = Failure(NoFix::kNoCandidates, "no survey image looks like it");
   CAIRN_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, MakeAttempts(query, prior, &candidate_ids));
   for (const Attempt& attempt : attempts) {
     CAIRN_ASSIGN_OR_RETURN(Localization localization, Try(query, attempt));

@@ -43,6 +43,8 @@ class Localizer {
   Result<Query> QueryFromImage(const cv::Mat& grey, const Camera& camera) const;
   Result<Query> QueryFromFeatures(Features features, const Camera& camera) const;
   Result<Localization> LocalizeQuery(const Query& query, const std::optional<PosePrior>& prior) const;
+  // The same, but these landmarks (ascending), of regions that were voted for, are matched before all others.
+  Result<Localization> LocalizeVoted(const Query& query, std::vector<LandmarkIdx> voted) const;
   // Localizes among these landmarks (ascending) only, and those of look-alikes that the prior does
   // not exclude.
   Result<Localization> LocalizeAmong(const Query& query, Scope scope, std::vector<LandmarkIdx> landmarks,
@@ -52,6 +54,9 @@ class Localizer {
 
  private:
   struct Attempt;
+  // `best`: what was found before.
+  Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
+                                      Localization best) const;
   // The last step of every fix: look-alikes are excluded, and the pose is put into the given frame.
   Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
                               Localization localization) const;

@@ -35,14 +35,6 @@ OptionTable DescribeOptions(RegionTrackerOptions* o) {
        .value = &o->max_num_neighbour_regions,
        .help = "most regions besides its own whose landmarks are looked for",
        .min = 0},
-      {.name = "min_num_votes",
-       .value = &o->min_num_votes,
-       .help = "visible landmarks that make a region a candidate when lost",
-       .min = 1},
-      {.name = "max_num_voted_regions",
-       .value = &o->max_num_voted_regions,
-       .help = "most candidate regions whose landmarks are matched when lost",
-       .min = 1},
   };
 }
 
@@ -91,19 +83,29 @@ Result<Localization> RegionTracker::TrackQuery(const Query& query) {
     }
   }
   // [Sala06 §III] a region whose features are not all visible was left: the visible ones vote
-  if (has_features) {
-    CAIRN_ASSIGN_OR_RETURN(auto voted, VotedLandmarks(query));
-    if (!voted.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(Localization found, localizer_.LocalizeAmong(query, Scope::kRegions,
-                                                                          std::move(voted), std::nullopt));
-      if (found.has_fix() && found.num_unguided_inliers >= localizer_.options().sure_num_unguided_inliers) {
-        Update(found);
-        return found;
-      }
-    }
-  }
-  CAIRN_ASSIGN_OR_RETURN(Localization found, localizer_.LocalizeQuery(query, std::nullopt));
+  CAIRN_ASSIGN_OR_RETURN(Localization found,
+                         has_features ? FindLost(query) : localizer_.LocalizeQuery(query, std::nullopt));
   Update(found);
+  return found;
+}
+
+Result<Localization> RegionTracker::FindLost(const Query& query) const {
+  CAIRN_ASSIGN_OR_RETURN(Vote vote, VoteBy(query));
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> voted, LandmarksOfRegions(*map_, vote.regions));
+  Localization found;
+  if (!voted.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(
+        found, options_.votes.localize_when_lost
+                   ? localizer_.LocalizeVoted(query, std::move(voted))
+                   : localizer_.LocalizeAmong(query, Scope::kVotes, std::move(voted), std::nullopt));
+  } else if (options_.votes.localize_when_lost) {
+    CAIRN_ASSIGN_OR_RETURN(found, localizer_.LocalizeQuery(query, std::nullopt));
+  } else {
+    found.scope = Scope::kVotes;
+    found.message = std::move(vote.message);
+    found.num_features = static_cast<int>(query.features.keypoints.size());
+  }
+  found.voted_regions = std::move(vote.regions);
   return found;
 }
 
@@ -143,25 +145,19 @@ Result<std::vector<LandmarkIdx>> RegionTracker::ExpectedLandmarks(const PosePrio
   return in_view;
 }
 
-Result<std::vector<LandmarkIdx>> RegionTracker::VotedLandmarks(const Query& query) const {
-  std::vector<LandmarkIdx> none;
-  if (map_->num_landmarks() > localizer_.options().fall_back_max_num_landmarks) return none;
+Result<Vote> RegionTracker::VoteBy(const Query& query) const {
+  const int max_num_landmarks = localizer_.options().fall_back_max_num_landmarks;
+  if (map_->num_landmarks() > max_num_landmarks) {
+    return Vote{.message = fmt::format("the map's {} landmarks are too many to vote, at most {} may "
+                                       "(fall_back_max_num_landmarks)",
+                                       map_->num_landmarks(), max_num_landmarks)};
+  }
   CAIRN_ASSIGN_OR_RETURN(const auto all, map_->AllLandmarks());
   std::vector<LandmarkIdx> visible;
   for (const Correspondence& match : MatchLandmarks(query, *all, localizer_.options().match)) {
     visible.push_back(match.landmark);
   }
-  std::sort(visible.begin(), visible.end());
-  visible.erase(std::unique(visible.begin(), visible.end()), visible.end());
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<RegionVotes> votes, VotesForRegions(*map_, visible));
-  std::vector<RegionIdx> regions;
-  for (const RegionVotes& vote : votes) {
-    // [Sala06 §III] regions with "at least k votes" are candidates, those with most first
-    if (vote.num_votes < options_.min_num_votes) break;
-    if (static_cast<int>(regions.size()) == options_.max_num_voted_regions) break;
-    regions.push_back(vote.region);
-  }
-  return LandmarksOfRegions(*map_, regions);
+  return VoteForRegions(*map_, visible, options_.votes);
 }
 
 bool RegionTracker::Agrees(const Localization& found, const PosePrior& prior) const {

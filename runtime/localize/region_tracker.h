@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/localize/localizer.h"
+#include "runtime/localize/region_votes.h"
 
 namespace cairn {
 
@@ -21,19 +22,21 @@ struct RegionTrackerOptions {
   // Most regions besides its own, those of the nearest survey images, whose landmarks are looked for.
   // REQUIRES: >= 0
   int max_num_neighbour_regions = 6;
-  // Landmarks seen that make a region a candidate [Sala06 §III: k].  REQUIRES: >= 1
-  int min_num_votes = 7;
-  // Most candidate regions whose landmarks are matched when the robot is lost.  REQUIRES: >= 1
-  int max_num_voted_regions = 3;
+  // When it is lost.
+  VoteOptions votes;
 };
+// Without those of the vote, which have a table of their own.
 OptionTable DescribeOptions(RegionTrackerOptions* options);
 
 // Finds where a camera is, frame after frame [Sala06 §III].  While it has a fix it looks only for the
 // landmarks of its region and of the regions around that the motion so far (constant velocity, less certain
 // with every frame) predicts to be in view; a fix far from the prediction does not count.  When that fails,
-// all visible landmarks vote for the regions that they belong to, and those of the regions with the most
-// votes are matched; last, the frame is localized as if it were the first.  The latter two do not use earlier
-// frames: a kidnapped robot is found again.  One per camera; the map is shared.
+// all visible landmarks vote for the regions that they belong to (region_votes.h), and those of the regions
+// with the most votes are matched; where these give no sure fix, the frame is localized as if it were the
+// first. The latter two do not use earlier frames: a kidnapped robot is found again.  A region of four
+// landmarks can be voted for, but a fix needs seven inliers (AcceptOptions::min_num_inliers): of several such
+// regions, or of none.  Maps of more landmarks than fall_back_max_num_landmarks have no vote.  One per
+// camera; the map is shared.
 class RegionTracker {
  public:
   explicit RegionTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options = {},
@@ -51,8 +54,9 @@ class RegionTracker {
   Result<Localization> TrackQuery(const Query& query);
   // Landmarks of its own and the neighbouring regions that the prediction has in view, ascending.
   Result<std::vector<LandmarkIdx>> ExpectedLandmarks(const PosePrior& prior, const Camera& camera) const;
-  // Landmarks of the regions that the visible landmarks vote for, ascending.
-  Result<std::vector<LandmarkIdx>> VotedLandmarks(const Query& query) const;
+  // The visible landmarks vote for their regions.
+  Result<Vote> VoteBy(const Query& query) const;
+  Result<Localization> FindLost(const Query& query) const;
   bool Agrees(const Localization& found, const PosePrior& prior) const;
   void Update(const Localization& found);
 

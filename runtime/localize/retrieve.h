@@ -33,17 +33,6 @@ Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::ve
 Result<std::vector<LandmarkIdx>> LandmarksOfRegions(const Map& map, const std::vector<RegionIdx>& regions);
 Result<std::vector<LandmarkIdx>> LandmarksOfImages(const Map& map, const std::vector<int32_t>& images);
 
-// For every region the number of these landmarks (each once) that it has [Sala06 §III: the visible features
-// vote], most first, ties to the smaller index; regions without any are left out.
-struct RegionVotes {
-  RegionIdx region = -1;
-  int num_votes = 0;
-};
-Result<std::vector<RegionVotes>> VotesForRegions(const Map& map, const std::vector<LandmarkIdx>& landmarks);
-
-// The region that has most of these landmarks, the smaller index on a tie; -1 for none.
-Result<RegionIdx> RegionWithMost(const Map& map, const std::vector<LandmarkIdx>& landmarks);
-
 // Distance from a place (in the map's own frame) to the nearest survey camera, metres; infinite
 // without images.
 Result<double> DistanceFromSurvey(const Map& map, const Eigen::Vector3d& center);

@@ -240,6 +240,10 @@ Result<std::shared_ptr<const Views>> Map::FloorViews() const {
       store_->cache.Insert(kWholeViews, std::move(views), num_bytes));
 }
 
+Result<std::shared_ptr<const VisualBlock>> Map::LandmarkModels(int64_t ordinal) const {
+  return store_->Load(BlockKind::kLandmarkModels, ordinal, DecodeVisualBlock, &MapLayout::MakeVisualBlock);
+}
+
 Result<VisualMapData> Map::LandmarkModels() const {
   if (!has_visual_map()) {
     return MakeError(ErrorCode::kNotFound,
@@ -249,8 +253,7 @@ Result<VisualMapData> Map::LandmarkModels() const {
   }
   VisualMapData models;
   for (int64_t ordinal = 0; ordinal < store_->directory.NumBlocks(BlockKind::kLandmarkModels); ++ordinal) {
-    CAIRN_ASSIGN_OR_RETURN(const auto block, store_->Load(BlockKind::kLandmarkModels, ordinal,
-                                                          DecodeVisualBlock, &MapLayout::MakeVisualBlock));
+    CAIRN_ASSIGN_OR_RETURN(const auto block, LandmarkModels(ordinal));
     CAIRN_RETURN_IF_ERROR(AppendModels(*block, "map '" + store_->head.name + "'", &models));
   }
   return models;

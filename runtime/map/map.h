@@ -20,6 +20,7 @@ struct ImageBlock;
 struct StationBlock;
 struct RegionBlock;
 struct WordBlock;
+struct VisualBlock;
 // core/blocks/map_rows.h:
 struct MapRows;
 struct MapImage;
@@ -94,9 +95,11 @@ class Map {
 
   // Whether there is a visual map (runtime/visual_map/visual_map.h).
   bool has_visual_map() const;
-  // The models of all landmarks; their images are in range.  Not kept in the cache: the caller turns them
-  // into a VisualMap.  Errors: NotFound where the map has none; Corrupt.
+  // The models of all landmarks; their images are in range.  The caller turns them into a VisualMap.  Errors:
+  // NotFound where the map has none; Corrupt.
   Result<VisualMapData> LandmarkModels() const;
+  // Some of them, a block like those above.  REQUIRES: has_visual_map()
+  Result<std::shared_ptr<const VisualBlock>> LandmarkModels(int64_t ordinal) const;
 
   // The name of an image by its index; the image itself.  Errors: as Images.
   Result<std::string> ImageName(int64_t image) const;

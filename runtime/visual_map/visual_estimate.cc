@@ -370,6 +370,12 @@ class Estimator {
   double log_sum_ = 0;
 };
 
+std::vector<LandmarkIdx> LandmarksSeen(const std::vector<SeenLandmark>& seen) {
+  std::vector<LandmarkIdx> landmarks;
+  for (const SeenLandmark& match : seen) landmarks.push_back(match.landmark);
+  return landmarks;
+}
+
 Status CheckPrior(const VisualMap& map, const std::vector<double>& prior) {
   if (prior.empty()) return Ok();
   double sum = 0;
@@ -400,7 +406,8 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
   return WithoutExceptions("visual map", [&]() -> Result<VisualPose> {
     CAIRN_RETURN_IF_ERROR(CheckVisualInput(map, seen, options));
     CAIRN_RETURN_IF_ERROR(CheckPrior(map, prior));
-    return Estimator(map, seen, options, prior).Run();
+    CAIRN_ASSIGN_OR_RETURN(const auto loaded, map.With(LandmarksSeen(seen)));
+    return Estimator(*loaded, seen, options, prior).Run();
   });
 }
 
@@ -410,7 +417,8 @@ Result<LatticePosterior> PosteriorOnLattice(const VisualMap& map, const std::vec
     CAIRN_RETURN_IF_ERROR(CheckVisualInput(map, seen, options));
     VisualEstimateOptions without_elsewhere = options;
     without_elsewhere.elsewhere_ratio = kNoElsewhere;
-    return Estimator(map, seen, without_elsewhere, {}).RunOnLattice();
+    CAIRN_ASSIGN_OR_RETURN(const auto loaded, map.With(LandmarksSeen(seen)));
+    return Estimator(*loaded, seen, without_elsewhere, {}).RunOnLattice();
   });
 }
 

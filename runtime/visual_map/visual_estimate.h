@@ -102,7 +102,7 @@ double SharedGrowth(double spread_ratio);
 
 // `prior`: probability per place of the map (sums to 1), empty: uniform.  Same input, same result.  O(matches
 // * places).  Errors: InvalidArgument (an invalid prior or one of another length, a landmark that does not
-// exist, a number that is not finite, a bad option).
+// exist, a number that is not finite, a bad option); as VisualMap::With.
 Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                                       const VisualEstimateOptions& options = {},
                                       const std::vector<double>& prior = {});

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
 #include "core/vocabulary/document_scores.h"
 
@@ -88,18 +89,44 @@ Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
   if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
     return MakeError(ErrorCode::kInvalidArgument,
                      "visual map: the odometry's way or turn is not a finite number");
-  const std::vector<Eigen::Vector2d>& places = map_->places();
   const double cell_variance = kCellVariance * map_->spacing_m() * map_->spacing_m();
-  const double variance = std::pow(options_.odometry_way_ratio * way_m.norm(), 2) +
-                          std::pow(options_.odometry_sigma_m, 2) + (way_m.norm() > 0 ? cell_variance : 0);
-  const TurnKernel turn = KernelOf(
-      std::remainder(turn_left_rad, 2 * std::numbers::pi),
-      std::hypot(options_.odometry_turn_ratio * turn_left_rad, RadFromDeg(options_.odometry_sigma_deg)));
+  Shift(way_m,
+        std::pow(options_.odometry_way_ratio * way_m.norm(), 2) + std::pow(options_.odometry_sigma_m, 2) +
+            (way_m.norm() > 0 ? cell_variance : 0),
+        turn_left_rad,
+        std::hypot(options_.odometry_turn_ratio * turn_left_rad, RadFromDeg(options_.odometry_sigma_deg)));
+  return Ok();
+}
+
+Status VisualFilter::Wander(double sigma_m, double sigma_rad) {
+  if (!(sigma_m >= 0 && sigma_rad >= 0 && std::isfinite(sigma_m + sigma_rad)))
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "visual map: a way of {:g} m and a turn of {:g} rad as standard deviations; both must be "
+        "finite and not negative",
+        sigma_m, sigma_rad);
+  Shift({0, 0}, sigma_m * sigma_m, 0, sigma_rad);
+  return Ok();
+}
+
+double VisualFilter::AtHeading(int32_t place, double heading_deg, double half_sector_deg) const {
+  double sum = 0;
+  for (int bin = 0; bin < kNumBins; ++bin) {
+    if (AngleBetweenDeg(DegFromRad(bin * kBinRad), heading_deg) <= half_sector_deg)
+      sum += belief_[place][bin];
+  }
+  return sum;
+}
+
+void VisualFilter::Shift(const Eigen::Vector2d& way_m, double way_variance, double turn_left_rad,
+                         double turn_sigma_rad) {
+  const std::vector<Eigen::Vector2d>& places = map_->places();
+  const TurnKernel turn = KernelOf(std::remainder(turn_left_rad, 2 * std::numbers::pi), turn_sigma_rad);
   double largest = 0;
   for (const std::vector<double>& of_place : belief_)
     for (const double share : of_place) largest = std::max(largest, share);
   std::vector<std::vector<double>> moved(places.size(), std::vector<double>(kNumBins, 0));
-  const double reach_m = kReachSigmas * std::sqrt(variance) + 1e-9;
+  const double reach_m = kReachSigmas * std::sqrt(way_variance) + 1e-9;
   for (int bin = 0; bin < kNumBins; ++bin) {
     const double c = std::cos(bin * kBinRad), s = std::sin(bin * kBinRad);
     const Eigen::Vector2d way(c * way_m.x() - s * way_m.y(), s * way_m.x() + c * way_m.y());
@@ -111,7 +138,7 @@ Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
       for (size_t to = 0; to < places.size(); ++to) {
         const double squared = (places[to] - places[from] - way).squaredNorm();
         if (squared > reach_m * reach_m) continue;
-        reached.emplace_back(to, variance > 0 ? std::exp(-0.5 * squared / variance) : 1);
+        reached.emplace_back(to, way_variance > 0 ? std::exp(-0.5 * squared / way_variance) : 1);
         sum += reached.back().second;
       }
       for (const auto& [to, weight] : reached) {  // probability that leaves the survey is lost
@@ -125,7 +152,6 @@ Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
   }
   belief_ = std::move(moved);
   Normalise(&belief_);
-  return Ok();
 }
 
 Result<VisualPose> VisualFilter::See(const std::vector<SeenLandmark>& seen) {

@@ -31,6 +31,9 @@ class VisualFilter {
   // The robot drove: ahead and to the left (m, in its frame at the start), and turned left (rad).
   // Errors: InvalidArgument for a number that is not finite.
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
+  // It drove, and nobody counted: standard deviations of its way, per axis, and of its turn.  Errors:
+  // InvalidArgument for a number that is negative or not finite.
+  Status Wander(double sigma_m, double sigma_rad);
   // It sees landmarks.  The result is that of this image with the previous belief as its prior.  Its
   // at_place, mean and entropy are those of the new belief; where the image has a flag, position and
   // covariance are too.  Errors: as EstimateVisualPose.
@@ -38,8 +41,14 @@ class VisualFilter {
 
   // Probability per place of the map; sums to 1.
   std::vector<double> AtPlaces() const;
+  // Of that, the part that looks in directions within a sector around this one.  REQUIRES: the map has the
+  // place
+  double AtHeading(int32_t place, double heading_deg, double half_sector_deg) const;
+  const VisualMap& map() const { return *map_; }
 
  private:
+  void Shift(const Eigen::Vector2d& way_m, double way_variance, double turn_left_rad, double turn_sigma_rad);
+
   std::shared_ptr<const VisualMap> map_;
   VisualFilterOptions options_;
   VisualEstimateOptions estimate_options_;

@@ -15,6 +15,7 @@
 #include "core/geometry/floor_pose.h"
 #include "core/world/visual_map.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/map/block_cache.h"
 #include "runtime/map/landmark_set.h"
 #include "runtime/map/map.h"
 
@@ -90,6 +91,17 @@ Result<VisualSurvey> SurveyOf(const Map& map, CameraId camera_id) {
   return survey;
 }
 
+int64_t NumBytes(const VisualMap::Models& models) {
+  int64_t num_bytes = sizeof(models);
+  for (const VisualMap::Model& model : models) {
+    // Of a sight: its place twice, and its weights.
+    constexpr size_t kSightBytes = 2 * sizeof(Eigen::Vector2d) + sizeof(Eigen::Vector3d);
+    num_bytes += static_cast<int64_t>(sizeof(model) + model.sight_places.size() * kSightBytes +
+                                      model.extent.size() * sizeof(VisualMap::AtPlace));
+  }
+  return num_bytes;
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(VisualMapOptions* o) {
@@ -106,14 +118,43 @@ OptionTable DescribeOptions(VisualMapOptions* o) {
           {.name = "visual_max_angle_rad",
            .value = &o->visual_max_angle_rad,
            .help = "visual map: largest descriptor angle of a match, radians",
-           .min = 1e-3}};
+           .min = 1e-3},
+          {.name = "model_budget_mib",
+           .value = &o->model_budget_mib,
+           .help = "visual map: memory for models that stay ready for later images, MiB",
+           .min = 0}};
+}
+
+struct VisualMap::Source {
+  std::shared_ptr<const Map> map;
+  VisualMapData survey;  // what all blocks repeat
+  BlockCache cache;      // models by landmark
+};
+
+Result<std::shared_ptr<const VisualMap>> VisualMap::Open(std::shared_ptr<const Map> map,
+                                                         const VisualMapOptions& options) {
+  return WithoutExceptions("visual map", [&]() -> Result<std::shared_ptr<const VisualMap>> {
+    if (!map->has_visual_map()) return map->LandmarkModels().error();
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map->LandmarkModels(0));
+    VisualMapData of_all = block->part;
+    of_all.landmarks.clear();
+    CAIRN_ASSIGN_OR_RETURN(VisualSurvey survey, SurveyOf(*map, of_all.camera_id));
+    auto made = MakeFrame(of_all, std::move(survey), options);
+    if (!made.ok())
+      return MakeError(made.error().code, "map '{}': {}", map->head().name, made.error().message);
+    const std::shared_ptr<VisualMap> visual = *std::move(made);
+    visual->num_landmarks_ = map->num_landmarks();
+    visual->source_.reset(
+        new Source{std::move(map), std::move(of_all), BlockCache(int64_t{options.model_budget_mib} << 20)});
+    return std::shared_ptr<const VisualMap>(visual);
+  });
 }
 
 Result<std::shared_ptr<const VisualMap>> VisualMap::Load(const Map& map, const VisualMapOptions& options) {
   return WithoutExceptions("visual map", [&]() -> Result<std::shared_ptr<const VisualMap>> {
     CAIRN_ASSIGN_OR_RETURN(const VisualMapData data, map.LandmarkModels());
     CAIRN_ASSIGN_OR_RETURN(VisualSurvey survey, SurveyOf(map, data.camera_id));
-    auto made = MakeMutable(data, std::move(survey), options);
+    auto made = MakeFull(data, std::move(survey), options);
     if (!made.ok())
       return MakeError(made.error().code, "map '{}': {}", map.head().name, made.error().message);
     const std::shared_ptr<VisualMap> visual = *std::move(made);
@@ -124,58 +165,99 @@ Result<std::shared_ptr<const VisualMap>> VisualMap::Load(const Map& map, const V
 
 Result<std::shared_ptr<const VisualMap>> VisualMap::Make(const VisualMapData& data, VisualSurvey survey,
                                                          const VisualMapOptions& options) {
-  CAIRN_ASSIGN_OR_RETURN(auto visual, MakeMutable(data, std::move(survey), options));
+  CAIRN_ASSIGN_OR_RETURN(auto visual, MakeFull(data, std::move(survey), options));
   return std::shared_ptr<const VisualMap>(std::move(visual));
 }
 
-Result<std::shared_ptr<VisualMap>> VisualMap::MakeMutable(const VisualMapData& data, VisualSurvey survey,
-                                                          const VisualMapOptions& options) {
+Result<std::shared_ptr<VisualMap>> VisualMap::MakeFrame(const VisualMapData& data, VisualSurvey survey,
+                                                        const VisualMapOptions& options) {
   VisualMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (survey.places.empty()) return MakeError(ErrorCode::kCorrupt, "a visual map without stations");
   std::shared_ptr<VisualMap> visual(new VisualMap());
   visual->options_ = options;
-  visual->survey_ = std::move(survey);
+  visual->survey_ = std::make_shared<const VisualSurvey>(std::move(survey));
   visual->spacing_m_ = MedianSpacing(visual->places());
-  visual->height_sigma_m_ = Deviation(visual->survey_.heights_m);
+  visual->height_sigma_m_ = Deviation(visual->survey_->heights_m);
   visual->has_learnt_focal_ = data.focal_px > 0;
   visual->focal_px_ = data.focal_px > 0
                           ? data.focal_px
                           : kGuessedFocal * std::max(visual->image_width_px(), visual->image_height_px());
   visual->errors_ = data.errors;
   visual->headings_deg_ = data.headings_deg;
-  CAIRN_RETURN_IF_ERROR(visual->AddModels(data));
   return visual;
 }
 
-Status VisualMap::AddModels(const VisualMapData& data) {
-  models_of_landmark_.resize(data.landmarks.size());
-  for (size_t landmark = 0; landmark < data.landmarks.size(); ++landmark) {
-    for (const HeadingModel& stored : data.landmarks[landmark]) {
-      std::vector<Sight> sights;
-      for (const LandmarkSight& sight : stored.sights) {
-        Eigen::Vector3d seen = sight.seen.cast<double>();
-        seen.head<2>() -= middle_px();
-        sights.push_back({survey_.images[sight.image], seen});
-      }
-      auto interpolation = LandmarkModel::Make(sights, stored.shape);
-      if (!interpolation) {
-        return MakeError(ErrorCode::kCorrupt, "the {} sights of landmark {} do not determine a model",
-                         sights.size(), landmark);
-      }
-      models_of_landmark_[landmark].push_back(static_cast<int32_t>(models_.size()));
-      models_.push_back({static_cast<LandmarkIdx>(landmark),
-                         stored.heading,
-                         std::move(*interpolation),
-                         stored.sigma,
-                         stored.predicts_badly,
-                         {},
-                         {}});
-      for (const Sight& sight : sights) models_.back().sight_places.push_back(sight.place);
-      FillExtent(&models_.back());
-    }
+Result<std::shared_ptr<VisualMap>> VisualMap::MakeFull(const VisualMapData& data, VisualSurvey survey,
+                                                       const VisualMapOptions& options) {
+  CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<VisualMap> visual, MakeFrame(data, std::move(survey), options));
+  visual->num_landmarks_ = static_cast<int64_t>(data.landmarks.size());
+  for (LandmarkIdx landmark = 0; landmark < visual->num_landmarks_; ++landmark) {
+    CAIRN_ASSIGN_OR_RETURN(auto models, visual->MakeModels(landmark, data.landmarks[landmark]));
+    visual->models_of_landmark_.emplace(landmark, std::move(models));
   }
-  return Ok();
+  return visual;
+}
+
+Result<std::shared_ptr<const VisualMap::Models>> VisualMap::MakeModels(
+    LandmarkIdx landmark, const std::vector<HeadingModel>& stored) const {
+  auto models = std::make_shared<Models>();
+  for (const HeadingModel& of_heading : stored) {
+    std::vector<Sight> sights;
+    for (const LandmarkSight& sight : of_heading.sights) {
+      Eigen::Vector3d seen = sight.seen.cast<double>();
+      seen.head<2>() -= middle_px();
+      sights.push_back({survey_->images[sight.image], seen});
+    }
+    auto interpolation = LandmarkModel::Make(sights, of_heading.shape);
+    if (!interpolation) {
+      return MakeError(ErrorCode::kCorrupt, "the {} sights of landmark {} do not determine a model",
+                       sights.size(), landmark);
+    }
+    Model& model = models->emplace_back(landmark, of_heading.heading, std::move(*interpolation),
+                                        of_heading.sigma, of_heading.predicts_badly);
+    for (const Sight& sight : sights) model.sight_places.push_back(sight.place);
+    FillExtent(&model);
+  }
+  return std::shared_ptr<const Models>(std::move(models));
+}
+
+Result<std::shared_ptr<const VisualMap::Models>> VisualMap::LoadModels(LandmarkIdx landmark) const {
+  if (auto kept = source_->cache.Find(landmark)) return std::static_pointer_cast<const Models>(kept);
+  const Map& map = *source_->map;
+  const std::string what = "map '" + map.head().name + "'";
+  CAIRN_ASSIGN_OR_RETURN(const auto block,
+                         map.LandmarkModels(map.directory().OrdinalOf(BlockKind::kLandmarkModels, landmark)));
+  CAIRN_RETURN_IF_ERROR(CheckSameSurvey(*block, source_->survey, what));
+  auto models = MakeModels(landmark, block->part.landmarks[landmark - block->first]);
+  if (!models.ok()) return MakeError(models.error().code, "{}: {}", what, models.error().message);
+  const int64_t num_bytes = NumBytes(**models);
+  return std::static_pointer_cast<const Models>(
+      source_->cache.Insert(landmark, *std::move(models), num_bytes));
+}
+
+const VisualMap::Models& VisualMap::ModelsOf(LandmarkIdx landmark) const {
+  static const Models kNone;
+  const auto found = models_of_landmark_.find(landmark);
+  return found == models_of_landmark_.end() ? kNone : *found->second;
+}
+
+Result<std::shared_ptr<const VisualMap>> VisualMap::With(const std::vector<LandmarkIdx>& landmarks) const {
+  if (!source_) return std::shared_ptr<const VisualMap>(std::shared_ptr<const VisualMap>(), this);
+  std::shared_ptr<VisualMap> with(new VisualMap(*this));
+  for (const LandmarkIdx landmark : landmarks) {
+    if (with->models_of_landmark_.contains(landmark)) continue;
+    CAIRN_ASSIGN_OR_RETURN(auto models, LoadModels(landmark));
+    with->models_of_landmark_.emplace(landmark, std::move(models));
+  }
+  return std::shared_ptr<const VisualMap>(std::move(with));
+}
+
+int64_t VisualMap::num_model_bytes() const {
+  if (source_) return source_->cache.num_bytes();
+  int64_t num_bytes = 0;
+  for (const auto& [landmark, models] : models_of_landmark_) num_bytes += NumBytes(*models);
+  return num_bytes;
 }
 
 Eigen::Vector3d VisualMap::Variance(const Model& model, const Eigen::Vector2d& position) const {
@@ -200,20 +282,40 @@ void VisualMap::FillExtent(Model* model) const {
 }
 
 Result<std::vector<SeenLandmark>> VisualMap::Match(const Query& query) const {
+  if (landmarks_) return MatchWith(query, *landmarks_);
+  if (!source_) return std::vector<SeenLandmark>();
+  CAIRN_ASSIGN_OR_RETURN(const auto all, source_->map->AllLandmarks());
+  return MatchWith(query, *all);
+}
+
+Result<std::vector<SeenLandmark>> VisualMap::MatchAmong(const Query& query,
+                                                        std::vector<LandmarkIdx> landmarks) const {
+  if (!source_) {
+    CAIRN_ASSIGN_OR_RETURN(std::vector<SeenLandmark> seen, Match(query));
+    std::erase_if(seen, [&](const SeenLandmark& match) {
+      return !std::binary_search(landmarks.begin(), landmarks.end(), match.landmark);
+    });
+    return seen;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto some, source_->map->Gather(std::move(landmarks), true));
+  return MatchWith(query, *some);
+}
+
+Result<std::vector<SeenLandmark>> VisualMap::MatchWith(const Query& query,
+                                                       const LandmarkSet& landmarks) const {
   if (query.camera.width != image_width_px() || query.camera.height != image_height_px()) {
     return MakeError(ErrorCode::kUnsupported,
                      "visual map: an image of {} x {} px; it knows images of the survey's camera, {} x {} px",
                      query.camera.width, query.camera.height, image_width_px(), image_height_px());
   }
   std::vector<SeenLandmark> seen;
-  if (!landmarks_) return seen;
-  for (const cairn::Match& match : MatchDescriptors(query.packed, landmarks_->packed,
+  for (const cairn::Match& match : MatchDescriptors(query.packed, landmarks.packed,
                                                     {.max_ratio = options_.visual_max_ratio,
                                                     .max_angle_rad = options_.visual_max_angle_rad,
                                                     .mutual = true})) {
     const Keypoint& keypoint = query.features.keypoints[match.idx1];
     seen.push_back(
-        {landmarks_->idx[match.idx2], {keypoint.x, keypoint.y, std::log2(std::max(keypoint.scale, 1e-3F))}});
+        {landmarks.idx[match.idx2], {keypoint.x, keypoint.y, std::log2(std::max(keypoint.scale, 1e-3F))}});
   }
   return seen;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,9 @@ struct VisualMapOptions {
   double visual_max_ratio = 0.85;
   // Largest angle between the descriptors of a match, radians.  REQUIRES: > 0
   double visual_max_angle_rad = 0.7;
+  // Memory for models that stay ready for later images (VisualMap::Open), MiB; those of the image at hand
+  // come on top.  REQUIRES: >= 0
+  int model_budget_mib = 64;
 };
 OptionTable DescribeOptions(VisualMapOptions* options);
 
@@ -50,7 +54,7 @@ struct VisualSurvey {
 // Stations closer together than a centimetre are one place.
 std::vector<Eigen::Vector2d> DistinctPlaces(const std::vector<Eigen::Vector2d>& stations);
 
-// The visual map of a map, ready to use: immutable, shareable.
+// The visual map of a map, ready to use: immutable to its users, shareable between threads.
 class VisualMap {
  public:
   // A model's prediction at a place of the survey.
@@ -71,8 +75,15 @@ class VisualMap {
     std::vector<AtPlace> extent;  // ascending place
   };
 
-  // Loads all models.  Errors: NotFound where the map has none; Corrupt (sights of an image that the map
-  // lacks, or that make no model; a camera that it lacks); Io.
+  // All models of a landmark, ascending heading.
+  using Models = std::vector<Model>;
+
+  // Reads what all models share, and no model: EstimateVisualPose loads those of the landmarks that an image
+  // shows, blocks of them at once, and keeps them within the budget.  The results are those of Load.  Errors:
+  // NotFound where the map has no visual map; Corrupt (a camera that it lacks, no station); Io.
+  static Result<std::shared_ptr<const VisualMap>> Open(std::shared_ptr<const Map> map,
+                                                       const VisualMapOptions& options = {});
+  // Loads all models.  Errors: as Open, and Corrupt for sights that make no model.
   static Result<std::shared_ptr<const VisualMap>> Load(const Map& map, const VisualMapOptions& options = {});
   // Without descriptors: Match finds nothing.  Errors: Corrupt (no place, sights that make no model),
   // InvalidArgument.  REQUIRES: the survey has all images of the data
@@ -80,7 +91,7 @@ class VisualMap {
                                                        const VisualMapOptions& options = {});
 
   // Where the survey was taken, floor frame, metres: the pose lattice, each place once.
-  const std::vector<Eigen::Vector2d>& places() const { return survey_.places; }
+  const std::vector<Eigen::Vector2d>& places() const { return survey_->places; }
   // Median distance from a place to the next.
   double spacing_m() const { return spacing_m_; }
   const std::vector<double>& headings_deg() const { return headings_deg_; }
@@ -91,39 +102,55 @@ class VisualMap {
   // Standard deviation of the survey's cameras' heights, m.
   double height_sigma_m() const { return height_sigma_m_; }
   // Size of the images that it can localize.
-  int image_width_px() const { return survey_.width_px; }
-  int image_height_px() const { return survey_.height_px; }
-  Eigen::Vector2d middle_px() const { return {0.5 * survey_.width_px, 0.5 * survey_.height_px}; }
+  int image_width_px() const { return survey_->width_px; }
+  int image_height_px() const { return survey_->height_px; }
+  Eigen::Vector2d middle_px() const { return {0.5 * survey_->width_px, 0.5 * survey_->height_px}; }
   // Variance of a model's prediction at a place: that of left-out sights, growing with the distance from
   // its sights.
   Eigen::Vector3d Variance(const Model& model, const Eigen::Vector2d& position) const;
-  const std::vector<Model>& models() const { return models_; }
-  // Models of a landmark: indices in models().
-  const std::vector<int32_t>& ModelsOf(LandmarkIdx landmark) const { return models_of_landmark_[landmark]; }
-  int64_t num_landmarks() const { return static_cast<int64_t>(models_of_landmark_.size()); }
+  int64_t num_landmarks() const { return num_landmarks_; }
+  // The models of a landmark; none where they are not loaded.
+  const Models& ModelsOf(LandmarkIdx landmark) const;
+  // This map with the models of these landmarks, loaded where they are not; it holds them as long as it is
+  // used.  For a map that has all models: that map, which must live as long.  Errors: Corrupt (sights that
+  // make no model, a damaged block); Io.  REQUIRES: landmarks in [0, num_landmarks())
+  Result<std::shared_ptr<const VisualMap>> With(const std::vector<LandmarkIdx>& landmarks) const;
+  // Memory of the models that are kept, bytes, approximately.
+  int64_t num_model_bytes() const;
 
-  // Matches by mutual nearest descriptors and ratio test with all landmarks of the map, ascending keypoint.
-  // Errors: Unsupported for an image of another size than the survey's.
+  // Matches by mutual nearest descriptors and ratio test with all landmarks of the map, or with these only
+  // (ascending), ascending keypoint.  Errors: Unsupported for an image of another size than the survey's; as
+  // Map::Landmarks.
   Result<std::vector<SeenLandmark>> Match(const Query& query) const;
+  Result<std::vector<SeenLandmark>> MatchAmong(const Query& query, std::vector<LandmarkIdx> landmarks) const;
 
  private:
+  // Where models come from that are not loaded, and those that are kept.
+  struct Source;
+
   VisualMap() = default;
-  static Result<std::shared_ptr<VisualMap>> MakeMutable(const VisualMapData& data, VisualSurvey survey,
-                                                        const VisualMapOptions& options);
-  Status AddModels(const VisualMapData& data);
+  static Result<std::shared_ptr<VisualMap>> MakeFrame(const VisualMapData& data, VisualSurvey survey,
+                                                      const VisualMapOptions& options);
+  static Result<std::shared_ptr<VisualMap>> MakeFull(const VisualMapData& data, VisualSurvey survey,
+                                                     const VisualMapOptions& options);
+  Result<std::shared_ptr<const Models>> MakeModels(LandmarkIdx landmark,
+                                                   const std::vector<HeadingModel>& stored) const;
+  Result<std::shared_ptr<const Models>> LoadModels(LandmarkIdx landmark) const;
   void FillExtent(Model* model) const;
+  Result<std::vector<SeenLandmark>> MatchWith(const Query& query, const LandmarkSet& landmarks) const;
 
   VisualMapOptions options_;
-  VisualSurvey survey_;
+  std::shared_ptr<const VisualSurvey> survey_;
   double height_sigma_m_ = 0;
   double spacing_m_ = 0;
   std::vector<double> headings_deg_;
   double focal_px_ = 0;
   bool has_learnt_focal_ = false;
   VisualErrors errors_;
-  std::vector<Model> models_;
-  std::vector<std::vector<int32_t>> models_of_landmark_;
-  std::shared_ptr<const LandmarkSet> landmarks_;
+  int64_t num_landmarks_ = 0;
+  std::unordered_map<LandmarkIdx, std::shared_ptr<const Models>> models_of_landmark_;
+  std::shared_ptr<const LandmarkSet> landmarks_;  // all, where all models are loaded
+  std::shared_ptr<Source> source_;                // none where they are
 };
 
 }  // namespace cairn

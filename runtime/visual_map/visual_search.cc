@@ -75,8 +75,7 @@ void VisualSearch::AddMissingMass(VisualHypothesis point, double reach_m) {
 void VisualSearch::FindTerms() {
   terms_.assign(map_.places().size() * map_.headings_deg().size(), {});
   for (int match = 0; match < static_cast<int>(seen_.size()); ++match) {
-    for (const int32_t index : map_.ModelsOf(seen_[match].landmark)) {
-      const VisualMap::Model& model = map_.models()[index];
+    for (const VisualMap::Model& model : map_.ModelsOf(seen_[match].landmark)) {
       for (const VisualMap::AtPlace& at : model.extent)
         terms_[static_cast<size_t>(model.heading) * map_.places().size() + at.place].push_back(
             {match, &model, &at});

@@ -124,6 +124,60 @@ TEST_F(VisualMapRun, EachEstimatorAnswersInItsOwnWay) {
   }
 }
 
+TEST_F(VisualMapRun, SequencesAreFollowedOnTheFloor) {
+  const ProgramRun one_by_one = Localize("visual.cairn" + images_ + " --estimator visual-map");
+  const ProgramRun both = Localize("visual.cairn" + images_ + " --estimator both --sequence");
+  ASSERT_EQ(both.exit_code, 0) << both.err;
+  const std::vector<json> alone = JsonLines(one_by_one.out), followed = JsonLines(both.out);
+  ASSERT_EQ(followed.size(), alone.size());
+  int num_fixes = 0;
+  for (size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_FALSE(alone[i].contains("scope"));
+    const json& on_floor = followed[i]["visual_map"];
+    const std::string scope = on_floor["scope"];
+    EXPECT_TRUE(scope == "track" || scope == "votes" || scope == "all") << scope;
+    EXPECT_EQ(on_floor["regions"].empty(), scope == "all");
+    if (!alone[i]["fix"].get<bool>() || !on_floor["fix"].get<bool>()) continue;
+    ++num_fixes;
+    const std::vector<double> a = alone[i]["floor_m"], b = on_floor["floor_m"];
+    EXPECT_LT(std::hypot(a[0] - b[0], a[1] - b[1]), 0.3) << on_floor.dump(1);
+  }
+  EXPECT_GE(num_fixes, 2);
+  const ProgramRun again = Localize("visual.cairn" + images_ + " --estimator both --sequence --threads 3");
+  EXPECT_EQ(again.out, both.out);
+}
+
+TEST_F(VisualMapRun, OdometryHasALineForEachImage) {
+  const std::string image = images_.substr(0, images_.find(' ', 1));
+  const auto run = [&](const std::string& odometry, int num_images) {
+    std::ofstream(*folder_ / "wheels.txt") << odometry;
+    std::string arguments = "visual.cairn --estimator visual-map --sequence --odometry wheels.txt";
+    for (int i = 0; i < num_images; ++i) arguments += image;
+    return Localize(arguments);
+  };
+  const ProgramRun stands = run("0 0 0 # stands\n\n0 0 0\n0 0 0\n", 3);
+  ASSERT_EQ(stands.exit_code, 0) << stands.err;
+  const std::vector<json> answers = JsonLines(stands.out);
+  EXPECT_LE(answers[2]["entropy"], answers[0]["entropy"]);
+  // The belief goes where the wheels say, beyond what unknown motion would allow.
+  const ProgramRun drives = run("0 0 0\n100 0 0\n", 2);
+  ASSERT_EQ(drives.exit_code, 0) << drives.err;
+  EXPECT_NE(JsonLines(drives.out)[1]["scope"], "track");
+  const ProgramRun short_one = run("0 0 0\n", 2);
+  EXPECT_EQ(short_one.exit_code, 2);
+  EXPECT_THAT(short_one.err, HasSubstr("lines for 1 images, and none for image 2"));
+  const ProgramRun long_one = run("0 0 0\n0 0 0\n", 1);
+  EXPECT_EQ(long_one.exit_code, 2);
+  EXPECT_THAT(long_one.err, HasSubstr("lines for 2 images, and there were 1"));
+  for (const char* bad : {"0 0\n", "0 0 0 0\n", "0 0 nan\n", "0 0 x\n"}) {
+    const ProgramRun refused = run(std::string("# wheels\n") + bad, 1);
+    EXPECT_EQ(refused.exit_code, 4) << bad;
+    EXPECT_THAT(refused.err, HasSubstr("wheels.txt:2: '")) << bad;
+  }
+  EXPECT_EQ(Localize("visual.cairn --estimator visual-map --sequence --odometry none.txt" + image).exit_code,
+            3);
+}
+
 TEST_F(VisualMapRun, WhatCannotBeDoneIsRefused) {
   const std::string build = "visual.build/";
   const ProgramRun plain =
@@ -135,6 +189,8 @@ TEST_F(VisualMapRun, WhatCannotBeDoneIsRefused) {
     const ProgramRun run = Localize("plain.cairn" + images_ + " --estimator " + estimator);
     EXPECT_NE(run.exit_code, 0);
     EXPECT_THAT(run.err, HasSubstr("visual_map = true"));
+    EXPECT_THAT(Localize("plain.cairn" + images_ + " --sequence --estimator " + estimator).err,
+                HasSubstr("visual_map = true"));
   }
   const ProgramRun poses = Localize("visual.cairn" + images_ + " --estimator visual-map -o poses.txt");
   EXPECT_NE(poses.exit_code, 0);

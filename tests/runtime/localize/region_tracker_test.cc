@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/localize/retrieve.h"
+#include "runtime/localize/region_votes.h"
 #include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
