@@ -38,8 +38,9 @@ void MeasureGap(int size, double degree, uint64_t seed, int num_tries,
     return 100.0 * (static_cast<double>(kept) - bound.lower_bound) / bound.lower_bound;
   };
   fmt::print("{:>6}{:>7}{:>8}{:>10}{:>7}{:>8}{:>12.1f}{:>12.1f}{:>11.1f}{:>11.1f}\n", graph.num_nodes(),
-             graph.num_links(), greedy.size(), best, bound.lower_bound, CountingBound(graph),
-             gap(greedy.size()), gap(best), improve_seconds, bound_seconds);
+             graph.num_links(), greedy.size(), best, bound.lower_bound,
+             cairn::link_appearance::CountingBound(graph), gap(greedy.size()), gap(best), improve_seconds,
+             bound_seconds);
   std::fflush(stdout);
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/base/random.h"
 #include "core/files/file.h"
+#include "core/map/map_file.h"
 #include "core/seal/map_seal.h"
 #include "runtime/localize/localizer.h"
 

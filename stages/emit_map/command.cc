@@ -246,10 +246,16 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   EmitMapOptions checked = arguments.options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  const bool is_by_trial = arguments.options.max_bytes > 0 || arguments.options.landmarks == "fewest";
+  if (!is_by_trial) {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"left_out_max_error_m", "left_out_max_error_deg"},
+        "is only read where landmarks is fewest or max_bytes is not 0; leave it out"));
+  }
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
   MapRows rows;
   std::string guarantee;
-  if (arguments.options.max_bytes > 0 || arguments.options.landmarks == "fewest") {
+  if (is_by_trial) {
     CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsByTrial(arguments, inputs, environment));
   } else {
     CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.parts, arguments.options, nullptr,

@@ -88,8 +88,8 @@ std::vector<char> MarkKept(size_t num_classes, const std::vector<std::vector<siz
 
 // The classes that `keep` marks in the order in which the map stores them.
 std::vector<size_t> StoredOrder(const Classes& classes,
-                                   const std::vector<std::vector<size_t>>& classes_of_regions,
-                                   const std::vector<char>& keep) {
+                                const std::vector<std::vector<size_t>>& classes_of_regions,
+                                const std::vector<char>& keep) {
   std::vector<RegionIdx> first_region(classes.classes.size(), kNoRegion);
   for (size_t region = 0; region < classes_of_regions.size(); ++region) {
     for (const size_t i : classes_of_regions[region]) {
@@ -315,6 +315,7 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .help = "models that predict left-out sights worse than this count less, px",
        .min = 0}};
   AddCondition({"landmarks", {"fewest"}}, {"min_recall_ratio", "max_error_ratio"}, &table);
+  AddCondition({"max_bytes", {"0"}}, {"min_recall_ratio", "max_error_ratio"}, &table);
   AddCondition({"visual_map", {"true"}}, {"max_num_sights", "bad_model_px"}, &table);
   return table;
 }

@@ -73,7 +73,11 @@ TEST(OptionsRead, WhatOtherOptionsTurnOffIsRefused) {
            {with(words, {"--depth", "4", "--descriptors-per-word", "3"}), "where depth is 0, and it is 4"},
            {with(words, {"--tree-from", "t.db", "--branching", "4"}),
             "where tree_from is empty, and it is t.db"},
-           {with(emit, {"--left-out-max-error-m", "1"}), "where max_bytes is not 0"},
+           {with(emit, {"--landmarks", "all", "--left-out-max-error-m", "1"}),
+            "where landmarks is fewest or max_bytes is not 0"},
+           {with(emit, {"--landmarks", "all", "--min-recall-ratio", "1"}),
+            "where landmarks is fewest, and it is all"},
+           {with(emit, {"--max-bytes", "9", "--max-error-ratio", "2"}), "where max_bytes is 0, and it is 9"},
            {with(emit, {"--max-num-sights", "32"}), "where visual_map is true"}}) {
     ExpectRefused(refusal);
   }

@@ -91,7 +91,7 @@ TEST(RegionTracker, WithholdsAVotedFixUntilTheLookAlikeIsExcluded) {
   RegionTracker careless(map, options);
   const Localization fix = track(&careless, truth);
   EXPECT_TRUE(fix.has_fix()) << fix.message;
-  EXPECT_EQ(fix.scope, Scope::kRegions);
+  EXPECT_EQ(fix.scope, Scope::kVotes);
 }
 
 TEST(Map, ListsLookAlikesAtBothPlaces) {

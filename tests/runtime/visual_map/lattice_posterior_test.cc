@@ -132,8 +132,7 @@ std::vector<double> BruteForcePosterior(const VisualMap& map, const std::vector<
                                               (point / kNumPoints + 0.5) / kNumPoints - 0.5);
         std::vector<std::tuple<Eigen::Vector3d, Eigen::Vector3d, Eigen::Vector3d>> terms;
         for (const SeenLandmark& match : seen) {
-          for (const int32_t index : map.ModelsOf(match.landmark)) {
-            const VisualMap::Model& model = map.models()[index];
+          for (const VisualMap::Model& model : map.ModelsOf(match.landmark)) {
             const bool extends = std::any_of(
                 model.extent.begin(), model.extent.end(),
                 [&](const VisualMap::AtPlace& each) { return each.place == static_cast<int32_t>(place); });
@@ -175,8 +174,10 @@ TEST(PosteriorOnLattice, IsThatOfBruteForce) {
   options.num_subdivisions = 9;
   options.num_refined_places = 40;
   Random random(11);
-  // From sure of a place to a posterior over many of them.
-  for (const double sigma_px : {8.0, 12.0, 30.0}) {
+  // From sure of a place to a posterior over many of them.  The estimator takes what agrees with a match for
+  // normal about its maximum, also beyond the place's square: where that is about as wide as the square, up
+  // to 0.19 of the mass lies elsewhere (also with 21 x 21 points and 321 turns here).
+  for (const auto& [sigma_px, most] : {std::pair(8.0, 0.12), {12.0, 0.2}, {30.0, 0.02}}) {
     options.visual_sigma_px = sigma_px;
     options.visual_sigma_octaves = 0.05 * sigma_px / 4;
     for (int i = 0; i < 2; ++i) {
@@ -194,7 +195,7 @@ TEST(PosteriorOnLattice, IsThatOfBruteForce) {
       double difference = 0;
       for (size_t place = 0; place < expected.size(); ++place)
         difference += 0.5 * std::abs(found->at_place[place] - expected[place]);
-      EXPECT_LT(difference, 0.15) << sigma_px << " px at " << truth.transpose();
+      EXPECT_LT(difference, most) << sigma_px << " px at " << truth.transpose();
     }
   }
 }
