@@ -41,7 +41,7 @@ for n in "${sizes[@]}"; do
   stage "$n" decompose-regions "$survey/world.db" --classes "$survey/classes.db" --k 40 -o "$survey/regions.db"
   stage "$n" build-vocabulary "$survey/features.db" -o "$survey/vocabulary.db"
   stage "$n" emit-map --classes "$survey/classes.db" --world "$survey/world.db" --regions "$survey/regions.db" \
-      --vocabulary "$survey/vocabulary.db" --name building -o "$survey/map.cairn"
+      --vocabulary "$survey/vocabulary.db" --name building --landmarks regions -o "$survey/map.cairn"
 done
 
 awk -F '\t' -v sizes="${sizes[*]}" '

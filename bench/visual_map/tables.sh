@@ -10,7 +10,7 @@ shift 5
 mkdir -p "$out"
 emit() {
   "$cairn" stage emit-map --classes "$build/classes.db" --world "$build/world.db" --vocabulary "$build/vocabulary.db" \
-    --regions "$1" --name "$2" --visual-map true -o "$out/$2.cairn" --log-level error --progress none > /dev/null
+    --regions "$1" --name "$2" --visual-map true --landmarks regions -o "$out/$2.cairn" --log-level error --progress none > /dev/null
   "$cairn" inspect "$out/$2.cairn" --svg "$out/regions_$2.svg" > /dev/null
 }
 # One region that keeps every feature of the world.

@@ -375,10 +375,12 @@ TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
 
   // A map of all features, in which every image is kept: ways over them by each weight.
   const auto emit = [&](const std::string& arguments) {
-    return RunShell("cd " + Path("tiny.build") +
-                    " && cairn stage emit-map --classes classes.db --world world.db --regions " +
-                    "regions.db --vocabulary vocabulary.db --name tiny -o ../memory.cairn --progress none " +
-                    arguments);
+    return RunShell(
+        "cd " + Path("tiny.build") +
+        " && cairn stage emit-map --classes classes.db --world world.db --regions " +
+        "regions.db --vocabulary vocabulary.db --name tiny --landmarks regions -o ../memory.cairn "
+        "--progress none " +
+        arguments);
   };
   const ProgramRun link =
       RunShell("cd " + Path("tiny.build") +

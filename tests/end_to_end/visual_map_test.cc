@@ -183,7 +183,7 @@ TEST_F(VisualMapRun, WhatCannotBeDoneIsRefused) {
   const ProgramRun plain =
       RunShell("cd " + folder_->string() + " && cairn stage emit-map --classes " + build +
                "classes.db --world " + build + "world.db --regions " + build + "regions.db --vocabulary " +
-               build + "vocabulary.db --name plain -o plain.cairn");
+               build + "vocabulary.db --name plain --landmarks regions -o plain.cairn");
   ASSERT_EQ(plain.exit_code, 0) << plain.err;
   for (const char* estimator : {"visual-map", "both"}) {
     const ProgramRun run = Localize("plain.cairn" + images_ + " --estimator " + estimator);
