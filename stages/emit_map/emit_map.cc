@@ -78,8 +78,8 @@ std::vector<std::vector<size_t>> CommonClasses(const Classes& classes, const Wor
 
 // Per class, whether a map without a limit keeps it.
 std::vector<char> MarkKept(size_t num_classes, const std::vector<std::vector<size_t>>& classes_of_regions,
-                           bool keep_all) {
-  std::vector<char> kept(num_classes, keep_all ? 1 : 0);
+                           const EmitMapOptions& options) {
+  std::vector<char> kept(num_classes, options.landmarks == "regions" ? 0 : 1);
   for (const std::vector<size_t>& of_region : classes_of_regions) {
     for (const size_t i : of_region) kept[i] = 1;
   }
@@ -335,8 +335,7 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
                      "emit_map: landmarks = \"fewest\", but it is not said which these are");
   }
   CAIRN_ASSIGN_OR_RETURN(auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
-  std::vector<char> kept =
-      MarkKept(classes.classes.size(), classes_of_regions, options.landmarks != "regions");
+  std::vector<char> kept = MarkKept(classes.classes.size(), classes_of_regions, options);
   if (keep != nullptr) {
     kept = *keep;
     classes_of_regions = CommonClasses(classes, world, decomposition, kept);
@@ -402,7 +401,7 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
 Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
                                       const Decomposition& decomposition, const EmitMapOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
-  return MarkKept(classes.classes.size(), classes_of_regions, options.landmarks == "all");
+  return MarkKept(classes.classes.size(), classes_of_regions, options);
 }
 
 Status AddViews(Views views, MapRows* rows) {

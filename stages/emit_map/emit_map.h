@@ -77,7 +77,8 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr);
 
-// Per class, whether a map without a limit of bytes keeps it.  Errors: as EmitMap.
+// Per class, whether a map may keep it: one of regions with landmarks = "regions", else every one.  Errors:
+// as EmitMap.
 Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
                                       const Decomposition& decomposition, const EmitMapOptions& options);
 

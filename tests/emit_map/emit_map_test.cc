@@ -1,10 +1,12 @@
 #include "stages/emit_map/emit_map.h"
-#include "stages/emit_map/quantize_descriptors.h"
+
+#include <algorithm>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/blocks/map_documents.h"
+#include "stages/emit_map/quantize_descriptors.h"
 #include "tests/core/map/example.h"
 
 namespace cairn::emit_map {
@@ -21,6 +23,21 @@ std::vector<ClassId> ClassIds(const MapRows& rows) {
   std::vector<ClassId> ids;
   for (const MapLandmark& landmark : rows.landmarks) ids.push_back(landmark.class_id);
   return ids;
+}
+
+// What max_bytes and the fewest landmarks choose from.
+TEST(KeptClasses, AreThoseOfRegionsOrAll) {
+  const EmitExample example = MakeEmitExample();
+  const auto num_kept = [&](const std::string& landmarks) {
+    const auto kept =
+        *KeptClasses(example.classes, example.world, example.decomposition, {.landmarks = landmarks});
+    EXPECT_EQ(kept.size(), example.classes.classes.size());
+    return static_cast<size_t>(std::count(kept.begin(), kept.end(), 1));
+  };
+  EXPECT_EQ(num_kept("regions"), Emit(example, "regions")->landmarks.size());
+  EXPECT_LT(num_kept("regions"), example.classes.classes.size());
+  EXPECT_EQ(num_kept("all"), example.classes.classes.size());
+  EXPECT_EQ(num_kept("fewest"), example.classes.classes.size());
 }
 
 TEST(EmitMap, FewestLandmarksHaveToBeNamed) {

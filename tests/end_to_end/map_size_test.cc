@@ -75,6 +75,11 @@ TEST_F(MapSize, FewestLandmarksLocalizeLeftOutImagesAsAllDo) {
   const json whole = json::parse(Run("cairn inspect tiny.cairn --json").out);
   EXPECT_EQ(fewest["landmarks"], "fewest");
   EXPECT_LT(fewest["num_landmarks"], whole["num_landmarks"]);
+  int64_t num_not_needed = 0;
+  for (const json& drop : fewest["dropped"]) {
+    if (drop["name"] == "not_needed") num_not_needed = drop["num_dropped"];
+  }
+  EXPECT_EQ(num_not_needed, whole["num_landmarks"].get<int64_t>() - fewest["num_landmarks"].get<int64_t>());
   EXPECT_THAT(Run("cairn inspect fewest.cairn").out, HasSubstr("landmarks = fewest"));
 
   // Stricter: all that all landmarks localize, and no larger error.
