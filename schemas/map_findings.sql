@@ -31,3 +31,21 @@ CREATE TABLE drop_reasons (
   num_dropped INTEGER NOT NULL,
   at_stations BLOB NOT NULL          -- how many at each station, in order: a varint each; empty: none at any
 );
+
+-- What a map whose landmarks were chosen by trial promises; one row, or none.
+CREATE TABLE promises (
+  promise_id      INTEGER PRIMARY KEY,   -- 0
+  min_matches     INTEGER NOT NULL,      -- with this probability, at least so many landmarks are matched
+  max_error_m     REAL NOT NULL,         -- and the pose is within these limits
+  max_error_deg   REAL NOT NULL,
+  probability     REAL NOT NULL,
+  match_ratio     REAL NOT NULL,         -- from what is expected to what happens (core/promise/promise_model.h)
+  shape           REAL NOT NULL,
+  error_ratio     REAL NOT NULL,
+  radius_m        REAL NOT NULL,         -- of a view
+  radius_deg      REAL NOT NULL,
+  landmarks_bound INTEGER NOT NULL,      -- no map with fewer keeps the promise where it can be kept
+  nodes           BLOB NOT NULL,         -- see FORMAT.md
+  left_out        BLOB NOT NULL,         -- calibration curves: survey images left out of the maps that were tried,
+  held_out        BLOB NOT NULL          -- and images of the self-test
+);

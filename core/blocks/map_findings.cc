@@ -1,5 +1,6 @@
 #include "core/blocks/map_findings.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace cairn {
@@ -44,9 +45,60 @@ Status CheckDropCount(const DropCount& row, size_t num_stations) {
   return Ok();
 }
 
+bool IsProbability(double value) { return value >= 0 && value <= 1; }
+
+bool IsNonNegative(double value) { return value >= 0 && std::isfinite(value); }
+
+Status CheckCurve(const std::vector<PromiseBin>& bins) {
+  for (size_t i = 0; i < bins.size(); ++i) {
+    const PromiseBin& bin = bins[i];
+    if (!IsProbability(bin.least) || !IsProbability(bin.mean_promised) || bin.num < 1 || bin.num_kept < 0 ||
+        bin.num_kept > bin.num || (i > 0 && !(bin.least > bins[i - 1].least)))
+      return Invalid("{} of {} promises of {:.3f} kept", bin.num_kept, bin.num, bin.mean_promised);
+  }
+  return Ok();
+}
+
+Status CheckPromise(const MapPromise& promise, size_t num_regions, size_t num_images) {
+  const PromiseTerms& terms = promise.terms;
+  if (terms.min_matches < 1 || !(terms.max_error_m > 0) || !std::isfinite(terms.max_error_m) ||
+      !(terms.max_error_deg > 0) || !std::isfinite(terms.max_error_deg) || !(terms.probability > 0) ||
+      !(terms.probability < 1)) {
+    return Invalid("a promise of {} matches within {} m, {} deg with probability {}", terms.min_matches,
+                   terms.max_error_m, terms.max_error_deg, terms.probability);
+  }
+  const PromiseModel& model = promise.model;
+  if (!IsNonNegative(model.match_ratio) || !IsNonNegative(model.error_ratio) || !IsNonNegative(model.shape) ||
+      !(model.shape > 0) || !IsNonNegative(promise.radius_m) || !IsNonNegative(promise.radius_deg) ||
+      promise.landmarks_lower_bound < 0) {
+    return Invalid("the promise's model has impossible numbers");
+  }
+  for (const NodePromise& node : promise.nodes) {
+    const auto exists = [&](int32_t image) { return image >= 0 && static_cast<size_t>(image) < num_images; };
+    if (!exists(node.image) || !exists(node.other_image) || node.region < 0 ||
+        static_cast<size_t>(node.region) >= num_regions || !IsProbability(node.probability) ||
+        !IsProbability(node.most_probable) || !IsNonNegative(node.num_matches) ||
+        !IsNonNegative(node.sigma_m)) {
+      return Invalid(
+          "a promise of {} between images {} and {} of {}, in region {} of {}, with {} matches, sigma {}",
+          node.probability, node.image, node.other_image, num_images, node.region, num_regions,
+          node.num_matches, node.sigma_m);
+    }
+  }
+  CAIRN_RETURN_IF_ERROR(CheckCurve(promise.left_out));
+  return CheckCurve(promise.held_out);
+}
+
 }  // namespace
 
-Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations) {
+int MapPromise::NumKept() const {
+  return static_cast<int>(std::count_if(nodes.begin(), nodes.end(), [&](const NodePromise& node) {
+    return node.probability >= terms.probability;
+  }));
+}
+
+Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations,
+                        size_t num_images) {
   for (size_t i = 0; i < findings.self_test_regions.size(); ++i) {
     const RegionSelfTest& row = findings.self_test_regions[i];
     if (i > 0 && row.region <= findings.self_test_regions[i - 1].region)
@@ -66,6 +118,7 @@ Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t 
       return Invalid("what is dropped for reason {} is out of order", row.reason_id);
     CAIRN_RETURN_IF_ERROR(CheckDropCount(row, num_stations));
   }
+  if (findings.promise) return CheckPromise(*findings.promise, num_regions, num_images);
   return Ok();
 }
 

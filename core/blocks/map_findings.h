@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/promise/promise_model.h"
 
 namespace cairn {
 
@@ -57,17 +58,48 @@ struct RegionEntropy {
   friend bool operator==(const RegionEntropy&, const RegionEntropy&) = default;
 };
 
+// What a robot can rely on that looks from about here (core/promise).
+struct NodePromise {
+  // Images by index: the survey image of the node, or the two between whose headings it lies.
+  int32_t image = 0;
+  int32_t other_image = 0;
+  RegionIdx region = 0;      // whose landmarks alone keep the promise
+  double probability = 0;    // that the terms hold
+  double num_matches = 0;    // landmarks to expect matched
+  double sigma_m = 0;        // of the camera's place by these: square root of its covariance's trace
+  double most_probable = 0;  // the probability if all classes of the survey were landmarks
+  friend bool operator==(const NodePromise&, const NodePromise&) = default;
+};
+
+// What the map promises, node by node, and how promises of its kind fared.
+struct MapPromise {
+  PromiseTerms terms;
+  PromiseModel model;
+  // A node answers for images this far around it, times kNodeReach (core/promise/promise_nodes.h).
+  double radius_m = 0;
+  double radius_deg = 0;
+  // No map of this survey with fewer landmarks keeps the promise at the nodes where it can be kept.
+  int64_t landmarks_lower_bound = 0;
+  std::vector<NodePromise> nodes;
+  std::vector<PromiseBin> left_out;  // survey images left out of the maps that were tried
+  std::vector<PromiseBin> held_out;  // images of the self-test
+  int NumKept() const;               // nodes whose probability is the terms' at least
+  friend bool operator==(const MapPromise&, const MapPromise&) = default;
+};
+
 // What the compilation found out about a map, for people who assess it (schemas/map_findings.sql).  A robot
 // does not need it to localize.
 struct MapFindings {
   std::vector<RegionSelfTest> self_test_regions;  // those with held-out images, ascending region
   std::vector<RegionEntropy> region_entropies;    // those with images of the appearance graph, ascending
   std::vector<DropCount> drops;                   // reasons that occurred, ascending
+  std::optional<MapPromise> promise;              // of maps whose landmarks were chosen by trial
   friend bool operator==(const MapFindings&, const MapFindings&) = default;
 };
 
-// Errors: InvalidArgument, naming the row: a row out of order, of a region that does not exist, or with
-// impossible numbers.
-Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations);
+// Errors: InvalidArgument, naming the row: a row out of order, of a region, station or image that does not
+// exist, or with impossible numbers.
+Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations,
+                        size_t num_images);
 
 }  // namespace cairn

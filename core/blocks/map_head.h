@@ -13,6 +13,9 @@
 
 namespace cairn {
 
+// MapHead::algorithm of regions that keep promises (core/promise) instead of k common landmarks.
+inline constexpr const char* kPromiseAlgorithm = "promise";
+
 // What a map says of itself as a whole.
 struct MapHead {
   std::string name;
@@ -32,7 +35,8 @@ struct MapHead {
   std::string landmark_choice = "regions";
   // Which images retrieval finds: "all", or those of the appearance graph's kept nodes ("kept").
   std::string documents = "all";
-  // How the regions were made.
+  // How the regions were made; kPromiseAlgorithm: of the nodes whose promises the same landmarks keep, and k,
+  // tau, rho are 0.
   std::string algorithm;
   int k = 0;
   int tau = 0;

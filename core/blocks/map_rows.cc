@@ -242,7 +242,7 @@ Status CheckMapRows(const MapRows& rows) {
     }
     if (!is_document[image]) return Invalid("the vocabulary knows image {}, which is not kept", image_id);
   }
-  return CheckMapFindings(rows.findings, rows.regions.size(), rows.stations.size());
+  return CheckMapFindings(rows.findings, rows.regions.size(), rows.stations.size(), rows.images.size());
 }
 
 std::vector<int> LandmarksSeenAt(const MapRows& rows) {

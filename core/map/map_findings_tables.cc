@@ -1,8 +1,11 @@
 #include "core/map/map_findings_tables.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/base/blob.h"
+#include "core/blocks/map_codes.h"
 
 namespace cairn {
 namespace {
@@ -11,8 +14,10 @@ constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
 
 // The tables that a map may have: earlier formats lack some.
 const std::vector<StoredTable>& FindingsTables() {
-  static const std::vector<StoredTable> tables = {
-      {"drop_reasons", 7, 4096}, {"region_entropies", 2, 1 << 24}, {"self_test_regions", 8, 1 << 24}};
+  static const std::vector<StoredTable> tables = {{"drop_reasons", 7, 4096},
+                                                  {"promises", 14, 1},
+                                                  {"region_entropies", 2, 1 << 24},
+                                                  {"self_test_regions", 8, 1 << 24}};
   return tables;
 }
 
@@ -61,6 +66,129 @@ void WriteDropCounts(SQLite::Database& database, const MapFindings& findings) {
     insert.exec();
     insert.reset();
   }
+}
+
+// Probabilities, and sigmas over the views' radius, are stored in steps of 1 / 1000; matches in tenths.
+constexpr double kThousandths = 1000;
+constexpr double kTenths = 10;
+
+uint64_t Steps(double value, double per_unit) {
+  return static_cast<uint64_t>(std::llround(value * per_unit));
+}
+
+std::string EncodeNodes(const MapPromise& promise) {
+  BlobWriter blob;
+  int32_t last = 0;
+  for (const NodePromise& node : promise.nodes) {
+    blob.Varint(ZigZag(node.image - last));
+    blob.Varint(ZigZag(node.other_image - node.image));
+    blob.Varint(static_cast<uint64_t>(node.region));
+    // Rounded down: nothing is promised that is not kept.
+    blob.Varint(static_cast<uint64_t>(node.probability * kThousandths + 1e-9));
+    blob.Varint(static_cast<uint64_t>(node.most_probable * kThousandths + 1e-9));
+    blob.Varint(Steps(node.num_matches, kTenths));
+    blob.Varint(promise.radius_m > 0 ? Steps(std::min(node.sigma_m / promise.radius_m, 1e6), kThousandths)
+                                     : 0);
+    last = node.image;
+  }
+  return blob.Take();
+}
+
+std::string EncodeCurve(const std::vector<PromiseBin>& bins) {
+  BlobWriter blob;
+  for (const PromiseBin& bin : bins) {
+    blob.Varint(Steps(bin.least, kThousandths));
+    blob.Varint(Steps(bin.mean_promised, kThousandths));
+    blob.Varint(static_cast<uint64_t>(bin.num));
+    blob.Varint(static_cast<uint64_t>(bin.num_kept));
+  }
+  return blob.Take();
+}
+
+void WritePromise(SQLite::Database& database, const MapFindings& findings) {
+  if (!findings.promise) return;
+  const MapPromise& promise = *findings.promise;
+  SQLite::Statement insert(database,
+                           "INSERT INTO promises VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  insert.bind(1, 0);
+  insert.bind(2, promise.terms.min_matches);
+  insert.bind(3, promise.terms.max_error_m);
+  insert.bind(4, promise.terms.max_error_deg);
+  insert.bind(5, promise.terms.probability);
+  insert.bind(6, promise.model.match_ratio);
+  insert.bind(7, promise.model.shape);
+  insert.bind(8, promise.model.error_ratio);
+  insert.bind(9, promise.radius_m);
+  insert.bind(10, promise.radius_deg);
+  insert.bind(11, promise.landmarks_lower_bound);
+  int column = 12;
+  for (const std::string& bytes :
+       {EncodeNodes(promise), EncodeCurve(promise.left_out), EncodeCurve(promise.held_out)})
+    insert.bind(column++, bytes.data(), static_cast<int>(bytes.size()));
+  insert.exec();
+}
+
+int32_t Int32(int64_t value) { return value >= 0 && value <= kMaxCount ? static_cast<int32_t>(value) : -1; }
+
+// Without overflow: the file may be anything.
+int64_t Sum(int64_t a, int64_t b) {
+  return static_cast<int64_t>(static_cast<uint64_t>(a) + static_cast<uint64_t>(b));
+}
+
+Status DecodeNodes(const std::string& bytes, const std::string& path, MapPromise* promise) {
+  BlobReader blob(bytes);
+  int64_t last = 0;
+  while (blob.ok() && blob.num_left() > 0) {
+    NodePromise node;
+    const int64_t image = Sum(last, UnZigZag(blob.Varint()));
+    node.image = Int32(image);
+    node.other_image = Int32(Sum(image, UnZigZag(blob.Varint())));
+    if (node.image < 0 || node.other_image < 0) return Corrupt(path, "table promises: a node of no image");
+    node.region = Int32(static_cast<int64_t>(blob.Varint()));
+    node.probability = static_cast<double>(blob.Varint()) / kThousandths;
+    node.most_probable = static_cast<double>(blob.Varint()) / kThousandths;
+    node.num_matches = static_cast<double>(blob.Varint()) / kTenths;
+    node.sigma_m = static_cast<double>(blob.Varint()) / kThousandths * promise->radius_m;
+    last = image;
+    promise->nodes.push_back(node);
+  }
+  return blob.ok() ? Ok() : Corrupt(path, "table promises: the nodes are cut off");
+}
+
+Result<std::vector<PromiseBin>> DecodeCurve(const std::string& bytes, const std::string& path) {
+  BlobReader blob(bytes);
+  std::vector<PromiseBin> bins;
+  while (blob.ok() && blob.num_left() > 0) {
+    PromiseBin bin{.least = static_cast<double>(blob.Varint()) / kThousandths};
+    bin.mean_promised = static_cast<double>(blob.Varint()) / kThousandths;
+    bin.num = Int32(static_cast<int64_t>(blob.Varint()));
+    bin.num_kept = Int32(static_cast<int64_t>(blob.Varint()));
+    bins.push_back(bin);
+  }
+  if (!blob.ok()) return Corrupt(path, "table promises: a calibration curve is cut off");
+  return bins;
+}
+
+Result<MapPromise> DecodePromise(const StoredRow& row, const std::string& path) {
+  MapPromise promise;
+  CAIRN_ASSIGN_OR_RETURN(const int64_t min_matches, row.Integer(1, 1, kMaxCount));
+  promise.terms.min_matches = static_cast<int>(min_matches);
+  CAIRN_ASSIGN_OR_RETURN(promise.terms.max_error_m, row.Real(2));
+  CAIRN_ASSIGN_OR_RETURN(promise.terms.max_error_deg, row.Real(3));
+  CAIRN_ASSIGN_OR_RETURN(promise.terms.probability, row.Real(4));
+  CAIRN_ASSIGN_OR_RETURN(promise.model.match_ratio, row.Real(5));
+  CAIRN_ASSIGN_OR_RETURN(promise.model.shape, row.Real(6));
+  CAIRN_ASSIGN_OR_RETURN(promise.model.error_ratio, row.Real(7));
+  CAIRN_ASSIGN_OR_RETURN(promise.radius_m, row.Real(8));
+  CAIRN_ASSIGN_OR_RETURN(promise.radius_deg, row.Real(9));
+  CAIRN_ASSIGN_OR_RETURN(promise.landmarks_lower_bound, row.Integer(10));
+  CAIRN_ASSIGN_OR_RETURN(const std::string nodes, row.Blob(11));
+  CAIRN_RETURN_IF_ERROR(DecodeNodes(nodes, path, &promise));
+  CAIRN_ASSIGN_OR_RETURN(const std::string left_out, row.Blob(12));
+  CAIRN_ASSIGN_OR_RETURN(promise.left_out, DecodeCurve(left_out, path));
+  CAIRN_ASSIGN_OR_RETURN(const std::string held_out, row.Blob(13));
+  CAIRN_ASSIGN_OR_RETURN(promise.held_out, DecodeCurve(held_out, path));
+  return promise;
 }
 
 Result<int> CountOf(const StoredRow& row, size_t column) {
@@ -116,6 +244,7 @@ void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
   WriteSelfTestRegions(database, findings);
   WriteRegionEntropies(database, findings);
   WriteDropCounts(database, findings);
+  WritePromise(database, findings);
 }
 
 Result<StoredRows> ReadFindingsRows(SQLite::Database& database, const std::string& path,
@@ -137,6 +266,8 @@ Result<MapFindings> DecodeMapFindings(const StoredRows& rows, const std::string&
       } else if (table == "region_entropies") {
         CAIRN_ASSIGN_OR_RETURN(const RegionEntropy entropy, DecodeRegionEntropy(row));
         findings.region_entropies.push_back(entropy);
+      } else if (table == "promises") {
+        CAIRN_ASSIGN_OR_RETURN(findings.promise, DecodePromise(row, path));
       } else {
         CAIRN_ASSIGN_OR_RETURN(DropCount count, DecodeDropCount(row, path));
         findings.drops.push_back(std::move(count));

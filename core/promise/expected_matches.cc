@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
 #include "core/base/parallel.h"
-#include "core/base/quantiles.h"
 #include "core/geometry/pose.h"
-#include "core/promise/view_distance.h"
+#include "core/promise/promise_nodes.h"
 
 namespace cairn {
 namespace {
@@ -29,9 +30,14 @@ constexpr double kMaxDistanceFactor = 2.5;
 constexpr double kShiftDeg = 5;
 constexpr double kShiftLogRatio = 0.1;
 constexpr int64_t kMaxNumPairs = 60'000;
-constexpr double kViewSpacing = 0.5;
 constexpr size_t kMaxNumNear = 64;
 constexpr int kMinNumShared = 5;
+constexpr double kLeastDistance = 1e-9;
+// Features of the nearest sight: its angle and its octaves are counted in these.
+constexpr double kAngleUnitDeg = 20;
+constexpr double kOctavesUnit = 0.5;
+// An image taken anywhere may find what this many of the survey's images nearest to it saw.
+constexpr size_t kMaxNumNearest = 32;
 
 struct View {
   Pose cam_from_world;
@@ -66,19 +72,12 @@ class Learner {
     FindNear();
   }
 
-  // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
-  std::vector<int32_t> Looking(size_t i) const {
-    std::vector<int32_t> candidates;
-    for (const int32_t image : seen_by_[i])
-      candidates.insert(candidates.end(), views_[image].near.begin(), views_[image].near.end());
-    std::sort(candidates.begin(), candidates.end());
-    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
-    std::erase_if(candidates, [&](int32_t image) {
-      return !std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image) && !LooksAt(image, i);
-    });
-    return candidates;
-  }
-
+  // Which sights of a class count, and from how far.
+  enum class Sights {
+    kOfOtherViews,  // those of the image's own view do not
+    kFromThere,     // all
+    kFromNearby,    // all, and the image is taken about a view's radius farther away
+  };
   // The sights of a class: where those that look at it stand, and which of them see it.
   struct Lookers {
     std::vector<int32_t> images;
@@ -92,70 +91,88 @@ class Learner {
     for (const int32_t image : lookers.images) {
       lookers.sees.push_back(std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image));
       const Eigen::Vector3d ray = views_[image].center - classes_.classes[i].position;
-      const double distance = std::max(ray.norm(), 1e-9);
+      const double distance = std::max(ray.norm(), kLeastDistance);
       lookers.rays.push_back(ray / distance);
       lookers.log_distances.push_back(std::log2(distance));
     }
     return lookers;
   }
 
-  // What is known of a class at the j-th image that looks at it.  `is_left_out`: from other views alone;
-  // false: as a robot in the image's view would find it.  False where no sight is left or all are far.
-  bool Describe(const Lookers& lookers, size_t j, double prior, bool is_left_out,
-                FeatureVector* features) const {
-    double sum = 0, seen = 0, least = 1e9, nearest_deg = 180, nearest_log = 10;
+  // What is known of a class from the sights of it, for an image that sees it along `ray` at a distance.
+  // `squared(image)`: of the image's view to a survey image's.  False where no sight is left or all are far.
+  template <class SquaredDistance>
+  bool Describe(const Lookers& lookers, const Eigen::Vector3d& ray, double log_distance, double prior,
+                Sights which, const SquaredDistance& squared, FeatureVector* features) const {
+    double sum = 0, seen = 0, least = std::numeric_limits<double>::infinity(), nearest_deg = 180,
+           nearest_octaves = 10;
     int num_seen = 0;
     for (size_t other = 0; other < lookers.images.size(); ++other) {
-      double d2 = distance_.Squared(lookers.images[j], lookers.images[other]);
-      if (is_left_out && d2 < 1) continue;
-      if (!is_left_out) d2 += 1;
+      double d2 = squared(lookers.images[other]);
+      if (which == Sights::kOfOtherViews && d2 < 1) continue;
+      if (which == Sights::kFromNearby) d2 += 1;
       const double weight = std::exp(-d2 / (2 * kKernelWidth * kKernelWidth));
       sum += weight;
       if (!lookers.sees[other]) continue;
       seen += weight;
       ++num_seen;
-      const double angle =
-          DegFromRad(std::acos(std::clamp(lookers.rays[j].dot(lookers.rays[other]), -1.0, 1.0)));
-      const double log_ratio = std::abs(lookers.log_distances[j] - lookers.log_distances[other]);
-      const double far = angle * angle / (20 * 20) + log_ratio * log_ratio / (0.5 * 0.5);
-      if (far < least) least = far, nearest_deg = angle, nearest_log = log_ratio;
+      const double octaves = std::abs(log_distance - lookers.log_distances[other]);
+      const double octaves2 = octaves * octaves / (kOctavesUnit * kOctavesUnit);
+      const double cosine = std::clamp(ray.dot(lookers.rays[other]), -1.0, 1.0);
+      // An angle is at least as long as its chord.
+      const double unit_rad = RadFromDeg(kAngleUnitDeg);
+      if (2 * (1 - cosine) / (unit_rad * unit_rad) + octaves2 >= least) continue;
+      const double angle_deg = DegFromRad(std::acos(cosine));
+      const double far = angle_deg * angle_deg / (kAngleUnitDeg * kAngleUnitDeg) + octaves2;
+      if (far < least) least = far, nearest_deg = angle_deg, nearest_octaves = octaves;
     }
-    if (num_seen == 0 || nearest_deg > kMaxAngleDeg || nearest_log > std::log2(kMaxDistanceFactor))
+    if (num_seen == 0 || nearest_deg > kMaxAngleDeg || nearest_octaves > std::log2(kMaxDistanceFactor))
       return false;
-    if (is_left_out && num_seen < 2) return false;
-    if (!is_left_out) {
+    if (which == Sights::kOfOtherViews && num_seen < 2) return false;
+    if (which == Sights::kFromNearby) {
       nearest_deg = std::hypot(nearest_deg, kShiftDeg);
-      nearest_log = std::hypot(nearest_log, kShiftLogRatio);
+      nearest_octaves = std::hypot(nearest_octaves, kShiftLogRatio);
     }
     const double rate =
         std::clamp((seen + kPriorWeight * prior) / (sum + kPriorWeight), kLeastRate, 1 - kLeastRate);
-    *features << 1, std::log(rate / (1 - rate)), std::log1p(sum), std::log(num_seen), nearest_deg / 20,
-        nearest_log / 0.5, static_cast<double>(num_seen) / static_cast<double>(lookers.images.size());
+    *features << 1, std::log(rate / (1 - rate)), std::log1p(sum), std::log(num_seen),
+        nearest_deg / kAngleUnitDeg, nearest_octaves / kOctavesUnit,
+        static_cast<double>(num_seen) / static_cast<double>(lookers.images.size());
     return true;
   }
+  // For the j-th image that looks at it.
+  bool DescribeAtImage(const Lookers& lookers, size_t j, double prior, Sights which,
+                       FeatureVector* features) const {
+    return Describe(
+        lookers, lookers.rays[j], lookers.log_distances[j], prior, which,
+        [&](int32_t other) { return distance_.Squared(lookers.images[j], other); }, features);
+  }
 
-  double depth() const { return distance_.depth(); }
+  const ViewDistance& distance() const { return distance_; }
   const std::vector<int32_t>& seen_by(size_t i) const { return seen_by_[i]; }
 
-  // Images that lie apart, so that every image is within kViewSpacing of one of them.
-  std::vector<int32_t> Views() const {
-    std::vector<int32_t> chosen;
-    for (int32_t image = 0; image < static_cast<int32_t>(views_.size()); ++image) {
-      const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](int32_t other) {
-        return distance_.Squared(image, other) < kViewSpacing * kViewSpacing;
-      });
-      if (!is_near) chosen.push_back(image);
-    }
-    return chosen;
+  bool IsInView(const Camera& camera, const Pose& cam_from_world, size_t i) const {
+    const auto pixel = ImageFromCamera(camera, cam_from_world * classes_.classes[i].position);
+    return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < camera.width &&
+           pixel->y() < camera.height;
   }
 
  private:
+  // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
+  std::vector<int32_t> Looking(size_t i) const {
+    std::vector<int32_t> candidates;
+    for (const int32_t image : seen_by_[i])
+      candidates.insert(candidates.end(), views_[image].near.begin(), views_[image].near.end());
+    std::sort(candidates.begin(), candidates.end());
+    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+    std::erase_if(candidates, [&](int32_t image) {
+      return !std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image) && !LooksAt(image, i);
+    });
+    return candidates;
+  }
+
   bool LooksAt(int32_t image, size_t i) const {
     const View& view = views_[image];
-    if (view.camera == nullptr) return false;
-    const auto pixel = ImageFromCamera(*view.camera, view.cam_from_world * classes_.classes[i].position);
-    return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < view.camera->width &&
-           pixel->y() < view.camera->height;
+    return view.camera != nullptr && IsInView(*view.camera, view.cam_from_world, i);
   }
 
   void FindNear() {
@@ -205,56 +222,132 @@ FeatureVector FitLogistic(const std::vector<FeatureVector>& rows, const std::vec
   return weights;
 }
 
+double Probability(const FeatureVector& weights, const FeatureVector& features) {
+  return 1 / (1 + std::exp(-weights.dot(features)));
+}
+
 }  // namespace
 
+class MatchModel::Impl {
+ public:
+  Impl(const Classes& classes, const ViewOptions& options, int num_threads)
+      : classes_(classes), learner_(classes, options), lookers_(classes.classes.size()) {
+    const auto num_classes = static_cast<int64_t>(lookers_.size());
+    ParallelFor(num_classes, num_threads, [&](int64_t i) { lookers_[i] = learner_.LookersOf(i); });
+    seen_in_.resize(classes.images.size());
+    int64_t num_looking = 0, num_seen = 0;
+    for (int64_t i = 0; i < num_classes; ++i) {
+      num_looking += static_cast<int64_t>(lookers_[i].images.size());
+      num_seen += static_cast<int64_t>(learner_.seen_by(i).size());
+      for (const int32_t image : learner_.seen_by(i)) seen_in_[image].push_back(i);
+    }
+    if (num_looking == 0) return;
+    prior_ = static_cast<double>(num_seen) / static_cast<double>(num_looking);
+
+    const int64_t step = std::max<int64_t>(1, num_looking / kMaxNumPairs);
+    std::vector<std::vector<std::pair<FeatureVector, char>>> learnt(num_classes);
+    ParallelFor((num_classes + step - 1) / step, num_threads, [&](int64_t n) {
+      const int64_t i = n * step;
+      for (size_t j = 0; j < lookers_[i].images.size(); ++j) {
+        FeatureVector features;
+        if (learner_.DescribeAtImage(lookers_[i], j, prior_, Learner::Sights::kOfOtherViews, &features))
+          learnt[i].emplace_back(features, lookers_[i].sees[j]);
+      }
+    });
+    std::vector<FeatureVector> rows;
+    std::vector<char> seen;
+    for (const auto& list : learnt) {
+      for (const auto& [features, is_seen] : list) rows.push_back(features), seen.push_back(is_seen);
+    }
+    num_learnt_from_ = static_cast<int64_t>(rows.size());
+    weights_ = FitLogistic(rows, seen);
+  }
+
+  ExpectedMatches OfViews(int num_threads) const {
+    ExpectedMatches matches;
+    matches.views = ImagesApart(distance(), classes_.images.size(), kViewSpacing);
+    matches.depth = learner_.distance().depth();
+    matches.num_learnt_from = num_learnt_from_;
+    for (int f = 0; f < kNumMatchFeatures; ++f) matches.weights[f] = weights_[f];
+    matches.of_class.resize(lookers_.size());
+    std::vector<int32_t> view_of_image(classes_.images.size(), -1);
+    for (size_t view = 0; view < matches.views.size(); ++view)
+      view_of_image[matches.views[view]] = static_cast<int32_t>(view);
+    ParallelFor(static_cast<int64_t>(lookers_.size()), num_threads, [&](int64_t i) {
+      for (size_t j = 0; j < lookers_[i].images.size(); ++j) {
+        FeatureVector features;
+        const int32_t view = view_of_image[lookers_[i].images[j]];
+        if (view < 0 ||
+            !learner_.DescribeAtImage(lookers_[i], j, prior_, Learner::Sights::kFromNearby, &features))
+          continue;
+        matches.of_class[i].push_back({view, static_cast<float>(Probability(weights_, features))});
+      }
+    });
+    return matches;
+  }
+
+  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, Where where) const {
+    const size_t num_images = classes_.images.size();
+    std::vector<double> squared(num_images);
+    std::vector<size_t> nearest(num_images);
+    for (size_t image = 0; image < num_images; ++image) {
+      squared[image] = distance().Squared(cam_from_world, image);
+      nearest[image] = image;
+    }
+    const size_t num_nearest = std::min(num_images, kMaxNumNearest);
+    std::partial_sort(
+        nearest.begin(), nearest.begin() + static_cast<ptrdiff_t>(num_nearest), nearest.end(),
+        [&](size_t a, size_t b) { return std::pair(squared[a], a) < std::pair(squared[b], b); });
+    std::vector<size_t> candidates;
+    for (size_t n = 0; n < num_nearest; ++n)
+      candidates.insert(candidates.end(), seen_in_[nearest[n]].begin(), seen_in_[nearest[n]].end());
+    std::sort(candidates.begin(), candidates.end());
+    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+
+    const Eigen::Vector3d center = cam_from_world.Center();
+    const auto which = where == Where::kThere ? Learner::Sights::kFromThere : Learner::Sights::kFromNearby;
+    std::vector<ClassMatch> matches;
+    for (const size_t i : candidates) {
+      if (!learner_.IsInView(camera, cam_from_world, i)) continue;
+      const Eigen::Vector3d ray = center - classes_.classes[i].position;
+      const double distance_m = std::max(ray.norm(), kLeastDistance);
+      FeatureVector features;
+      if (learner_.Describe(
+              lookers_[i], ray / distance_m, std::log2(distance_m), prior_, which,
+              [&](int32_t image) { return squared[image]; }, &features))
+        matches.push_back({i, static_cast<float>(Probability(weights_, features))});
+    }
+    return matches;
+  }
+
+  const ViewDistance& distance() const { return learner_.distance(); }
+
+ private:
+  const Classes& classes_;
+  Learner learner_;
+  std::vector<Learner::Lookers> lookers_;     // per class
+  std::vector<std::vector<size_t>> seen_in_;  // per image: classes
+  double prior_ = 0;                          // share of those that look at a class which see it
+  FeatureVector weights_ = FeatureVector::Zero();
+  int64_t num_learnt_from_ = 0;
+};
+
+MatchModel::MatchModel(const Classes& classes, const ViewOptions& options, int num_threads)
+    : impl_(std::make_unique<Impl>(classes, options, num_threads)) {}
+MatchModel::~MatchModel() = default;
+MatchModel::MatchModel(MatchModel&&) noexcept = default;
+MatchModel& MatchModel::operator=(MatchModel&&) noexcept = default;
+
+ExpectedMatches MatchModel::OfViews(int num_threads) const { return impl_->OfViews(num_threads); }
+
+std::vector<ClassMatch> MatchModel::At(const Camera& camera, const Pose& cam_from_world, Where where) const {
+  return impl_->At(camera, cam_from_world, where);
+}
+
+const ViewDistance& MatchModel::distance() const { return impl_->distance(); }
+
 ExpectedMatches LearnMatches(const Classes& classes, const ViewOptions& options, int num_threads) {
-  const Learner learner(classes, options);
-  const auto num_classes = static_cast<int64_t>(classes.classes.size());
-  std::vector<Learner::Lookers> lookers(num_classes);
-  ParallelFor(num_classes, num_threads, [&](int64_t i) { lookers[i] = learner.LookersOf(i); });
-  int64_t num_looking = 0, num_seen = 0;
-  for (int64_t i = 0; i < num_classes; ++i) {
-    num_looking += static_cast<int64_t>(lookers[i].images.size());
-    num_seen += static_cast<int64_t>(learner.seen_by(i).size());
-  }
-  ExpectedMatches matches;
-  matches.views = learner.Views();
-  matches.depth = learner.depth();
-  matches.of_class.resize(num_classes);
-  if (num_looking == 0) return matches;
-  const double prior = static_cast<double>(num_seen) / static_cast<double>(num_looking);
-
-  const int64_t step = std::max<int64_t>(1, num_looking / kMaxNumPairs);
-  std::vector<std::vector<std::pair<FeatureVector, char>>> learnt(num_classes);
-  ParallelFor((num_classes + step - 1) / step, num_threads, [&](int64_t n) {
-    const int64_t i = n * step;
-    for (size_t j = 0; j < lookers[i].images.size(); ++j) {
-      FeatureVector features;
-      if (learner.Describe(lookers[i], j, prior, true, &features))
-        learnt[i].emplace_back(features, lookers[i].sees[j]);
-    }
-  });
-  std::vector<FeatureVector> rows;
-  std::vector<char> seen;
-  for (const auto& list : learnt) {
-    for (const auto& [features, is_seen] : list) rows.push_back(features), seen.push_back(is_seen);
-  }
-  matches.num_learnt_from = static_cast<int64_t>(rows.size());
-  const FeatureVector weights = FitLogistic(rows, seen);
-  for (int f = 0; f < kNumMatchFeatures; ++f) matches.weights[f] = weights[f];
-
-  std::vector<int32_t> view_of_image(classes.images.size(), -1);
-  for (size_t view = 0; view < matches.views.size(); ++view)
-    view_of_image[matches.views[view]] = static_cast<int32_t>(view);
-  ParallelFor(num_classes, num_threads, [&](int64_t i) {
-    for (size_t j = 0; j < lookers[i].images.size(); ++j) {
-      FeatureVector features;
-      const int32_t view = view_of_image[lookers[i].images[j]];
-      if (view < 0 || !learner.Describe(lookers[i], j, prior, false, &features)) continue;
-      matches.of_class[i].push_back({view, static_cast<float>(1 / (1 + std::exp(-weights.dot(features))))});
-    }
-  });
-  return matches;
+  return MatchModel(classes, options, num_threads).OfViews(num_threads);
 }
 
 }  // namespace cairn

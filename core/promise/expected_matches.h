@@ -1,9 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "core/camera/camera.h"
+#include "core/geometry/pose.h"
 #include "core/promise/view_distance.h"
 #include "core/world/feature_class.h"
 
@@ -27,9 +31,41 @@ struct ExpectedMatches {
   int64_t num_learnt_from = 0;  // pairs of a class and an image
 };
 
+// A class, and the probability that a robot's image finds it.
+struct ClassMatch {
+  size_t i = 0;  // position in Classes::classes
+  float probability = 0;
+};
+
 // Learns from the survey when a class that others saw is seen: for every image and every class in its view,
-// from the sights in other views alone.  O(classes * images that could see them).  Same result for
-// any number of threads.
+// from the sights in other views alone.  Same result for any number of threads.
+class MatchModel {
+ public:
+  // O(classes * images that could see them).  `classes` must outlive it.
+  MatchModel(const Classes& classes, const ViewOptions& options, int num_threads);
+  ~MatchModel();
+  MatchModel(MatchModel&&) noexcept;
+  MatchModel& operator=(MatchModel&&) noexcept;
+
+  // Of the survey's views.
+  ExpectedMatches OfViews(int num_threads) const;
+
+  // Where the survey's images are when an image is taken at a pose.
+  enum class Where {
+    kThere,   // exactly there: the pose is known
+    kNearby,  // about one view's radius from there
+  };
+  // The classes that an image taken there may find, ascending.  Const and safe from any thread.
+  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, Where where) const;
+
+  const ViewDistance& distance() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// MatchModel::OfViews.
 ExpectedMatches LearnMatches(const Classes& classes, const ViewOptions& options, int num_threads);
 
 }  // namespace cairn

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+#include <limits>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -11,50 +11,76 @@
 namespace cairn {
 namespace {
 
-// What a robot knows of its pose without landmarks: half the distance of what it sees, and this much.
-constexpr double kRoughSigmaRatio = 0.5;
-constexpr double kRoughSigmaDeg = 30;
+// All gains are computed anew when the number taken has doubled, until so many are taken: later ones hardly
+// grow.
+constexpr size_t kMaxTakenAtRefresh = 512;
 
-class LandmarkOrder {
+}  // namespace
+
+class LandmarkOrder::Impl {
  public:
-  LandmarkOrder(const Classes& classes, const ExpectedMatches& matches, const LandmarkOrderOptions& options)
-      : classes_(classes),
-        matches_(matches),
-        options_(options),
-        lack_(matches.views.size(), 1),
-        information_(matches.views.size(), kRoughSigmaRatio * matches.depth, kRoughSigmaDeg) {
-    std::unordered_map<CameraId, const Camera*> cameras;
-    for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
-    std::unordered_map<ImageId, const SurveyImage*> images;
-    for (const SurveyImage& image : classes.images) {
-      images[image.image_id] = &image;
-      const auto camera = cameras.find(image.camera_id);
-      focal_of_image_[image.image_id] = camera == cameras.end() ? 1 : camera->second->MeanFocal();
-    }
-    for (const int32_t image : matches.views) {
+  Impl(const Classes& classes, ExpectedMatches matches, std::vector<size_t> pool,
+       const LandmarkOrderOptions& options, int num_threads)
+      : matches_(std::move(matches)),
+        pool_(std::move(pool)),
+        enough_(options.enough_matches),
+        num_threads_(num_threads),
+        sights_(classes, options.keypoints),
+        lack_(matches_.views.size(), 1),
+        information_(PoseInformation::Rough(matches_.views.size(), matches_.depth)),
+        heap_(pool_.size()) {
+    for (const int32_t image : matches_.views) {
       const SurveyImage& row = classes.images[image];
-      views_.push_back({row.cam_from_world, focal_of_image_.at(row.image_id)});
+      views_.push_back({row.cam_from_world, sights_.FocalOf(row.image_id)});
     }
-    size_rad_m_.reserve(classes.classes.size());
-    for (const FeatureClass& feature_class : classes.classes) {
-      double sum = 0;
-      int num = 0;
-      for (const Observation& observation : feature_class.observations) {
-        const auto image = images.find(observation.image_id);
-        if (image == images.end()) continue;
-        const double distance = (image->second->cam_from_world * feature_class.position).norm();
-        sum += observation.keypoint.scale * distance / focal_of_image_.at(observation.image_id);
-        ++num;
-      }
-      size_rad_m_.push_back(num > 0 ? sum / num : 0);
+    for (size_t n = 0; n < pool_.size(); ++n) heap_[n].n = n;
+  }
+
+  std::vector<size_t> First(size_t num) {
+    num = std::min(num, pool_.size());
+    while (order_.size() < num) TakeNext();
+    return {order_.begin(), order_.begin() + static_cast<ptrdiff_t>(num)};
+  }
+
+ private:
+  struct View {
+    Pose cam_from_world;
+    double focal;  // px
+  };
+  struct Candidate {
+    double bound = 0;
+    size_t n = 0;  // in pool_
+  };
+
+  static bool Worse(const Candidate& a, const Candidate& b) {
+    return a.bound != b.bound ? a.bound < b.bound : a.n > b.n;
+  }
+
+  void TakeNext() {
+    // Gains hardly grow: an earlier value is nearly a bound [Minoux, "Accelerated greedy algorithms", 1978].
+    // Those that did grow are found whenever as many again have been taken.
+    if (order_.size() >= next_refresh_) {
+      ParallelFor(static_cast<int64_t>(heap_.size()), num_threads_,
+                  [&](int64_t i) { heap_[i].bound = Gain(pool_[heap_[i].n]); });
+      std::make_heap(heap_.begin(), heap_.end(), Worse);
+      next_refresh_ = order_.size() <= kMaxTakenAtRefresh / 2 ? 2 * order_.size() + 1
+                                                              : std::numeric_limits<size_t>::max();
     }
+    while (true) {
+      std::pop_heap(heap_.begin(), heap_.end(), Worse);
+      heap_.back().bound = Gain(pool_[heap_.back().n]);
+      if (heap_.size() == 1 || !Worse(heap_.back(), heap_.front())) break;
+      std::push_heap(heap_.begin(), heap_.end(), Worse);
+    }
+    Take(pool_[heap_.back().n]);
+    order_.push_back(pool_[heap_.back().n]);
+    heap_.pop_back();
   }
 
   double Gain(size_t i) const {
     double gain = 0;
     for (const ExpectedMatch& match : matches_.of_class[i]) {
-      gain += options_.enough_matches * lack_[match.view] *
-              (1 - std::exp(-match.probability / options_.enough_matches));
+      gain += enough_ * lack_[match.view] * (1 - std::exp(-match.probability / enough_));
       if (const auto sight = SightOf(i, match)) gain += information_.PlaceGain(*sight);
     }
     return gain;
@@ -63,79 +89,39 @@ class LandmarkOrder {
   void Take(size_t i) {
     std::vector<SightInformation> sights;
     for (const ExpectedMatch& match : matches_.of_class[i]) {
-      lack_[match.view] *= std::exp(-match.probability / options_.enough_matches);
+      lack_[match.view] *= std::exp(-match.probability / enough_);
       if (const auto sight = SightOf(i, match)) sights.push_back(*sight);
     }
     information_.Add(sights);
   }
 
- private:
-  struct View {
-    Pose cam_from_world;
-    double focal;  // px
-  };
-
   std::optional<SightInformation> SightOf(size_t i, const ExpectedMatch& match) const {
-    const FeatureClass& feature_class = classes_.classes[i];
     const View& view = views_[match.view];
-    const double distance = (view.cam_from_world * feature_class.position).norm();
-    const double scale_px = distance > 0 ? size_rad_m_[i] * view.focal / distance : 0;
-    const double sigma_px =
-        std::hypot(options_.keypoint_sigma_px, options_.keypoint_sigma_per_scale * scale_px,
-                   feature_class.reprojection_error_px);
-    const auto root =
-        InformationRoot(feature_class, view.cam_from_world, sigma_px / view.focal, match.probability);
+    const auto root = sights_.Root(i, view.cam_from_world, view.focal, match.probability);
     if (!root) return std::nullopt;
     return SightInformation{static_cast<size_t>(match.view), *root};
   }
 
-  const Classes& classes_;
-  const ExpectedMatches& matches_;
-  const LandmarkOrderOptions& options_;
-  std::unordered_map<ImageId, double> focal_of_image_;
+  ExpectedMatches matches_;
+  std::vector<size_t> pool_;
+  double enough_;
+  int num_threads_;
+  LandmarkSights sights_;
   std::vector<View> views_;
-  std::vector<double> size_rad_m_;  // per class: angle of its keypoints times distance
-  std::vector<double> lack_;        // per view: exp(-m_v / e)
+  std::vector<double> lack_;  // per view: exp(-m_v / e)
   PoseInformation information_;
+  std::vector<Candidate> heap_;  // of those not yet taken
+  std::vector<size_t> order_;
+  size_t next_refresh_ = 0;
 };
 
-}  // namespace
+LandmarkOrder::LandmarkOrder(const Classes& classes, ExpectedMatches matches, std::vector<size_t> pool,
+                             const LandmarkOrderOptions& options, int num_threads)
+    : impl_(std::make_unique<Impl>(classes, std::move(matches), std::move(pool), options, num_threads)) {}
+LandmarkOrder::~LandmarkOrder() = default;
+LandmarkOrder::LandmarkOrder(LandmarkOrder&&) noexcept = default;
+LandmarkOrder& LandmarkOrder::operator=(LandmarkOrder&&) noexcept = default;
 
-std::vector<size_t> OrderLandmarks(const Classes& classes, const ExpectedMatches& matches,
-                                   const std::vector<size_t>& pool, const LandmarkOrderOptions& options,
-                                   int num_threads) {
-  LandmarkOrder state(classes, matches, options);
-  struct Candidate {
-    double bound;
-    size_t i;  // in `pool`
-  };
-  const auto worse = [](const Candidate& a, const Candidate& b) {
-    return a.bound != b.bound ? a.bound < b.bound : a.i > b.i;
-  };
-  std::vector<Candidate> heap(pool.size());
-  for (size_t i = 0; i < pool.size(); ++i) heap[i].i = i;
-  std::vector<size_t> order;
-  size_t next_refresh = 0;
-  while (!heap.empty()) {
-    // Gains hardly grow: an earlier value is nearly a bound [Minoux, "Accelerated greedy algorithms", 1978].
-    // Those that did grow are found whenever as many again have been taken.
-    if (order.size() >= next_refresh) {
-      ParallelFor(static_cast<int64_t>(heap.size()), num_threads,
-                  [&](int64_t i) { heap[i].bound = state.Gain(pool[heap[i].i]); });
-      std::make_heap(heap.begin(), heap.end(), worse);
-      next_refresh = 2 * order.size() + 1;
-    }
-    std::pop_heap(heap.begin(), heap.end(), worse);
-    heap.back().bound = state.Gain(pool[heap.back().i]);
-    if (heap.size() > 1 && worse(heap.back(), heap.front())) {
-      std::push_heap(heap.begin(), heap.end(), worse);
-      continue;
-    }
-    state.Take(pool[heap.back().i]);
-    order.push_back(pool[heap.back().i]);
-    heap.pop_back();
-  }
-  return order;
-}
+std::vector<size_t> LandmarkOrder::First(size_t n) { return impl_->First(n); }
 
 }  // namespace cairn

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "core/promise/expected_matches.h"
+#include "core/promise/landmark_sights.h"
 #include "core/world/feature_class.h"
 
 namespace cairn {
@@ -11,10 +13,7 @@ namespace cairn {
 struct LandmarkOrderOptions {
   // As many matches as a robot needs to be localized for certain.  REQUIRES: > 0
   double enough_matches = 10;
-  // Standard deviation of a small keypoint's position, px, and its growth with the keypoint's scale; these
-  // and the class's reprojection error add as squares.  REQUIRES: > 0, >= 0
-  double keypoint_sigma_px = 0.5;
-  double keypoint_sigma_per_scale = 0.2;
+  KeypointErrors keypoints;
 };
 
 // Orders classes so that, for any n, the first n of them serve robots in the survey's views best: a small map
@@ -28,11 +27,24 @@ struct LandmarkOrderOptions {
 // well: it goes on counting where there are enough, and prefers landmarks that are near, small, well
 // triangulated and seen in many directions.
 //
-// `pool`: positions in classes.classes, ascending; the result has each once.  Ties: the smaller position.
-// Same result for any number of threads.  The first term is submodular, the second nearly: an earlier gain is
-// taken for a bound, so that now and then a gain that grew is overlooked for a while.
-std::vector<size_t> OrderLandmarks(const Classes& classes, const ExpectedMatches& matches,
-                                   const std::vector<size_t>& pool, const LandmarkOrderOptions& options,
-                                   int num_threads);
+// Ties: the smaller position.  Same result for any number of threads.  The first term is submodular, the
+// second nearly: an earlier gain is taken for a bound, so that now and then a gain that grew is overlooked.
+class LandmarkOrder {
+ public:
+  // `pool`: positions in classes.classes, ascending; they are ordered.  `classes` must outlive it.
+  LandmarkOrder(const Classes& classes, ExpectedMatches matches, std::vector<size_t> pool,
+                const LandmarkOrderOptions& options, int num_threads);
+  ~LandmarkOrder();
+  LandmarkOrder(LandmarkOrder&&) noexcept;
+  LandmarkOrder& operator=(LandmarkOrder&&) noexcept;
+
+  // The first n, or all if there are fewer.  What was ordered before is not ordered again, so asking for few
+  // costs little.
+  std::vector<size_t> First(size_t n);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace cairn

@@ -17,6 +17,8 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // Nearer than this a landmark has no bearing, metres.
 constexpr double kMinDistanceM = 1e-6;
+constexpr double kRoughSigmaRatio = 0.5;
+constexpr double kRoughSigmaDeg = 30;
 
 }  // namespace
 
@@ -31,7 +33,14 @@ std::optional<Matrix26d> InformationRoot(const FeatureClass& feature_class, cons
   const Matrix23d basis_in_world = basis * cam_from_world.rotation.toRotationMatrix();
   const Eigen::Matrix2d noise = keypoint_sigma_rad * keypoint_sigma_rad * Eigen::Matrix2d::Identity() +
                                 basis_in_world * feature_class.covariance * basis_in_world.transpose();
-  return Matrix26d(std::sqrt(probability) * noise.llt().matrixL().solve(jacobian));
+  // noise = L L', and the root is sqrt(p) L^-1 J: two rows, by hand because it is what costs time.
+  const double l00 = std::sqrt(noise(0, 0));
+  const double l10 = noise(1, 0) / l00;
+  const double l11 = std::sqrt(noise(1, 1) - l10 * l10);
+  Matrix26d root;
+  root.row(0) = std::sqrt(probability) / l00 * jacobian.row(0);
+  root.row(1) = std::sqrt(probability) / l11 * (jacobian.row(1) - l10 / l00 * jacobian.row(0));
+  return root;
 }
 
 PoseInformation::PoseInformation(size_t num_views, double rough_sigma_m, double rough_sigma_deg) {
@@ -40,6 +49,14 @@ PoseInformation::PoseInformation(size_t num_views, double rough_sigma_m, double 
       Eigen::Vector3d::Constant(rough_sigma_m);
   const Vector6d variance = rough_sigma.cwiseAbs2();
   views_.assign(num_views, {variance.cwiseInverse().asDiagonal(), variance.asDiagonal()});
+}
+
+PoseInformation PoseInformation::Rough(size_t num_views, double depth) {
+  return {num_views, kRoughSigmaRatio * depth, kRoughSigmaDeg};
+}
+
+double PoseInformation::PlaceVariance(size_t view) const {
+  return views_[view].covariance.bottomRightCorner<3, 3>().trace();
 }
 
 double PoseInformation::DeterminantGain(const std::vector<SightInformation>& sights) const {
@@ -60,7 +77,7 @@ double PoseInformation::PlaceGain(const SightInformation& sight) const {
   const Eigen::Matrix2d factor = Eigen::Matrix2d::Identity() + sight.root * product;
   const Eigen::Matrix<double, 3, 2> of_place = product.bottomRows<3>();
   const double fall = (of_place * factor.inverse() * of_place.transpose()).trace();
-  const double trace = covariance.bottomRightCorner<3, 3>().trace();
+  const double trace = PlaceVariance(sight.view);
   return fall <= 0 ? 0 : -std::log1p(-std::min(fall / trace, 1 - 1e-12));
 }
 

@@ -36,12 +36,18 @@ class PoseInformation {
   // rotation, degrees.  REQUIRES: > 0
   PoseInformation(size_t num_views, double rough_sigma_m, double rough_sigma_deg);
 
+  // Without landmarks a robot knows its place to half the distance of what it sees, and its rotation to 30
+  // degrees.
+  static PoseInformation Rough(size_t num_views, double depth);
+
   // What a landmark would add to the sum over views of log det A_v; >= 0.
   double DeterminantGain(const std::vector<SightInformation>& sights) const;
   // By what one sight of it would make the logarithm of the trace of the place's covariance in its view
   // smaller; >= 0.
   double PlaceGain(const SightInformation& sight) const;
   void Add(const std::vector<SightInformation>& sights);
+  // Trace of the covariance of the camera's place, m^2.
+  double PlaceVariance(size_t view) const;
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;

@@ -8,6 +8,21 @@
 #include "core/geometry/pose.h"
 
 namespace cairn {
+namespace {
+
+double SquaredInRadii(const Eigen::Quaterniond& rotation_a, const Eigen::Vector3d& center_a,
+                      const Eigen::Quaterniond& rotation_b, const Eigen::Vector3d& center_b, double radius_m,
+                      double radius_deg) {
+  const double cosine = std::abs(rotation_a.dot(rotation_b));
+  const double turn = DegFromRad(2 * std::acos(std::min(1.0, cosine))) / radius_deg;
+  return (center_a - center_b).squaredNorm() / (radius_m * radius_m) + turn * turn;
+}
+
+}  // namespace
+
+double ViewDistanceSquared(const Pose& a, const Pose& b, double radius_m, double radius_deg) {
+  return SquaredInRadii(a.rotation, a.Center(), b.rotation, b.Center(), radius_m, radius_deg);
+}
 
 ViewDistance::ViewDistance(const Classes& classes, const ViewOptions& options) : options_(options) {
   std::unordered_map<ImageId, size_t> index;
@@ -28,11 +43,15 @@ ViewDistance::ViewDistance(const Classes& classes, const ViewOptions& options) :
 
 double ViewDistance::operator()(size_t a, size_t b) const { return std::sqrt(Squared(a, b)); }
 
-double ViewDistance::Squared(size_t a, size_t b) const {
-  const double radius = options_.same_view_ratio * depth_;
-  const double cosine = std::abs(poses_[a].rotation.dot(poses_[b].rotation));
-  const double turn = DegFromRad(2 * std::acos(std::min(1.0, cosine))) / options_.same_view_deg;
-  return (centers_[a] - centers_[b]).squaredNorm() / (radius * radius) + turn * turn;
+double ViewDistance::Squared(size_t a, size_t b) const { return Squared(poses_[a].rotation, centers_[a], b); }
+
+double ViewDistance::Squared(const Pose& cam_from_world, size_t b) const {
+  return Squared(cam_from_world.rotation, cam_from_world.Center(), b);
+}
+
+double ViewDistance::Squared(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& center,
+                             size_t b) const {
+  return SquaredInRadii(rotation, center, poses_[b].rotation, centers_[b], radius(), radius_deg());
 }
 
 }  // namespace cairn

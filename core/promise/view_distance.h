@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/geometry/pose.h"
 #include "core/world/feature_class.h"
 
 namespace cairn {
@@ -16,6 +17,9 @@ struct ViewOptions {
   double same_view_deg = 15;     // REQUIRES: > 0
 };
 
+// Square of the distance of two views in radii, a view's radius being `radius_m` and `radius_deg`.
+double ViewDistanceSquared(const Pose& a, const Pose& b, double radius_m, double radius_deg);
+
 // The distance of two survey images in radii of a view.
 class ViewDistance {
  public:
@@ -24,10 +28,17 @@ class ViewDistance {
   // `a`, `b`: positions in Classes::images.
   double operator()(size_t a, size_t b) const;
   double Squared(size_t a, size_t b) const;
+  // Of any pose and survey image `b`.
+  double Squared(const Pose& cam_from_world, size_t b) const;
   // Metres, or the map's units.
   double depth() const { return depth_; }
+  // Of a view: metres, or the map's units.
+  double radius() const { return options_.same_view_ratio * depth_; }
+  double radius_deg() const { return options_.same_view_deg; }
 
  private:
+  double Squared(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& center, size_t b) const;
+
   std::vector<Pose> poses_;
   std::vector<Eigen::Vector3d> centers_;
   double depth_ = 1;

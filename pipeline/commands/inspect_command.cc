@@ -24,6 +24,7 @@
 #include "pipeline/program/json_text.h"
 #include "pipeline/report/ambiguity_svg.h"
 #include "pipeline/report/floor_svg.h"
+#include "stages/check_map/promise_figures.h"
 #include "stages/check_map/report.h"
 
 namespace cairn::pipeline {
@@ -109,6 +110,26 @@ void AddVisualMap(const MapDirectory& directory, const VisualMapData& visual_map
   (*json)["num_landmark_model_bytes"] = num_bytes;
 }
 
+nlohmann::ordered_json CurveJson(const std::vector<PromiseBin>& bins) {
+  auto json = nlohmann::ordered_json::array();
+  for (const PromiseBin& bin : bins)
+    json.push_back({{"promised", bin.mean_promised}, {"num_images", bin.num}, {"num_kept", bin.num_kept}});
+  return json;
+}
+
+// Without the nodes, which `inspect --at` tells of.
+nlohmann::ordered_json PromiseJson(const MapPromise& promise) {
+  return {{"probability", promise.terms.probability},
+          {"min_matches", promise.terms.min_matches},
+          {"max_error_m", promise.terms.max_error_m},
+          {"max_error_deg", promise.terms.max_error_deg},
+          {"num_nodes", promise.nodes.size()},
+          {"num_kept", promise.NumKept()},
+          {"landmarks_lower_bound", promise.landmarks_lower_bound},
+          {"left_out", CurveJson(promise.left_out)},
+          {"held_out", CurveJson(promise.held_out)}};
+}
+
 nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t num_bytes,
                                const std::vector<std::pair<std::string, int64_t>>& tables) {
   size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
@@ -163,6 +184,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
   json["self_test"] = rows.self_test;
   json["dropped"] = DropsJson(rows);
   json["ambiguity"] = AmbiguityJson(rows);
+  if (rows.findings.promise) json["promise"] = PromiseJson(*rows.findings.promise);
   json["self_test_regions"] = check_map::SelfTestRegionsJson(rows.findings.self_test_regions);
   json["stage_options"] = rows.stage_options;
   json["input_hashes"] = rows.input_hashes;
@@ -210,6 +232,11 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
     if (key == "self_test_regions") {
       if (!value.empty())
         text += "\n" + check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines);
+      continue;
+    }
+    if (key == "promise") {
+      text +=
+          "\n" + check_map::PromiseText(*rows.findings.promise, rows.frame.unit == "metre" ? "m" : "units");
       continue;
     }
     if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before

@@ -88,8 +88,8 @@ struct CheckMapReport {
   // images (AddFullFigures):
   //   num_by_retrieval, all_images_num_by_retrieval: fixes from landmarks that retrieval led to, not from all
   //   landmarks of the map; all_images_num_localized, all_images_localized_ratio, all_images_precision_ratio
-  // and of a map with a floor plan what AddPlanFigures (plan_fit.h) and CompareWithPlan
-  // (plan_agreement.h) say.
+  // and of a map with a promise what AddPromiseFigures (promise_figures.h) says; and of a map with a floor
+  // plan what AddPlanFigures (plan_fit.h) and CompareWithPlan (plan_agreement.h) say.
   std::map<std::string, double> figures;
   std::string plan_verdict;  // PlanVerdict; empty where there is no floor plan
   // The same by region, of images with a true pose: filled by SummarizeRegions (region_figures.h).

@@ -16,6 +16,7 @@
 #include "runtime/scans/read_scans.h"
 #include "stages/check_map/check_map.h"
 #include "stages/check_map/plan_agreement.h"
+#include "stages/check_map/promise_figures.h"
 #include "stages/check_map/region_figures.h"
 #include "stages/check_map/report.h"
 
@@ -110,6 +111,8 @@ Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& c
   if (!report.images.empty() || !report.plan_verdict.empty()) rows.self_test = report.figures;
   if (!report.images.empty()) {
     rows.findings.self_test_regions = report.regions;
+    if (rows.findings.promise)
+      rows.findings.promise->held_out = CalibrationCurve(PromiseOutcomes(rows, report.images));
   }
   rows.stage_options["check_map"] = OptionsToml(DescribeOptions(&options));
   return WriteMapRows(rows, path);
@@ -195,6 +198,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     }
     FindStations(rows, arguments.options, &held_out.images);
     held_out.regions = SummarizeRegions(rows, held_out.images, arguments.options);
+    if (rows.findings.promise) AddPromiseFigures(rows, held_out.images, &held_out.figures);
     WarnOfRejects(held_out);
   }
   CAIRN_RETURN_IF_ERROR(CheckPlan(rows, arguments, environment, &held_out));

@@ -135,6 +135,7 @@ Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
 
 Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, MapRows* rows) {
   CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.parts.world, dropped));
+  if (rows->algorithm == kPromiseAlgorithm) return Ok();  // its regions leave no station out
   for (const DroppedItem& item : dropped) {
     if (DescribeDropReason(item.reason).kind == DropKind::kStation)
       rows->stations[item.item_id].is_covered = false;
@@ -155,10 +156,11 @@ std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<cha
 
 // The whole map except its self-test.  `classes` and `parts` may be those of a part of the survey.
 Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const SurveyParts& parts,
-                         EmitMapOptions options, const std::vector<char>* keep, int num_threads) {
+                         EmitMapOptions options, const std::vector<char>* keep, const Promises* promises,
+                         int num_threads) {
   CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                          EmitMap(classes, parts.world, parts.decomposition, inputs.vocabulary, options,
-                                 parts.appearance ? &*parts.appearance : nullptr, keep));
+                                 parts.appearance ? &*parts.appearance : nullptr, keep, promises));
   rows.name = inputs.provenance.name;
   rows.writer = inputs.provenance.writer;
   rows.instruction_set = inputs.provenance.instruction_set;
@@ -178,11 +180,11 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
 }
 
 std::string RecallText(const FittedSize& fitted) {
-  if (fitted.trial_of_all.num_tried == 0) return "no survey image was left out to try it on";
+  if (fitted.trial_of_all.NumTried() == 0) return "no survey image was left out to try it on";
   return fmt::format(
       "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
       "everything",
-      fitted.trial.num_tried, fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
+      fitted.trial.NumTried(), fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
       fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM());
 }
 
@@ -197,7 +199,26 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const E
       "{} of {} stations see fewer than k = {}; {}\n",
       options.max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks,
       guarantee.num_stations_below_k, rows.stations.size(), rows.k,
-      fitted.trial_of_all.num_tried == 0 ? "everything fits" : RecallText(fitted));
+      fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted));
+}
+
+std::string PromiseText(const MapPromise& promise) {
+  const PromiseTerms& terms = promise.terms;
+  return fmt::format(
+      "emit_map: the promise: {:.0f} % of the images find at least {} landmarks and are localized within "
+      "{:.3g} "
+      "{}, {:.3g} deg; kept at {} of {} places and headings; no map with fewer than {} landmarks keeps it at "
+      "all of these\n",
+      100 * terms.probability, terms.min_matches, terms.max_error_m, "m", terms.max_error_deg,
+      promise.NumKept(), promise.nodes.size(), promise.landmarks_lower_bound);
+}
+
+PromiseOptions PromiseOptionsOf(const EmitMapOptions& options) {
+  return {.terms = {.min_matches = options.promise_matches,
+                    .max_error_m = options.left_out_max_error_m,
+                    .max_error_deg = options.left_out_max_error_deg,
+                    .probability = options.promise_probability},
+          .max_region_landmarks = static_cast<size_t>(options.max_region_landmarks)};
 }
 
 // The rows of the map with the landmarks that trials choose, and what they found.
@@ -214,6 +235,7 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
   CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep, KeptClasses(inputs.classes, inputs.parts.world,
                                                                        inputs.parts.decomposition, options));
   const DropReason reason = options.max_bytes > 0 ? DropReason::kOverBudget : DropReason::kNotNeeded;
+  const Promises* promises = nullptr;
   const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
                             int descriptor_bits) -> Result<MapRows> {
     options.descriptor_bits = descriptor_bits;
@@ -221,7 +243,7 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
     options.visual_map = arguments.options.visual_map && is_whole;
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                            MakeRows(inputs, classes, is_whole ? inputs.parts : PartsOf(classes, inputs.parts),
-                                    options, &keep, environment.num_threads));
+                                    options, &keep, promises, environment.num_threads));
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep, reason), inputs, &rows));
     return rows;
   };
@@ -229,7 +251,8 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
                                    .descriptor_bits = options.descriptor_bits,
                                    .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},
                                    .min_recall_ratio = options.min_recall_ratio,
-                                   .max_error_ratio = options.max_error_ratio};
+                                   .max_error_ratio = options.max_error_ratio,
+                                   .promise = PromiseOptionsOf(options)};
   CAIRN_ASSIGN_OR_RETURN(
       const FittedSize fitted,
       options.max_bytes > 0
@@ -237,8 +260,10 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
                     TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress)
           : ChooseFewest(inputs.classes, arguments.matches_path, emit, fit_options, environment.num_threads,
                          *environment.progress));
+  if (fitted.promises) promises = &*fitted.promises;
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits));
   std::string text = GuaranteeText(rows, fitted, arguments.options);
+  if (fitted.promises) text += PromiseText(fitted.promises->findings);
   return std::pair(std::move(rows), std::move(text));
 }
 
@@ -249,7 +274,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const bool is_by_trial = arguments.options.max_bytes > 0 || arguments.options.landmarks == "fewest";
   if (!is_by_trial) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
-        {"left_out_max_error_m", "left_out_max_error_deg"},
+        {"left_out_max_error_m", "left_out_max_error_deg", "promise_matches", "promise_probability",
+         "max_region_landmarks"},
         "is only read where landmarks is fewest or max_bytes is not 0; leave it out"));
   }
   CAIRN_ASSIGN_OR_RETURN(const Inputs inputs, ReadInputs(arguments, environment.seed));
@@ -259,7 +285,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     CAIRN_ASSIGN_OR_RETURN(std::tie(rows, guarantee), MakeRowsByTrial(arguments, inputs, environment));
   } else {
     CAIRN_ASSIGN_OR_RETURN(rows, MakeRows(inputs, inputs.classes, inputs.parts, arguments.options, nullptr,
-                                          environment.num_threads));
+                                          nullptr, environment.num_threads));
     CAIRN_RETURN_IF_ERROR(AddDrops(inputs.dropped, inputs, &rows));
   }
   CAIRN_RETURN_IF_ERROR(WriteMapRows(rows, arguments.output_path));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "core/blocks/map_documents.h"
@@ -167,13 +168,13 @@ Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order, Ma
   return Ok();
 }
 
-Status AddStations(const World& world, const Decomposition& decomposition, MapRows* rows) {
+Status AddStations(const World& world, const std::vector<StationIdx>& uncovered, MapRows* rows) {
   for (StationIdx i = 0; i < world.num_stations(); ++i) {
     MapStation station{.position = world.positions[i]};
     if (!world.headings_deg.empty()) station.heading_deg = world.headings_deg[i];
     rows->stations.push_back(station);
   }
-  for (const StationIdx station : decomposition.uncovered) {
+  for (const StationIdx station : uncovered) {
     if (station < 0 || station >= world.num_stations()) {
       return MakeError(ErrorCode::kInvalidArgument, "emit_map: uncovered station {} of {}", station,
                        world.num_stations());
@@ -194,6 +195,15 @@ Status AddStations(const World& world, const Decomposition& decomposition, MapRo
     }
   }
   return Ok();
+}
+
+// The stations at which these images were taken, ascending.
+std::vector<StationIdx> StationsOf(const std::vector<size_t>& images, const MapRows& rows) {
+  std::set<StationIdx> stations;
+  for (const size_t image : images) {
+    if (rows.images[image].station >= 0) stations.insert(rows.images[image].station);
+  }
+  return {stations.begin(), stations.end()};
 }
 
 // Nodes with images of the map, and those of their links that have a kept one at an end.
@@ -275,6 +285,20 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->max_error_ratio,
        .help = "fewest landmarks: largest growth of the median error of left-out images",
        .min = 1},
+      {.name = "promise_matches",
+       .value = &options->promise_matches,
+       .help = "what the map promises at every place and heading: at least so many matched landmarks, within "
+               "left_out_max_error_m and _deg",
+       .min = 1},
+      {.name = "promise_probability",
+       .value = &options->promise_probability,
+       .help = "with this probability",
+       .min = 0.01,
+       .max = 0.999},
+      {.name = "max_region_landmarks",
+       .value = &options->max_region_landmarks,
+       .help = "most landmarks of a region that keeps the promise by itself; more where one place needs them",
+       .min = 1},
       {.name = "descriptor_bits",
        .value = &options->descriptor_bits,
        .help = "most bits in which a value of a landmark's descriptor is stored; 8: unchanged",
@@ -322,7 +346,8 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
-                        const Appearance* appearance, const std::vector<char>* keep) {
+                        const Appearance* appearance, const std::vector<char>* keep,
+                        const Promises* promises) {
   EmitMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (options.words == "survey" && options.documents == "kept") {
@@ -340,6 +365,10 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     kept = *keep;
     classes_of_regions = CommonClasses(classes, world, decomposition, kept);
   }
+  if (promises != nullptr) {
+    classes_of_regions.clear();
+    for (const Promises::Region& region : promises->regions) classes_of_regions.push_back(region.classes);
+  }
   const std::vector<size_t> order = StoredOrder(classes, classes_of_regions, kept);
   if (order.empty()) {
     return MakeError(
@@ -350,19 +379,26 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   }
   MapRows rows;
   rows.landmark_choice = options.landmarks;
-  rows.algorithm = decomposition.algorithm;
-  rows.k = decomposition.k;
-  rows.tau = decomposition.tau;
-  rows.rho = decomposition.rho;
-  rows.lower_bound = decomposition.lower_bound;
-  rows.uncovered_limit = decomposition.uncovered_limit;
+  if (promises != nullptr) {
+    rows.algorithm = kPromiseAlgorithm;
+    rows.lower_bound = promises->regions_lower_bound;
+    rows.findings.promise = promises->findings;
+  } else {
+    rows.algorithm = decomposition.algorithm;
+    rows.k = decomposition.k;
+    rows.tau = decomposition.tau;
+    rows.rho = decomposition.rho;
+    rows.lower_bound = decomposition.lower_bound;
+    rows.uncovered_limit = decomposition.uncovered_limit;
+  }
   rows.floor_from_world = world.floor_from_world;
   rows.camera_from_given = classes.camera_from_given;
   rows.stated_pose_sigma_m = classes.stated_pose_sigma_m;
   rows.stated_pose_sigma_deg = classes.stated_pose_sigma_deg;
   rows.cameras = classes.cameras;
   CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
-  CAIRN_RETURN_IF_ERROR(AddStations(world, decomposition, &rows));
+  CAIRN_RETURN_IF_ERROR(
+      AddStations(world, promises != nullptr ? std::vector<StationIdx>() : decomposition.uncovered, &rows));
   if (appearance) AddAppearance(*appearance, &rows);
   rows.documents = options.documents;
   const std::vector<char> is_document = DocumentImages(rows);
@@ -376,8 +412,9 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
 
   std::vector<LandmarkIdx> landmark_of_class(classes.classes.size(), -1);
   for (size_t i = 0; i < order.size(); ++i) landmark_of_class[order[i]] = static_cast<LandmarkIdx>(i);
-  for (size_t region = 0; region < decomposition.regions.size(); ++region) {
-    MapRegion row{.stations = decomposition.regions[region].stations};
+  for (size_t region = 0; region < classes_of_regions.size(); ++region) {
+    MapRegion row{.stations = promises != nullptr ? StationsOf(promises->regions[region].images, rows)
+                                                  : decomposition.regions[region].stations};
     for (const size_t i : classes_of_regions[region]) row.landmarks.push_back(landmark_of_class[i]);
     std::sort(row.landmarks.begin(), row.landmarks.end());
     // Two features of a world may be parts of one class.

@@ -13,6 +13,7 @@
 #include "core/world/decomposition.h"
 #include "core/world/feature_class.h"
 #include "core/world/world.h"
+#include "stages/emit_map/make_promises.h"
 
 namespace cairn::emit_map {
 
@@ -37,6 +38,13 @@ struct EmitMapOptions {
   // largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
   double max_error_ratio = 1.5;
+  // What maps promise whose landmarks are chosen by trial, at every place and heading of the survey: that
+  // with this probability, so many landmarks are matched and the pose is within the limits above
+  // (core/promise). REQUIRES: >= 1; in (0, 1)
+  int promise_matches = 10;
+  double promise_probability = 0.95;
+  // Most landmarks of a region of such a map; more where one place needs them.  REQUIRES: >= 1
+  int max_region_landmarks = 500;
   // Bits in which a value of a landmark's descriptor is stored; 8: unchanged.  "fewest" and max_bytes take
   // fewer where that serves them.  REQUIRES: in [1, 8]
   int descriptor_bits = 5;
@@ -68,14 +76,15 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // features, with its inverted files for words = "survey".  `appearance` may be null: the map then has no
 // links between images.  Images of `appearance` that `classes` lacks are left out.  `keep`, where given,
 // marks the classes that may be landmarks; a region then has all of them that can be seen from all of its
-// stations.  The result has no name, seed, options or hashes: those are the caller's.  Pure.
-// O(observations).  Errors: InvalidArgument (inputs that do not belong together: a region's feature, a
-// feature's class or a station's image does not exist; documents = "kept" without kept images; landmarks =
-// "fewest" without `keep`: which these are is found by trials, fit_size.h), NoData (no
-// class is kept).
+// stations.  `promises`, where given, replaces the decomposition's regions by its own.  The result has no
+// name, seed, options or hashes: those are the caller's.  Pure. O(observations).  Errors: InvalidArgument
+// (inputs that do not belong together: a region's feature, a feature's class or a station's image does not
+// exist; documents = "kept" without kept images; landmarks = "fewest" without `keep`: which these are is
+// found by trials, fit_size.h), NoData (no class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
-                        const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr);
+                        const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr,
+                        const Promises* promises = nullptr);
 
 // Per class, whether a map may keep it: one of regions with landmarks = "regions", else every one.  Errors:
 // as EmitMap.

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <limits>
-#include <numeric>
-#include <set>
 
 #include "core/blocks/map_rows.h"
-#include "core/promise/landmark_order.h"
 
 namespace cairn::emit_map {
 namespace {
@@ -21,11 +19,11 @@ constexpr double kClearMargin = 0.03;
 // The search for a size ends at this part of the limit.
 constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
-// Placeholders for figures of the self-test, which are added later: more than check_map has, with
-// longer names.
 // ChooseFewest tries numbers of landmarks that grow by this factor.
 constexpr double kLadderFactor = 1.2;
 constexpr double kFewestLandmarks = 50;
+// Placeholders for figures of the self-test, which are added later: more than check_map has, with
+// longer names.
 constexpr int kNumFigures = 30;
 constexpr size_t kFigureNameBytes = 26;
 constexpr size_t kCheckMapOptionsBytes = 2048;
@@ -116,78 +114,11 @@ std::vector<size_t> Pool(const std::vector<char>& may_keep) {
   return pool;
 }
 
-// Positions of the same classes in a survey that lacks some.
-std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
-                           const std::vector<char>& may_keep) {
-  std::set<ClassId> ids;
-  for (size_t i = 0; i < may_keep.size(); ++i) {
-    if (may_keep[i] != 0) ids.insert(classes.classes[i].class_id);
-  }
-  std::vector<size_t> pool;
-  for (size_t i = 0; i < survey.classes.classes.size(); ++i) {
-    if (ids.contains(survey.classes.classes[i].class_id)) pool.push_back(i);
-  }
-  return pool;
-}
-
 // Whether more images are localized, or as many by a clearly wider margin.
 bool IsBetter(const LeftOutTrial& a, const LeftOutTrial& b) {
   if (a.NumRight() != b.NumRight()) return a.NumRight() > b.NumRight();
   return a.MeanMargin() > b.MeanMargin() + kClearMargin;
 }
-
-std::vector<size_t> OrderOf(const Classes& classes, const std::vector<size_t>& pool, int num_threads) {
-  return OrderLandmarks(classes, LearnMatches(classes, {}, num_threads), pool, {}, num_threads);
-}
-
-// Parts of the survey, each with the order of its classes, and maps of them.
-class Trials {
- public:
-  static Result<Trials> Make(const Classes& classes, const std::vector<char>& may_keep,
-                             const std::string& matches_path, const EmitKept& emit,
-                             const FitSizeOptions& options, int num_threads) {
-    Trials trials(emit, options, num_threads);
-    CAIRN_ASSIGN_OR_RETURN(const auto rounds, ChooseLeftOut(classes, options.max_num_left_out));
-    for (const LeftOutImages& round : rounds) {
-      CAIRN_ASSIGN_OR_RETURN(LeftOutSurvey survey, LeaveOutImages(classes, matches_path, round));
-      std::vector<size_t> order = OrderOf(survey.classes, PoolIn(survey, classes, may_keep), num_threads);
-      trials.parts_.push_back({std::move(survey), std::move(order)});
-    }
-    return trials;
-  }
-
-  // Maps of the first n classes in this many bits a descriptor value; none where a part has no class at all.
-  Result<LeftOutTrial> Try(size_t n, int bits) const {
-    LeftOutTrial sum;
-    for (const Part& part : parts_) {
-      if (part.order.empty()) {
-        sum.num_tried += static_cast<int>(part.survey.images.size());
-        continue;
-      }
-      CAIRN_ASSIGN_OR_RETURN(
-          MapRows rows, emit_(part.survey.classes,
-                              SizeFitter::FirstOf(part.order, n, part.survey.classes.classes.size()), bits));
-      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, TryLeftOutImages(std::move(rows), part.survey.images,
-                                                                        options_.limits, num_threads_));
-      sum.Add(trial);
-    }
-    return sum;
-  }
-
- private:
-  struct Part {
-    LeftOutSurvey survey;
-    std::vector<size_t> order;
-  };
-
-  Trials(const EmitKept& emit, const FitSizeOptions& options, int num_threads)
-      : emit_(emit), options_(options), num_threads_(num_threads) {}
-
-  const EmitKept& emit_;
-  const FitSizeOptions& options_;
-  int num_threads_;
-  std::vector<Part> parts_;
-};
 
 // Ascending numbers of bits, the last of which is the most that may be used.  With two, wrong poses found as
 // many landmarks by their looks as right ones: a kitchen image was placed 1.2 m off with 39 inliers.
@@ -219,7 +150,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   }
   bits_tried.insert(bits_tried.begin(), options.descriptor_bits);
 
-  const std::vector<size_t> order = OrderOf(classes, pool, num_threads);
+  const PromiseMaker maker(classes, num_threads);
+  const std::vector<size_t> order = maker.Order(pool).First(pool.size());
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
   for (const int bits : bits_tried) {
@@ -242,10 +174,13 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
     return fitted;
   }
 
-  CAIRN_ASSIGN_OR_RETURN(const Trials trials,
-                         Trials::Make(classes, may_keep, matches_path, emit, options, num_threads));
+  progress.Begin("trying what to keep", static_cast<int64_t>(kMaxNumRounds + 1 + num_that_fit.size()),
+                 "steps");
+  CAIRN_ASSIGN_OR_RETURN(
+      Trials trials, Trials::Make(classes, may_keep, matches_path, options.max_num_left_out, options.limits,
+                                  emit, num_threads, progress));
   CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, trials.Try(pool.size(), options.descriptor_bits));
-  progress.Begin("trying what to keep", static_cast<int64_t>(num_that_fit.size()), "maps");
+  progress.Advance();
   size_t best = num_that_fit.size();
   for (size_t i = 0; i < num_that_fit.size(); ++i) {
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
@@ -261,6 +196,7 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   CAIRN_ASSIGN_OR_RETURN(const size_t n,
                          fitter.MostThatFit(classes, order, fitted.descriptor_bits, &fitted.num_bytes));
   fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
+  fitted.promises = maker.Promise(fitted.keep, trials.fared(), options.promise);
   return fitted;
 }
 
@@ -268,14 +204,25 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
                                 const FitSizeOptions& options, int num_threads, Progress& progress) {
   FittedSize fitted{.keep = std::vector<char>(classes.classes.size(), 1),
                     .descriptor_bits = options.descriptor_bits};
-  progress.Begin("trying how few landmarks will do", 1, "choices");
-  const Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, emit, options, num_threads);
+  const std::vector<size_t> sizes = Ladder(classes.classes.size());
+  const std::vector<int> bits_to_try = FewestBitsFirst(options.descriptor_bits);
+  const auto num_halvings = static_cast<int64_t>(std::ceil(std::log2(sizes.size())));
+  progress.Begin("trying how few landmarks will do",
+                 static_cast<int64_t>(kMaxNumRounds + bits_to_try.size()) + num_halvings + 1, "steps");
+  Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, options.max_num_left_out,
+                                       options.limits, emit, num_threads, progress);
   if (!trials.ok()) {
     if (trials.error().code != ErrorCode::kNoData) return trials.error();
     progress.End();
     return fitted;
   }
-  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, trials->Try(classes.classes.size(), options.descriptor_bits));
+  const auto attempt = [&](size_t n, int bits) -> Result<LeftOutTrial> {
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
+    Result<LeftOutTrial> trial = trials->Try(n, bits);
+    progress.Advance();
+    return trial;
+  };
+  CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, attempt(classes.classes.size(), options.descriptor_bits));
   fitted.trial = fitted.trial_of_all;
   if (fitted.trial_of_all.NumRight() < kMinNumRight) {
     progress.End();
@@ -285,20 +232,18 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
     return trial.NumRight() >= options.min_recall_ratio * fitted.trial_of_all.NumRight() &&
            trial.MedianErrorM() <= options.max_error_ratio * fitted.trial_of_all.MedianErrorM();
   };
-  const std::vector<size_t> sizes = Ladder(classes.classes.size());
   size_t num_kept = classes.classes.size();
-  for (const int bits : FewestBitsFirst(options.descriptor_bits)) {
+  for (const int bits : bits_to_try) {
     // All of them in the most bits will do.  More landmarks hardly ever do worse: the fewest by bisection.
     size_t too_few = 0, enough = sizes.size() - 1;  // below `too_few` none will do
     if (bits < options.descriptor_bits) {
-      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, trials->Try(sizes.back(), bits));
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, attempt(sizes.back(), bits));
       if (!will_do(trial)) continue;
       fitted.trial = trial;
     }
     while (too_few < enough) {
-      if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
       const size_t middle = (too_few + enough) / 2;
-      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, trials->Try(sizes[middle], bits));
+      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, attempt(sizes[middle], bits));
       if (will_do(trial)) {
         enough = middle;
         fitted.trial = trial;
@@ -310,9 +255,12 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
     fitted.descriptor_bits = bits;
     break;
   }
-  std::vector<size_t> all(classes.classes.size());
-  std::iota(all.begin(), all.end(), size_t{0});
-  fitted.keep = SizeFitter::FirstOf(OrderOf(classes, all, num_threads), num_kept, classes.classes.size());
+  const PromiseMaker maker(classes, num_threads);
+  const std::vector<size_t> first =
+      num_kept < classes.classes.size() ? maker.Order(Pool(fitted.keep)).First(num_kept) : Pool(fitted.keep);
+  fitted.keep = maker.Complete(first, trials->fared(), options.promise);
+  fitted.promises = maker.Promise(fitted.keep, trials->fared(), options.promise);
+  progress.Advance();
   progress.End();
   return fitted;
 }

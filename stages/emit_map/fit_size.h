@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,12 +11,14 @@
 #include "core/world/feature_class.h"
 #include "core/world/world.h"
 #include "stages/emit_map/leave_out_images.h"
+#include "stages/emit_map/make_promises.h"
+#include "stages/emit_map/trials.h"
 
 namespace cairn::emit_map {
 
 // Chooses which classes a map keeps, and how many bits of their descriptors, by trying maps of a part of the
 // survey on survey images that are left out (leave_out_images.h).  Candidates are the first classes of
-// OrderLandmarks (core/promise/landmark_order.h); what is chosen is then made from the whole survey.
+// LandmarkOrder (core/promise/landmark_order.h); what is chosen is then made from the whole survey.
 struct FitSizeOptions {
   int64_t max_bytes = 0;    // of the sealed map's file
   int descriptor_bits = 5;  // at most
@@ -26,12 +28,8 @@ struct FitSizeOptions {
   // localized, and the largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
   double max_error_ratio = 1.5;
+  PromiseOptions promise;
 };
-
-// Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these) and
-// this many bits per descriptor value: EmitMap and all that is added to a map after it.
-using EmitKept = std::function<Result<MapRows>(const Classes& classes, const std::vector<char>& keep,
-                                               int descriptor_bits)>;
 
 // Part of the error message where no map of so few bytes is possible.
 inline constexpr const char* kLeastPossible = "the least possible is";
@@ -43,6 +41,8 @@ struct FittedSize {
   // Trials on the left-out images: of this choice, and of the map of everything that may be kept.  No trials
   // are made where everything fits.
   LeftOutTrial trial, trial_of_all;
+  // What the map promises, and its regions; nothing where no trials are made.
+  std::optional<Promises> promises;
 };
 
 // The largest choice within max_bytes, with as many bits as localize most left-out images, and then with most
@@ -56,7 +56,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
                            Progress& progress);
 
 // The fewest landmarks with which left-out images are localized as often and nearly as well as with all of
-// them (min_recall_ratio, max_error_ratio), in the fewest bits that allow it.  All, untried, where the survey
+// them (min_recall_ratio, max_error_ratio), in the fewest bits that allow it, and what else it takes to keep
+// the promise at every node.  All, untried, where the survey
 // is too small to try anything: fewer than twelve images, or fewer than `kMinNumRight` left-out ones that the
 // map of everything localizes.  Errors: those of LeaveOutImages and `emit`; Cancelled.
 inline constexpr int kMinNumRight = 8;

@@ -176,26 +176,35 @@ SurveyParts PartsOf(const Classes& classes, SurveyParts parts) {
 }
 
 void LeftOutTrial::Add(const LeftOutTrial& other) {
-  num_tried += other.num_tried;
-  errors_m.insert(errors_m.end(), other.errors_m.begin(), other.errors_m.end());
-  num_inliers.insert(num_inliers.end(), other.num_inliers.begin(), other.num_inliers.end());
+  images.insert(images.end(), other.images.begin(), other.images.end());
+}
+
+int LeftOutTrial::NumRight() const {
+  return static_cast<int>(
+      std::count_if(images.begin(), images.end(), [](const LeftOutResult& image) { return image.is_right; }));
 }
 
 double LeftOutTrial::MeanMargin() const {
   double sum = 0;
-  for (const int num : num_inliers) sum += std::min(num, kPlentyOfInliers);
-  return sum / std::max(1, kPlentyOfInliers * num_tried);
+  for (const LeftOutResult& image : images) sum += std::min(image.num_inliers, kPlentyOfInliers);
+  return sum / std::max(1, kPlentyOfInliers * NumTried());
 }
 
-double LeftOutTrial::MedianErrorM() const { return errors_m.empty() ? 0 : UpperMedian(errors_m); }
+double LeftOutTrial::MedianErrorM() const {
+  std::vector<double> errors_m;
+  for (const LeftOutResult& image : images) {
+    if (image.is_right) errors_m.push_back(image.error_m);
+  }
+  return errors_m.empty() ? 0 : UpperMedian(std::move(errors_m));
+}
 
 Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads) {
   // Fixes are in the frame of the stated poses; the true ones here are the map's own.
   rows.camera_from_given = Pose();
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::FromRows(std::move(rows)));
-  std::vector<double> error_of(images.size(), -1);  // negative: not localized within the limits
-  std::vector<int> num_inliers(images.size(), 0);
+  LeftOutTrial trial;
+  trial.images.resize(images.size());
   std::vector<Status> statuses(images.size());
   ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
     const Result<Localization> found = Localizer(map).LocalizeFeatures(images[i].features, images[i].camera);
@@ -206,18 +215,10 @@ Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage
     if (!found->has_fix()) return;
     const double error_m = CenterErrorM(found->cam_from_world, images[i].cam_from_world);
     const double error_deg = RotationErrorDeg(found->cam_from_world, images[i].cam_from_world);
-    if (error_m <= limits.max_error_m && error_deg <= limits.max_error_deg) {
-      error_of[i] = error_m;
-      num_inliers[i] = found->num_inliers;
-    }
+    if (error_m <= limits.max_error_m && error_deg <= limits.max_error_deg)
+      trial.images[i] = {true, error_m, found->num_inliers};
   });
   for (const Status& status : statuses) CAIRN_RETURN_IF_ERROR(status);
-  LeftOutTrial trial{.num_tried = static_cast<int>(images.size())};
-  for (size_t i = 0; i < images.size(); ++i) {
-    if (error_of[i] < 0) continue;
-    trial.errors_m.push_back(error_of[i]);
-    trial.num_inliers.push_back(num_inliers[i]);
-  }
   return trial;
 }
 

@@ -61,26 +61,30 @@ struct SurveyParts {
 // left out, for which their neighbours are kept.  Stations, areas and regions stay.  O(parts).
 SurveyParts PartsOf(const Classes& classes, SurveyParts parts);
 
-// The result of maps on left-out images.
+// How a left-out image fared in a map.
+struct LeftOutResult {
+  bool is_right = false;  // localized within the limits
+  double error_m = 0;     // and how far off; 0 unless right
+  int num_inliers = 0;    // 0 unless right
+};
+
+// The results of maps on left-out images.
 struct LeftOutTrial {
-  int num_tried = 0;
-  // Of images localized within the limits: metres, and inliers.
-  std::vector<double> errors_m;
-  std::vector<int> num_inliers;
+  std::vector<LeftOutResult> images;
 
   void Add(const LeftOutTrial& other);
-  int NumRight() const { return static_cast<int>(errors_m.size()); }
-  double RightRatio() const { return num_tried > 0 ? static_cast<double>(NumRight()) / num_tried : 0; }
+  int NumTried() const { return static_cast<int>(images.size()); }
+  int NumRight() const;
   // Over all images: inliers of those localized right, at most 50, over 50; else 0.
   double MeanMargin() const;
-  double MedianErrorM() const;  // 0 where there are none
+  double MedianErrorM() const;  // of those localized right; 0 where there are none
 };
 struct LeftOutLimits {
   double max_error_m = 0.1;
   double max_error_deg = 5;
 };
-// Localizes the images in a map of the survey that lacks them.  Same result for any number of threads.
-// Errors: InvalidArgument (CheckMapRows), Corrupt.
+// Localizes the images in a map of the survey that lacks them; results in their order.  Same result for any
+// number of threads. Errors: InvalidArgument (CheckMapRows), Corrupt.
 Result<LeftOutTrial> TryLeftOutImages(MapRows rows, const std::vector<TrialImage>& images,
                                       const LeftOutLimits& limits, int num_threads);
 

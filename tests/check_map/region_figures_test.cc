@@ -117,7 +117,7 @@ TEST(RegionFigures, ImageCountsInEveryRegionOfItsStationOrOutside) {
                                    RegionSelfTest{0, 3, 3, 0, RegionSelfTest::Errors{0.02, 0.2, 0.04, 0.4}},
                                    RegionSelfTest{1, 3, 2, 1, RegionSelfTest::Errors{0.02, 0.2, 0.8, 8}}));
   EXPECT_TRUE(
-      CheckMapFindings({.self_test_regions = regions}, rows.regions.size(), rows.stations.size()).ok());
+      CheckMapFindings({.self_test_regions = regions}, rows.regions.size(), rows.stations.size(), 0).ok());
 }
 
 TEST(RegionFigures, GateNamesTheRegionTheFigureAndTheLimit) {

@@ -22,6 +22,12 @@ std::vector<size_t> All(const Classes& classes) {
   return pool;
 }
 
+std::vector<size_t> OrderLandmarks(const Classes& classes, const ExpectedMatches& matches,
+                                   const std::vector<size_t>& pool, const LandmarkOrderOptions& options,
+                                   int num_threads) {
+  return LandmarkOrder(classes, matches, pool, options, num_threads).First(pool.size());
+}
+
 // Class i is expected in these views, with these probabilities.
 ExpectedMatches MatchesOf(const Classes& classes, std::vector<std::vector<ExpectedMatch>> of_class) {
   ExpectedMatches matches;
@@ -31,7 +37,7 @@ ExpectedMatches MatchesOf(const Classes& classes, std::vector<std::vector<Expect
   return matches;
 }
 
-TEST(OrderLandmarks, ServesViewsThatHaveNothingBeforeThoseThatHaveSome) {
+TEST(LandmarkOrder, ServesViewsThatHaveNothingBeforeThoseThatHaveSome) {
   // Three classes at one place in view 0, one in view 1: it comes second, not last.
   Classes classes = WallSurvey(2, 5);
   for (int i = 0; i < 3; ++i) AddClass({0, 0, 2}, {1}, 3, &classes);
@@ -40,7 +46,7 @@ TEST(OrderLandmarks, ServesViewsThatHaveNothingBeforeThoseThatHaveSome) {
   EXPECT_THAT(OrderLandmarks(classes, matches, All(classes), {}, 1), ElementsAre(0, 3, 1, 2));
 }
 
-TEST(OrderLandmarks, LikelyNearSmallAndWellKnownOnesComeFirst) {
+TEST(LandmarkOrder, LikelyNearSmallAndWellKnownOnesComeFirst) {
   const auto first = [](const std::function<void(Classes*)>& change, float probability) {
     Classes classes = WallSurvey(1, 1);
     for (int i = 0; i < 2; ++i) AddClass({0, 0, 2}, {1}, 3, &classes);
@@ -56,7 +62,7 @@ TEST(OrderLandmarks, LikelyNearSmallAndWellKnownOnesComeFirst) {
   EXPECT_EQ(first([](Classes* c) { c->classes[0].covariance *= 1e6; }, 0.5F), 1U);
 }
 
-TEST(OrderLandmarks, ScaleIsThatWithWhichTheViewWouldSeeIt) {
+TEST(LandmarkOrder, ScaleIsThatWithWhichTheViewWouldSeeIt) {
   // Seen with scale 8 from 1 m and with scale 2 from 4 m: the same size.  A larger one comes last.
   Classes classes = WallSurvey(3, 0);
   classes.images[1].cam_from_world.translation = {0, 0, -1};
@@ -85,8 +91,9 @@ double Value(const Classes& classes, const ExpectedMatches& matches, const std::
         if (match.view != static_cast<int32_t>(view)) continue;
         expected += match.probability;
         const FeatureClass& row = classes.classes[i];
-        const double sigma_px = std::hypot(
-            options.keypoint_sigma_px, options.keypoint_sigma_per_scale * row.observations[0].keypoint.scale);
+        const double sigma_px =
+            std::hypot(options.keypoints.sigma_px,
+                       options.keypoints.sigma_per_scale * row.observations[0].keypoint.scale);
         const auto root = InformationRoot(row, classes.images[matches.views[view]].cam_from_world,
                                           sigma_px / 200, match.probability);
         information += root->transpose() * *root;
@@ -99,7 +106,7 @@ double Value(const Classes& classes, const ExpectedMatches& matches, const std::
   return sum;
 }
 
-TEST(OrderLandmarks, IsAsGoodAsTakingWhatAddsMostEachTimeForAnyNumberOfThreads) {
+TEST(LandmarkOrder, IsAsGoodAsTakingWhatAddsMostEachTimeForAnyNumberOfThreads) {
   constexpr size_t kNumClasses = 60;
   Random random(5);
   for (int trial = 0; trial < 3; ++trial) {
@@ -146,7 +153,7 @@ TEST(OrderLandmarks, IsAsGoodAsTakingWhatAddsMostEachTimeForAnyNumberOfThreads) 
   }
 }
 
-TEST(OrderLandmarks, OrdersThePoolAlone) {
+TEST(LandmarkOrder, OrdersThePoolAlone) {
   Classes classes = WallSurvey(1, 1);
   for (int i = 0; i < 4; ++i) AddClass({0.1 * i, 0, 2}, {1}, 3, &classes);
   const auto matches = MatchesOf(classes, {{{0, 0.2F}}, {{0, 0.4F}}, {}, {{0, 0.9F}}});
@@ -155,7 +162,7 @@ TEST(OrderLandmarks, OrdersThePoolAlone) {
 }
 
 // An observation in an image that the survey lacks has no size, and a camera that it lacks no focal length.
-TEST(OrderLandmarks, ObservationsOfUnknownImagesDoNotCount) {
+TEST(LandmarkOrder, ObservationsOfUnknownImagesDoNotCount) {
   Classes classes = WallSurvey(1, 1);
   AddClass({0, 0, 2}, {1, 5}, 3, &classes);
   AddClass({0, 0, 2}, {5}, 3, &classes);

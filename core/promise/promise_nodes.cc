@@ -1,0 +1,75 @@
+#include "core/promise/promise_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "core/camera/camera.h"
+
+namespace cairn {
+namespace {
+
+// Angle between the rays at the middle of the left and of the right edge, degrees; 0 where there is none or
+// it is no angle of a pinhole's kind (panoramas see all around whichever way they look).
+double FieldOfViewDeg(const Camera& camera) {
+  const auto left = BearingFromImage(camera, {0, camera.height / 2.0});
+  const auto right = BearingFromImage(camera, {static_cast<double>(camera.width), camera.height / 2.0});
+  if (!left || !right) return 0;
+  return DegFromRad(std::acos(std::clamp(left->dot(*right), -1.0, 1.0)));
+}
+
+}  // namespace
+
+Pose PoseBetween(const Pose& a, const Pose& b, int part, int num_parts) {
+  const Eigen::Vector3d center = (a.Center() + b.Center()) / 2;
+  const Eigen::Quaterniond rotation = a.rotation.slerp(static_cast<double>(part) / num_parts, b.rotation);
+  return {rotation, -(rotation * center)};
+}
+
+std::vector<int32_t> ImagesApart(const ViewDistance& distance, size_t num_images, double spacing) {
+  std::vector<int32_t> chosen;
+  for (int32_t image = 0; image < static_cast<int32_t>(num_images); ++image) {
+    const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](int32_t other) {
+      return distance.Squared(image, other) < spacing * spacing;
+    });
+    if (!is_near) chosen.push_back(image);
+  }
+  return chosen;
+}
+
+std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance) {
+  std::unordered_map<CameraId, double> view_deg;
+  for (const Camera& camera : classes.cameras) view_deg[camera.camera_id] = FieldOfViewDeg(camera);
+  const std::vector<int32_t> images = ImagesApart(distance, classes.images.size(), kViewSpacing);
+  std::vector<PromiseNode> nodes;
+  for (const int32_t image : images) nodes.push_back({classes.images[image].cam_from_world, image, image});
+
+  const auto pose_of = [&](int32_t image) -> const Pose& { return classes.images[image].cam_from_world; };
+  const double step_deg = 2 * kNodeReach * distance.radius_deg();
+  std::vector<PromiseNode> between;
+  for (size_t n = 0; n < images.size(); ++n) {
+    const int32_t a = images[n];
+    std::vector<int32_t> here;  // at the same place, looking elsewhere
+    for (const int32_t b : images) {
+      if (CenterErrorM(pose_of(a), pose_of(b)) < distance.radius()) here.push_back(b);
+    }
+    for (const int32_t b : here) {
+      if (b <= a || classes.images[b].camera_id != classes.images[a].camera_id) continue;
+      const double turn_deg = RotationErrorDeg(pose_of(a), pose_of(b));
+      if (turn_deg <= step_deg || turn_deg > view_deg[classes.images[a].camera_id]) continue;
+      const bool has_other_between = std::any_of(here.begin(), here.end(), [&](int32_t c) {
+        return c != a && c != b &&
+               std::max(RotationErrorDeg(pose_of(a), pose_of(c)), RotationErrorDeg(pose_of(b), pose_of(c))) <
+                   turn_deg;
+      });
+      if (has_other_between) continue;
+      const int num_parts = static_cast<int>(std::ceil(turn_deg / step_deg));
+      for (int part = 1; part < num_parts; ++part)
+        between.push_back({PoseBetween(pose_of(a), pose_of(b), part, num_parts), a, b});
+    }
+  }
+  nodes.insert(nodes.end(), between.begin(), between.end());
+  return nodes;
+}
+
+}  // namespace cairn

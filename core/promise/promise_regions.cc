@@ -1,0 +1,165 @@
+#include "core/promise/promise_regions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace cairn {
+namespace {
+
+// A node is next to the nodes nearest to it.
+constexpr size_t kNumNeighbours = 8;
+// Demands count as met when this little is lacking: probabilities are sums of floats.
+constexpr double kMetTolerance = 1e-6;
+
+// Per node the nearest others, and those whose nearest it is, ascending.
+std::vector<std::vector<int32_t>> Neighbours(const std::vector<PromiseNode>& nodes, double radius,
+                                             double radius_deg) {
+  std::vector<std::vector<int32_t>> neighbours(nodes.size());
+  std::vector<std::pair<double, int32_t>> order;
+  for (size_t a = 0; a < nodes.size(); ++a) {
+    order.clear();
+    for (size_t b = 0; b < nodes.size(); ++b) {
+      if (a == b) continue;
+      order.emplace_back(
+          ViewDistanceSquared(nodes[a].cam_from_world, nodes[b].cam_from_world, radius, radius_deg),
+          static_cast<int32_t>(b));
+    }
+    const size_t num = std::min(kNumNeighbours, order.size());
+    std::partial_sort(order.begin(), order.begin() + static_cast<ptrdiff_t>(num), order.end());
+    for (size_t n = 0; n < num; ++n) {
+      neighbours[a].push_back(order[n].second);
+      neighbours[order[n].second].push_back(static_cast<int32_t>(a));
+    }
+  }
+  for (std::vector<int32_t>& list : neighbours) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  return neighbours;
+}
+
+class Divider {
+ public:
+  Divider(const CoverProblem& problem, const std::vector<char>& keep, size_t max_landmarks)
+      : problem_(problem),
+        keep_(keep),
+        max_landmarks_(max_landmarks),
+        of_node_(problem.demands.size()),
+        is_divided_(problem.demands.size(), 0) {
+    for (size_t i = 0; i < keep.size(); ++i) {
+      if (keep[i] == 0) continue;
+      for (const ExpectedMatch& match : (*problem.of_class)[i])
+        of_node_[match.view].push_back({i, match.probability});
+    }
+  }
+
+  bool IsDivided(int32_t node) const { return is_divided_[node] != 0; }
+
+  PromiseRegion GrowFrom(int32_t seed, const std::vector<std::vector<int32_t>>& neighbours) {
+    PromiseRegion region;
+    lacking_ = problem_.demands;
+    is_in_.assign(keep_.size(), 0);
+    std::optional<int32_t> next = seed;
+    std::vector<int32_t> border;
+    while (next) {
+      const std::vector<size_t> extra = ExtraFor(*next);
+      if (!region.nodes.empty() && region.classes.size() + extra.size() > max_landmarks_) {
+        for (const size_t i : extra) Change(i, false);
+        break;
+      }
+      region.classes.insert(region.classes.end(), extra.begin(), extra.end());
+      region.nodes.push_back(*next);
+      is_divided_[*next] = 1;
+      for (const int32_t node : neighbours[*next]) border.push_back(node);
+      std::sort(border.begin(), border.end());
+      border.erase(std::unique(border.begin(), border.end()), border.end());
+      std::erase_if(border, [&](int32_t node) { return IsDivided(node); });
+      next.reset();
+      for (const int32_t node : border) {
+        if (!next || Lack(node) < Lack(*next)) next = node;
+      }
+    }
+    Fill(&region);
+    std::sort(region.nodes.begin(), region.nodes.end());
+    std::sort(region.classes.begin(), region.classes.end());
+    return region;
+  }
+
+ private:
+  double Lack(int32_t node) const { return std::max(0.0, lacking_[node]); }
+
+  void Change(size_t i, bool take) {
+    is_in_[i] = take ? 1 : 0;
+    for (const ExpectedMatch& match : (*problem_.of_class)[i])
+      lacking_[match.view] += take ? -match.probability : match.probability;
+  }
+
+  // Takes the landmarks that the node lacks: those first that meet most of what nodes around it lack, too.
+  std::vector<size_t> ExtraFor(int32_t node) {
+    std::vector<size_t> extra;
+    while (lacking_[node] > kMetTolerance) {
+      double most = 0;
+      std::optional<size_t> best;
+      for (const auto& [i, probability] : of_node_[node]) {
+        if (is_in_[i] != 0) continue;
+        double gain = 0;
+        for (const ExpectedMatch& match : (*problem_.of_class)[i]) {
+          if (match.view == node || is_divided_[match.view] == 0)
+            gain += std::clamp<double>(lacking_[match.view], 0, match.probability);
+        }
+        if (gain > most) most = gain, best = i;
+      }
+      if (!best) break;
+      Change(*best, true);
+      extra.push_back(*best);
+    }
+    return extra;
+  }
+
+  void Fill(PromiseRegion* region) const {
+    std::vector<double> sums(keep_.size(), 0);
+    for (const int32_t node : region->nodes) {
+      for (const auto& [i, probability] : of_node_[node]) sums[i] += probability;
+    }
+    std::vector<size_t> order;
+    for (size_t i = 0; i < sums.size(); ++i) {
+      if (sums[i] > 0 && is_in_[i] == 0) order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return sums[a] > sums[b]; });
+    for (const size_t i : order) {
+      if (region->classes.size() >= max_landmarks_) break;
+      region->classes.push_back(i);
+    }
+  }
+
+  const CoverProblem& problem_;
+  const std::vector<char>& keep_;
+  size_t max_landmarks_;
+  std::vector<std::vector<std::pair<size_t, float>>> of_node_;
+  std::vector<char> is_divided_;
+  std::vector<double> lacking_;  // per node, of the region that grows
+  std::vector<char> is_in_;      // per class, the same
+};
+
+}  // namespace
+
+PromiseRegions DivideNodes(const std::vector<PromiseNode>& nodes, double view_radius, double view_radius_deg,
+                           const CoverProblem& problem, const std::vector<char>& keep, size_t max_landmarks,
+                           int64_t cover_bound) {
+  const auto neighbours = Neighbours(nodes, view_radius, view_radius_deg);
+  Divider divider(problem, keep, max_landmarks);
+  PromiseRegions result;
+  for (int32_t seed = 0; seed < static_cast<int32_t>(nodes.size()); ++seed) {
+    if (!divider.IsDivided(seed)) result.regions.push_back(divider.GrowFrom(seed, neighbours));
+  }
+  size_t most = max_landmarks;
+  for (const PromiseRegion& region : result.regions) most = std::max(most, region.classes.size());
+  if (!result.regions.empty() && most > 0) {
+    const auto num = static_cast<int64_t>(most);
+    result.lower_bound = static_cast<int>(std::max<int64_t>(1, (cover_bound + num - 1) / num));
+  }
+  return result;
+}
+
+}  // namespace cairn

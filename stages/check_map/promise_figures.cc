@@ -1,0 +1,99 @@
+#include "stages/check_map/promise_figures.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/promise/promise_nodes.h"
+#include "core/promise/view_distance.h"
+
+namespace cairn::check_map {
+namespace {
+
+std::string CurveText(const char* what, const std::vector<PromiseBin>& bins) {
+  if (bins.empty()) return "";
+  std::string text = fmt::format("  {:<22} promised  kept\n", what);
+  for (const PromiseBin& bin : bins)
+    text += fmt::format("  {:<22} {:>6.1f} % {:>5.1f} %  ({} of {} images)\n", "", 100 * bin.mean_promised,
+                        100.0 * bin.num_kept / bin.num, bin.num_kept, bin.num);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Pose> NodePoses(const MapRows& rows) {
+  const std::vector<NodePromise>& nodes = rows.findings.promise->nodes;
+  std::vector<Pose> poses;
+  for (size_t i = 0; i < nodes.size();) {
+    // Nodes between two headings follow each other.
+    size_t end = i + 1;
+    while (nodes[i].image != nodes[i].other_image && end < nodes.size() &&
+           nodes[end].image == nodes[i].image && nodes[end].other_image == nodes[i].other_image)
+      ++end;
+    const Pose& a = rows.images[nodes[i].image].cam_from_world;
+    const Pose& b = rows.images[nodes[i].other_image].cam_from_world;
+    const int num_parts = static_cast<int>(end - i) + 1;
+    for (int part = 1; part < num_parts; ++part)
+      poses.push_back(nodes[i].image == nodes[i].other_image ? a : PoseBetween(a, b, part, num_parts));
+    i = end;
+  }
+  return poses;
+}
+
+std::vector<PromiseOutcome> PromiseOutcomes(const MapRows& rows, const std::vector<HeldOutResult>& images) {
+  const MapPromise& promise = *rows.findings.promise;
+  const std::vector<Pose> poses = NodePoses(rows);
+  std::vector<PromiseOutcome> outcomes;
+  for (const HeldOutResult& image : images) {
+    if (!image.true_cam_from_world || !image.rejected.empty()) continue;
+    const Pose cam_from_world = rows.camera_from_given * *image.true_cam_from_world;
+    std::optional<size_t> nearest;
+    double least = kNodeReach * kNodeReach;
+    for (size_t node = 0; node < poses.size(); ++node) {
+      const double squared =
+          ViewDistanceSquared(cam_from_world, poses[node], promise.radius_m, promise.radius_deg);
+      if (squared < least) least = squared, nearest = node;
+    }
+    if (!nearest) continue;
+    outcomes.push_back({promise.nodes[*nearest].probability,
+                        image.has_fix() && image.localization.num_inliers >= promise.terms.min_matches &&
+                            image.error_m <= promise.terms.max_error_m &&
+                            image.error_deg <= promise.terms.max_error_deg});
+  }
+  return outcomes;
+}
+
+void AddPromiseFigures(const MapRows& rows, const std::vector<HeldOutResult>& images,
+                       std::map<std::string, double>* figures) {
+  const std::vector<PromiseOutcome> outcomes = PromiseOutcomes(rows, images);
+  int num_promised = 0, num_kept = 0;
+  for (const PromiseOutcome& outcome : outcomes) {
+    if (outcome.probability < rows.findings.promise->terms.probability) continue;
+    ++num_promised;
+    num_kept += outcome.is_kept ? 1 : 0;
+  }
+  const auto num_tried = std::count_if(images.begin(), images.end(), [](const HeldOutResult& image) {
+    return image.true_cam_from_world && image.rejected.empty();
+  });
+  (*figures)["num_promised"] = num_promised;
+  (*figures)["num_promised_kept"] = num_kept;
+  (*figures)["num_beyond_promises"] = static_cast<double>(num_tried) - static_cast<double>(outcomes.size());
+  if (num_promised > 0) (*figures)["promised_kept_ratio"] = static_cast<double>(num_kept) / num_promised;
+}
+
+std::string PromiseText(const MapPromise& promise, const std::string& unit) {
+  const PromiseTerms& terms = promise.terms;
+  std::string text = fmt::format(
+      "promise\n  {:.0f} % of the images find at least {} landmarks and are localized within {:.3g} {}, "
+      "{:.3g} "
+      "deg,\n  where they are taken within {:.2g} {}, {:.2g} deg of one of {} places and headings; {} of "
+      "these "
+      "keep it\n  no map of this survey with fewer than {} landmarks keeps it where it can be kept\n",
+      100 * terms.probability, terms.min_matches, terms.max_error_m, unit, terms.max_error_deg,
+      kNodeReach * promise.radius_m, unit, kNodeReach * promise.radius_deg, promise.nodes.size(),
+      promise.NumKept(), promise.landmarks_lower_bound);
+  text += CurveText("left-out survey images", promise.left_out);
+  text += CurveText("held-out images", promise.held_out);
+  return text;
+}
+
+}  // namespace cairn::check_map

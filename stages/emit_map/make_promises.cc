@@ -1,0 +1,129 @@
+#include "stages/emit_map/make_promises.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+#include <utility>
+
+#include "core/base/parallel.h"
+#include "core/promise/expectation.h"
+#include "core/promise/promise_cover.h"
+#include "core/promise/promise_regions.h"
+
+namespace cairn::emit_map {
+namespace {
+
+// Where all classes are too few for the promise, this part of what they give is kept: the rest are many that
+// hardly any robot matches.
+constexpr double kReachableRatio = 0.9;
+
+std::vector<PromiseOutcome> Outcomes(const std::vector<PromiseTrial>& fared, const PromiseModel& model,
+                                     const PromiseTerms& terms) {
+  std::vector<PromiseOutcome> outcomes;
+  for (const PromiseTrial& trial : fared)
+    outcomes.push_back(
+        {model.Probability(trial.expected, terms), trial.is_right && trial.num_matches >= terms.min_matches});
+  return outcomes;
+}
+
+}  // namespace
+
+PromiseMaker::PromiseMaker(const Classes& classes, int num_threads)
+    : classes_(classes),
+      num_threads_(num_threads),
+      model_(classes, {}, num_threads),
+      sights_(classes, {}),
+      nodes_(PromiseNodes(classes, model_.distance())),
+      of_node_(nodes_.size()),
+      of_class_(classes.classes.size()) {
+  std::unordered_map<CameraId, const Camera*> cameras;
+  for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
+  ParallelFor(static_cast<int64_t>(nodes_.size()), num_threads, [&](int64_t node) {
+    const Camera& camera = *cameras.at(classes.images[nodes_[node].image].camera_id);
+    of_node_[node] = model_.At(camera, nodes_[node].cam_from_world, MatchModel::Where::kNearby);
+  });
+  for (size_t node = 0; node < nodes_.size(); ++node) {
+    for (const ClassMatch& match : of_node_[node])
+      of_class_[match.i].push_back({static_cast<int32_t>(node), match.probability});
+  }
+}
+
+LandmarkOrder PromiseMaker::Order(std::vector<size_t> pool) const {
+  return {classes_, model_.OfViews(num_threads_), std::move(pool), {}, num_threads_};
+}
+
+std::vector<char> PromiseMaker::Complete(const std::vector<size_t>& first,
+                                         const std::vector<PromiseTrial>& fared,
+                                         const PromiseOptions& options) const {
+  const PromiseModel model = FitPromiseModel(fared);
+  CoverProblem problem{.of_class = &of_class_};
+  problem.demands = Demands(of_class_, nodes_.size(), model.NeededMatches(options.terms), kReachableRatio);
+  std::vector<size_t> taken = first;
+  std::sort(taken.begin(), taken.end());
+  std::vector<char> keep(classes_.classes.size(), 0);
+  for (const size_t i : CoverFast(problem, taken)) keep[i] = 1;
+  return keep;
+}
+
+Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<PromiseTrial>& fared,
+                               const PromiseOptions& options) const {
+  const PromiseModel model = FitPromiseModel(fared);
+  const ViewDistance& distance = model_.distance();
+  Promises promises;
+  promises.findings = {.terms = options.terms,
+                       .model = model,
+                       .radius_m = distance.radius(),
+                       .radius_deg = distance.radius_deg(),
+                       .left_out = CalibrationCurve(Outcomes(fared, model, options.terms))};
+  const std::vector<char> all(keep.size(), 1);
+  promises.findings.nodes.resize(nodes_.size());
+  ParallelFor(static_cast<int64_t>(nodes_.size()), num_threads_, [&](int64_t node) {
+    const double focal = sights_.FocalOf(classes_.images[nodes_[node].image].image_id);
+    const auto expect = [&](const std::vector<char>& these) {
+      return ExpectationOf(sights_, of_node_[node], these, nodes_[node].cam_from_world, focal,
+                           distance.depth());
+    };
+    const Expectation expected = expect(keep), most = expect(all);
+    promises.findings.nodes[node] = {.image = nodes_[node].image,
+                                     .other_image = nodes_[node].other_image,
+                                     .probability = model.Probability(expected, options.terms),
+                                     .num_matches = model.match_ratio * expected.num_matches,
+                                     .sigma_m = model.error_ratio * expected.sigma_m,
+                                     .most_probable = model.Probability(most, options.terms)};
+  });
+
+  // The bound is of the promise: the map has more landmarks where exactness asks for them.
+  CoverProblem problem{.of_class = &of_class_};
+  problem.demands = Demands(of_class_, nodes_.size(), model.NeededMatches(options.terms), kReachableRatio);
+  promises.findings.landmarks_lower_bound = CoverBest(problem, {.num_threads = num_threads_}).lower_bound;
+  // A map of few bytes may lack what its nodes demand.
+  std::vector<double> kept(nodes_.size(), 0);
+  for (size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i] == 0) continue;
+    for (const ExpectedMatch& match : of_class_[i]) kept[match.view] += match.probability;
+  }
+  for (size_t node = 0; node < nodes_.size(); ++node) {
+    if (kept[node] < problem.demands[node]) problem.demands[node] = kReachableRatio * kept[node];
+  }
+  const PromiseRegions divided =
+      DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem, keep,
+                  options.max_region_landmarks, promises.findings.landmarks_lower_bound);
+  promises.regions_lower_bound = divided.lower_bound;
+  for (const PromiseRegion& region : divided.regions) {
+    for (const int32_t node : region.nodes)
+      promises.findings.nodes[node].region = static_cast<RegionIdx>(promises.regions.size());
+    promises.regions.push_back({.images = {}, .classes = region.classes});
+  }
+  for (size_t image = 0; image < classes_.images.size(); ++image) {
+    size_t nearest = 0;
+    double least = 0;
+    for (size_t node = 0; node < nodes_.size(); ++node) {
+      const double squared = distance.Squared(nodes_[node].cam_from_world, image);
+      if (node == 0 || squared < least) least = squared, nearest = node;
+    }
+    promises.regions[promises.findings.nodes[nearest].region].images.push_back(image);
+  }
+  return promises;
+}
+
+}  // namespace cairn::emit_map

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/blocks/map_rows.h"
+#include "core/promise/expected_matches.h"
+#include "core/promise/landmark_order.h"
+#include "core/promise/landmark_sights.h"
+#include "core/promise/promise_model.h"
+#include "core/world/feature_class.h"
+#include "stages/emit_map/leave_out_images.h"
+
+namespace cairn::emit_map {
+
+// Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these) and
+// this many bits per descriptor value: EmitMap and all that is added to a map after it.
+using EmitKept = std::function<Result<MapRows>(const Classes& classes, const std::vector<char>& keep,
+                                               int descriptor_bits)>;
+
+// Per class, whether it is among these.
+std::vector<char> MarkThese(const std::vector<size_t>& chosen, size_t num_classes);
+
+// Maps of parts of the survey, each tried on survey images that it lacks (leave_out_images.h).  A map has the
+// first n classes of LandmarkOrder.
+class Trials {
+ public:
+  // At most about `max_num_left_out` images are tried.  `may_keep`: per class, whether a map may have it.
+  // Advances `progress` by kMaxNumRounds.  Errors: those of ChooseLeftOut, LeaveOutImages; Cancelled.
+  static Result<Trials> Make(const Classes& classes, const std::vector<char>& may_keep,
+                             const std::string& matches_path, size_t max_num_left_out,
+                             const LeftOutLimits& limits, const EmitKept& emit, int num_threads,
+                             Progress& progress);
+
+  // One result per tried image; images of a part that has no class at all are not localized.  What was
+  // expected of each image is kept beside it.
+  Result<LeftOutTrial> Try(size_t n, int descriptor_bits);
+
+  // Of all maps tried so far: what was expected of each image, and how it fared.
+  const std::vector<PromiseTrial>& fared() const { return fared_; }
+
+ private:
+  struct Part {
+    std::unique_ptr<LeftOutSurvey> survey;
+    std::vector<size_t> pool;
+    LandmarkOrder order;
+    LandmarkSights sights;
+    double depth;
+    std::vector<std::vector<ClassMatch>> matches;  // per tried image
+  };
+
+  Trials(const EmitKept& emit, const LeftOutLimits& limits, int num_threads)
+      : emit_(&emit), limits_(limits), num_threads_(num_threads) {}
+
+  const EmitKept* emit_;
+  LeftOutLimits limits_;
+  int num_threads_;
+  std::vector<Part> parts_;
+  std::vector<PromiseTrial> fared_;
+};
+
+}  // namespace cairn::emit_map
