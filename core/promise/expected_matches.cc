@@ -19,6 +19,8 @@ using FeatureVector = Eigen::Matrix<double, kNumMatchFeatures, 1>;
 
 // Sights weigh exp(-d^2 / 2 h^2), d = distance of views, h = this many views' radii.
 constexpr double kKernelWidth = 1.5;
+// Beyond this square of a distance sights weigh less than a ten thousandth: nothing.
+constexpr double kFarthestSquared = 2 * kKernelWidth * kKernelWidth * 9.2;
 // A priori as good as this many matches.
 constexpr double kPriorWeight = 0.5;
 // Nothing is certain.
@@ -31,6 +33,7 @@ constexpr double kShiftDeg = 5;
 constexpr double kShiftLogRatio = 0.1;
 constexpr int64_t kMaxNumPairs = 60'000;
 constexpr size_t kMaxNumNear = 64;
+constexpr size_t kMaxImagesInTable = 4096;
 constexpr int kMinNumShared = 5;
 constexpr double kLeastDistance = 1e-9;
 // Features of the nearest sight: its angle and its octaves are counted in these.
@@ -70,6 +73,14 @@ class Learner {
       }
     }
     FindNear();
+    if (views_.size() > kMaxImagesInTable) return;
+    squared_.resize(views_.size() * views_.size());
+    for (size_t a = 0; a < views_.size(); ++a) {
+      for (size_t b = 0; b <= a; ++b) {
+        const double squared = distance_.Squared(a, b);
+        squared_[a * views_.size() + b] = squared_[b * views_.size() + a] = static_cast<float>(squared);
+      }
+    }
   }
 
   // Which sights of a class count, and from how far.
@@ -110,7 +121,7 @@ class Learner {
       double d2 = squared(lookers.images[other]);
       if (which == Sights::kOfOtherViews && d2 < 1) continue;
       if (which == Sights::kFromNearby) d2 += 1;
-      const double weight = std::exp(-d2 / (2 * kKernelWidth * kKernelWidth));
+      const double weight = d2 < kFarthestSquared ? std::exp(-d2 / (2 * kKernelWidth * kKernelWidth)) : 0.0;
       sum += weight;
       if (!lookers.sees[other]) continue;
       seen += weight;
@@ -144,7 +155,7 @@ class Learner {
                        FeatureVector* features) const {
     return Describe(
         lookers, lookers.rays[j], lookers.log_distances[j], prior, which,
-        [&](int32_t other) { return distance_.Squared(lookers.images[j], other); }, features);
+        [&](int32_t other) { return Squared(lookers.images[j], other); }, features);
   }
 
   const ViewDistance& distance() const { return distance_; }
@@ -157,6 +168,10 @@ class Learner {
   }
 
  private:
+  double Squared(int32_t a, int32_t b) const {
+    return squared_.empty() ? distance_.Squared(a, b) : squared_[a * views_.size() + b];
+  }
+
   // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
   std::vector<int32_t> Looking(size_t i) const {
     std::vector<int32_t> candidates;
@@ -201,6 +216,7 @@ class Learner {
   const ViewDistance distance_;
   std::vector<View> views_;
   std::vector<std::vector<int32_t>> seen_by_;
+  std::vector<float> squared_;  // distances of all pairs; empty: too many images
 };
 
 // Maximum likelihood of logistic regression by Newton's method, with a weak pull to 0.

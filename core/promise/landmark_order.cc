@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -11,9 +10,8 @@
 namespace cairn {
 namespace {
 
-// All gains are computed anew when the number taken has doubled, until so many are taken: later ones hardly
-// grow.
-constexpr size_t kMaxTakenAtRefresh = 512;
+// Up to so many, sights are computed once and kept: 64 bytes each.
+constexpr size_t kMaxKeptSights = 1 << 24;
 
 }  // namespace
 
@@ -34,6 +32,12 @@ class LandmarkOrder::Impl {
       views_.push_back({row.cam_from_world, sights_.FocalOf(row.image_id)});
     }
     for (size_t n = 0; n < pool_.size(); ++n) heap_[n].n = n;
+    size_t num_sights = 0;
+    for (const size_t i : pool_) num_sights += matches_.of_class[i].size();
+    if (num_sights > kMaxKeptSights) return;
+    kept_sights_.resize(pool_.size());
+    ParallelFor(static_cast<int64_t>(pool_.size()), num_threads_,
+                [&](int64_t n) { kept_sights_[n] = SightsOf(pool_[n]); });
   }
 
   std::vector<size_t> First(size_t num) {
@@ -61,45 +65,77 @@ class LandmarkOrder::Impl {
     // Those that did grow are found whenever as many again have been taken.
     if (order_.size() >= next_refresh_) {
       ParallelFor(static_cast<int64_t>(heap_.size()), num_threads_,
-                  [&](int64_t i) { heap_[i].bound = Gain(pool_[heap_[i].n]); });
+                  [&](int64_t i) { heap_[i].bound = Gain(heap_[i].n); });
       std::make_heap(heap_.begin(), heap_.end(), Worse);
-      next_refresh_ = order_.size() <= kMaxTakenAtRefresh / 2 ? 2 * order_.size() + 1
-                                                              : std::numeric_limits<size_t>::max();
+      next_refresh_ = 2 * order_.size() + 1;
     }
     while (true) {
       std::pop_heap(heap_.begin(), heap_.end(), Worse);
-      heap_.back().bound = Gain(pool_[heap_.back().n]);
+      heap_.back().bound = Gain(heap_.back().n);
       if (heap_.size() == 1 || !Worse(heap_.back(), heap_.front())) break;
       std::push_heap(heap_.begin(), heap_.end(), Worse);
     }
-    Take(pool_[heap_.back().n]);
+    Take(heap_.back().n);
     order_.push_back(pool_[heap_.back().n]);
     heap_.pop_back();
   }
 
-  double Gain(size_t i) const {
-    double gain = 0;
+  // A sight, and how much it adds to a view that has nothing yet.
+  struct Sight {
+    int32_t view;
+    float first_gain;
+    double shrinkage;  // of exp(-m_v / e)
+    bool has_root;
+    Eigen::Matrix<float, 2, 6> root;
+  };
+
+  std::vector<Sight> SightsOf(size_t i) const {
+    std::vector<Sight> sights;
+    sights.reserve(matches_.of_class[i].size());
     for (const ExpectedMatch& match : matches_.of_class[i]) {
-      gain += enough_ * lack_[match.view] * (1 - std::exp(-match.probability / enough_));
-      if (const auto sight = SightOf(i, match)) gain += information_.PlaceGain(*sight);
+      Sight sight{.view = match.view};
+      sight.shrinkage = std::exp(-match.probability / enough_);
+      sight.first_gain = static_cast<float>(enough_ * (1 - sight.shrinkage));
+      const View& view = views_[match.view];
+      const auto root = sights_.Root(i, view.cam_from_world, view.focal, match.probability);
+      sight.has_root = root.has_value();
+      if (root) sight.root = root->cast<float>();
+      sights.push_back(sight);
     }
+    return sights;
+  }
+
+  // Calls with the sights of the n-th of the pool.
+  template <class Body>
+  void WithSights(size_t n, const Body& body) const {
+    if (kept_sights_.empty()) {
+      body(SightsOf(pool_[n]));
+    } else {
+      body(kept_sights_[n]);
+    }
+  }
+
+  double Gain(size_t n) const {
+    double gain = 0;
+    WithSights(n, [&](const std::vector<Sight>& sights) {
+      for (const Sight& sight : sights) {
+        gain += sight.first_gain * lack_[sight.view];
+        if (sight.has_root)
+          gain += information_.PlaceGain({static_cast<size_t>(sight.view), sight.root.cast<double>()});
+      }
+    });
     return gain;
   }
 
-  void Take(size_t i) {
-    std::vector<SightInformation> sights;
-    for (const ExpectedMatch& match : matches_.of_class[i]) {
-      lack_[match.view] *= std::exp(-match.probability / enough_);
-      if (const auto sight = SightOf(i, match)) sights.push_back(*sight);
-    }
-    information_.Add(sights);
-  }
-
-  std::optional<SightInformation> SightOf(size_t i, const ExpectedMatch& match) const {
-    const View& view = views_[match.view];
-    const auto root = sights_.Root(i, view.cam_from_world, view.focal, match.probability);
-    if (!root) return std::nullopt;
-    return SightInformation{static_cast<size_t>(match.view), *root};
+  void Take(size_t n) {
+    std::vector<SightInformation> seen;
+    WithSights(n, [&](const std::vector<Sight>& sights) {
+      for (const Sight& sight : sights) {
+        lack_[sight.view] *= sight.shrinkage;
+        if (sight.has_root) seen.push_back({static_cast<size_t>(sight.view), sight.root.cast<double>()});
+      }
+    });
+    information_.Add(seen);
   }
 
   ExpectedMatches matches_;
@@ -110,7 +146,8 @@ class LandmarkOrder::Impl {
   std::vector<View> views_;
   std::vector<double> lack_;  // per view: exp(-m_v / e)
   PoseInformation information_;
-  std::vector<Candidate> heap_;  // of those not yet taken
+  std::vector<std::vector<Sight>> kept_sights_;  // of the pool; empty: too many
+  std::vector<Candidate> heap_;                  // of those not yet taken
   std::vector<size_t> order_;
   size_t next_refresh_ = 0;
 };

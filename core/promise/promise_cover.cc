@@ -13,7 +13,7 @@ namespace {
 constexpr double kMetTolerance = 1e-6;
 // The subgradient's step: halved when the bound has not grown for so many iterations.
 constexpr int kPatience = 15;
-constexpr int kIterationsPerCover = 25;
+constexpr int kIterationsPerCover = 100;
 // Bodies of ParallelFor take this many classes or nodes at a time.
 constexpr int64_t kChunk = 1024;
 
@@ -124,11 +124,19 @@ class Cover {
 class Dual {
  public:
   Dual(const CoverProblem& problem, int num_threads)
-      : problem_(problem), num_threads_(num_threads), worth_(problem.of_class->size()) {
-    of_node_.resize(problem.demands.size());
+      : problem_(problem),
+        num_threads_(num_threads),
+        worth_(problem.of_class->size()),
+        first_(problem.demands.size() + 1, 0) {
+    for (const std::vector<ExpectedMatch>& matches : *problem.of_class) {
+      for (const ExpectedMatch& match : matches) ++first_[match.view + 1];
+    }
+    for (size_t v = 0; v + 1 < first_.size(); ++v) first_[v + 1] += first_[v];
+    of_node_.resize(first_.back());
+    std::vector<size_t> next(first_.begin(), first_.end() - 1);
     for (size_t i = 0; i < worth_.size(); ++i) {
       for (const ExpectedMatch& match : (*problem.of_class)[i])
-        of_node_[match.view].push_back({i, match.probability});
+        of_node_[next[match.view]++] = {static_cast<int32_t>(i), match.probability};
     }
   }
 
@@ -145,9 +153,8 @@ class Dual {
     for (const double worth : worth_) bound -= std::max(0.0, worth - 1);
     ForChunks(prices.size(), num_threads_, [&](int64_t v) {
       double rest = problem_.demands[v];
-      for (const auto& [i, probability] : of_node_[v]) {
-        if (worth_[i] > 1) rest -= probability;
-      }
+      for (size_t n = first_[v]; n < first_[v + 1]; ++n)
+        rest -= worth_[of_node_[n].i] > 1 ? of_node_[n].probability : 0;
       (*gradient)[v] = rest;
     });
     return bound;
@@ -159,16 +166,15 @@ class Dual {
   // Prices at which the best paid class is worth 1: a bound from the start.
   std::vector<double> FirstPrices() const {
     std::vector<double> prices(problem_.demands.size(), 0);
+    std::vector<double> sums(worth_.size(), 0);
+    for (size_t i = 0; i < worth_.size(); ++i) {
+      for (const ExpectedMatch& match : (*problem_.of_class)[i])
+        sums[i] += problem_.demands[match.view] > 0 ? match.probability : 0;
+    }
     for (size_t v = 0; v < prices.size(); ++v) {
       if (!(problem_.demands[v] > 0)) continue;
       double most = 0;
-      for (const auto& [i, probability] : of_node_[v]) {
-        double sum = 0;
-        for (const ExpectedMatch& match : (*problem_.of_class)[i]) {
-          if (problem_.demands[match.view] > 0) sum += match.probability;
-        }
-        most = std::max(most, sum);
-      }
+      for (size_t n = first_[v]; n < first_[v + 1]; ++n) most = std::max(most, sums[of_node_[n].i]);
       prices[v] = most > 0 ? 1 / most : 0;
     }
     return prices;
@@ -178,7 +184,12 @@ class Dual {
   const CoverProblem& problem_;
   int num_threads_;
   std::vector<double> worth_;
-  std::vector<std::vector<std::pair<size_t, float>>> of_node_;
+  struct Entry {
+    int32_t i;  // class
+    float probability;
+  };
+  std::vector<size_t> first_;  // of node v: of_node_[first_[v]] up to first_[v + 1]
+  std::vector<Entry> of_node_;
 };
 
 }  // namespace

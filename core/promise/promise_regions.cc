@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <utility>
 
 namespace cairn {
 namespace {
@@ -45,11 +47,15 @@ class Divider {
       : problem_(problem),
         keep_(keep),
         max_landmarks_(max_landmarks),
+        kept_of_class_(*problem.of_class),
         of_node_(problem.demands.size()),
         is_divided_(problem.demands.size(), 0) {
     for (size_t i = 0; i < keep.size(); ++i) {
-      if (keep[i] == 0) continue;
-      for (const ExpectedMatch& match : (*problem.of_class)[i])
+      if (keep[i] == 0) {
+        kept_of_class_[i].clear();
+        continue;
+      }
+      for (const ExpectedMatch& match : kept_of_class_[i])
         of_node_[match.view].push_back({i, match.probability});
     }
   }
@@ -58,18 +64,22 @@ class Divider {
 
   PromiseRegion GrowFrom(int32_t seed, const std::vector<std::vector<int32_t>>& neighbours) {
     PromiseRegion region;
-    lacking_ = problem_.demands;
-    is_in_.assign(keep_.size(), 0);
+    Restart({});
     std::optional<int32_t> next = seed;
     std::vector<int32_t> border;
     while (next) {
+      const std::vector<size_t> before = region.classes;
       const std::vector<size_t> extra = ExtraFor(*next);
-      if (!region.nodes.empty() && region.classes.size() + extra.size() > max_landmarks_) {
-        for (const size_t i : extra) Change(i, false);
-        break;
-      }
       region.classes.insert(region.classes.end(), extra.begin(), extra.end());
       region.nodes.push_back(*next);
+      if (region.classes.size() > max_landmarks_) region.classes = CoverOf(region.nodes);
+      if (region.nodes.size() > 1 && region.classes.size() > max_landmarks_) {
+        region.nodes.pop_back();
+        region.classes = before;
+        Restart(before);
+        break;
+      }
+      Restart(region.classes);
       is_divided_[*next] = 1;
       for (const int32_t node : neighbours[*next]) border.push_back(node);
       std::sort(border.begin(), border.end());
@@ -80,19 +90,96 @@ class Divider {
         if (!next || Lack(node) < Lack(*next)) next = node;
       }
     }
-    Fill(&region);
-    std::sort(region.nodes.begin(), region.nodes.end());
-    std::sort(region.classes.begin(), region.classes.end());
     return region;
+  }
+
+  // Joins neighbouring regions, the smallest first, while their nodes can do with so few landmarks.
+  void Join(const std::vector<std::vector<int32_t>>& neighbours, std::vector<PromiseRegion>* regions) const {
+    std::vector<size_t> region_of(problem_.demands.size());
+    const auto renumber = [&] {
+      for (size_t r = 0; r < regions->size(); ++r) {
+        for (const int32_t node : (*regions)[r].nodes) region_of[node] = r;
+      }
+    };
+    renumber();
+    std::set<std::pair<std::pair<int32_t, size_t>, std::pair<int32_t, size_t>>> tried;
+    while (true) {
+      std::optional<std::pair<size_t, size_t>> joined;
+      std::vector<size_t> by_size(regions->size());
+      for (size_t r = 0; r < by_size.size(); ++r) by_size[r] = r;
+      std::stable_sort(by_size.begin(), by_size.end(), [&](size_t a, size_t b) {
+        return (*regions)[a].nodes.size() < (*regions)[b].nodes.size();
+      });
+      for (const size_t small : by_size) {
+        std::set<size_t> others;
+        for (const int32_t node : (*regions)[small].nodes) {
+          for (const int32_t neighbour : neighbours[node]) others.insert(region_of[neighbour]);
+        }
+        others.erase(small);
+        for (const size_t other : others) {
+          PromiseRegion &a = (*regions)[small], &b = (*regions)[other];
+          if (!tried.insert(std::minmax(Name(a), Name(b))).second) continue;
+          std::vector<int32_t> nodes = a.nodes;
+          nodes.insert(nodes.end(), b.nodes.begin(), b.nodes.end());
+          std::vector<size_t> classes = CoverOf(nodes);
+          if (classes.size() > max_landmarks_) continue;
+          b = {std::move(nodes), std::move(classes)};
+          joined = {small, other};
+          break;
+        }
+        if (joined) break;
+      }
+      if (!joined) return;
+      regions->erase(regions->begin() + static_cast<ptrdiff_t>(joined->first));
+      renumber();
+    }
+  }
+
+  // Fills what room is left with the landmarks that its nodes expect most.
+  void Fill(PromiseRegion* region) const {
+    std::vector<double> sums(keep_.size(), 0);
+    for (const int32_t node : region->nodes) {
+      for (const auto& [i, probability] : of_node_[node]) sums[i] += probability;
+    }
+    for (const size_t i : region->classes) sums[i] = 0;
+    std::vector<size_t> order;
+    for (size_t i = 0; i < sums.size(); ++i) {
+      if (sums[i] > 0) order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return sums[a] > sums[b]; });
+    for (const size_t i : order) {
+      if (region->classes.size() >= max_landmarks_) break;
+      region->classes.push_back(i);
+    }
+    std::sort(region->nodes.begin(), region->nodes.end());
+    std::sort(region->classes.begin(), region->classes.end());
   }
 
  private:
   double Lack(int32_t node) const { return std::max(0.0, lacking_[node]); }
 
-  void Change(size_t i, bool take) {
-    is_in_[i] = take ? 1 : 0;
-    for (const ExpectedMatch& match : (*problem_.of_class)[i])
-      lacking_[match.view] += take ? -match.probability : match.probability;
+  void Take(size_t i) {
+    is_in_[i] = 1;
+    for (const ExpectedMatch& match : (*problem_.of_class)[i]) lacking_[match.view] -= match.probability;
+  }
+
+  void Restart(const std::vector<size_t>& classes) {
+    lacking_ = problem_.demands;
+    is_in_.assign(keep_.size(), 0);
+    for (const size_t i : classes) Take(i);
+  }
+
+  // A small cover of these nodes alone.
+  std::vector<size_t> CoverOf(const std::vector<int32_t>& nodes) const {
+    CoverProblem problem{.of_class = &kept_of_class_};
+    problem.demands.assign(problem_.demands.size(), 0);
+    for (const int32_t node : nodes) problem.demands[node] = problem_.demands[node];
+    return CoverFast(problem);
+  }
+
+  // A region that grows gets another.
+  static std::pair<int32_t, size_t> Name(const PromiseRegion& region) {
+    return {region.nodes[0], region.nodes.size()};
   }
 
   // Takes the landmarks that the node lacks: those first that meet most of what nodes around it lack, too.
@@ -111,31 +198,16 @@ class Divider {
         if (gain > most) most = gain, best = i;
       }
       if (!best) break;
-      Change(*best, true);
+      Take(*best);
       extra.push_back(*best);
     }
     return extra;
   }
 
-  void Fill(PromiseRegion* region) const {
-    std::vector<double> sums(keep_.size(), 0);
-    for (const int32_t node : region->nodes) {
-      for (const auto& [i, probability] : of_node_[node]) sums[i] += probability;
-    }
-    std::vector<size_t> order;
-    for (size_t i = 0; i < sums.size(); ++i) {
-      if (sums[i] > 0 && is_in_[i] == 0) order.push_back(i);
-    }
-    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return sums[a] > sums[b]; });
-    for (const size_t i : order) {
-      if (region->classes.size() >= max_landmarks_) break;
-      region->classes.push_back(i);
-    }
-  }
-
   const CoverProblem& problem_;
   const std::vector<char>& keep_;
   size_t max_landmarks_;
+  std::vector<std::vector<ExpectedMatch>> kept_of_class_;
   std::vector<std::vector<std::pair<size_t, float>>> of_node_;
   std::vector<char> is_divided_;
   std::vector<double> lacking_;  // per node, of the region that grows
@@ -153,6 +225,8 @@ PromiseRegions DivideNodes(const std::vector<PromiseNode>& nodes, double view_ra
   for (int32_t seed = 0; seed < static_cast<int32_t>(nodes.size()); ++seed) {
     if (!divider.IsDivided(seed)) result.regions.push_back(divider.GrowFrom(seed, neighbours));
   }
+  divider.Join(neighbours, &result.regions);
+  for (PromiseRegion& region : result.regions) divider.Fill(&region);
   size_t most = max_landmarks;
   for (const PromiseRegion& region : result.regions) most = std::max(most, region.classes.size());
   if (!result.regions.empty() && most > 0) {

@@ -123,6 +123,14 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<
     }
     promises.regions[promises.findings.nodes[nearest].region].images.push_back(image);
   }
+  for (const NodePromise& node : promises.findings.nodes) {
+    for (const int32_t image : {node.image, node.other_image})
+      promises.regions[node.region].images.push_back(static_cast<size_t>(image));
+  }
+  for (Promises::Region& region : promises.regions) {
+    std::sort(region.images.begin(), region.images.end());
+    region.images.erase(std::unique(region.images.begin(), region.images.end()), region.images.end());
+  }
   return promises;
 }
 

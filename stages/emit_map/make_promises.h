@@ -21,7 +21,8 @@ struct PromiseOptions {
 // What a map promises, and the regions whose landmarks alone keep it.
 struct Promises {
   struct Region {
-    std::vector<size_t> images;   // positions in Classes::images that are nearest to its nodes, ascending
+    // Positions in Classes::images, ascending: those of its nodes, and those nearest to one of them.
+    std::vector<size_t> images;
     std::vector<size_t> classes;  // positions, ascending
   };
   MapPromise findings;
