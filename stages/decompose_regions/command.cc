@@ -37,6 +37,25 @@ void WarnIfDisconnected(const World& world) {
       components.size(), components[1][0], components[0][0]);
 }
 
+// A world of which no station is coverable has no region, which a warning says: a map that chooses its
+// landmarks otherwise needs none.
+Result<Decomposition> Decompose(const World& world, const Arguments& arguments,
+                                const CommandEnvironment& environment) {
+  const DecomposeRegionsOptions& options = arguments.options;
+  Result<Decomposition> result = DecomposeRegions(world, options, environment.seed, *environment.progress);
+  if (result.ok()) return result;
+  if (result.error().code != ErrorCode::kNoData || world.num_stations() == 0 ||
+      !CoverableStations(world, options.k, options.tau).empty()) {
+    return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
+  }
+  spdlog::warn("{}: there is no region, as {}", arguments.world, result.error().message);
+  return Decomposition{.algorithm = options.algorithm,
+                       .k = options.k,
+                       .tau = options.tau,
+                       .rho = options.rho,
+                       .seed = environment.seed};
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   if (arguments.classes.empty()) {
@@ -51,10 +70,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                                            kMemoryPerClassesByte, environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(const World world, ReadWorld(arguments.world));
   WarnIfDisconnected(world);
-  Result<Decomposition> result =
-      DecomposeRegions(world, arguments.options, environment.seed, *environment.progress);
-  if (!result.ok()) return MakeError(result.error().code, "{}: {}", arguments.world, result.error().message);
-  if (!arguments.classes.empty()) {
+  Result<Decomposition> result = Decompose(world, arguments, environment);
+  if (!result.ok()) return result.error();
+  if (!arguments.classes.empty() && !result->regions.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
     result = ChooseFeatures(world, classes, *result, arguments.options.choose_features);
     if (!result.ok()) {

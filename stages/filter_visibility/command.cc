@@ -1,5 +1,7 @@
 #include "stages/filter_visibility/command.h"
 
+#include <spdlog/spdlog.h>
+
 #include "core/line/memory.h"
 #include "stages/filter_visibility/filter_visibility.h"
 
@@ -23,6 +25,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
   CAIRN_ASSIGN_OR_RETURN(const FilterVisibilityResult result, FilterVisibility(classes, arguments.options));
   const World& world = result.world;
+  // A map that does not choose its landmarks by regions needs no feature of the world.
+  if (world.num_features() == 0)
+    spdlog::warn("{}: {}", arguments.classes, WhyNoFeature(result, classes.classes.size()));
   environment.report->in = {{"classes", static_cast<int64_t>(classes.classes.size())}};
   environment.report->out = {{"classes", world.num_features()}, {"stations", world.num_stations()}};
   AddDropped("classes", result.dropped, environment.report);

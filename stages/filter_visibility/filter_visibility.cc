@@ -184,18 +184,18 @@ Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
     result.world.areas.push_back(std::move(kept));
     result.world.class_ids.push_back(feature_class.class_id);
   }
-  if (result.world.areas.empty()) {
-    std::string reasons;
-    for (const auto& [reason, count] : result.dropped)
-      reasons += fmt::format("{}{} by {}", reasons.empty() ? "" : ", ", count, reason);
-    return MakeError(ErrorCode::kNoData,
-                     "none of {} classes is visible enough from the {} stations of a {} survey ({}): loosen "
-                     "the options of filter_visibility or survey more densely",
-                     classes.classes.size(), stations.cells.size(),
-                     stations.is_lattice ? "lattice" : "driven",
-                     reasons.empty() ? "there was none" : "dropped " + reasons);
-  }
   return result;
+}
+
+std::string WhyNoFeature(const FilterVisibilityResult& result, size_t num_classes) {
+  std::string reasons;
+  for (const auto& [reason, count] : result.dropped)
+    reasons += fmt::format("{}{} by {}", reasons.empty() ? "" : ", ", count, reason);
+  return fmt::format(
+      "none of {} classes is visible enough from the {} stations of a {} survey ({}): loosen the options of "
+      "filter_visibility or survey more densely",
+      num_classes, result.world.num_stations(), result.is_lattice ? "lattice" : "driven",
+      reasons.empty() ? "there was none" : "dropped " + reasons);
 }
 
 }  // namespace cairn::filter_visibility

@@ -59,8 +59,12 @@ struct FilterVisibilityResult {
 
 // Pure: no files, no clock, no globals.  O(observations log observations).  Errors: InvalidArgument (a bad
 // option, or survey = "lattice" for images that do not lie on a grid), Corrupt (a class observed in an
-// unknown image), NoData (no image, or no class left: says how many each filter dropped).
+// unknown image), NoData (no image).  A survey of which no class is left is a world of stations without
+// features.
 Result<FilterVisibilityResult> FilterVisibility(const Classes& classes,
                                                 const FilterVisibilityOptions& options);
+
+// Why the world has no feature: how many of the classes each filter dropped.  One sentence.
+std::string WhyNoFeature(const FilterVisibilityResult& result, size_t num_classes);
 
 }  // namespace cairn::filter_visibility

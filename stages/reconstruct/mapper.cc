@@ -13,6 +13,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSecondsPerHour = 3600;
+// Least median angle between the rays of the two images of a start, which COLMAP itself takes down to a
+// quarter; its default is 16.
+constexpr double kSmallTriangulationAngleDeg = 2;
 
 // The camera that is given to the mapper.
 Camera MapperCamera(Camera camera, const MapperOptions& options) {
@@ -46,13 +49,18 @@ std::string Flag(bool value) { return value ? "1" : "0"; }
 
 std::vector<std::string> MapperWords(const std::string& database, const std::string& images_folder,
                                      const MapperOptions& options, const std::string& models) {
-  return {"colmap", "mapper", "--database_path", database, "--image_path", images_folder, "--output_path",
-          models, "--random_seed", "0", "--Mapper.num_threads", options.deterministic ? "1" : "-1",
-          "--Mapper.extract_colors", "0", "--Mapper.min_num_matches", std::to_string(kMinNumMatches),
-          // Also small models: they are listed, and a small capture may have only one.
-          "--Mapper.min_model_size", "3", "--Mapper.ba_refine_focal_length",
-          Flag(options.refine_focal_length), "--Mapper.ba_refine_extra_params",
-          Flag(options.refine_distortion)};
+  std::vector<std::string> words = {
+      "colmap", "mapper", "--database_path", database, "--image_path", images_folder, "--output_path", models,
+      "--random_seed", "0", "--Mapper.num_threads", options.deterministic ? "1" : "-1",
+      "--Mapper.extract_colors", "0", "--Mapper.min_num_matches", std::to_string(kMinNumMatches),
+      // Also small models: they are listed, and a small capture may have only one.
+      "--Mapper.min_model_size", "3", "--Mapper.ba_refine_focal_length", Flag(options.refine_focal_length),
+      "--Mapper.ba_refine_extra_params", Flag(options.refine_distortion)};
+  if (options.start_from_any_pair) {
+    words.insert(words.end(), {"--Mapper.init_max_forward_motion", "1", "--Mapper.init_min_tri_angle",
+                               fmt::format("{}", kSmallTriangulationAngleDeg)});
+  }
+  return words;
 }
 
 std::string LastLines(const ProgramOutcome& outcome) {

@@ -18,6 +18,10 @@ struct MapperOptions {
   // parameter for cameras that are given without any.
   bool refine_focal_length = true;
   bool refine_distortion = true;
+  // Whether a reconstruction may start from any two images, also where the camera moved straight ahead
+  // between them or points are seen at small angles.  Such a start is less exact, and along a street or a
+  // corridor often the only one.
+  bool start_from_any_pair = false;
   // One thread, and the same bytes on every run.  False: all cores in bundle adjustment, faster for hundreds
   // of images, but no two runs give the same result.
   bool deterministic = true;

@@ -144,36 +144,72 @@ size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
 }
 
-// The mapper's models.  Distortion and shape cannot be distinguished from two images: where too few images
-// are registered with distortion, the mapper runs once more without.
+// One run of the mapper.
+struct MapperAttempt {
+  const char* folder;
+  const char* name;    // of the images that it registers, in a warning
+  const char* remedy;  // what makes it the first attempt; may be empty
+  MapperOptions options;
+};
+
+// How the mapper is run until enough images are registered.  Distortion and shape cannot be distinguished
+// from two images: the second attempt is without.  Along a street all pairs are of forward motion and small
+// angles, which COLMAP does not start from: the third starts from any pair.
+std::vector<MapperAttempt> Attempts(const MapperOptions& options) {
+  std::vector<MapperAttempt> attempts;
+  MapperOptions simpler = options;
+  simpler.refine_distortion = false;
+  if (options.refine_distortion) {
+    attempts.push_back({"first", "with the cameras' distortion refined", "", options});
+    attempts.push_back(
+        {"without_distortion", "without", ": refine_distortion = false saves the first attempt", simpler});
+  } else {
+    attempts.push_back({"first", "without distortion", "", options});
+  }
+  simpler.start_from_any_pair = true;
+  attempts.push_back({"from_any_pair", "from a start of any motion", "", simpler});
+  return attempts;
+}
+
+// The models of the attempt that registers most images.
 Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
                                            const ReconstructOptions& options, const std::string& work_folder,
                                            Progress& progress, ReconstructResult* result) {
-  const auto run = [&](const MapperOptions& mapper, const char* name) -> Result<std::vector<ColmapModel>> {
-    const std::string folder = work_folder + "/" + name;
+  const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
+  Result<std::vector<ColmapModel>> best = MakeError(ErrorCode::kNoData, "");
+  std::string counts;
+  const std::vector<MapperAttempt> attempts = Attempts(options.mapper);
+  const MapperAttempt* taken = attempts.data();
+  for (const MapperAttempt& attempt : attempts) {
+    const bool is_first = &attempt == attempts.data();
+    const std::string folder = work_folder + "/" + attempt.folder;
     std::error_code error;
     if (!std::filesystem::create_directory(folder, error))
       return WriteError(folder, "cannot be created", error.value());
-    return RunMapper(input, capture.images_folder, mapper, folder, progress);
-  };
-  Result<std::vector<ColmapModel>> models = run(options.mapper, "first");
-  const bool may_help = models.ok() || models.error().code == ErrorCode::kNoData;
-  const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
-  if (!options.mapper.refine_distortion || !may_help ||
-      (models.ok() && static_cast<double>(NumRegistered(models)) >= num_wanted)) {
-    return models;
+    Result<std::vector<ColmapModel>> models =
+        RunMapper(input, capture.images_folder, attempt.options, folder, progress);
+    if (!models.ok() && models.error().code != ErrorCode::kNoData &&
+        (is_first || models.error().code == ErrorCode::kCancelled)) {
+      return models;
+    }
+    const size_t num_registered = NumRegistered(models);
+    counts += is_first ? fmt::format("{} of {} images were registered {}", num_registered,
+                                     input.images.size(), attempt.name)
+                       : fmt::format(", {} {}", num_registered, attempt.name);
+    if (is_first || num_registered > NumRegistered(best)) {
+      best = std::move(models);
+      taken = &attempt;
+    }
+    if (static_cast<double>(NumRegistered(best)) >= num_wanted && best.ok()) {
+      if (!is_first) {
+        result->warnings.push_back(
+            fmt::format("{}; the reconstruction is the one {}{}", counts, taken->name, taken->remedy));
+      }
+      return best;
+    }
   }
-  MapperOptions simpler = options.mapper;
-  simpler.refine_distortion = false;
-  Result<std::vector<ColmapModel>> without = run(simpler, "without_distortion");
-  if (!without.ok() && without.error().code == ErrorCode::kCancelled) return without;
-  const bool is_better = NumRegistered(without) > NumRegistered(models);
-  result->warnings.push_back(
-      fmt::format("{} of {} images were registered with the cameras' distortion refined, {} without; the "
-                  "reconstruction is the one {}",
-                  NumRegistered(models), input.images.size(), NumRegistered(without),
-                  is_better ? "without: refine_distortion = false saves the first attempt" : "with"));
-  return is_better ? std::move(without) : std::move(models);
+  result->warnings.push_back(fmt::format("{}; the reconstruction is the one {}", counts, taken->name));
+  return best;
 }
 
 // Why an image is not in the model kept.

@@ -16,7 +16,8 @@ namespace cairn::reconstruct {
 
 // Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
 // (mapper.h), which GPS, known positions or known distances then determine (align.h).  Where too few images
-// are registered with the cameras' distortion refined, the mapper runs once more without.  Before:
+// are registered with the cameras' distortion refined, the mapper runs once more without, and then from a
+// start of any motion.  Before:
 // match_features.  After: group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;

@@ -63,6 +63,45 @@ TEST_F(MapSize, SameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(*ReadFile(Path("again.build/unsealed.cairn")), *ReadFile(Path("small.build/unsealed.cairn")));
 }
 
+// Where no station has enough common features, or no class is seen widely enough, there is no region: a map
+// that does not choose its landmarks by regions does without.
+TEST_F(MapSize, SurveyWithoutRegionsMakesAMapWithoutRegions) {
+  const auto compile = [&](const std::string& name, const std::string& from, const std::string& to,
+                           const std::string& landmarks) {
+    const std::string recipe = Path(name + ".toml");
+    WriteTinyRecipe(recipe);
+    ReplaceInFile(recipe, from, to);
+    ReplaceInFile(recipe, "landmarks = \"all\"", "landmarks = \"" + landmarks + "\"");
+    fs::copy(Path("tiny.build"), Path(name + ".build"), fs::copy_options::recursive);
+    return Run(fmt::format("cairn compile {0}.toml -o {0}.cairn --progress none", name));
+  };
+  const ProgramRun few_common = compile("few_common", "k = 4", "k = 100000", "fewest");
+  ASSERT_EQ(few_common.exit_code, 0) << few_common.err;
+  EXPECT_THAT(few_common.err, HasSubstr("there is no region, as no station is coverable: k = 100000"));
+  const ProgramRun few_stations =
+      compile("few_stations", "min_num_stations_driven = 2", "min_num_stations_driven = 1000", "all");
+  ASSERT_EQ(few_stations.exit_code, 0) << few_stations.err;
+  EXPECT_THAT(few_stations.err, HasSubstr("classes is visible enough from the"));
+  EXPECT_THAT(few_stations.err, HasSubstr("there is no region, as no station is coverable"));
+  for (const std::string name : {"few_common", "few_stations"}) {
+    const json inspected = json::parse(Run("cairn inspect " + name + ".cairn --json").out);
+    EXPECT_EQ(inspected["num_regions"], 0) << name;
+    EXPECT_GT(inspected["num_landmarks"], 0) << name;
+    const json check = json::parse(Run("cat " + name + ".build/check.json").out);
+    const json whole = json::parse(Run("cat tiny.build/check.json").out);
+    EXPECT_GE(check["num_localized"].get<double>(), whole["num_localized"].get<double>() - 1) << name;
+    EXPECT_EQ(Run("cairn verify " + name + ".cairn").exit_code, 0);
+    EXPECT_THAT(Run("cairn inspect " + name + ".cairn --at 2,2").out, HasSubstr("in no region"));
+    const ProgramRun report = Run("cairn report " + name + ".cairn -o " + name + ".html");
+    EXPECT_EQ(report.exit_code, 0) << report.err;
+  }
+
+  const ProgramRun by_regions = compile("by_regions", "k = 4", "k = 100000", "regions");
+  EXPECT_EQ(by_regions.exit_code, static_cast<int>(ErrorCode::kNoData)) << by_regions.err;
+  EXPECT_THAT(by_regions.err, HasSubstr("0 regions keep none of"));
+  EXPECT_FALSE(fs::exists(Path("by_regions.cairn")));
+}
+
 TEST_F(MapSize, FewestLandmarksLocalizeLeftOutImagesAsAllDo) {
   WriteTinyRecipe(Path("fewest.toml"));
   ReplaceInFile(Path("fewest.toml"), "landmarks = \"all\"", "landmarks = \"fewest\"");

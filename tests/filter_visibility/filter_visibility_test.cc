@@ -275,13 +275,16 @@ TEST(FilterVisibility, DrivenSurveysNeedConnectedStations) {
               testing::UnorderedElementsAre(testing::Pair("few_stations", 1), testing::Pair("scattered", 1)));
 }
 
-TEST(FilterVisibility, NothingLeftNamesTheFilters) {
+TEST(FilterVisibility, NothingLeftIsAWorldWithoutFeaturesAndNamesTheFilters) {
   Classes classes = LatticeSurvey(kFullLattice);
   AddClass({"###.....", "........", "........", "........", "........", "........"}, &classes);
   const Result<FilterVisibilityResult> result = FilterVisibility(classes, {});
-  ASSERT_FALSE(result.ok());
-  EXPECT_EQ(result.error().code, ErrorCode::kNoData);
-  EXPECT_THAT(result.error().message, HasSubstr("1 by few_stations"));
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(result->world.num_features(), 0);
+  EXPECT_EQ(result->world.num_stations(), 48);
+  EXPECT_EQ(WhyNoFeature(*result, 1),
+            "none of 1 classes is visible enough from the 48 stations of a lattice survey (dropped 1 by "
+            "few_stations): loosen the options of filter_visibility or survey more densely");
 }
 
 TEST(FilterVisibility, ClassSeenInAnUnknownImageIsAnError) {

@@ -205,6 +205,28 @@ exec /usr/bin/colmap "$@")");
   EXPECT_THAT(Run(survey, only_with)->warnings, SizeIs(0));
 }
 
+// As along a street: COLMAP starts from no pair of forward motion unless it is told to.
+TEST_F(ReconstructTest, WithoutAStartTheMapperAtLastStartsFromAnyPair) {
+  const FakeColmap colmap(R"(case "$*" in
+*"init_max_forward_motion 1 "*) exec /usr/bin/colmap "$@";;
+esac
+echo "ERROR: failed to create sparse model"; exit 1)");
+  const SyntheticSurvey survey = MakeSyntheticSurvey(12, 11);
+  WriteControlPoints(survey);
+  ReconstructOptions options{.control_points = "control_points.txt"};
+  const auto result = Run(survey, options);
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->images, SizeIs(12));
+  ASSERT_FALSE(result->warnings.empty());
+  EXPECT_EQ(result->warnings[0],
+            "0 of 12 images were registered with the cameras' distortion refined, 0 without, 12 from a start "
+            "of any motion; the reconstruction is the one from a start of any motion");
+  options.mapper.refine_distortion = false;
+  EXPECT_EQ(Run(survey, options)->warnings[0],
+            "0 of 12 images were registered without distortion, 12 from a start of any motion; the "
+            "reconstruction is the one from a start of any motion");
+}
+
 TEST_F(ReconstructTest, BadOptionsAreRefused) {
   const SyntheticSurvey survey = MakeSyntheticSurvey(3, 18);
   for (const ReconstructOptions& options :
