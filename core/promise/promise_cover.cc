@@ -192,6 +192,20 @@ class Dual {
   std::vector<Entry> of_node_;
 };
 
+// A cover that begins with the classes that pay.
+void TakeIfBetter(const CoverProblem& problem, const std::vector<double>& worth, LandmarkCover* best) {
+  Cover cover(problem);
+  for (size_t i = 0; i < worth.size(); ++i) {
+    if (worth[i] > 1) cover.Take(i);
+  }
+  cover.Complete();
+  std::vector<size_t> order = cover.Taken();
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return worth[a] < worth[b]; });
+  cover.GiveBack(order);
+  std::vector<size_t> chosen = cover.Taken();
+  if (chosen.size() < best->chosen.size()) best->chosen = std::move(chosen);
+}
+
 }  // namespace
 
 std::vector<double> Demands(const std::vector<std::vector<ExpectedMatch>>& of_class, size_t num_nodes,
@@ -232,20 +246,8 @@ LandmarkCover CoverBest(const CoverProblem& problem, const CoverOptions& options
       prices = best_prices;
       dual.Evaluate(prices, &gradient);
     }
-    if (iteration % kIterationsPerCover == kIterationsPerCover - 1) {
-      Cover cover(problem);
-      std::vector<size_t> order;
-      for (size_t i = 0; i < dual.worth().size(); ++i) {
-        if (dual.worth()[i] > 1) cover.Take(i);
-      }
-      cover.Complete();
-      order = cover.Taken();
-      std::stable_sort(order.begin(), order.end(),
-                       [&](size_t a, size_t b) { return dual.worth()[a] < dual.worth()[b]; });
-      cover.GiveBack(order);
-      std::vector<size_t> chosen = cover.Taken();
-      if (chosen.size() < best.chosen.size()) best.chosen = std::move(chosen);
-    }
+    if (iteration % kIterationsPerCover == kIterationsPerCover - 1)
+      TakeIfBetter(problem, dual.worth(), &best);
     double norm2 = 0;
     for (size_t v = 0; v < prices.size(); ++v) {
       if (prices[v] > 0 || gradient[v] > 0) norm2 += gradient[v] * gradient[v];
@@ -255,6 +257,8 @@ LandmarkCover CoverBest(const CoverProblem& problem, const CoverOptions& options
         step_ratio * (static_cast<double>(best.chosen.size()) - std::min(bound, best_bound)) / norm2;
     for (size_t v = 0; v < prices.size(); ++v) prices[v] = std::max(0.0, prices[v] + step * gradient[v]);
   }
+  dual.Evaluate(best_prices, &gradient);
+  TakeIfBetter(problem, dual.worth(), &best);
   best.lower_bound = static_cast<int64_t>(std::ceil(best_bound - 1e-6 * std::max(1.0, best_bound)));
   return best;
 }

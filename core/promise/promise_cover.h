@@ -24,7 +24,7 @@ std::vector<double> Demands(const std::vector<std::vector<ExpectedMatch>>& of_cl
                             double needed, double reachable_ratio);
 
 struct CoverOptions {
-  int num_iterations = 200;  // of the lower bound
+  int num_iterations = 500;  // of the lower bound
   int num_threads = 0;       // 0: all cores
 };
 

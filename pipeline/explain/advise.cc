@@ -12,6 +12,7 @@
 #include "core/world/drop_reason.h"
 #include "pipeline/explain/station_losses.h"
 #include "pipeline/explain/station_text.h"
+#include "stages/check_map/promise_figures.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -183,13 +184,49 @@ void AddPoorRegions(const MapRows& rows, const std::vector<StationIdx>& about,
     const MapRegion& region = rows.regions[test->region];
     advice->push_back(
         {.text = fmt::format(
-             "Region {} ({}) localizes {} of {} held-out image{} with its {} landmarks. A larger k, or "
-             "images between its stations, would help.",
+             "Region {} ({}) localizes {} of {} held-out image{} with its {} landmarks. {}mages between its "
+             "stations would help.",
              test->region, WhereText(rows, region.stations), test->num_localized, test->num_held_out,
-             test->num_held_out == 1 ? "" : "s", region.landmarks.size()),
+             test->num_held_out == 1 ? "" : "s", region.landmarks.size(),
+             rows.k > 0 ? "A larger k, or i" : "I"),
          .stations = region.stations,
          .region = test->region,
          .images_to_take = ViewsBetween(rows, region.stations, neighbours)});
+  }
+}
+
+// Stations where the promise is not kept, neighbours together.
+void AddBrokenPromises(const MapRows& rows, const std::vector<StationIdx>& about,
+                       const std::vector<std::vector<StationIdx>>& neighbours, std::vector<Advice>* advice) {
+  if (!rows.findings.promise) return;
+  const MapPromise& promise = *rows.findings.promise;
+  std::map<std::string, std::set<StationIdx>> stations_of;  // by reason, without numbers
+  std::map<StationIdx, const NodePromise*> worst;
+  for (const NodePromise& node : promise.nodes) {
+    if (node.probability >= promise.terms.probability) continue;
+    const StationIdx station = rows.images[node.image].station;
+    if (station < 0) continue;
+    stations_of[node.most_probable >= promise.terms.probability ? "budget" : "survey"].insert(station);
+    const auto [at, is_new] = worst.try_emplace(station, &node);
+    if (!is_new && node.probability < at->second->probability) at->second = &node;
+  }
+  for (const auto& [reason, of_reason] : stations_of) {
+    for (std::vector<StationIdx>& stations :
+         Components(std::vector<StationIdx>(of_reason.begin(), of_reason.end()), neighbours)) {
+      if (!Concerns(stations, about)) continue;
+      const NodePromise& node =
+          *worst.at(*std::min_element(stations.begin(), stations.end(), [&](StationIdx a, StationIdx b) {
+            return worst.at(a)->probability < worst.at(b)->probability;
+          }));
+      advice->push_back({.text = fmt::format(
+                             "The promise is not kept at {}: an image there is localized with a probability "
+                             "of {:.0f} %, where {:.0f} % are promised: {}.",
+                             WhereText(rows, stations), 100 * node.probability,
+                             100 * promise.terms.probability, check_map::WhyNotPromised(node, promise)),
+                         .stations = stations,
+                         .images_to_take = reason == "survey" ? ViewsBetween(rows, stations, neighbours)
+                                                              : std::vector<Advice::View>()});
+    }
   }
 }
 
@@ -283,6 +320,7 @@ std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& a
   }
   std::stable_sort(advice.begin(), advice.end(),
                    [](const Advice& a, const Advice& b) { return a.stations.size() > b.stations.size(); });
+  AddBrokenPromises(rows, about, neighbours, &advice);
   AddPoorRegions(rows, about, neighbours, &advice);
   AddAmbiguousRegions(rows, about, &advice);
   AddOptions(rows, &advice);

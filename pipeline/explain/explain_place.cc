@@ -13,6 +13,7 @@
 #include "core/geometry/pose.h"
 #include "pipeline/explain/station_losses.h"
 #include "pipeline/explain/station_text.h"
+#include "stages/check_map/promise_figures.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -135,8 +136,8 @@ std::string CoverageText(const MapRows& rows, const StationLosses& losses, Stati
   }
   if (const auto reason = losses.WhyUncovered(station))
     text += fmt::format(": {}", DescribeDropReason(*reason).text);
-  text += fmt::format("\nin view: {} features that a robot can expect to see; k = {}\n",
-                      losses.NumVisible(station), rows.k);
+  text += fmt::format("\nin view: {} features that a robot can expect to see", losses.NumVisible(station));
+  text += rows.k > 0 ? fmt::format("; k = {}\n", rows.k) : "\n";
   text += fmt::format("landmarks seen from here: {}\n", losses.NumLandmarks(station));
   for (const RegionIdx region : regions) {
     const MapRegion& row = rows.regions[region];
@@ -146,6 +147,47 @@ std::string CoverageText(const MapRows& rows, const StationLosses& losses, Stati
     text += test ? "; self-test: " + SelfTestText(*test) + "\n" : "; no held-out image\n";
   }
   return text;
+}
+
+// What the map promises to images taken at the station, by heading.
+std::string PromisesText(const MapRows& rows, StationIdx station) {
+  if (!rows.findings.promise) return "";
+  const MapPromise& promise = *rows.findings.promise;
+  const std::vector<Pose> poses = check_map::NodePoses(rows);
+  std::string text;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const NodePromise& node = promise.nodes[i];
+    if (rows.images[node.image].station != station && rows.images[node.other_image].station != station)
+      continue;
+    text += fmt::format("  looking towards {:>4.0f} deg: {:.1f} %, {:.0f} matches to expect, region {}\n",
+                        FloorPoseOf(poses[i], rows.floor_from_world).heading_deg, 100 * node.probability,
+                        node.num_matches, node.region);
+    if (const std::string why = check_map::WhyNotPromised(node, promise); !why.empty())
+      text += "    not kept: " + why + "\n";
+  }
+  const PromiseTerms& terms = promise.terms;
+  if (text.empty()) return "promise: no place or heading of the survey's views is here\n";
+  return fmt::format("promise: an image is localized within {:.3g} {}, {:.3g} deg by {} landmarks at least\n",
+                     terms.max_error_m, rows.frame.unit == "metre" ? "m" : "units", terms.max_error_deg,
+                     terms.min_matches) +
+         text;
+}
+
+nlohmann::ordered_json PromisesJson(const MapRows& rows, StationIdx station) {
+  const std::vector<Pose> poses = check_map::NodePoses(rows);
+  auto json = nlohmann::ordered_json::array();
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const NodePromise& node = rows.findings.promise->nodes[i];
+    if (rows.images[node.image].station != station && rows.images[node.other_image].station != station)
+      continue;
+    json.push_back({{"heading_deg", FloorPoseOf(poses[i], rows.floor_from_world).heading_deg},
+                    {"probability", node.probability},
+                    {"most_probable", node.most_probable},
+                    {"num_matches", node.num_matches},
+                    {"sigma_m", node.sigma_m},
+                    {"region", node.region}});
+  }
+  return json;
 }
 
 std::string LossesText(const MapRows& rows, StationIdx station) {
@@ -204,6 +246,7 @@ std::string ExplainStationText(const MapRows& rows, StationIdx station) {
   const std::vector<int32_t> images = ImagesAt(rows, station);
   std::string text = StationText(rows, station) + "\n";
   text += CoverageText(rows, losses, station, RegionsOf(rows, station), images);
+  text += PromisesText(rows, station);
   text += fmt::format("survey images: {}{}{}\n", images.size(), images.empty() ? "" : ": ",
                       NamesText(rows, images));
   std::set<int32_t> nodes;
@@ -246,6 +289,7 @@ nlohmann::ordered_json ExplainStationJson(const MapRows& rows, StationIdx statio
     }
   }
   for (const int32_t image : images) json["images"].push_back(rows.images[image].name);
+  if (rows.findings.promise) json["promises"] = PromisesJson(rows, station);
   for (const DropCount& drop : rows.findings.drops) {
     if (drop.at_stations.empty() || drop.at_stations[station] == 0) continue;
     json["dropped"].push_back({{"stage", drop.stage},

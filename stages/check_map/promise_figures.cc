@@ -80,6 +80,24 @@ void AddPromiseFigures(const MapRows& rows, const std::vector<HeldOutResult>& im
   if (num_promised > 0) (*figures)["promised_kept_ratio"] = static_cast<double>(num_kept) / num_promised;
 }
 
+std::string WhyNotPromised(const NodePromise& node, const MapPromise& promise) {
+  const PromiseTerms& terms = promise.terms;
+  if (node.probability >= terms.probability) return "";
+  if (node.most_probable >= terms.probability)
+    return "the map is smaller than the promise asks for: max_bytes leaves out what would keep it";
+  const PromiseModel& model = promise.model;
+  if (node.num_matches < model.match_ratio * model.NeededMatches(terms)) {
+    return fmt::format(
+        "{:.0f} matches are to be expected, {:.0f} are needed, and all that the survey saw there are too "
+        "few: "
+        "bare walls, blur, or an end of the survey; images taken around there would help",
+        node.num_matches, model.match_ratio * model.NeededMatches(terms));
+  }
+  return "what is seen there fixes the place too loosely (far away, or all in one direction); nearer images "
+         "would "
+         "help";
+}
+
 std::string PromiseText(const MapPromise& promise, const std::string& unit) {
   const PromiseTerms& terms = promise.terms;
   std::string text = fmt::format(

@@ -26,6 +26,9 @@ std::vector<PromiseOutcome> PromiseOutcomes(const MapRows& rows, const std::vect
 void AddPromiseFigures(const MapRows& rows, const std::vector<HeldOutResult>& images,
                        std::map<std::string, double>* figures);
 
+// Why a node does not keep the promise, for people; empty where it does.
+std::string WhyNotPromised(const NodePromise& node, const MapPromise& promise);
+
 // For people: the terms, how many nodes keep them, and the calibration curves.
 std::string PromiseText(const MapPromise& promise, const std::string& unit);
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -134,9 +135,14 @@ Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
 }
 
 Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, MapRows* rows) {
-  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.parts.world, dropped));
-  if (rows->algorithm == kPromiseAlgorithm) return Ok();  // its regions leave no station out
-  for (const DroppedItem& item : dropped) {
+  std::vector<DroppedItem> counted = dropped;
+  if (rows->algorithm == kPromiseAlgorithm) {  // what stage 5's regions leave out is in these all the same
+    std::erase_if(counted, [](const DroppedItem& item) {
+      return std::string_view(DescribeDropReason(item.reason).stage) == "decompose_regions";
+    });
+  }
+  CAIRN_ASSIGN_OR_RETURN(rows->findings.drops, CountDrops(inputs.classes, inputs.parts.world, counted));
+  for (const DroppedItem& item : counted) {
     if (DescribeDropReason(item.reason).kind == DropKind::kStation)
       rows->stations[item.item_id].is_covered = false;
   }

@@ -17,6 +17,9 @@ namespace {
 // hardly any robot matches.
 constexpr double kReachableRatio = 0.9;
 
+// The bound is then within a hundredth of the best that the dual can prove.
+constexpr int kBoundIterations = 200;
+
 std::vector<PromiseOutcome> Outcomes(const std::vector<PromiseTrial>& fared, const PromiseModel& model,
                                      const PromiseTerms& terms) {
   std::vector<PromiseOutcome> outcomes;
@@ -95,7 +98,8 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<
   // The bound is of the promise: the map has more landmarks where exactness asks for them.
   CoverProblem problem{.of_class = &of_class_};
   problem.demands = Demands(of_class_, nodes_.size(), model.NeededMatches(options.terms), kReachableRatio);
-  promises.findings.landmarks_lower_bound = CoverBest(problem, {.num_threads = num_threads_}).lower_bound;
+  promises.findings.landmarks_lower_bound =
+      CoverBest(problem, {.num_iterations = kBoundIterations, .num_threads = num_threads_}).lower_bound;
   // A map of few bytes may lack what its nodes demand.
   std::vector<double> kept(nodes_.size(), 0);
   for (size_t i = 0; i < keep.size(); ++i) {
