@@ -151,8 +151,8 @@ Status AnswerPlaceQuestion(const PlaceQuestion& question, const CommandEnvironme
   const auto num_covered = std::count_if(rows.stations.begin(), rows.stations.end(),
                                          [](const MapStation& station) { return station.is_covered; });
   *environment.out << fmt::format(
-      "map '{}': {} of {} stations are covered by {} regions of k = {}\n{}{}", rows.name, num_covered,
-      rows.stations.size(), rows.regions.size(), rows.k,
+      "map '{}': {} of {} stations are covered by {} regions{}\n{}{}", rows.name, num_covered,
+      rows.stations.size(), rows.regions.size(), rows.k > 0 ? fmt::format(" of k = {}", rows.k) : "",
       advice.empty() ? "nothing to improve\n" : "what would help, most important first\n",
       AdviceText(advice));
   return Ok();

@@ -100,6 +100,39 @@ Json RegionsJson(const MapRows& rows) {
   return list;
 }
 
+Json CurveJson(const std::vector<PromiseBin>& bins) {
+  Json list = Json::array();
+  for (const PromiseBin& bin : bins)
+    list.push_back({Rounded(bin.mean_promised, 1e-3), bin.num_kept, bin.num});
+  return list;
+}
+
+// The terms, the calibration curves, and per station the least probability of its nodes.
+Json PromiseJson(const MapRows& rows) {
+  if (!rows.findings.promise) return {};
+  const MapPromise& promise = *rows.findings.promise;
+  std::vector<std::optional<double>> least(rows.stations.size());
+  for (const NodePromise& node : promise.nodes) {
+    for (const int32_t image : {node.image, node.other_image}) {
+      const StationIdx station = rows.images[image].station;
+      if (station >= 0) least[station] = std::min(least[station].value_or(1), node.probability);
+    }
+  }
+  Json at_stations = Json::array();
+  for (const std::optional<double>& probability : least)
+    at_stations.push_back(probability ? Json(Rounded(*probability, 1e-3)) : Json());
+  return {{"probability", promise.terms.probability},
+          {"min_matches", promise.terms.min_matches},
+          {"max_error_m", promise.terms.max_error_m},
+          {"max_error_deg", promise.terms.max_error_deg},
+          {"num_nodes", promise.nodes.size()},
+          {"num_kept", promise.NumKept()},
+          {"landmarks_lower_bound", promise.landmarks_lower_bound},
+          {"at_stations", std::move(at_stations)},
+          {"left_out", CurveJson(promise.left_out)},
+          {"held_out", CurveJson(promise.held_out)}};
+}
+
 Json LandmarksJson(const MapRows& rows) {
   std::vector<RegionIdx> first_region(rows.landmarks.size(), -1);
   for (RegionIdx region = static_cast<RegionIdx>(rows.regions.size()) - 1; region >= 0; --region) {
@@ -367,6 +400,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
                {"images", ImagesJson(rows)},
                {"views", ViewsJson(rows.views)},
                {"drops", DropsJson(rows.findings)},
+               {"promise", PromiseJson(rows)},
                {"self_test", rows.self_test},
                {"advice", AdviceJson(inputs.advice)},
                {"poor_localized_ratio", kPoorLocalizedRatio},

@@ -70,9 +70,22 @@ function drawSizes() {
     scales: {x: axis('bytes of the map', {type: 'logarithmic', ticks: {callback: value => /^[125]/.test(String(value)) ? roundBytes(value) : '', maxRotation: 0}}), y: axis('held-out images, %', {scale: {max: 100}})}}},
     data.pareto.map(point => `${bytes(point.bytes)} ${percent(point.localized)}`).join(', '));
 }
+// How often promises of about the same probability were kept: on the line where the map knows what it says.
+function drawPromises() {
+  if (!data.promise) return;
+  const set = (text, curve, colour, pointStyle) => ({type: 'scatter', clip: false, label: text, data: curve.map(([promised, kept, tried]) => ({x: 100 * promised, y: 100 * kept / tried, kept, tried})), pointStyle, pointRadius: curve.map(([, , tried]) => 4 + 2 * Math.log10(tried)), borderColor: colour, backgroundColor: colour});
+  const sets = [set('left-out survey images', data.promise.left_out, inked(blue), 'circle'), set('held-out images', data.promise.held_out, inked(orange), 'triangle')].filter(one => one.data.length);
+  if (!sets.length) return;
+  sets.push({type: 'line', label: 'as promised', data: [{x: 0, y: 0}, {x: 100, y: 100}], borderColor: styled('--line'), borderDash: [5, 3], borderWidth: 2, pointRadius: 0});
+  chart('Promised and kept: each mark stands for images with about the same promise, a larger one for more', {type: 'scatter', data: {datasets: sets}, options: {
+    plugins: {legend: {labels: {color: styled('--ink'), usePointStyle: true}}, tooltip: {callbacks: {label: item => item.raw.tried === undefined ? '' : `${item.dataset.label}: ${item.raw.x.toFixed(1)} % promised, ${item.raw.kept} of ${item.raw.tried} kept`}}},
+    scales: {x: axis('promised, %', {scale: {min: 0, max: 100}}), y: axis('kept, %', {scale: {min: 0, max: 100}})}}},
+    sets.filter(one => one.type === 'scatter').map(one => `${one.label}: ${one.data.map(point => `${point.kept} of ${point.tried} at ${Math.round(point.x)} %`).join(', ')}`).join('; '));
+}
 function drawCharts() {
   drawRegionCharts();
   regionTable();
+  drawPromises();
   histogram('Landmarks seen from a station', S.seen, 'landmarks', 'stations');
   drawSizes();
   if (data.lower_bound) bars('Regions against their proven lower bound', ['this map', 'least possible'], [R.length, data.lower_bound], 'regions', '', {horizontal: true, ticks: {precision: 0}});

@@ -91,7 +91,7 @@ function explainStation(i) {
   const losses = data.drops.filter(drop => drop.at.length && drop.at[i] > 0)
     .map(drop => [drop.at[i], `${drop.kind}${drop.at[i] === 1 ? '' : 's'}`, defined(drop.text, `${drop.name}, ${drop.stage}`)]);
   const nodes = [element('h3', {}, `Station ${i}`), element('p', {class: 'soft'}, stationPlace(i)), covered,
-    table([[term('features in view'), S.visible[i]], [term('landmarks seen'), S.seen[i]], [term('k'), data.k], [term('survey images'), S.images[i].length]])];
+    table([[term('features in view'), S.visible[i]], [term('landmarks seen'), S.seen[i]], ...(data.k ? [[term('k'), data.k]] : []), ...(data.promise && data.promise.at_stations[i] !== null ? [['promised to images here, at least', percent(data.promise.at_stations[i])]] : []), [term('survey images'), S.images[i].length]])];
   if (S.entropy[i] !== null) nodes.push(element('p', {}, term('entropy'), `: ${S.entropy[i].toFixed(2)} nats, as ${Math.exp(S.entropy[i]).toFixed(1)} places alike`));
   if (regionsAt[i].length) nodes.push(element('p', {class: 'buttons'}, 'Regions: ', ...regionsAt[i].map(region => button(String(region), () => explainRegion(region)))));
   nodes.push(...adviceNodes(data.advice.filter(entry => entry.stations.includes(i))), ...heldOutNodes(heldOutAt[i]));

@@ -25,6 +25,10 @@ card(bytes(data.bytes), data.sealed ? 'sealed map' : 'map, not sealed');
 card(count(L.x.length), [term('landmark', L.x.length === 1 ? 'landmark' : 'landmarks'), data.landmark_choice === 'all' ? ': every class' : '']);
 card(count(R.length), [term('region', R.length === 1 ? 'region' : 'regions'), data.lower_bound ? `, at least ${data.lower_bound} are needed` : '']);
 card(`${count(numCovered)} of ${count(numStations)}`, [term('station', 'stations'), ' ', term('covered')], {bad: numCovered < numStations});
+if (data.promise) {
+  const P = data.promise;
+  card(`${count(P.num_kept)} of ${count(P.num_nodes)}`, ['places and headings keep the ', defined('promise', `${percent(P.probability, 0)} of the images taken there find ${P.min_matches} landmarks at least and are localized within ${lengthText(P.max_error_m)}, ${degrees(P.max_error_deg)}`)], {bad: P.num_kept < P.num_nodes});
+}
 if (tested) {
   card(`${tested.localized} of ${tested.held_out}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.held_out});
   if (tested.median_m !== undefined && tested.median_deg !== undefined) {
@@ -92,6 +96,9 @@ function selfTestRows() {
     add(defined('found by retrieval', 'images whose landmarks retrieval led to; of the others the whole map was searched'), count(f.num_by_retrieval), f.all_images_num_by_retrieval === undefined ? '' : `${count(f.all_images_num_by_retrieval)} with all images kept`);
   }
   if (f.all_images_localized_ratio !== undefined) add('localized if all images were kept', percent(f.all_images_localized_ratio));
+  if (f.num_promised !== undefined) {
+    add(defined('promises kept', 'of the images that stand where the map keeps its promise, those that were localized within its limits by as many landmarks'), `${f.num_promised_kept} of ${f.num_promised}${f.num_beyond_promises > 0 ? `; ${f.num_beyond_promises} images stand where nothing is promised` : ''}`, data.promise ? `at least ${percent(data.promise.probability, 0)}` : '', data.promise && f.num_promised_kept < data.promise.probability * f.num_promised);
+  }
   if (f.plan_images_free_ratio !== undefined) add('survey images in rooms of the floor plan', percent(f.plan_images_free_ratio), percent(1));
   if (f.plan_fixes_free_ratio !== undefined) add('poses in rooms of the floor plan', percent(f.plan_fixes_free_ratio), percent(1));
   return rows;
