@@ -11,6 +11,7 @@ struct PromiseTerms {
   double max_error_m = 0.1;   // or the map's units; REQUIRES: > 0
   double max_error_deg = 5;   // REQUIRES: > 0
   double probability = 0.95;  // REQUIRES: in (0, 1)
+  friend bool operator==(const PromiseTerms&, const PromiseTerms&) = default;
 };
 
 // What a map lets expect of an image.

@@ -128,13 +128,13 @@ TEST(ChooseLeftOut, SurveysOfOneViewTryNothingAndSmallOnesAreRefused) {
 }
 
 TEST(LeftOutTrial, SumsUpAndCountsFiftyInliersAtMost) {
-  LeftOutTrial trial{.num_tried = 3, .errors_m = {0.3, 0.1}, .num_inliers = {20, 80}};
-  trial.Add({.num_tried = 1, .errors_m = {0.2}, .num_inliers = {30}});
+  LeftOutTrial trial{.images = {{true, 0.3, 20}, {}, {true, 0.1, 80}}};
+  trial.Add({.images = {{true, 0.2, 30}}});
+  EXPECT_EQ(trial.NumTried(), 4);
   EXPECT_EQ(trial.NumRight(), 3);
-  EXPECT_DOUBLE_EQ(trial.RightRatio(), 0.75);
   EXPECT_DOUBLE_EQ(trial.MedianErrorM(), 0.2);
-  EXPECT_DOUBLE_EQ(trial.MeanMargin(), 0.5);  // (20 + 50 + 0 + 30) / 200
-  EXPECT_EQ(LeftOutTrial().RightRatio(), 0);
+  EXPECT_DOUBLE_EQ(trial.MeanMargin(), 0.5);  // (20 + 0 + 50 + 30) / 200
+  EXPECT_EQ(LeftOutTrial().NumTried(), 0);
   EXPECT_EQ(LeftOutTrial().MedianErrorM(), 0);
   EXPECT_EQ(LeftOutTrial().MeanMargin(), 0);
 }

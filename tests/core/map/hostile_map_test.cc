@@ -67,6 +67,20 @@ std::string FindingsText(const MapFindings& findings) {
     text += fmt::format("{} {} {} {} {} {} {}\n", row.reason_id, row.stage, row.kind, row.name, row.text,
                         row.num_dropped, fmt::join(row.at_stations, ","));
   }
+  if (findings.promise) {
+    const MapPromise& promise = *findings.promise;
+    text += fmt::format("{} {} {} {} {} {}\n", promise.terms.min_matches, promise.terms.max_error_m,
+                        promise.terms.probability, promise.model.shape, promise.radius_m,
+                        promise.landmarks_lower_bound);
+    for (const NodePromise& node : promise.nodes) {
+      text += fmt::format("{} {} {} {} {} {}\n", node.image, node.other_image, node.region, node.probability,
+                          node.num_matches, node.sigma_m);
+    }
+    for (const auto* curve : {&promise.left_out, &promise.held_out}) {
+      for (const PromiseBin& bin : *curve)
+        text += fmt::format("{} {} {}\n", bin.least, bin.num, bin.num_kept);
+    }
+  }
   return text;
 }
 

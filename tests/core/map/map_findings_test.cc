@@ -1,6 +1,9 @@
 #include "core/blocks/map_findings.h"
 
+#include <cmath>
 #include <filesystem>
+#include <functional>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,6 +32,17 @@ MapRows RowsWithFindings() {
   rows.findings.region_entropies = {{0, 0.125}, {1, 2.5}};
   rows.findings.drops = {{1, "extract_features", "image", "unreadable", "cannot be read", 3, {}},
                          {44, "decompose_regions", "station", "left_over", "...", 200, {0, 200, 1}}};
+  rows.findings.promise = {
+      .terms = {.min_matches = 12, .max_error_m = 0.25, .max_error_deg = 3, .probability = 0.9},
+      .model = {.match_ratio = 0.75, .shape = 4, .error_ratio = 1.5},
+      .radius_m = 0.5,
+      .radius_deg = 15,
+      .landmarks_lower_bound = 17,
+      .nodes = {{0, 0, 1, 0.875, 25.5, 0.125, 0.875},
+                {1, 0, 0, 1, 300, 0.001, 1},
+                {1, 1, 0, 0, 0, 4000, 0.5}},
+      .left_out = {{0, 4, 1, 0.25}, {0.95, 300, 299, 0.999}},
+      .held_out = {{0.98, 1, 1, 0.981}}};
   return rows;
 }
 
@@ -57,6 +71,51 @@ TEST(MapFindings, RowsThatCannotBeAreNotWritten) {
   EXPECT_THAT(error_of({0, 2, 1, 0, RegionSelfTest::Errors{-1, 0, 0, 0}}), HasSubstr("an error of -1"));
 }
 
+TEST(MapFindings, PromisesThatCannotBeAreNotWritten) {
+  const auto error_of = [](const std::function<void(MapPromise*)>& change) {
+    MapRows rows = RowsWithFindings();
+    change(&*rows.findings.promise);
+    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    EXPECT_FALSE(status.ok());
+    return status.ok() ? "" : status.error().message;
+  };
+  const double kInfinity = std::numeric_limits<double>::infinity(), kNan = std::nan("");
+  const std::function<void(MapPromise*)> terms[] = {
+      [](MapPromise* p) { p->terms.min_matches = 0; },
+      [](MapPromise* p) { p->terms.max_error_m = 0; },
+      [&](MapPromise* p) { p->terms.max_error_m = kNan; },
+      [&](MapPromise* p) { p->terms.max_error_m = kInfinity; },
+      [](MapPromise* p) { p->terms.max_error_deg = 0; },
+      [&](MapPromise* p) { p->terms.max_error_deg = kInfinity; },
+      [](MapPromise* p) { p->terms.probability = 0; },
+      [](MapPromise* p) { p->terms.probability = 1; }};
+  for (const auto& change : terms) EXPECT_THAT(error_of(change), HasSubstr("map: a promise of "));
+  const std::function<void(MapPromise*)> models[] = {[](MapPromise* p) { p->model.match_ratio = -1; },
+                                                     [](MapPromise* p) { p->model.shape = 0; },
+                                                     [&](MapPromise* p) { p->model.shape = kInfinity; },
+                                                     [](MapPromise* p) { p->model.error_ratio = -0.1; },
+                                                     [](MapPromise* p) { p->radius_m = -1; },
+                                                     [&](MapPromise* p) { p->radius_deg = kNan; },
+                                                     [](MapPromise* p) { p->landmarks_lower_bound = -1; }};
+  for (const auto& change : models) EXPECT_THAT(error_of(change), HasSubstr("model has impossible numbers"));
+  const std::function<void(MapPromise*)> nodes[] = {[](MapPromise* p) { p->nodes[0].image = 99; },
+                                                    [](MapPromise* p) { p->nodes[0].other_image = -1; },
+                                                    [](MapPromise* p) { p->nodes[0].region = 2; },
+                                                    [](MapPromise* p) { p->nodes[0].region = -1; },
+                                                    [](MapPromise* p) { p->nodes[0].probability = 1.1; },
+                                                    [](MapPromise* p) { p->nodes[0].most_probable = -0.1; },
+                                                    [](MapPromise* p) { p->nodes[0].num_matches = -1; },
+                                                    [&](MapPromise* p) { p->nodes[0].sigma_m = kNan; }};
+  for (const auto& change : nodes) EXPECT_THAT(error_of(change), HasSubstr("between images"));
+  const std::function<void(MapPromise*)> curves[] = {
+      [](MapPromise* p) { p->left_out[1].least = 0; }, [](MapPromise* p) { p->left_out[0].num = 0; },
+      [](MapPromise* p) { p->held_out[0].num_kept = 2; }, [](MapPromise* p) { p->held_out[0].num_kept = -1; },
+      [](MapPromise* p) { p->held_out[0].mean_promised = 1.5; }};
+  for (const auto& change : curves) EXPECT_THAT(error_of(change), HasSubstr("kept"));
+}
+
+TEST(MapPromise, CountsTheNodesThatKeepIt) { EXPECT_EQ(RowsWithFindings().findings.promise->NumKept(), 1); }
+
 TEST(MapFindings, DamagedRowsAreRefused) {
   for (const char* sql :
        {"UPDATE self_test_regions SET region_idx = 2 WHERE region_idx = 1",
@@ -70,15 +129,26 @@ TEST(MapFindings, DamagedRowsAreRefused) {
         "UPDATE self_test_regions SET p90_error_deg = 9e999",
         "UPDATE region_entropies SET region_idx = 2 WHERE region_idx = 1",
         "UPDATE region_entropies SET region_idx = -1 WHERE region_idx = 1",
-        "UPDATE region_entropies SET entropy = -1",
-        "UPDATE region_entropies SET entropy = 9e999",
+        "UPDATE region_entropies SET entropy = -1", "UPDATE region_entropies SET entropy = 9e999",
         "UPDATE drop_reasons SET reason_id = -1 WHERE reason_id = 1",
         "UPDATE drop_reasons SET num_dropped = 0",
         "UPDATE drop_reasons SET num_dropped = 199 WHERE reason_id = 44",
         "UPDATE drop_reasons SET at_stations = x'0000'",
         "UPDATE drop_reasons SET at_stations = x'0000ff' WHERE reason_id = 44",
         "UPDATE drop_reasons SET at_stations = x'0000ffffffff7f' WHERE reason_id = 44",
-        "ALTER TABLE drop_reasons DROP COLUMN text",
+        "UPDATE promises SET min_matches = 0", "UPDATE promises SET probability = 2",
+        "UPDATE promises SET max_error_m = 'x'", "UPDATE promises SET landmarks_bound = -1",
+        "UPDATE promises SET nodes = 1", "UPDATE promises SET nodes = x'00'",
+        // images 0 and 0, region 0, probability 2000 / 1000
+        "UPDATE promises SET nodes = x'000000d00f000000'",
+        // images -1, and 2^31
+        "UPDATE promises SET nodes = x'01000000000000'",
+        "UPDATE promises SET nodes = x'808080801000000000000000'", "UPDATE promises SET left_out = x'00'",
+        "UPDATE promises SET held_out = x'00000001'",
+        "INSERT INTO promises SELECT 1, min_matches, max_error_m, max_error_deg, probability, match_ratio, "
+        "shape, "
+        "error_ratio, radius_m, radius_deg, landmarks_bound, nodes, left_out, held_out FROM promises",
+        "ALTER TABLE promises DROP COLUMN held_out", "ALTER TABLE drop_reasons DROP COLUMN text",
         "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
         "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
         "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
@@ -97,6 +167,7 @@ TEST(GoldenMap, Version2_1IsRead) {
   ASSERT_TRUE(rows.ok()) << rows.error().message;
   MapFindings expected = RowsWithFindings().findings;
   expected.region_entropies.clear();  // came with 2.3
+  expected.promise.reset();           // came with 2.6
   EXPECT_EQ(rows->findings, expected);
   EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
   EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
@@ -113,7 +184,8 @@ TEST(MapFindings, MapOfAFormatWithoutTheTablesHasNone) {
 TEST(MapFindings, ChangedOrMissingFindingsAreRefused) {
   for (const char* const sql :
        {"DROP TABLE self_test_regions", "DROP TABLE region_entropies; DROP TABLE drop_reasons",
-        "UPDATE drop_reasons SET num_dropped = num_dropped + 1"}) {
+        "UPDATE drop_reasons SET num_dropped = num_dropped + 1", "DROP TABLE promises",
+        "UPDATE promises SET shape = shape + 1"}) {
     ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("changed.cairn")).ok());
     SQLite::Database(MapPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
     const Result<MapFile> file = MapFile::Open(MapPath("changed.cairn"), {});  // which does not read them
