@@ -7,6 +7,7 @@
 
 #include "core/base/blob.h"
 #include "core/blocks/map_codes.h"
+#include "core/blocks/map_packed_blocks.h"
 
 namespace cairn {
 namespace {
@@ -47,8 +48,9 @@ std::string EncodeBlock(const ImageBlock& block) {
     for (const double t : image.cam_from_world.translation) {
       writer.UInt32(static_cast<uint32_t>(EncodeLength(t)));
     }
-    WriteRuns(image.landmarks, &writer);
+    if (!block.is_packed) WriteRuns(image.landmarks, &writer);
   }
+  if (block.is_packed) writer.Bytes(PackSights(block.images));
   return writer.Take();
 }
 
@@ -90,12 +92,21 @@ Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& en
       if (std::abs(static_cast<double>(code)) > kMaxCoordinate) return corrupt("the coordinates");
       t = DecodeLength(code);
     }
+    if (entry.is_packed) continue;
     int64_t max_num_values = std::min<int64_t>(kMaxImageLandmarks, max_num_landmarks);
     const int64_t before = max_num_values;
     if (!ReadRuns(&reader, directory.Count(BlockKind::kLandmarks), &max_num_values, &image.landmarks)) {
       return corrupt("the pose and the landmarks");
     }
     max_num_landmarks -= before - max_num_values;
+  }
+  if (entry.is_packed) {
+    block.is_packed = true;
+    if (!reader.ok() || !UnpackSights(reader.Bytes(reader.num_left()), directory.Count(BlockKind::kLandmarks),
+                                      &block.images)) {
+      return Corrupt(what, "the packed landmarks of {} images make no sense", entry.count);
+    }
+    return block;
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} images", entry.count);
   return block;

@@ -7,6 +7,7 @@
 #include "core/base/blob.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_codes.h"
+#include "core/blocks/map_packed_blocks.h"
 
 namespace cairn {
 namespace {
@@ -154,6 +155,10 @@ std::string EncodeBlock(const LandmarkBlock& block) {
     WriteRuns(local, &writer);
   }
   WriteRuns(block.image_blocks, &writer);
+  if (block.descriptor_code) {
+    writer.Bytes(PackLandmarks(block));
+    return writer.Take();
+  }
   int64_t class_id = 0;
   for (const MapLandmark& landmark : block.landmarks) {
     writer.Varint(ZigZag(static_cast<int64_t>(landmark.class_id) - class_id));
@@ -180,6 +185,10 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   int64_t max_num_values = kMaxListElements;
   if (!ReadRuns(&reader, directory.NumBlocks(BlockKind::kImages), &max_num_values, &block.image_blocks)) {
     return corrupt("the image blocks");
+  }
+  if (entry.is_packed) {
+    if (!UnpackLandmarks(reader.Bytes(reader.num_left()), &block)) return corrupt("the packed numbers");
+    return block;
   }
   int64_t class_id = 0;
   for (MapLandmark& landmark : block.landmarks) {

@@ -13,6 +13,7 @@
 #include "core/blocks/map_findings.h"
 #include "core/blocks/map_head.h"
 #include "core/features/features.h"
+#include "core/features/transform_code.h"
 #include "core/geometry/pose.h"
 #include "core/plan/views.h"
 #include "core/vocabulary/vocabulary_tree.h"
@@ -82,6 +83,9 @@ struct MapRows : MapHead {
   std::vector<MapRegion> regions;
   std::vector<MapLandmark> landmarks;
   DescriptorMatrix descriptors;               // row i: landmark i
+  // Where it is known, landmarks and what images see are stored packed, and the descriptors' own levels stand
+  // for them.
+  std::optional<TransformCode> descriptor_code;
   std::vector<MapAppearanceNode> appearance;  // none: not known
   // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
   Vocabulary vocabulary;
@@ -95,7 +99,7 @@ struct MapRows : MapHead {
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 5;
+inline constexpr int kMapVersionMinor = 6;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;
