@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "core/base/blob.h"
-#include "core/blocks/map_codes.h"
-#include "core/blocks/map_packed_blocks.h"
+#include "core/packing/map_codes.h"
+#include "core/packing/packed_sights.h"
 
 namespace cairn {
 namespace {
@@ -50,7 +50,11 @@ std::string EncodeBlock(const ImageBlock& block) {
     }
     if (!block.is_packed) WriteRuns(image.landmarks, &writer);
   }
-  if (block.is_packed) writer.Bytes(PackSights(block.images));
+  if (block.is_packed) {
+    SightLists lists;
+    for (const MapImage& image : block.images) lists.push_back(image.landmarks);
+    writer.Bytes(PackSights(lists));
+  }
   return writer.Take();
 }
 
@@ -102,10 +106,12 @@ Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& en
   }
   if (entry.is_packed) {
     block.is_packed = true;
+    SightLists lists(block.images.size());
     if (!reader.ok() || !UnpackSights(reader.Bytes(reader.num_left()), directory.Count(BlockKind::kLandmarks),
-                                      &block.images)) {
+                                      kMaxImageLandmarks, &lists)) {
       return Corrupt(what, "the packed landmarks of {} images make no sense", entry.count);
     }
+    for (size_t i = 0; i < lists.size(); ++i) block.images[i].landmarks = std::move(lists[i]);
     return block;
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} images", entry.count);

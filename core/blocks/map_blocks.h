@@ -43,7 +43,8 @@ const char* BlockKindName(BlockKind kind);  // "stations"
 // What the directory says of a block.
 struct BlockEntry {
   uint8_t kind = 0;  // a BlockKind, or one of a later minor version
-  // Of landmarks and images: stored in few bits (core/blocks/map_packed_blocks.h); a kind of its own in files.
+  // Of landmarks and images: stored in few bits (core/packing/packed_landmarks.h); a kind of its own in
+  // files.
   bool is_packed = false;
   uint32_t first = 0;
   uint32_t count = 0;  // elements first .. first + count - 1
@@ -87,7 +88,7 @@ struct LandmarkBlock {
   DescriptorMatrix descriptors;
   // Regions that have landmarks here, ascending, with those.
   std::vector<std::pair<RegionIdx, std::vector<LandmarkIdx>>> regions;
-  std::vector<int32_t> image_blocks;  // ordinals of image blocks, ascending
+  std::vector<int32_t> image_blocks;             // ordinals of image blocks, ascending
   std::optional<TransformCode> descriptor_code;  // where the block is packed
 };
 

@@ -6,8 +6,8 @@
 
 #include "core/base/blob.h"
 #include "core/blocks/map_blocks.h"
-#include "core/blocks/map_codes.h"
-#include "core/blocks/map_packed_blocks.h"
+#include "core/packing/map_codes.h"
+#include "core/packing/packed_landmarks.h"
 
 namespace cairn {
 namespace {
@@ -156,7 +156,7 @@ std::string EncodeBlock(const LandmarkBlock& block) {
   }
   WriteRuns(block.image_blocks, &writer);
   if (block.descriptor_code) {
-    writer.Bytes(PackLandmarks(block));
+    writer.Bytes(PackLandmarks({block.landmarks, block.descriptors, *block.descriptor_code}));
     return writer.Take();
   }
   int64_t class_id = 0;
@@ -187,7 +187,12 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
     return corrupt("the image blocks");
   }
   if (entry.is_packed) {
-    if (!UnpackLandmarks(reader.Bytes(reader.num_left()), &block)) return corrupt("the packed numbers");
+    PackedLandmarks packed;
+    if (!reader.ok() || !UnpackLandmarks(reader.Bytes(reader.num_left()), entry.count, &packed))
+      return corrupt("the packed numbers");
+    block.landmarks = std::move(packed.landmarks);
+    block.descriptors = std::move(packed.descriptors);
+    block.descriptor_code = packed.code;
     return block;
   }
   int64_t class_id = 0;

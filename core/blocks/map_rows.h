@@ -15,6 +15,7 @@
 #include "core/features/features.h"
 #include "core/features/transform_code.h"
 #include "core/geometry/pose.h"
+#include "core/packing/map_landmark.h"
 #include "core/plan/views.h"
 #include "core/vocabulary/vocabulary_tree.h"
 #include "core/world/visual_map.h"
@@ -23,14 +24,6 @@ namespace cairn {
 
 // The contents of a map file as plain values, the same for writers and readers.  schemas/FORMAT.md says what
 // each means on disk.
-
-struct MapLandmark {
-  ClassId class_id = 0;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
-  double scale_m = 0;                                    // size (sigma) of the feature in space; 0: not known
-  int num_observations = 0;                              // survey images that see it
-};
 
 struct MapImage {
   ImageId image_id = 0;
@@ -82,7 +75,7 @@ struct MapRows : MapHead {
   std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
   std::vector<MapRegion> regions;
   std::vector<MapLandmark> landmarks;
-  DescriptorMatrix descriptors;               // row i: landmark i
+  DescriptorMatrix descriptors;  // row i: landmark i
   // Where it is known, landmarks and what images see are stored packed, and the descriptors' own levels stand
   // for them.
   std::optional<TransformCode> descriptor_code;

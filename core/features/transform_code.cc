@@ -32,8 +32,8 @@ using Values = std::array<int64_t, kDescriptorDim>;
 
 // One axis of a separable transform or, transposed, of its inverse: `stride` values lie between two of it.
 template <size_t kSize>
-void TransformAxis(const std::array<std::array<int64_t, kSize>, kSize>& matrix, bool is_inverse, size_t stride,
-                   Values* values) {
+void TransformAxis(const std::array<std::array<int64_t, kSize>, kSize>& matrix, bool is_inverse,
+                   size_t stride, Values* values) {
   for (size_t first = 0; first < values->size(); ++first) {
     if (first / stride % kSize != 0) continue;
     std::array<int64_t, kSize> result = {};
@@ -68,8 +68,7 @@ TransformLevels LevelsOf(const uint8_t* descriptor, const TransformCode& code) {
   Transform(false, &values);
   TransformLevels levels;
   for (size_t i = 0; i < values.size(); ++i) {
-    const int64_t level =
-        std::min(kMaxLevel, (std::abs(values[i]) / code.step + kRounding) / kOne);
+    const int64_t level = std::min(kMaxLevel, (std::abs(values[i]) / code.step + kRounding) / kOne);
     levels[i] = static_cast<int16_t>(values[i] < 0 ? -level : level);
   }
   return levels;

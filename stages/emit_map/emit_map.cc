@@ -233,7 +233,6 @@ bool StoresTransform(const EmitMapOptions& options) {
 
 // The step of a coefficient's levels: 24 for 3 bits a value, half of it for one bit more.
 int TransformStep(int descriptor_bits) {
-  if (const char* s = getenv("XSTEP"); s && descriptor_bits == 3) return atoi(s);
   constexpr int kStepOfOneBit = 96;
   return kStepOfOneBit >> (descriptor_bits - 1);
 }
@@ -298,8 +297,9 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .max = 8},
       {.name = "descriptor_code",
        .value = &options->descriptor_code,
-       .help = "how descriptors are stored: levels of their values, levels of a transform's coefficients, all "
-               "packed in fewer bytes, or auto: a transform where left-out survey images try the map",
+       .help =
+           "how descriptors are stored: levels of their values, levels of a transform's coefficients, all "
+           "packed in fewer bytes, or auto: a transform where left-out survey images try the map",
        .choices = {"auto", "levels", "transform"}},
       {.name = "min_num_landmarks_for_words",
        .value = &options->min_num_landmarks_for_words,

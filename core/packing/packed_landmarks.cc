@@ -1,4 +1,5 @@
-// Packed landmarks: drawn in schemas/FORMAT.md.
+#include "core/packing/packed_landmarks.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,10 +7,9 @@
 #include <memory>
 #include <type_traits>
 
-#include "core/base/range_coder.h"
-#include "core/blocks/map_codes.h"
-#include "core/blocks/map_packed_blocks.h"
-#include "core/features/transform_code.h"
+#include "core/base/blob.h"
+#include "core/packing/map_codes.h"
+#include "core/packing/range_coder.h"
 
 namespace cairn {
 namespace {
@@ -62,7 +62,8 @@ PackedCovariance PackCovariance(const Eigen::Matrix3d& covariance) {
     factor(row, row) = std::sqrt(std::max(0.0, rest));
     for (int col = 0; col < row; ++col, ++next) {
       const double ratio = size > 0 ? factor(row, col) / (size * kRatioUnit) : 0;
-      packed.ratios[next] = static_cast<int32_t>(std::lround(std::clamp<double>(ratio, -kMaxRatio, kMaxRatio)));
+      packed.ratios[next] =
+          static_cast<int32_t>(std::lround(std::clamp<double>(ratio, -kMaxRatio, kMaxRatio)));
     }
   }
   return packed;
@@ -215,8 +216,7 @@ void CodeLandmark(Coder& coder, const std::array<int64_t, 3>& middle, int64_t pr
     covariance.sizes[i] = static_cast<uint8_t>(models->sizes[i].Code(coder, covariance.sizes[i]));
   for (int i = 0; i < 3; ++i) {
     const int64_t ratio = CodeSigned(coder, &models->ratios[i], &models->signs[i], covariance.ratios[i]);
-    covariance.ratios[i] =
-        static_cast<int32_t>(std::clamp<int64_t>(ratio, -kMaxRatio, kMaxRatio));
+    covariance.ratios[i] = static_cast<int32_t>(std::clamp<int64_t>(ratio, -kMaxRatio, kMaxRatio));
   }
   const int shift = PositionShift(covariance);
   for (int axis = 0; axis < 3; ++axis) {
@@ -250,7 +250,7 @@ bool CodeDescriptor(Coder& coder, const std::array<int, kDescriptorDim>& order, 
 
 }  // namespace
 
-std::string PackLandmarks(const LandmarkBlock& block) {
+std::string PackLandmarks(const PackedLandmarks& block) {
   std::vector<PackedLandmark> all;
   for (const MapLandmark& landmark : block.landmarks) all.push_back(PackLandmark(landmark));
   // The median of what is stored, not of what was given: the same when it is encoded again.
@@ -264,7 +264,7 @@ std::string PackLandmarks(const LandmarkBlock& block) {
     middle[axis] = *place;
   }
   BlobWriter writer;
-  const TransformCode& code = *block.descriptor_code;
+  const TransformCode& code = block.code;
   writer.UInt8(static_cast<uint8_t>(code.step));
   writer.Bytes(code.mean.data(), code.mean.size());
   for (const int64_t coordinate : middle) writer.UInt32(static_cast<uint32_t>(coordinate));
@@ -283,7 +283,7 @@ std::string PackLandmarks(const LandmarkBlock& block) {
   return writer.Take();
 }
 
-bool UnpackLandmarks(std::string_view bytes, LandmarkBlock* block) {
+bool UnpackLandmarks(std::string_view bytes, size_t num_landmarks, PackedLandmarks* block) {
   BlobReader reader(bytes);
   TransformCode code{.step = reader.UInt8()};
   const std::string_view mean = reader.Bytes(code.mean.size());
@@ -291,8 +291,10 @@ bool UnpackLandmarks(std::string_view bytes, LandmarkBlock* block) {
   std::array<int64_t, 3> middle;
   for (int64_t& coordinate : middle) coordinate = static_cast<int32_t>(reader.UInt32());
   if (!reader.ok() || code.step < 1) return false;
-  block->descriptor_code = code;
-  block->descriptors = DescriptorMatrix::Zero(static_cast<Eigen::Index>(block->landmarks.size()), kDescriptorDim);
+  block->code = code;
+  block->landmarks.assign(num_landmarks, {});
+  block->descriptors =
+      DescriptorMatrix::Zero(static_cast<Eigen::Index>(block->landmarks.size()), kDescriptorDim);
   RangeDecoder coder(reader.Bytes(reader.num_left()));
   const auto models = std::make_unique<Models>();
   const auto order = CoefficientOrder();

@@ -1,4 +1,4 @@
-#include "core/base/range_coder.h"
+#include "core/packing/range_coder.h"
 
 #include <algorithm>
 
