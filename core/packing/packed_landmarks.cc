@@ -45,25 +45,32 @@ constexpr int kMaxRatio = 65536;
 
 PackedCovariance PackCovariance(const Eigen::Matrix3d& covariance) {
   PackedCovariance packed;
-  Eigen::Matrix3d factor = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d factor = Eigen::Matrix3d::Zero(), stored = Eigen::Matrix3d::Zero();
   int next = 0;
   for (int row = 0; row < 3; ++row) {
-    double least = 0;  // a ratio must not become too large
     for (int col = 0; col < row; ++col) {
-      double rest = covariance(row, col);
-      for (int k = 0; k < col; ++k) rest -= factor(row, k) * factor(col, k);
+      const double rest = covariance(row, col) - factor.row(row).head(col).dot(factor.row(col).head(col));
       factor(row, col) = factor(col, col) > 0 ? rest / factor(col, col) : 0;
-      least = std::max(least, std::abs(factor(row, col)) / (kMaxRatio * kRatioUnit / 2));
     }
     const double rest = covariance(row, row) - factor.row(row).head(row).squaredNorm();
-    packed.sizes[row] = PackSize(std::max(least, std::sqrt(std::max(0.0, rest))));
-    const double size = UnpackSize(packed.sizes[row]);
-    // Later entries are of the factor before it is rounded.
     factor(row, row) = std::sqrt(std::max(0.0, rest));
+    // What is expected of this coordinate given those before stays as it is, though these are rounded: the
+    // errors of a row do not grow in the next.
+    Eigen::RowVector3d slopes = Eigen::RowVector3d::Zero();
+    for (int col = row - 1; col >= 0; --col) {
+      if (factor(col, col) > 0)
+        slopes[col] = (factor(row, col) - slopes.dot(factor.col(col))) / factor(col, col);
+    }
+    const Eigen::RowVector3d wanted = slopes * stored;
+    const double least = wanted.cwiseAbs().maxCoeff() / (kMaxRatio * kRatioUnit / 2);
+    packed.sizes[row] = PackSize(std::max(least, factor(row, row)));
+    stored(row, row) = UnpackSize(packed.sizes[row]);
     for (int col = 0; col < row; ++col, ++next) {
-      const double ratio = size > 0 ? factor(row, col) / (size * kRatioUnit) : 0;
+      const double unit = kRatioUnit * stored(row, row);
+      const double ratio = unit > 0 ? wanted[col] / unit : 0;
       packed.ratios[next] =
           static_cast<int32_t>(std::lround(std::clamp<double>(ratio, -kMaxRatio, kMaxRatio)));
+      stored(row, col) = packed.ratios[next] * unit;
     }
   }
   return packed;

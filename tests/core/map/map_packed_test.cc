@@ -23,6 +23,7 @@ using testing::HasSubstr;
 MapRows PackedRows(int step = 24) {
   MapRows rows = FullRows();
   rows.findings = {};
+  rows.lower_bound.reset();
   rows.regions.clear();
   rows.stations.clear();
   rows.station_edges.clear();
