@@ -4,7 +4,7 @@
 
 #include "core/base/blob.h"
 #include "core/blocks/map_blocks.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
 #include "core/world/appearance.h"
 
 namespace cairn {

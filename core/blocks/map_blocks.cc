@@ -6,7 +6,8 @@
 #include <limits>
 
 #include "core/base/blob.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
+#include "core/packing/packed_sights.h"
 
 namespace cairn {
 namespace {
@@ -47,7 +48,12 @@ std::string EncodeBlock(const ImageBlock& block) {
     for (const double t : image.cam_from_world.translation) {
       writer.UInt32(static_cast<uint32_t>(EncodeLength(t)));
     }
-    WriteRuns(image.landmarks, &writer);
+    if (!block.is_packed) WriteRuns(image.landmarks, &writer);
+  }
+  if (block.is_packed) {
+    SightLists lists;
+    for (const MapImage& image : block.images) lists.push_back(image.landmarks);
+    writer.Bytes(PackSights(lists));
   }
   return writer.Take();
 }
@@ -90,12 +96,23 @@ Result<ImageBlock> DecodeImageBlock(std::string_view bytes, const BlockEntry& en
       if (std::abs(static_cast<double>(code)) > kMaxCoordinate) return corrupt("the coordinates");
       t = DecodeLength(code);
     }
+    if (entry.is_packed) continue;
     int64_t max_num_values = std::min<int64_t>(kMaxImageLandmarks, max_num_landmarks);
     const int64_t before = max_num_values;
     if (!ReadRuns(&reader, directory.Count(BlockKind::kLandmarks), &max_num_values, &image.landmarks)) {
       return corrupt("the pose and the landmarks");
     }
     max_num_landmarks -= before - max_num_values;
+  }
+  if (entry.is_packed) {
+    block.is_packed = true;
+    SightLists lists(block.images.size());
+    if (!reader.ok() || !UnpackSights(reader.Bytes(reader.num_left()), directory.Count(BlockKind::kLandmarks),
+                                      kMaxImageLandmarks, &lists)) {
+      return Corrupt(what, "the packed landmarks of {} images make no sense", entry.count);
+    }
+    for (size_t i = 0; i < lists.size(); ++i) block.images[i].landmarks = std::move(lists[i]);
+    return block;
   }
   if (!reader.Finished()) return Corrupt(what, "bytes are left after {} images", entry.count);
   return block;

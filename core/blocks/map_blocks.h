@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/blocks/map_rows.h"
+#include "core/features/transform_code.h"
 #include "core/plan/views.h"
 
 namespace cairn {
@@ -41,6 +43,9 @@ const char* BlockKindName(BlockKind kind);  // "stations"
 // What the directory says of a block.
 struct BlockEntry {
   uint8_t kind = 0;  // a BlockKind, or one of a later minor version
+  // Of landmarks and images: stored in few bits (core/packing/packed_landmarks.h); a kind of its own in
+  // files.
+  bool is_packed = false;
   uint32_t first = 0;
   uint32_t count = 0;  // elements first .. first + count - 1
   uint32_t num_bytes = 0;
@@ -83,12 +88,14 @@ struct LandmarkBlock {
   DescriptorMatrix descriptors;
   // Regions that have landmarks here, ascending, with those.
   std::vector<std::pair<RegionIdx, std::vector<LandmarkIdx>>> regions;
-  std::vector<int32_t> image_blocks;  // ordinals of image blocks, ascending
+  std::vector<int32_t> image_blocks;             // ordinals of image blocks, ascending
+  std::optional<TransformCode> descriptor_code;  // where the block is packed
 };
 
 struct ImageBlock {
   int32_t first = 0;  // index of the first image
   std::vector<MapImage> images;
+  bool is_packed = false;
 };
 
 struct StationBlock {

@@ -34,6 +34,25 @@ int64_t FewestBytes(BlockKind kind) {
   return 1;
 }
 
+// Kinds of the packed forms of blocks, in files alone.
+constexpr uint8_t kPackedLandmarks = 13;
+constexpr uint8_t kPackedImages = 14;
+
+uint8_t StoredKind(const BlockEntry& entry) {
+  if (!entry.is_packed) return entry.kind;
+  return entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks) ? kPackedLandmarks : kPackedImages;
+}
+
+void SetStoredKind(uint8_t stored, BlockEntry* entry) {
+  entry->is_packed = stored == kPackedLandmarks || stored == kPackedImages;
+  entry->kind = stored == kPackedLandmarks ? static_cast<uint8_t>(BlockKind::kLandmarks)
+                : stored == kPackedImages  ? static_cast<uint8_t>(BlockKind::kImages)
+                                           : stored;
+}
+
+// Packed landmarks can take almost no bytes, so there is a limit to how many a block has.
+constexpr uint32_t kMaxPackedLandmarks = 1024;
+
 constexpr const char* kOtherKind = "other";
 
 // As MapDirectory::Encode writes an entry: kind; first, count, number of bytes; hash; two corners.
@@ -96,7 +115,7 @@ int64_t MapDirectory::OrdinalOf(BlockKind kind, int64_t element) const {
 std::string MapDirectory::Encode() const {
   BlobWriter writer;
   for (const BlockEntry& entry : blocks_) {
-    writer.UInt8(entry.kind);
+    writer.UInt8(StoredKind(entry));
     writer.UInt32(entry.first);
     writer.UInt32(entry.count);
     writer.UInt32(entry.num_bytes);
@@ -117,7 +136,7 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
   int64_t num_bytes = 0;
   while (reader.num_left() > 0 && reader.ok()) {
     BlockEntry entry;
-    entry.kind = reader.UInt8();
+    SetStoredKind(reader.UInt8(), &entry);
     entry.first = reader.UInt32();
     entry.count = reader.UInt32();
     entry.num_bytes = reader.UInt32();
@@ -139,7 +158,10 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
           int64_t{entry.first} + entry.count > std::numeric_limits<int32_t>::max()) {
         return corrupt("its elements do not follow those of the block before");
       }
-      if (entry.count == 0 || int64_t{entry.count} * FewestBytes(kind) > entry.num_bytes) {
+      const bool is_packed_landmarks = entry.is_packed && kind == BlockKind::kLandmarks;
+      if (entry.count == 0 ||
+          (is_packed_landmarks ? entry.count > kMaxPackedLandmarks
+                               : int64_t{entry.count} * FewestBytes(kind) > entry.num_bytes)) {
         return corrupt("more elements than its bytes can hold, or none");
       }
       const bool is_single = kind == BlockKind::kVocabularyTree || kind == BlockKind::kDocumentNorms ||

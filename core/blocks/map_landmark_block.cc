@@ -6,7 +6,8 @@
 
 #include "core/base/blob.h"
 #include "core/blocks/map_blocks.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
+#include "core/packing/packed_landmarks.h"
 
 namespace cairn {
 namespace {
@@ -154,6 +155,10 @@ std::string EncodeBlock(const LandmarkBlock& block) {
     WriteRuns(local, &writer);
   }
   WriteRuns(block.image_blocks, &writer);
+  if (block.descriptor_code) {
+    writer.Bytes(PackLandmarks({block.landmarks, block.descriptors, *block.descriptor_code}));
+    return writer.Take();
+  }
   int64_t class_id = 0;
   for (const MapLandmark& landmark : block.landmarks) {
     writer.Varint(ZigZag(static_cast<int64_t>(landmark.class_id) - class_id));
@@ -180,6 +185,15 @@ Result<LandmarkBlock> DecodeLandmarkBlock(std::string_view bytes, const BlockEnt
   int64_t max_num_values = kMaxListElements;
   if (!ReadRuns(&reader, directory.NumBlocks(BlockKind::kImages), &max_num_values, &block.image_blocks)) {
     return corrupt("the image blocks");
+  }
+  if (entry.is_packed) {
+    PackedLandmarks packed;
+    if (!reader.ok() || !UnpackLandmarks(reader.Bytes(reader.num_left()), entry.count, &packed))
+      return corrupt("the packed numbers");
+    block.landmarks = std::move(packed.landmarks);
+    block.descriptors = std::move(packed.descriptors);
+    block.descriptor_code = packed.code;
+    return block;
   }
   int64_t class_id = 0;
   for (MapLandmark& landmark : block.landmarks) {

@@ -8,6 +8,8 @@ namespace {
 
 constexpr size_t kLandmarksPerBlock = 1024;
 constexpr size_t kImagesPerBlock = 32;
+// Sights are packed by those of the images before in the block.
+constexpr size_t kPackedImagesPerBlock = 64;
 constexpr size_t kStationsPerBlock = 1024;
 constexpr size_t kRegionsPerBlock = 1024;
 constexpr size_t kWordsPerBlock = 1024;
@@ -18,7 +20,8 @@ constexpr size_t kLandmarkModelsPerBlock = 256;
 
 }  // namespace
 
-MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
+MapLayout::MapLayout(const MapRows& rows)
+    : rows_(rows), images_per_block_(rows.descriptor_code ? kPackedImagesPerBlock : kImagesPerBlock) {
   regions_of_station_.resize(rows.stations.size());
   for (size_t region = 0; region < rows.regions.size(); ++region) {
     for (const StationIdx station : rows.regions[region].stations) {
@@ -41,7 +44,7 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
   if (!rows.appearance.empty() && rows.appearance[0].entropy)
     CutEvenly(BlockKind::kAmbiguity, rows.appearance.size(), kAppearanceNodesPerBlock);
   const size_t first_image_block = entries_.size();
-  CutEvenly(BlockKind::kImages, rows.images.size(), kImagesPerBlock);
+  CutEvenly(BlockKind::kImages, rows.images.size(), images_per_block_);
   for (size_t i = first_image_block; i < entries_.size(); ++i) {
     BlockEntry& entry = entries_[i];
     for (uint32_t k = entry.first; k < entry.first + entry.count; ++k) {
@@ -60,7 +63,9 @@ MapLayout::MapLayout(const MapRows& rows) : rows_(rows) {
 }
 
 void MapLayout::AddEntry(BlockKind kind, size_t first, size_t count) {
+  const bool can_be_packed = kind == BlockKind::kLandmarks || kind == BlockKind::kImages;
   entries_.push_back({.kind = static_cast<uint8_t>(kind),
+                      .is_packed = can_be_packed && rows_.descriptor_code,
                       .first = static_cast<uint32_t>(first),
                       .count = static_cast<uint32_t>(count)});
 }
@@ -124,7 +129,7 @@ void MapLayout::LinkRegions() {
 void MapLayout::LinkImages() {
   image_blocks_of_block_.resize(first_landmarks_.size());
   for (size_t image = 0; image < rows_.images.size(); ++image) {
-    const auto image_block = static_cast<int32_t>(image / kImagesPerBlock);
+    const auto image_block = static_cast<int32_t>(image / images_per_block_);
     for (const LandmarkIdx landmark : rows_.images[image].landmarks) {
       std::vector<int32_t>& image_blocks = image_blocks_of_block_[landmark_block_[landmark]];
       if (image_blocks.empty() || image_blocks.back() != image_block) image_blocks.push_back(image_block);
@@ -141,12 +146,13 @@ LandmarkBlock MapLayout::MakeLandmarkBlock(const BlockEntry& entry) const {
   block.descriptors = rows_.descriptors.middleRows(entry.first, entry.count);
   block.regions = regions_of_block_[ordinal];
   block.image_blocks = image_blocks_of_block_[ordinal];
+  block.descriptor_code = rows_.descriptor_code;
   return block;
 }
 
 ImageBlock MapLayout::MakeImageBlock(const BlockEntry& entry) const {
   const auto begin = rows_.images.begin() + entry.first;
-  return {static_cast<int32_t>(entry.first), {begin, begin + entry.count}};
+  return {static_cast<int32_t>(entry.first), {begin, begin + entry.count}, entry.is_packed};
 }
 
 StationBlock MapLayout::MakeStationBlock(const BlockEntry& entry) const {

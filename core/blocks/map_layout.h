@@ -44,6 +44,7 @@ class MapLayout {
   void AddEntry(BlockKind kind, size_t first, size_t count);
 
   const MapRows& rows_;
+  size_t images_per_block_;
   std::vector<BlockEntry> entries_;
   std::vector<int32_t> first_landmarks_;  // of every landmark block
   std::vector<int32_t> landmark_block_;   // ordinal, of every landmark

@@ -13,7 +13,9 @@
 #include "core/blocks/map_findings.h"
 #include "core/blocks/map_head.h"
 #include "core/features/features.h"
+#include "core/features/transform_code.h"
 #include "core/geometry/pose.h"
+#include "core/packing/map_landmark.h"
 #include "core/plan/views.h"
 #include "core/vocabulary/vocabulary_tree.h"
 #include "core/world/visual_map.h"
@@ -22,14 +24,6 @@ namespace cairn {
 
 // The contents of a map file as plain values, the same for writers and readers.  schemas/FORMAT.md says what
 // each means on disk.
-
-struct MapLandmark {
-  ClassId class_id = 0;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // world frame, metres
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the position, m^2
-  double scale_m = 0;                                    // size (sigma) of the feature in space; 0: not known
-  int num_observations = 0;                              // survey images that see it
-};
 
 struct MapImage {
   ImageId image_id = 0;
@@ -81,7 +75,10 @@ struct MapRows : MapHead {
   std::vector<std::pair<StationIdx, StationIdx>> station_edges;  // u < v, ascending
   std::vector<MapRegion> regions;
   std::vector<MapLandmark> landmarks;
-  DescriptorMatrix descriptors;               // row i: landmark i
+  DescriptorMatrix descriptors;  // row i: landmark i
+  // Where it is known, landmarks and what images see are stored packed, and the descriptors' own levels stand
+  // for them.
+  std::optional<TransformCode> descriptor_code;
   std::vector<MapAppearanceNode> appearance;  // none: not known
   // Its documents are among `images`.  Without nodes: every landmark is its own word, found by exact search.
   Vocabulary vocabulary;
@@ -95,7 +92,7 @@ struct MapRows : MapHead {
 };
 
 inline constexpr int kMapVersionMajor = 2;
-inline constexpr int kMapVersionMinor = 5;
+inline constexpr int kMapVersionMinor = 6;
 // Most landmarks of an image, and the longest name of one: what a reader allocates is bounded.
 inline constexpr int kMaxImageLandmarks = 1 << 18;
 inline constexpr int kMaxNameBytes = 4096;

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "core/blocks/map_blocks.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
 
 namespace cairn {
 namespace {

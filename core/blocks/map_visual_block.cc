@@ -5,7 +5,7 @@
 
 #include "core/base/blob.h"
 #include "core/blocks/map_blocks.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
 #include "core/world/visual_map.h"
 
 namespace cairn {

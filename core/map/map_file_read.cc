@@ -20,6 +20,8 @@ class RowsReader {
     static_cast<MapHead&>(rows_) = file_.head();
     const MapDirectory& directory = file_.directory();
     rows_.regions.resize(directory.Count(BlockKind::kRegions));
+    // Packed landmarks can take few bytes: what they decode to is limited before it is allocated.
+    if (directory.Count(BlockKind::kLandmarks) * kDescriptorDim > num_bytes_left_) return TooMuch();
     rows_.descriptors.resize(directory.Count(BlockKind::kLandmarks), kDescriptorDim);
     rows_.landmarks.reserve(directory.Count(BlockKind::kLandmarks));
     for (int64_t block = 0; block < static_cast<int64_t>(directory.blocks().size()); ++block) {
@@ -96,12 +98,14 @@ class RowsReader {
   Status Take(Result<Block> block, Add&& add) {
     CAIRN_RETURN_IF_ERROR(block);
     num_bytes_left_ -= NumBytes(*block);
-    if (num_bytes_left_ < 0) {
-      return MakeError(ErrorCode::kCorrupt,
-                       "{}: its blocks decode to more than {} times its size: not a map that cairn wrote",
-                       file_.path(), kMostUnfolding);
-    }
+    if (num_bytes_left_ < 0) return TooMuch();
     return add(*std::move(block));
+  }
+
+  Error TooMuch() const {
+    return MakeError(ErrorCode::kCorrupt,
+                     "{}: its blocks decode to more than {} times its size: not a map that cairn wrote",
+                     file_.path(), kMostUnfolding);
   }
 
   // Postings name images in a file, but documents in rows.
@@ -145,6 +149,11 @@ class RowsReader {
   }
 
   Status AddLandmarks(const LandmarkBlock& block) {
+    if (block.first > 0 && block.descriptor_code != rows_.descriptor_code) {
+      return MakeError(ErrorCode::kCorrupt, "{}: its blocks of landmarks are coded in different ways",
+                       file_.path());
+    }
+    rows_.descriptor_code = block.descriptor_code;
     rows_.landmarks.insert(rows_.landmarks.end(), block.landmarks.begin(), block.landmarks.end());
     rows_.descriptors.middleRows(block.first, block.descriptors.rows()) = block.descriptors;
     for (const auto& [region, landmarks] : block.regions) {

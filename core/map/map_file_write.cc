@@ -65,7 +65,7 @@ Result<Hash> WriteTables(SQLite::Database& database, const MapRows& rows, const 
 
 Status WriteMapRows(const MapRows& rows, const std::string& path) {
   CAIRN_RETURN_IF_ERROR(CheckMapRows(rows));
-  const int page_size = rows.landmarks.size() < kLandmarksForLargePages ? 1024 : 4096;
+  const int page_size = rows.landmarks.size() < kLandmarksForLargePages ? 512 : 4096;
   return ReplaceFileAtomically(path, [&](const std::string& temporary) -> Status {
     Hash root = {};
     CAIRN_RETURN_IF_ERROR(WithDatabaseErrors(path, [&]() -> Status {

@@ -3,9 +3,9 @@
 #include <filesystem>
 
 #include "core/base/blob.h"
-#include "core/blocks/map_codes.h"
 #include "core/files/database.h"
 #include "core/map/map_head_tables.h"
+#include "core/packing/map_codes.h"
 
 namespace cairn {
 namespace {

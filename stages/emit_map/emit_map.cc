@@ -8,6 +8,7 @@
 
 #include "core/blocks/map_documents.h"
 #include "core/camera/pixel_ray.h"
+#include "core/features/transform_code.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
 
@@ -232,6 +233,20 @@ void AddAppearance(const Appearance& appearance, MapRows* rows) {
   }
 }
 
+// Whether descriptors are stored by the levels of a transform's coefficients.
+bool StoresTransform(const EmitMapOptions& options) {
+  constexpr int kMostBits = 6;  // with more, it does not pay
+  if (options.descriptor_bits > kMostBits) return false;
+  return options.descriptor_code == "transform" ||
+         (options.descriptor_code == "auto" && (options.landmarks == "fewest" || options.max_bytes > 0));
+}
+
+// The step of a coefficient's levels: 24 for 3 bits a value, half of it for one bit more.
+int TransformStep(int descriptor_bits) {
+  constexpr int kStepOfOneBit = 96;
+  return kStepOfOneBit >> (descriptor_bits - 1);
+}
+
 // The mean of the entropies of the images at each region's stations.
 void AddRegionEntropies(MapRows* rows) {
   std::vector<std::vector<double>> at_station(rows->stations.size());
@@ -304,6 +319,12 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .help = "most bits in which a value of a landmark's descriptor is stored; 8: unchanged",
        .min = 1,
        .max = 8},
+      {.name = "descriptor_code",
+       .value = &options->descriptor_code,
+       .help =
+           "how descriptors are stored: levels of their values, levels of a transform's coefficients, all "
+           "packed in fewer bytes, or auto: a transform where left-out survey images try the map",
+       .choices = {"auto", "levels", "transform"}},
       {.name = "min_num_landmarks_for_words",
        .value = &options->min_num_landmarks_for_words,
        .help = "fewest landmarks of a map with a vocabulary; in a smaller one every landmark is a word",
@@ -421,7 +442,11 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     row.landmarks.erase(std::unique(row.landmarks.begin(), row.landmarks.end()), row.landmarks.end());
     rows.regions.push_back(std::move(row));
   }
-  QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
+  if (StoresTransform(options)) {
+    rows.descriptor_code = QuantizeByTransform(TransformStep(options.descriptor_bits), &rows.descriptors);
+  } else {
+    QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);
+  }
   AddRegionEntropies(&rows);
   const auto num_landmarks = static_cast<double>(rows.landmarks.size());
   if (options.words == "survey") {

@@ -48,6 +48,11 @@ struct EmitMapOptions {
   // Bits in which a value of a landmark's descriptor is stored; 8: unchanged.  "fewest" and max_bytes take
   // fewer where that serves them.  REQUIRES: in [1, 8]
   int descriptor_bits = 5;
+  // How they are stored: by levels of the values, "levels"; by levels of a transform's coefficients, packed
+  // together with all else of landmarks, "transform" (core/features/transform_code.h), which takes less than
+  // half as many bytes and is not read by programs before format 2.6; or, "auto", by a transform where
+  // left-out images try the map: "fewest" and max_bytes.
+  std::string descriptor_code = "auto";
   // A map with at least this many landmarks gets a vocabulary; in a smaller one every landmark is its own
   // word.  REQUIRES: >= 0
   int min_num_landmarks_for_words = 16384;

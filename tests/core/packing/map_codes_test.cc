@@ -1,4 +1,4 @@
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
 
 #include <cmath>
 
