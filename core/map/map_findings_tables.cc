@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/base/blob.h"
-#include "core/blocks/map_codes.h"
+#include "core/packing/map_codes.h"
 
 namespace cairn {
 namespace {

@@ -241,9 +241,10 @@ bool StoresTransform(const EmitMapOptions& options) {
          (options.descriptor_code == "auto" && (options.landmarks == "fewest" || options.max_bytes > 0));
 }
 
-// The step of a coefficient's levels: 24 for 3 bits a value, half of it for one bit more.
+// The step of a coefficient's levels: 16 for 3 bits a value, with which descriptors err as much as by levels
+// of 3 bits a value; half of it for one bit more.
 int TransformStep(int descriptor_bits) {
-  constexpr int kStepOfOneBit = 96;
+  constexpr int kStepOfOneBit = 64;
   return kStepOfOneBit >> (descriptor_bits - 1);
 }
 
