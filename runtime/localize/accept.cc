@@ -114,6 +114,11 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .help = "smallest number of inliers after refinement, as part of those before",
        .min = 0,
        .max = 1},
+      {.name = "min_guided_sigmas",
+       .value = &o->min_guided_sigmas,
+       .help = "fewest guided matches at the pose above those with the camera turned aside, in standard "
+               "deviations of these; 0: not tested",
+       .min = 0},
       {.name = "spread_grid",
        .value = &o->spread_grid,
        .help = "cells per side of the image for the spread",

@@ -378,6 +378,17 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     CAIRN_ASSIGN_OR_RETURN(covisible, map_->Gather(std::move(seen), false));
     std::vector<Correspondence> guided = MatchGuided(query, *covisible, cam_from_world, options_.match);
     if (guided.size() >= matches.size()) {
+      const double sigmas = options_.accept.min_guided_sigmas;
+      const double by_chance =
+          sigmas > 0 ? GuidedByChance(query, *covisible, cam_from_world, options_.match) : 0;
+      if (static_cast<double>(guided.size()) < by_chance + sigmas * std::sqrt(by_chance)) {
+        localization.num_inliers = 0;
+        return fail(
+            NoFix::kTooFewInliers,
+            fmt::format("{} landmarks are where the pose says, and beside it there are {:.0f}: no more "
+                        "than by chance",
+                        guided.size(), by_chance));
+      }
       matches = std::move(guided);
       landmarks = covisible.get();
     }

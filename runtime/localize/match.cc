@@ -194,4 +194,19 @@ std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& l
   return correspondences;
 }
 
+double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+                      const MatchOptions& options) {
+  constexpr double kTurnInRadii = 4;
+  const double angle = kTurnInRadii * options.guided_radius_px / query.camera.MeanFocal();
+  double sum = 0;
+  for (const double signed_angle : {angle, -angle}) {
+    for (const Eigen::Vector3d& axis : {Eigen::Vector3d::UnitX().eval(), Eigen::Vector3d::UnitY().eval()}) {
+      const Pose aside_from_camera{Eigen::Quaterniond(Eigen::AngleAxisd(signed_angle, axis))};
+      sum += static_cast<double>(
+          MatchGuided(query, landmarks, aside_from_camera * cam_from_world, options).size());
+    }
+  }
+  return sum / 4;
+}
+
 }  // namespace cairn

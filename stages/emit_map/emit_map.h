@@ -37,7 +37,7 @@ struct EmitMapOptions {
   // "fewest": of the left-out images that all landmarks localize, the part that must stay localized, and the
   // largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.5;
+  double max_error_ratio = 1.35;
   // What maps promise whose landmarks are chosen by trial, at every place and heading of the survey: that
   // with this probability, so many landmarks are matched and the pose is within the limits above
   // (core/promise). REQUIRES: >= 1; in (0, 1)

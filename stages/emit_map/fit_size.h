@@ -27,7 +27,7 @@ struct FitSizeOptions {
   // ChooseFewest: of the left-out images that the map of everything localizes, the part that must stay
   // localized, and the largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.5;
+  double max_error_ratio = 1.35;
   PromiseOptions promise;
 };
 
