@@ -199,6 +199,10 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const E
     return fmt::format("emit_map: the fewest landmarks: {} bits a descriptor value; {}\n",
                        fitted.descriptor_bits, RecallText(fitted));
   }
+  if (fitted.promises) {
+    return fmt::format("emit_map: at most {} bytes: {} bits a descriptor value; {}\n", options.max_bytes,
+                       fitted.descriptor_bits, RecallText(fitted));
+  }
   const SizeGuarantee guarantee = GuaranteeOf(rows);
   return fmt::format(
       "emit_map: at most {} bytes: {} bits a descriptor value; at least {} common landmarks in every region; "

@@ -1,8 +1,8 @@
 // The fewest landmarks that keep a promise at every node (core/promise/promise_cover.h), in halls that grow:
 // how many there are, how many it takes at least, and time and memory over the number of nodes.
 //
-//   cover_scale --nodes 1000,2000,5000 --best
-//   cover_scale --nodes 10000,100000,1000000
+//   promise_cover --nodes 1000,2000,5000 --best
+//   promise_cover --nodes 10000,100000,1000000
 //
 // A hall is an open square with a lattice of places 0.5 m apart, four headings each, and landmarks all over
 // it, 7 a square metre, that face any way: a node sees those within 6 m, 35 degrees of its heading and 60
