@@ -30,6 +30,12 @@ inline MapRows FullRows() {
   camera.camera_id = 9;
   camera.width = 300;
   rows.cameras.push_back(camera);
+  rows.findings.promise = {.radius_m = 0.5,
+                           .radius_deg = 15,
+                           .landmarks_lower_bound = 2,
+                           .nodes = {{0, 0, 1, 0.875, 25.5, 0.125, 0.875}, {1, 0, 0, 1, 30, 0.5, 1}},
+                           .left_out = {{0.95, 30, 29, 0.999}},
+                           .held_out = {{0.98, 1, 1, 0.981}}};
   rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                      {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
   rows.findings.drops = {{44, "decompose_regions", "station", "left_over", "not covered", 200, {0, 200, 1}}};

@@ -148,7 +148,7 @@ TEST(MapFindings, DamagedRowsAreRefused) {
         "INSERT INTO promises SELECT 1, min_matches, max_error_m, max_error_deg, probability, match_ratio, "
         "shape, "
         "error_ratio, radius_m, radius_deg, landmarks_bound, nodes, left_out, held_out FROM promises",
-        "ALTER TABLE promises DROP COLUMN held_out", "ALTER TABLE drop_reasons DROP COLUMN text",
+        "ALTER TABLE promises DROP COLUMN shape", "ALTER TABLE drop_reasons DROP COLUMN text",
         "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
         "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
         "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
