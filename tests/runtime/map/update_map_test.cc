@@ -129,7 +129,7 @@ TEST_F(UpdateMapTest, HostileDeltasAreRefused) {
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_num_bytes += delta->new_page_size; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_num_bytes -= delta->new_page_size; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 0; }), ErrorCode::kCorrupt);
-  EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 512; }), ErrorCode::kCorrupt);
+  EXPECT_EQ(code([](MapDelta* delta) { delta->new_page_size = 1024; }), ErrorCode::kCorrupt);
   EXPECT_EQ(code([](MapDelta* delta) { delta->old_page_size = 3; }), ErrorCode::kCorrupt);
   // A state that no map can have is refused as that, before anything is unfolded.
   const auto states = [&](const Change& change) {
