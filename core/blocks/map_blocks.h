@@ -40,6 +40,9 @@ enum class BlockKind : uint8_t {
 inline constexpr int kNumBlockKinds = 13;   // 0 is none
 const char* BlockKindName(BlockKind kind);  // "stations"
 
+// Regions of one place are of different headings, and few places have so many.
+inline constexpr int64_t kMaxRegionsPerStation = 1024;
+
 // What the directory says of a block.
 struct BlockEntry {
   uint8_t kind = 0;  // a BlockKind, or one of a later minor version

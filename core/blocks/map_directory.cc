@@ -180,7 +180,7 @@ Result<MapDirectory> MapDirectory::Decode(std::string_view bytes, int64_t max_nu
     return MakeError(ErrorCode::kCorrupt,
                      "directory: a vocabulary tree, words and a norm per image belong together");
   }
-  if (directory.Count(BlockKind::kRegions) > directory.Count(BlockKind::kStations)) {
+  if (directory.Count(BlockKind::kRegions) > kMaxRegionsPerStation * directory.Count(BlockKind::kStations)) {
     return MakeError(ErrorCode::kCorrupt, "directory: {} regions of {} stations",
                      directory.Count(BlockKind::kRegions), directory.Count(BlockKind::kStations));
   }

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/base/printable.h"
+#include "core/blocks/map_blocks.h"
 #include "core/blocks/map_documents.h"
 #include "core/capture/sessions.h"
 #include "core/world/appearance.h"
@@ -82,8 +83,8 @@ Status CheckRegions(const MapRows& rows) {
     return Invalid("{} regions with a lower bound of {}, {} stations uncovered", rows.regions.size(),
                    rows.lower_bound.value_or(0), rows.uncovered_limit);
   }
-  // Each region has a station that no other one before it has.
-  if (rows.regions.size() > rows.stations.size())
+  if (static_cast<int64_t>(rows.regions.size()) >
+      kMaxRegionsPerStation * static_cast<int64_t>(rows.stations.size()))
     return Invalid("{} regions of {} stations", rows.regions.size(), rows.stations.size());
   for (size_t i = 0; i < rows.regions.size(); ++i) {
     if (rows.regions[i].stations.empty()) return Invalid("region {} has no station", i);

@@ -116,8 +116,9 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .max = 1},
       {.name = "min_guided_sigmas",
        .value = &o->min_guided_sigmas,
-       .help = "fewest guided matches at the pose above those with the camera turned aside, in standard "
-               "deviations of these; 0: not tested",
+       .help =
+           "fewest landmarks found where the pose says above those found beside these places, in standard "
+           "deviations of the latter; 0: not tested",
        .min = 0},
       {.name = "spread_grid",
        .value = &o->spread_grid,

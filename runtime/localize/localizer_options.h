@@ -112,9 +112,9 @@ struct AcceptOptions {
   // points crowd in the image, many lie within the wide limit of a wrong pose and few within the refined
   // one's.  REQUIRES: in [0, 1]
   double min_kept_ratio = 0.5;
-  // Guided matching finds some landmarks beside any pose by chance: where it finds c of them with the camera
-  // turned aside, on average, it must find more than c + min_guided_sigmas sqrt(c) at the pose (as many
-  // standard deviations of a Poisson number).  0: not tested.  REQUIRES: >= 0
+  // Guided matching finds some landmarks by chance, at any pose: where it finds c of them beside their places
+  // (GuidedByChance), it must find more than c + min_guided_sigmas sqrt(c) at these (as many standard
+  // deviations of a Poisson number).  0: not tested.  REQUIRES: >= 0
   double min_guided_sigmas = 5.5;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells.  REQUIRES: >= 1

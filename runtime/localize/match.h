@@ -25,8 +25,8 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
 std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
                                         const Pose& cam_from_world, const MatchOptions& options);
 
-// How many MatchGuided finds where there is nothing to be found: the mean with the camera turned aside from
-// the pose, four ways, by four times guided_radius_px.
+// How many MatchGuided finds where there is nothing to be found: the mean over four ways of looking for each
+// landmark beside its projection, four times as far off as it is looked for at all.
 double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
                       const MatchOptions& options);
 

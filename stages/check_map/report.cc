@@ -106,9 +106,10 @@ std::string ReportText(const PrintedReport& report) {
   const auto line = [&](const std::string& name, const std::string& value) { text += Line(name, value); };
   line("map", fmt::format("{}{}", report.rows->name, report.rows->sealed ? "" : " (unsealed)"));
   line("landmarks", fmt::format("{} ({})", report.rows->landmarks.size(), report.rows->landmark_choice));
-  line("regions",
-       fmt::format("{} ({}, k = {})", NumRegionsText(report.rows->regions.size(), report.rows->lower_bound),
-                   report.rows->algorithm, report.rows->k));
+  line(
+      "regions",
+      fmt::format("{} ({}{})", NumRegionsText(report.rows->regions.size(), report.rows->lower_bound),
+                  report.rows->algorithm, report.rows->k > 0 ? fmt::format(", k = {}", report.rows->k) : ""));
   line("MB", fmt::format("{:.2f}", static_cast<double>(report.map_bytes) / 1e6));
   if (report.held_out != nullptr && !report.held_out->images.empty()) {
     const CheckMapReport& held_out = *report.held_out;

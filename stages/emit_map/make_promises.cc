@@ -98,20 +98,25 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<
   // The bound is of the promise: the map has more landmarks where exactness asks for them.
   CoverProblem problem{.of_class = &of_class_};
   problem.demands = Demands(of_class_, nodes_.size(), model.NeededMatches(options.terms), kReachableRatio);
-  promises.findings.landmarks_lower_bound =
-      CoverBest(problem, {.num_iterations = kBoundIterations, .num_threads = num_threads_}).lower_bound;
-  // A map of few bytes may lack what its nodes demand.
+  const auto bound_of = [&](const CoverProblem& cover) {
+    return CoverBest(cover, {.num_iterations = kBoundIterations, .num_threads = num_threads_}).lower_bound;
+  };
+  promises.findings.landmarks_lower_bound = bound_of(problem);
+  // A map of few bytes may lack what its nodes demand: its regions have what it has.
   std::vector<double> kept(nodes_.size(), 0);
   for (size_t i = 0; i < keep.size(); ++i) {
     if (keep[i] == 0) continue;
     for (const ExpectedMatch& match : of_class_[i]) kept[match.view] += match.probability;
   }
+  bool is_lacking = false;
   for (size_t node = 0; node < nodes_.size(); ++node) {
-    if (kept[node] < problem.demands[node]) problem.demands[node] = kReachableRatio * kept[node];
+    if (kept[node] >= problem.demands[node]) continue;
+    problem.demands[node] = kReachableRatio * kept[node];
+    is_lacking = true;
   }
-  const PromiseRegions divided =
-      DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem, keep,
-                  options.max_region_landmarks, promises.findings.landmarks_lower_bound);
+  const int64_t cover_bound = is_lacking ? bound_of(problem) : promises.findings.landmarks_lower_bound;
+  const PromiseRegions divided = DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem, keep,
+                                             options.max_region_landmarks, cover_bound);
   promises.regions_lower_bound = divided.lower_bound;
   for (const PromiseRegion& region : divided.regions) {
     for (const int32_t node : region.nodes)

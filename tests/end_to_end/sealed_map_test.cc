@@ -118,14 +118,14 @@ TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
 }
 
 TEST_F(SealedMap, InspectStatesTheFormatOfTheFile) {
-  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4", "2.5"}) {
+  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6"}) {
     const ProgramRun run = RunShell("cairn inspect --json " GOLDEN_DIR "/map_" + version + ".cairn");
     EXPECT_THAT(run.out, HasSubstr("\"format\": \"" + version + "\"")) << run.err;
   }
 }
 
 TEST_F(SealedMap, EveryEarlierFormatIsMigratedToTodays) {
-  for (const std::string version : {"1.0", "2.0", "2.1", "2.2", "2.3", "2.4", "2.5"}) {
+  for (const std::string version : {"1.0", "2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6"}) {
     const std::string migrated = Path("migrated_" + version + ".cairn");
     const ProgramRun run = RunShell("cairn migrate " GOLDEN_DIR "/map_" + version + ".cairn -o " + migrated);
     ASSERT_EQ(run.exit_code, 0) << run.err;

@@ -4,13 +4,45 @@
 #include <string>
 
 #include "core/base/blob.h"
+#include "core/features/transform_code.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
 
+namespace {
+
+using namespace cairn;
+
+// The counts of a map's kinds of blocks, each less 1, as the fuzzer takes them.
+std::string CountsOf(const MapDirectory& directory) {
+  std::string counts(kNumBlockKinds, '\0');
+  for (int kind = 1; kind < kNumBlockKinds; ++kind)
+    counts[kind] = static_cast<char>(directory.Count(static_cast<BlockKind>(kind)) - 1);
+  return counts;
+}
+
+// The packed blocks of a map, and it itself.
+bool WritePacked(MapRows rows, const std::string& folder) {
+  const std::string map = folder + "/map_packed";
+  rows.descriptor_code = QuantizeByTransform(16, &rows.descriptors);
+  if (!WriteMapRows(rows, map).ok()) return false;
+  const auto file = MapFile::Open(map, {});
+  if (!file.ok()) return false;
+  for (size_t i = 0; i < file->directory().blocks().size(); ++i) {
+    const BlockEntry& entry = file->directory().blocks()[i];
+    if (!entry.is_packed) continue;
+    const bool is_landmarks = entry.kind == static_cast<uint8_t>(BlockKind::kLandmarks);
+    const std::string seed =
+        (is_landmarks ? "\x10" : "\x11") + CountsOf(file->directory()) + *file->ReadBlock(i);
+    if (!WriteFileAtomically(fmt::format("{}/packed_{}", folder, entry.kind), seed).ok()) return false;
+  }
+  return WriteFileAtomically(map, std::string(1, '\0') + *ReadFile(map)).ok();
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  using namespace cairn;
   if (argc != 3) return std::fprintf(stderr, "usage: make_fuzz_seeds FOLDER map_1.0.cairn\n"), 2;
   const std::string folder = argv[1];
   const EmitExample example = MakeEmitExample();
@@ -28,16 +60,14 @@ int main(int argc, char** argv) {
     rows->findings.drops = {
         {44, "decompose_regions", "station", "left_over", "not covered", 200, {0, 200, 1}}};
     const std::string map = folder + (min_num_landmarks_for_words == 0 ? "/map_words" : "/map");
+    if (min_num_landmarks_for_words == 0 && !WritePacked(*rows, folder)) return 1;
     if (!WriteMapRows(*rows, map).ok()) return 1;
     const auto file = MapFile::Open(map, {});
     if (!file.ok()) return 1;
     for (size_t i = 0; min_num_landmarks_for_words == 0 && i < file->directory().blocks().size(); ++i) {
       const BlockEntry& entry = file->directory().blocks()[i];
-      std::string counts(kNumBlockKinds, '\0');  // of each kind, less 1
-      for (int kind = 1; kind < kNumBlockKinds; ++kind) {
-        counts[kind] = static_cast<char>(file->directory().Count(static_cast<BlockKind>(kind)) - 1);
-      }
-      const std::string seed = std::string(1, static_cast<char>(entry.kind)) + counts + *file->ReadBlock(i);
+      const std::string seed =
+          std::string(1, static_cast<char>(entry.kind)) + CountsOf(file->directory()) + *file->ReadBlock(i);
       if (!WriteFileAtomically(fmt::format("{}/block_{}", folder, entry.kind), seed).ok()) return 1;
       BlobWriter replaced;  // by itself
       replaced.UInt8(15);

@@ -1,7 +1,8 @@
 // libFuzzer's entry: feeds any bytes to the files that a robot reads.  The first byte chooses: 0 a whole map
 // file, opened, read and asked for a place and a way; 1 to 12 a block of that kind, the next 13 bytes being
 // the counts that its directory states; 13 a directory; 14 a map of format 1; 15 a whole map some of whose
-// blocks are replaced, each by a kind, a count, a length and bytes, and sealed again.  Built with the preset
+// blocks are replaced, each by a kind, a count, a length and bytes, and sealed again; 16 and 17 a block of
+// packed landmarks and of packed images, after its counts.  Built with the preset
 // `fuzz`, hashes are not compared, so that what lies behind them is reached.
 #include <unistd.h>
 
@@ -94,7 +95,7 @@ void TryReplacedBlocks(std::string_view bytes) {
 }
 
 // Counts as the directory of a small map would state them: from the bytes.
-MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_bytes) {
+MapDirectory DirectoryFor(BlockKind kind, bool is_packed, std::string_view counts, size_t num_bytes) {
   MapDirectory directory;
   for (int k = 1; k < kNumBlockKinds; ++k) {
     const auto count = static_cast<uint32_t>(static_cast<uint8_t>(counts[k])) + 1;
@@ -102,6 +103,7 @@ MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_by
     if (!is_own && kind != BlockKind::kVocabularyTree && k == static_cast<int>(BlockKind::kVocabularyTree))
       continue;
     directory.Add({.kind = static_cast<uint8_t>(k),
+                   .is_packed = is_own && is_packed,
                    .first = 0,
                    .count = is_own ? std::min<uint32_t>(count, static_cast<uint32_t>(num_bytes) + 1) : count,
                    .num_bytes = static_cast<uint32_t>(num_bytes)});
@@ -109,9 +111,10 @@ MapDirectory DirectoryFor(BlockKind kind, std::string_view counts, size_t num_by
   return directory;
 }
 
-void TryBlock(BlockKind kind, std::string_view bytes) {
+void TryBlock(BlockKind kind, bool is_packed, std::string_view bytes) {
   if (bytes.size() < kCountBytes) return;
-  const MapDirectory directory = DirectoryFor(kind, bytes.substr(0, kCountBytes), bytes.size() - kCountBytes);
+  const MapDirectory directory =
+      DirectoryFor(kind, is_packed, bytes.substr(0, kCountBytes), bytes.size() - kCountBytes);
   if (directory.NumBlocks(kind) == 0) return;  // a kind of a later version
   const BlockEntry& entry = directory.Entry(kind, 0);
   bytes.remove_prefix(kCountBytes);
@@ -184,15 +187,17 @@ void TryBlock(BlockKind kind, std::string_view bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   if (size == 0) return 0;
   const std::string_view rest(reinterpret_cast<const char*>(bytes) + 1, size - 1);
-  const int choice = bytes[0] % 16;
+  const int choice = bytes[0] % 18;
   if (choice == 0) {
     cairn::TryFile(rest);
   } else if (choice < cairn::kNumBlockKinds) {
-    cairn::TryBlock(static_cast<cairn::BlockKind>(choice), rest);
+    cairn::TryBlock(static_cast<cairn::BlockKind>(choice), false, rest);
   } else if (choice == 13) {
     (void)cairn::MapDirectory::Decode(rest, 1 << 20).ok();
   } else if (choice == 15) {
     cairn::TryReplacedBlocks(rest);
+  } else if (choice > 15) {
+    cairn::TryBlock(choice == 16 ? cairn::BlockKind::kLandmarks : cairn::BlockKind::kImages, true, rest);
   } else {
     (void)cairn::ReadMapRowsVersion1(cairn::WriteTemporary(rest)).ok();
   }

@@ -39,7 +39,9 @@ class ReportInputsTest(unittest.TestCase):
         run = subprocess.run([CAIRN, 'report', copy, '-o', page], capture_output=True, text=True)
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn('another compilation', run.stderr)
-        self.assertFalse('"held_out":[' in pathlib.Path(page).read_text())
+        self.assertNotIn('"held_out_is_self_test"', pathlib.Path(page).read_text())  # stands beside them
+        shown = report(self.folder.name, MAP)
+        self.assertIn('"held_out_is_self_test"', shown.read_text())
 
     def test_paper_needs_no_script(self):
         page = report(self.folder.name, MAP, '--print', '--svg', os.path.join(self.folder.name, 'pictures'))

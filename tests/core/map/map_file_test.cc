@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "core/blocks/map_rows.h"
+#include "core/features/transform_code.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
+#include "tests/core/map/full_rows.h"
 
 namespace cairn {
 namespace {
@@ -441,6 +443,26 @@ TEST(GoldenMap, Version2_5IsRead) {
   EXPECT_EQ(rows->findings_hash.size(), 64u);
   EXPECT_EQ(rows->findings, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->findings);
   EXPECT_EQ(rows->descriptors, ReadMapRows(GOLDEN_DIR "/map_2.4.cairn")->descriptors);
+}
+
+// Version 2.6: that of 2.5 with its descriptors by the levels of a transform, packed, and a promise.
+TEST(GoldenMap, Version2_6IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.6.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  MapRows before = *ReadMapRows(GOLDEN_DIR "/map_2.5.cairn");
+  const TransformCode code = QuantizeByTransform(16, &before.descriptors);
+  ASSERT_TRUE(rows->descriptor_code);
+  EXPECT_EQ(*rows->descriptor_code, code);
+  EXPECT_EQ(rows->descriptors, before.descriptors);
+  ASSERT_EQ(rows->landmarks.size(), before.landmarks.size());
+  for (size_t i = 0; i < before.landmarks.size(); ++i) {
+    EXPECT_LT((rows->landmarks[i].position - before.landmarks[i].position).norm(), 0.0021) << i;
+    EXPECT_EQ(rows->landmarks[i].num_observations, before.landmarks[i].num_observations);
+  }
+  for (size_t i = 0; i < before.images.size(); ++i)
+    EXPECT_EQ(rows->images[i].landmarks, before.images[i].landmarks) << i;
+  ASSERT_TRUE(rows->findings.promise);
+  EXPECT_EQ(*rows->findings.promise, FullRows().findings.promise);
 }
 
 }  // namespace

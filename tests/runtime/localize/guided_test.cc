@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include "runtime/localize/localizer.h"
+#include "runtime/localize/match.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/landmark_set.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+constexpr int kSide = 8;  // landmarks in a square of 8 x 8, 50 px apart, in the middle of the image
+
+struct Wall {
+  Query query;
+  LandmarkSet landmarks;
+};
+
+// A camera before a wall 2 m away whose landmarks all look the same or each like itself; `extra_px`: where
+// else each can be seen, relative to its place.
+Wall MakeWall(bool alike, const std::vector<Eigen::Vector2d>& extra_px, double sigma_m = 0) {
+  Random random(1);
+  Wall wall;
+  Features features;
+  Camera camera;
+  camera.width = camera.height = 600;
+  camera.model = CameraModel::kSimplePinhole;
+  camera.params = {400, 300, 300};
+  const auto look = RandomDescriptor(random);
+  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> looks;
+  std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> seen;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Eigen::Vector2d pixel(125 + 50 * (i % kSide), 125 + 50 * (i / kSide));
+    const Eigen::Vector2d ray = (pixel - Eigen::Vector2d(300, 300)) / 400;
+    wall.landmarks.idx.push_back(i);
+    wall.landmarks.landmarks.push_back({.position = {2 * ray.x(), 2 * ray.y(), 2},
+                                        .covariance = sigma_m * sigma_m * Eigen::Matrix3d::Identity()});
+    looks.push_back(alike ? look : RandomDescriptor(random));
+    std::vector<Eigen::Vector2d> places = {{0, 0}};
+    places.insert(places.end(), extra_px.begin(), extra_px.end());
+    for (const Eigen::Vector2d& place : places) {
+      features.keypoints.push_back(
+          {static_cast<float>(pixel.x() + place.x()), static_cast<float>(pixel.y() + place.y()), 2, 0});
+      seen.push_back(looks.back());
+    }
+  }
+  wall.landmarks.descriptors.resize(kSide * kSide, kDescriptorDim);
+  for (int i = 0; i < kSide * kSide; ++i) wall.landmarks.descriptors.row(i) = looks[i];
+  features.descriptors.resize(static_cast<Eigen::Index>(seen.size()), kDescriptorDim);
+  for (size_t i = 0; i < seen.size(); ++i) features.descriptors.row(static_cast<Eigen::Index>(i)) = seen[i];
+  wall.query = MakeQuery(std::move(features), camera, {});
+  return wall;
+}
+
+TEST(GuidedByChance, NothingWhereThingsLookLikeThemselves) {
+  const Wall wall = MakeWall(false, {});
+  EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
+  EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
+}
+
+TEST(GuidedByChance, IsTheMeanOfFourWays) {
+  // Looked for within 10 px, and beside their places 40 px away: at two of the four ways the same can be
+  // seen.
+  const Wall two = MakeWall(false, {{40, 0}, {0, -45}});
+  EXPECT_EQ(GuidedByChance(two.query, two.landmarks, {}, {}), kSide * kSide / 2.0);
+  const Wall four = MakeWall(false, {{40, 0}, {-40, 5}, {0, 40}, {3, -40}});
+  EXPECT_EQ(GuidedByChance(four.query, four.landmarks, {}, {}), kSide * kSide);
+  const Wall out_of_reach = MakeWall(false, {{51, 0}, {-28, 0}, {0, 51}, {0, -28}});
+  EXPECT_EQ(GuidedByChance(out_of_reach.query, out_of_reach.landmarks, {}, {}), 0);
+}
+
+TEST(GuidedByChance, WhereAllLooksAlikeAsManyAsThereAreBeside) {
+  // 50 px to the next: 40 px aside it is within reach, except beyond the last row or column.
+  const Wall wall = MakeWall(true, {});
+  EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
+  EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), kSide * (kSide - 1));
+}
+
+// A landmark that is looked for far around is looked for beside that: what is its own is not chance.
+TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
+  const Wall wall = MakeWall(false, {}, 0.1);  // 20 px: looked for within 61
+  EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
+  EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
+}
+
+TEST(Localizer, WhatIsFoundBesideItsPlaceAsOftenIsNoFix) {
+  // A map of a room whose every landmark appears a second time, 40 px to each side, in the image.
+  const SyntheticRoom room = MakeSyntheticRoom(3);
+  const auto map = Map::FromRows(room.rows);
+  const Pose truth = PoseAt({0.5, 0.3, 1.3}, 20);
+  const Features clean = RenderFeatures(room, truth, {}, 5);
+  LocalizerOptions options;
+  ASSERT_TRUE(Localizer(*map, options).LocalizeFeatures(clean, room.camera)->has_fix());
+  Random random(7);
+  Features repeated = clean;
+  const auto num = static_cast<Eigen::Index>(clean.keypoints.size());
+  repeated.descriptors.conservativeResize(5 * num, Eigen::NoChange);
+  int copy = 1;
+  for (const auto& [x, y] : std::vector<std::pair<float, float>>{{40, 0}, {-40, 0}, {0, 40}, {0, -40}}) {
+    for (const Keypoint& keypoint : clean.keypoints)
+      repeated.keypoints.push_back({keypoint.x + x, keypoint.y + y, keypoint.scale, keypoint.orientation});
+    for (Eigen::Index i = 0; i < num; ++i) {
+      // Alike, but less than the landmark itself.
+      auto look = NoisyDescriptor(clean.descriptors.row(i), random);
+      for (int more = 0; more < 3; ++more) look = NoisyDescriptor(look, random);
+      repeated.descriptors.row(copy * num + i) = look;
+    }
+    ++copy;
+  }
+  options.match.max_ratio = 1;  // else what stands there five times matches nothing
+  const auto refused = Localizer(*map, options).LocalizeFeatures(repeated, room.camera);
+  ASSERT_TRUE(refused.ok()) << refused.error().message;
+  EXPECT_FALSE(refused->has_fix());
+  EXPECT_EQ(refused->reason, NoFix::kTooFewInliers) << refused->message;
+  options.accept.min_guided_sigmas = 0;
+  EXPECT_TRUE(Localizer(*map, options).LocalizeFeatures(repeated, room.camera)->has_fix());
+}
+
+}  // namespace
+}  // namespace cairn
