@@ -354,9 +354,9 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
         BytesText(bytes), 100 * localized->second);
   };
   if (better != nullptr) {
-    advice->push_back({.text = "A map that localizes more is possible: " + text(*better)});
+    advice->insert(advice->begin(), {.text = "A map that localizes more is possible: " + text(*better)});
   } else if (smaller != nullptr) {
-    advice->push_back({.text = "A smaller map is enough: " + text(*smaller)});
+    advice->insert(advice->begin(), {.text = "A smaller map is enough: " + text(*smaller)});
   }
 }
 

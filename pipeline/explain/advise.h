@@ -35,7 +35,7 @@ inline constexpr double kPoorLocalizedRatio = 0.8;
 std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& about = {});
 
 // Adds advice from maps of other sizes of the same place: whether a smaller one is enough, or a larger one
-// localizes more.  `num_bytes` is the map's.
+// localizes more, before advice on places.  `num_bytes` is the map's.
 void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPoint>& sizes,
               std::vector<Advice>* advice);
 
