@@ -5,7 +5,6 @@
 #include <set>
 
 #include "core/base/printable.h"
-#include "core/blocks/map_blocks.h"
 #include "core/blocks/map_documents.h"
 #include "core/capture/sessions.h"
 #include "core/world/appearance.h"
@@ -83,8 +82,10 @@ Status CheckRegions(const MapRows& rows) {
     return Invalid("{} regions with a lower bound of {}, {} stations uncovered", rows.regions.size(),
                    rows.lower_bound.value_or(0), rows.uncovered_limit);
   }
-  if (static_cast<int64_t>(rows.regions.size()) >
-      kMaxRegionsPerStation * static_cast<int64_t>(rows.stations.size()))
+  // Each region has a station, or a place and heading of the promise, that no other one before it has.
+  if (const auto& promise = rows.findings.promise; promise && rows.regions.size() > promise->nodes.size())
+    return Invalid("{} regions of {} promises", rows.regions.size(), promise->nodes.size());
+  if (!rows.findings.promise && rows.regions.size() > rows.stations.size())
     return Invalid("{} regions of {} stations", rows.regions.size(), rows.stations.size());
   for (size_t i = 0; i < rows.regions.size(); ++i) {
     if (rows.regions[i].stations.empty()) return Invalid("region {} has no station", i);

@@ -79,48 +79,74 @@ double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, c
                    options.guided_radius_sigmas * options.guided_radius_sigmas * largest);
 }
 
-KeypointGrid GridFor(const Query& query, const MatchOptions& options) {
-  return KeypointGrid(query, std::max(8.0, options.guided_radius_px));
-}
+// A landmark where a pose puts it in the image, or beyond its edge.
+struct ProjectedLandmark {
+  size_t k = 0;  // position in the set
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double depth = 0;
+  double radius_px = 0;  // how far from there it is looked for
+};
 
-// Landmarks by the keypoints near their projections, moved by so many times the radius of the search.
-std::vector<Correspondence> MatchBeside(const Query& query, const KeypointGrid& grid,
-                                        const LandmarkSet& landmarks, const Pose& cam_from_world,
-                                        const Eigen::Vector2d& moved_in_radii, const MatchOptions& options) {
-  const double focal_px = query.camera.MeanFocal();
-  const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
-  // An angle between RootSIFT vectors of norm 512 as a dot product.
-  const double min_dot = kSquaredDescriptorNorm * std::cos(options.guided_max_angle_rad);
-  std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
-  for (size_t k = 0; k < landmarks.idx.size(); ++k) {
-    const LandmarkIdx landmark_idx = landmarks.idx[k];
-    const MapLandmark& landmark = landmarks.landmarks[k];
-    const Eigen::Vector3d point = cam_from_world * landmark.position;
-    const auto projected = ImageFromCamera(query.camera, point);
-    if (!projected) continue;
-    const double radius_px =
-        std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px);
-    const Eigen::Vector2d pixel = *projected + radius_px * moved_in_radii;
-    if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() > query.camera.width || pixel.y() > query.camera.height)
-      continue;
-    const uint8_t* descriptor = landmarks.descriptors.row(static_cast<Eigen::Index>(k)).data();
-    std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
-    grid.VisitNear(pixel, radius_px, [&](KeypointIdx i) {
-      if (!ScaleFits(query.features.keypoints[i], landmark, DepthOfScale(query.camera, point), focal_px,
-                     options.guided_max_scale_ratio))
-        return;
-      const int32_t dot = DescriptorDot(query.features.descriptors.row(i).data(), descriptor);
-      if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
-    });
-    if (best.second < 0 || best.first < min_dot) continue;
-    const auto [entry, inserted] =
-        best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
-    if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+// Looks for landmarks near their projections at a pose.
+class GuidedSearch {
+ public:
+  GuidedSearch(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+               const MatchOptions& options)
+      : query_(query),
+        landmarks_(landmarks),
+        options_(options),
+        grid_(query, std::max(8.0, options.guided_radius_px)) {
+    const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
+    const double focal_px = query.camera.MeanFocal();
+    for (size_t k = 0; k < landmarks.idx.size(); ++k) {
+      const MapLandmark& landmark = landmarks.landmarks[k];
+      const Eigen::Vector3d point = cam_from_world * landmark.position;
+      if (const auto pixel = ImageFromCamera(query.camera, point)) {
+        projected_.push_back(
+            {k, *pixel, DepthOfScale(query.camera, point),
+             std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px)});
+      }
+    }
   }
-  std::vector<Correspondence> correspondences;
-  for (const auto& [keypoint, match] : best_of_keypoint) correspondences.push_back({keypoint, match.second});
-  return correspondences;
-}
+
+  // Each as far beside its projection as so many times its radius, where that is in the image.
+  std::vector<Correspondence> Match(const Eigen::Vector2d& moved_in_radii) const {
+    const Camera& camera = query_.camera;
+    const double focal_px = camera.MeanFocal();
+    // An angle between RootSIFT vectors of norm 512 as a dot product.
+    const double min_dot = kSquaredDescriptorNorm * std::cos(options_.guided_max_angle_rad);
+    std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
+    for (const ProjectedLandmark& at : projected_) {
+      const Eigen::Vector2d pixel = at.pixel + at.radius_px * moved_in_radii;
+      if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() > camera.width || pixel.y() > camera.height) continue;
+      const uint8_t* descriptor = landmarks_.descriptors.row(static_cast<Eigen::Index>(at.k)).data();
+      std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
+      grid_.VisitNear(pixel, at.radius_px, [&](KeypointIdx i) {
+        if (!ScaleFits(query_.features.keypoints[i], landmarks_.landmarks[at.k], at.depth, focal_px,
+                       options_.guided_max_scale_ratio))
+          return;
+        const int32_t dot = DescriptorDot(query_.features.descriptors.row(i).data(), descriptor);
+        if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
+      });
+      if (best.second < 0 || best.first < min_dot) continue;
+      const LandmarkIdx landmark_idx = landmarks_.idx[at.k];
+      const auto [entry, inserted] =
+          best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
+      if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+    }
+    std::vector<Correspondence> correspondences;
+    for (const auto& [keypoint, match] : best_of_keypoint)
+      correspondences.push_back({keypoint, match.second});
+    return correspondences;
+  }
+
+ private:
+  const Query& query_;
+  const LandmarkSet& landmarks_;
+  const MatchOptions& options_;
+  KeypointGrid grid_;
+  std::vector<ProjectedLandmark> projected_;
+};
 
 }  // namespace
 
@@ -201,17 +227,17 @@ Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::v
 
 std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
                                         const Pose& cam_from_world, const MatchOptions& options) {
-  return MatchBeside(query, GridFor(query, options), landmarks, cam_from_world, {0, 0}, options);
+  return GuidedSearch(query, landmarks, cam_from_world, options).Match({0, 0});
 }
 
 double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
                       const MatchOptions& options) {
   constexpr double kRadii = 4;
-  const KeypointGrid grid = GridFor(query, options);
+  const GuidedSearch search(query, landmarks, cam_from_world, options);
   double sum = 0;
   for (const Eigen::Vector2d& aside : {Eigen::Vector2d(kRadii, 0), Eigen::Vector2d(-kRadii, 0),
                                        Eigen::Vector2d(0, kRadii), Eigen::Vector2d(0, -kRadii)}) {
-    sum += static_cast<double>(MatchBeside(query, grid, landmarks, cam_from_world, aside, options).size());
+    sum += static_cast<double>(search.Match(aside).size());
   }
   return sum / 4;
 }

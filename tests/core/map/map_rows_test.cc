@@ -180,8 +180,16 @@ TEST(MapRows, StationsAndRegionsThatMakeNoSenseAreRefused) {
   EXPECT_THAT(Refusal([](MapRows& r) { r.uncovered_limit = -1; }), HasSubstr("-1 stations uncovered"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.lower_bound = -1; }), HasSubstr("a lower bound of -1"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.lower_bound = 3; }), HasSubstr("2 regions with a lower bound of 3"));
-  EXPECT_THAT(Refusal([](MapRows& r) { r.regions.resize(3073, r.regions[0]); }),
-              HasSubstr("3073 regions of 3 stations"));
+  EXPECT_THAT(Refusal([](MapRows& r) {
+                r.findings.promise.reset();
+                r.regions.resize(4, r.regions[0]);
+              }),
+              HasSubstr("4 regions of 3 stations"));
+  EXPECT_THAT(Refusal([](MapRows& r) {
+                r.findings.promise = MapPromise{.nodes = std::vector<NodePromise>(3)};
+                r.regions.resize(4, r.regions[0]);
+              }),
+              HasSubstr("4 regions of 3 promises"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.regions[1].stations.clear(); }),
               HasSubstr("region 1 has no station"));
   EXPECT_THAT(Refusal([](MapRows& r) {
