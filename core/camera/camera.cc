@@ -136,12 +136,12 @@ Eigen::Vector3d BearingFromEquirectangular(const Camera& camera, const Eigen::Ve
 
 // Distorted coordinates in units of the focal length.
 std::optional<Eigen::Vector2d> DistortedFromCamera(const Camera& camera, const Eigen::Vector3d& p) {
-  const double off_axis = std::hypot(p.x(), p.y());
   if (IsPerspective(camera)) {
     if (!(p.z() > 0)) return std::nullopt;
     if (IsUndistorted(camera)) return p.hnormalized();
     return DistortionOf(camera).Apply(p.hnormalized());
   }
+  const double off_axis = std::hypot(p.x(), p.y());
   // Exactly behind the camera the direction off the axis is not defined.
   if (!p.allFinite() || (off_axis == 0 && !(p.z() > 0))) return std::nullopt;
   if (camera.model != CameraModel::kFov) {

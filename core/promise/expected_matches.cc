@@ -19,8 +19,8 @@ using FeatureVector = Eigen::Matrix<double, kNumMatchFeatures, 1>;
 
 // Sights weigh exp(-d^2 / 2 h^2), d = distance of views, h = this many views' radii.
 constexpr double kKernelWidth = 1.5;
-// Beyond this square of a distance sights weigh less than a ten thousandth: nothing.
-constexpr double kFarthestSquared = 2 * kKernelWidth * kKernelWidth * 9.2;
+// Less than a ten thousandth is nothing.
+constexpr double kLeastWeight = 1e-4;
 // A priori as good as this many matches.
 constexpr double kPriorWeight = 0.5;
 // Nothing is certain.
@@ -42,6 +42,9 @@ constexpr double kOctavesUnit = 0.5;
 // An image taken anywhere may find what this many of the survey's images nearest to it saw.
 constexpr size_t kMaxNumNearest = 32;
 
+// Of a sight from a view at this square of a distance.
+double WeightAt(double squared) { return std::exp(-squared / (2 * kKernelWidth * kKernelWidth)); }
+
 struct View {
   Pose cam_from_world;
   Eigen::Vector3d center;
@@ -51,7 +54,7 @@ struct View {
 
 class Learner {
  public:
-  Learner(const Classes& classes, const ViewOptions& options)
+  Learner(const Classes& classes, const ViewOptions& options, int num_threads)
       : classes_(classes), distance_(classes, options) {
     std::unordered_map<CameraId, const Camera*> cameras;
     for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
@@ -74,13 +77,11 @@ class Learner {
     }
     FindNear();
     if (views_.size() > kMaxImagesInTable) return;
-    squared_.resize(views_.size() * views_.size());
-    for (size_t a = 0; a < views_.size(); ++a) {
-      for (size_t b = 0; b <= a; ++b) {
-        const double squared = distance_.Squared(a, b);
-        squared_[a * views_.size() + b] = squared_[b * views_.size() + a] = static_cast<float>(squared);
-      }
-    }
+    weights_.resize(views_.size() * views_.size());
+    ParallelFor(static_cast<int64_t>(views_.size()), num_threads, [&](int64_t a) {
+      for (size_t b = 0; b < views_.size(); ++b)
+        weights_[a * views_.size() + b] = static_cast<float>(WeightAt(distance_.Squared(a, b)));
+    });
   }
 
   // Which sights of a class count, and from how far.
@@ -89,50 +90,61 @@ class Learner {
     kFromThere,     // all
     kFromNearby,    // all, and the image is taken about a view's radius farther away
   };
-  // The sights of a class: where those that look at it stand, and which of them see it.
+  // From where a class is seen.
+  struct Direction {
+    float log_distance;   // base 2
+    Eigen::Vector3f ray;  // unit vector from the class
+  };
+  Direction DirectionTo(size_t i, const Eigen::Vector3d& center) const {
+    const Eigen::Vector3d ray = center - classes_.classes[i].position;
+    const double distance = std::max(ray.norm(), kLeastDistance);
+    return {static_cast<float>(std::log2(distance)), (ray / distance).cast<float>()};
+  }
+  // The sights of a class: the images that look at it, those that see it first, ascending each.
   struct Lookers {
     std::vector<int32_t> images;
-    std::vector<char> sees;
-    std::vector<Eigen::Vector3d> rays;  // unit vectors from the class
-    std::vector<double> log_distances;  // base 2
+    std::vector<Direction> seen_from;  // of those that see it
   };
   Lookers LookersOf(size_t i) const {
     Lookers lookers;
     lookers.images = Looking(i);
-    for (const int32_t image : lookers.images) {
-      lookers.sees.push_back(std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image));
-      const Eigen::Vector3d ray = views_[image].center - classes_.classes[i].position;
-      const double distance = std::max(ray.norm(), kLeastDistance);
-      lookers.rays.push_back(ray / distance);
-      lookers.log_distances.push_back(std::log2(distance));
-    }
+    const auto sees = [&](int32_t image) {
+      return std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image);
+    };
+    const auto rest = std::stable_partition(lookers.images.begin(), lookers.images.end(), sees);
+    for (auto image = lookers.images.begin(); image != rest; ++image)
+      lookers.seen_from.push_back(DirectionTo(i, views_[*image].center));
     return lookers;
   }
 
-  // What is known of a class from the sights of it, for an image that sees it along `ray` at a distance.
-  // `squared(image)`: of the image's view to a survey image's.  False where no sight is left or all are far.
-  template <class SquaredDistance>
-  bool Describe(const Lookers& lookers, const Eigen::Vector3d& ray, double log_distance, double prior,
-                Sights which, const SquaredDistance& squared, FeatureVector* features) const {
+  // What is known of a class from the sights of it, for an image that looks at it from there.
+  // `weight(image)`: WeightAt of the image's view and a survey image's.  False where no sight is left or all
+  // are far.
+  template <class Weight>
+  bool Describe(const Lookers& lookers, const Direction& from, double prior, Sights which,
+                const Weight& weight_of, FeatureVector* features) const {
+    const double own_view = WeightAt(1), farther = which == Sights::kFromNearby ? WeightAt(1) : 1.0;
+    const double unit_rad = RadFromDeg(kAngleUnitDeg);
+    const size_t num_that_see = lookers.seen_from.size();
     double sum = 0, seen = 0, least = std::numeric_limits<double>::infinity(), nearest_deg = 180,
            nearest_octaves = 10;
     int num_seen = 0;
     for (size_t other = 0; other < lookers.images.size(); ++other) {
-      double d2 = squared(lookers.images[other]);
-      if (which == Sights::kOfOtherViews && d2 < 1) continue;
-      if (which == Sights::kFromNearby) d2 += 1;
-      const double weight = d2 < kFarthestSquared ? std::exp(-d2 / (2 * kKernelWidth * kKernelWidth)) : 0.0;
+      double weight = weight_of(lookers.images[other]);
+      if (which == Sights::kOfOtherViews && weight > own_view) continue;
+      weight *= farther;
+      if (weight < kLeastWeight) weight = 0;
       sum += weight;
-      if (!lookers.sees[other]) continue;
+      if (other >= num_that_see) continue;
       seen += weight;
       ++num_seen;
-      const double octaves = std::abs(log_distance - lookers.log_distances[other]);
+      const Direction& there = lookers.seen_from[other];
+      const double octaves = std::abs(from.log_distance - there.log_distance);
       const double octaves2 = octaves * octaves / (kOctavesUnit * kOctavesUnit);
-      const double cosine = std::clamp(ray.dot(lookers.rays[other]), -1.0, 1.0);
+      const double chord2 = (from.ray - there.ray).squaredNorm();
       // An angle is at least as long as its chord.
-      const double unit_rad = RadFromDeg(kAngleUnitDeg);
-      if (2 * (1 - cosine) / (unit_rad * unit_rad) + octaves2 >= least) continue;
-      const double angle_deg = DegFromRad(std::acos(cosine));
+      if (chord2 / (unit_rad * unit_rad) + octaves2 >= least) continue;
+      const double angle_deg = DegFromRad(2 * std::asin(std::min(1.0, std::sqrt(chord2) / 2)));
       const double far = angle_deg * angle_deg / (kAngleUnitDeg * kAngleUnitDeg) + octaves2;
       if (far < least) least = far, nearest_deg = angle_deg, nearest_octaves = octaves;
     }
@@ -140,8 +152,8 @@ class Learner {
       return false;
     if (which == Sights::kOfOtherViews && num_seen < 2) return false;
     if (which == Sights::kFromNearby) {
-      nearest_deg = std::hypot(nearest_deg, kShiftDeg);
-      nearest_octaves = std::hypot(nearest_octaves, kShiftLogRatio);
+      nearest_deg = std::sqrt(nearest_deg * nearest_deg + kShiftDeg * kShiftDeg);
+      nearest_octaves = std::sqrt(nearest_octaves * nearest_octaves + kShiftLogRatio * kShiftLogRatio);
     }
     const double rate =
         std::clamp((seen + kPriorWeight * prior) / (sum + kPriorWeight), kLeastRate, 1 - kLeastRate);
@@ -150,12 +162,14 @@ class Learner {
         static_cast<double>(num_seen) / static_cast<double>(lookers.images.size());
     return true;
   }
-  // For the j-th image that looks at it.
-  bool DescribeAtImage(const Lookers& lookers, size_t j, double prior, Sights which,
+  // For the j-th image that looks at class i.
+  bool DescribeAtImage(size_t i, const Lookers& lookers, size_t j, double prior, Sights which,
                        FeatureVector* features) const {
+    const int32_t image = lookers.images[j];
+    const Direction from =
+        j < lookers.seen_from.size() ? lookers.seen_from[j] : DirectionTo(i, views_[image].center);
     return Describe(
-        lookers, lookers.rays[j], lookers.log_distances[j], prior, which,
-        [&](int32_t other) { return Squared(lookers.images[j], other); }, features);
+        lookers, from, prior, which, [&](int32_t other) { return Weight(image, other); }, features);
   }
 
   const ViewDistance& distance() const { return distance_; }
@@ -168,8 +182,8 @@ class Learner {
   }
 
  private:
-  double Squared(int32_t a, int32_t b) const {
-    return squared_.empty() ? distance_.Squared(a, b) : squared_[a * views_.size() + b];
+  double Weight(int32_t a, int32_t b) const {
+    return weights_.empty() ? WeightAt(distance_.Squared(a, b)) : weights_[a * views_.size() + b];
   }
 
   // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
@@ -216,7 +230,7 @@ class Learner {
   const ViewDistance distance_;
   std::vector<View> views_;
   std::vector<std::vector<int32_t>> seen_by_;
-  std::vector<float> squared_;  // distances of all pairs; empty: too many images
+  std::vector<float> weights_;  // of all pairs; empty: too many images
 };
 
 // Maximum likelihood of logistic regression by Newton's method, with a weak pull to 0.
@@ -247,7 +261,7 @@ double Probability(const FeatureVector& weights, const FeatureVector& features) 
 class MatchModel::Impl {
  public:
   Impl(const Classes& classes, const ViewOptions& options, int num_threads)
-      : classes_(classes), learner_(classes, options), lookers_(classes.classes.size()) {
+      : classes_(classes), learner_(classes, options, num_threads), lookers_(classes.classes.size()) {
     const auto num_classes = static_cast<int64_t>(lookers_.size());
     ParallelFor(num_classes, num_threads, [&](int64_t i) { lookers_[i] = learner_.LookersOf(i); });
     seen_in_.resize(classes.images.size());
@@ -266,8 +280,8 @@ class MatchModel::Impl {
       const int64_t i = n * step;
       for (size_t j = 0; j < lookers_[i].images.size(); ++j) {
         FeatureVector features;
-        if (learner_.DescribeAtImage(lookers_[i], j, prior_, Learner::Sights::kOfOtherViews, &features))
-          learnt[i].emplace_back(features, lookers_[i].sees[j]);
+        if (learner_.DescribeAtImage(i, lookers_[i], j, prior_, Learner::Sights::kOfOtherViews, &features))
+          learnt[i].emplace_back(features, j < lookers_[i].seen_from.size());
       }
     });
     std::vector<FeatureVector> rows;
@@ -294,7 +308,7 @@ class MatchModel::Impl {
         FeatureVector features;
         const int32_t view = view_of_image[lookers_[i].images[j]];
         if (view < 0 ||
-            !learner_.DescribeAtImage(lookers_[i], j, prior_, Learner::Sights::kFromNearby, &features))
+            !learner_.DescribeAtImage(i, lookers_[i], j, prior_, Learner::Sights::kFromNearby, &features))
           continue;
         matches.of_class[i].push_back({view, static_cast<float>(Probability(weights_, features))});
       }
@@ -304,10 +318,11 @@ class MatchModel::Impl {
 
   std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, Where where) const {
     const size_t num_images = classes_.images.size();
-    std::vector<double> squared(num_images);
+    std::vector<double> squared(num_images), weights(num_images);
     std::vector<size_t> nearest(num_images);
     for (size_t image = 0; image < num_images; ++image) {
       squared[image] = distance().Squared(cam_from_world, image);
+      weights[image] = WeightAt(squared[image]);
       nearest[image] = image;
     }
     const size_t num_nearest = std::min(num_images, kMaxNumNearest);
@@ -325,12 +340,10 @@ class MatchModel::Impl {
     std::vector<ClassMatch> matches;
     for (const size_t i : candidates) {
       if (!learner_.IsInView(camera, cam_from_world, i)) continue;
-      const Eigen::Vector3d ray = center - classes_.classes[i].position;
-      const double distance_m = std::max(ray.norm(), kLeastDistance);
       FeatureVector features;
       if (learner_.Describe(
-              lookers_[i], ray / distance_m, std::log2(distance_m), prior_, which,
-              [&](int32_t image) { return squared[image]; }, &features))
+              lookers_[i], learner_.DirectionTo(i, center), prior_, which,
+              [&](int32_t image) { return weights[image]; }, &features))
         matches.push_back({i, static_cast<float>(Probability(weights_, features))});
     }
     return matches;

@@ -12,6 +12,8 @@ namespace {
 
 // Up to so many, sights are computed once and kept: 64 bytes each.
 constexpr size_t kMaxKeptSights = 1 << 24;
+// Far from underflow: a factor is 1e-12 at least.
+constexpr double kLeastProduct = 1e-200;
 
 }  // namespace
 
@@ -116,15 +118,19 @@ class LandmarkOrder::Impl {
   }
 
   double Gain(size_t n) const {
-    double gain = 0;
+    double gain = 0, ratio = 1;  // of the views' variances, multiplied: one logarithm for many
     WithSights(n, [&](const std::vector<Sight>& sights) {
       for (const Sight& sight : sights) {
         gain += sight.first_gain * lack_[sight.view];
-        if (sight.has_root)
-          gain += information_.PlaceGain({static_cast<size_t>(sight.view), sight.root.cast<double>()});
+        if (!sight.has_root) continue;
+        ratio *= information_.PlaceRatio(sight.view, sight.root.cast<double>());
+        if (ratio < kLeastProduct) {
+          gain -= std::log(ratio);
+          ratio = 1;
+        }
       }
     });
-    return gain;
+    return gain - std::log(ratio);
   }
 
   void Take(size_t n) {

@@ -36,8 +36,9 @@ std::optional<Eigen::Matrix<double, 2, 6>> LandmarkSights::Root(size_t i, const 
   const FeatureClass& feature_class = classes_.classes[i];
   const double distance = (cam_from_world * feature_class.position).norm();
   const double scale_px = distance > 0 ? size_rad_m_[i] * focal / distance : 0;
-  const double sigma_px =
-      std::hypot(errors_.sigma_px, errors_.sigma_per_scale * scale_px, feature_class.reprojection_error_px);
+  const Eigen::Vector3d sigmas_px(errors_.sigma_px, errors_.sigma_per_scale * scale_px,
+                                  feature_class.reprojection_error_px);
+  const double sigma_px = sigmas_px.norm();
   return InformationRoot(feature_class, cam_from_world, sigma_px / focal, probability);
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "core/geometry/vector_geometry.h"
@@ -13,6 +12,7 @@ namespace {
 
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
 using Matrix26d = Eigen::Matrix<double, 2, 6>;
+using Matrix62d = Eigen::Matrix<double, 6, 2>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // Nearer than this a landmark has no bearing, metres.
@@ -47,8 +47,7 @@ PoseInformation::PoseInformation(size_t num_views, double rough_sigma_m, double 
   Vector6d rough_sigma;
   rough_sigma << Eigen::Vector3d::Constant(RadFromDeg(rough_sigma_deg)),
       Eigen::Vector3d::Constant(rough_sigma_m);
-  const Vector6d variance = rough_sigma.cwiseAbs2();
-  views_.assign(num_views, {variance.cwiseInverse().asDiagonal(), variance.asDiagonal()});
+  covariances_.assign(num_views, rough_sigma.cwiseAbs2().asDiagonal());
 }
 
 PoseInformation PoseInformation::Rough(size_t num_views, double depth) {
@@ -56,7 +55,7 @@ PoseInformation PoseInformation::Rough(size_t num_views, double depth) {
 }
 
 double PoseInformation::PlaceVariance(size_t view) const {
-  return views_[view].covariance.bottomRightCorner<3, 3>().trace();
+  return covariances_[view].bottomRightCorner<3, 3>().trace();
 }
 
 double PoseInformation::DeterminantGain(const std::vector<SightInformation>& sights) const {
@@ -64,28 +63,36 @@ double PoseInformation::DeterminantGain(const std::vector<SightInformation>& sig
   for (const SightInformation& sight : sights) {
     // det(A + R' R) = det(A) det(1 + R A^-1 R')
     const Eigen::Matrix2d factor =
-        Eigen::Matrix2d::Identity() + sight.root * views_[sight.view].covariance * sight.root.transpose();
+        Eigen::Matrix2d::Identity() + sight.root * covariances_[sight.view] * sight.root.transpose();
     gain += std::log(std::max(1.0, factor.determinant()));
   }
   return gain;
 }
 
-double PoseInformation::PlaceGain(const SightInformation& sight) const {
-  // (A + R' R)^-1 = C - C R' (1 + R C R')^-1 R C, C = A^-1
-  const Matrix6d& covariance = views_[sight.view].covariance;
-  const Eigen::Matrix<double, 6, 2> product = covariance * sight.root.transpose();
-  const Eigen::Matrix2d factor = Eigen::Matrix2d::Identity() + sight.root * product;
-  const Eigen::Matrix<double, 3, 2> of_place = product.bottomRows<3>();
-  const double fall = (of_place * factor.inverse() * of_place.transpose()).trace();
-  const double trace = PlaceVariance(sight.view);
-  return fall <= 0 ? 0 : -std::log1p(-std::min(fall / trace, 1 - 1e-12));
+// (A + R' R)^-1 = C - C R' F^-1 R C,   F = 1 + R C R',   C = A^-1 [Woodbury].
+
+double PoseInformation::PlaceRatio(size_t view, const Matrix26d& root) const {
+  // By columns: landmarks are put into their order in the time that this takes.
+  const Matrix6d& c = covariances_[view];
+  const auto product_with = [&](int row) -> Vector6d {
+    return c.col(0) * root(row, 0) + c.col(1) * root(row, 1) + c.col(2) * root(row, 2) +
+           c.col(3) * root(row, 3) + c.col(4) * root(row, 4) + c.col(5) * root(row, 5);
+  };
+  const Vector6d a = product_with(0), b = product_with(1);
+  const Vector6d row_a = root.row(0), row_b = root.row(1);
+  const double f00 = 1 + row_a.dot(a), f01 = row_a.dot(b), f11 = 1 + row_b.dot(b);
+  const double s00 = a.tail<3>().squaredNorm(), s01 = a.tail<3>().dot(b.tail<3>()),
+               s11 = b.tail<3>().squaredNorm();
+  const double fall = (f11 * s00 - 2 * f01 * s01 + f00 * s11) / (f00 * f11 - f01 * f01);
+  return 1 - std::clamp(fall / PlaceVariance(view), 0.0, 1 - 1e-12);
 }
 
 void PoseInformation::Add(const std::vector<SightInformation>& sights) {
   for (const SightInformation& sight : sights) {
-    View& view = views_[sight.view];
-    view.information += sight.root.transpose() * sight.root;
-    view.covariance = view.information.inverse();
+    Matrix6d& covariance = covariances_[sight.view];
+    const Matrix62d product = covariance * sight.root.transpose();
+    const Eigen::Matrix2d factor = Eigen::Matrix2d::Identity() + sight.root * product;
+    covariance -= product * factor.inverse() * product.transpose();
   }
 }
 

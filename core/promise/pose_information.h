@@ -42,20 +42,15 @@ class PoseInformation {
 
   // What a landmark would add to the sum over views of log det A_v; >= 0.
   double DeterminantGain(const std::vector<SightInformation>& sights) const;
-  // By what one sight of it would make the logarithm of the trace of the place's covariance in its view
-  // smaller; >= 0.
-  double PlaceGain(const SightInformation& sight) const;
+  // The part of the trace of the place's covariance in its view that one sight of it would leave; in (0, 1].
+  double PlaceRatio(size_t view, const Eigen::Matrix<double, 2, 6>& root) const;
   void Add(const std::vector<SightInformation>& sights);
   // Trace of the covariance of the camera's place, m^2.
   double PlaceVariance(size_t view) const;
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
-  struct View {
-    Matrix6d information;  // A_v
-    Matrix6d covariance;   // its inverse
-  };
-  std::vector<View> views_;
+  std::vector<Matrix6d> covariances_;  // per view, the inverse of A_v
 };
 
 }  // namespace cairn

@@ -14,14 +14,15 @@ constexpr double kMetTolerance = 1e-6;
 // The subgradient's step: halved when the bound has not grown for so many iterations.
 constexpr int kPatience = 15;
 constexpr int kIterationsPerCover = 100;
-// Bodies of ParallelFor take this many classes or nodes at a time.
-constexpr int64_t kChunk = 1024;
+// Bodies of ParallelFor take so many at a time.
+constexpr int64_t kClassesAtOnce = 1024;
+constexpr int64_t kNodesAtOnce = 64;
 
 template <class Body>
-void ForChunks(size_t num, int num_threads, const Body& body) {
+void ForChunks(size_t num, int64_t at_once, int num_threads, const Body& body) {
   const auto count = static_cast<int64_t>(num);
-  ParallelFor((count + kChunk - 1) / kChunk, num_threads, [&](int64_t chunk) {
-    for (int64_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) body(i);
+  ParallelFor((count + at_once - 1) / at_once, num_threads, [&](int64_t chunk) {
+    for (int64_t i = chunk * at_once; i < std::min(count, (chunk + 1) * at_once); ++i) body(i);
   });
 }
 
@@ -127,6 +128,7 @@ class Dual {
       : problem_(problem),
         num_threads_(num_threads),
         worth_(problem.of_class->size()),
+        pays_(problem.of_class->size()),
         first_(problem.demands.size() + 1, 0) {
     for (const std::vector<ExpectedMatch>& matches : *problem.of_class) {
       for (const ExpectedMatch& match : matches) ++first_[match.view + 1];
@@ -142,19 +144,20 @@ class Dual {
 
   // The bound that prices prove, and its subgradient.
   double Evaluate(const std::vector<double>& prices, std::vector<double>* gradient) {
-    ForChunks(worth_.size(), num_threads_, [&](int64_t i) {
+    ForChunks(worth_.size(), kClassesAtOnce, num_threads_, [&](int64_t i) {
       double worth = 0;
       for (const ExpectedMatch& match : (*problem_.of_class)[i])
         worth += match.probability * prices[match.view];
       worth_[i] = worth;
+      pays_[i] = worth > 1 ? 1 : 0;
     });
     double bound = 0;
     for (size_t v = 0; v < prices.size(); ++v) bound += problem_.demands[v] * prices[v];
     for (const double worth : worth_) bound -= std::max(0.0, worth - 1);
-    ForChunks(prices.size(), num_threads_, [&](int64_t v) {
+    ForChunks(prices.size(), kNodesAtOnce, num_threads_, [&](int64_t v) {
       double rest = problem_.demands[v];
       for (size_t n = first_[v]; n < first_[v + 1]; ++n)
-        rest -= worth_[of_node_[n].i] > 1 ? of_node_[n].probability : 0;
+        rest -= pays_[of_node_[n].i] != 0 ? of_node_[n].probability : 0;
       (*gradient)[v] = rest;
     });
     return bound;
@@ -184,6 +187,7 @@ class Dual {
   const CoverProblem& problem_;
   int num_threads_;
   std::vector<double> worth_;
+  std::vector<char> pays_;  // whether it is worth more than 1
   struct Entry {
     int32_t i;  // class
     float probability;

@@ -11,6 +11,7 @@ namespace {
 
 // A node is next to the nodes nearest to it.
 constexpr size_t kNumNeighbours = 8;
+constexpr int32_t kNoNode = -1;
 // Demands count as met when this little is lacking: probabilities are sums of floats.
 constexpr double kMetTolerance = 1e-6;
 
@@ -47,15 +48,11 @@ class Divider {
       : problem_(problem),
         keep_(keep),
         max_landmarks_(max_landmarks),
-        kept_of_class_(*problem.of_class),
         of_node_(problem.demands.size()),
         is_divided_(problem.demands.size(), 0) {
     for (size_t i = 0; i < keep.size(); ++i) {
-      if (keep[i] == 0) {
-        kept_of_class_[i].clear();
-        continue;
-      }
-      for (const ExpectedMatch& match : kept_of_class_[i])
+      if (keep[i] == 0) continue;
+      for (const ExpectedMatch& match : (*problem.of_class)[i])
         of_node_[match.view].push_back({i, match.probability});
     }
   }
@@ -65,29 +62,30 @@ class Divider {
   PromiseRegion GrowFrom(int32_t seed, const std::vector<std::vector<int32_t>>& neighbours) {
     PromiseRegion region;
     Restart({});
-    std::optional<int32_t> next = seed;
+    int32_t next = seed;
     std::vector<int32_t> border;
-    while (next) {
+    while (next != kNoNode) {
       const std::vector<size_t> before = region.classes;
-      const std::vector<size_t> extra = ExtraFor(*next);
+      const std::vector<size_t> extra = ExtraFor(next);
       region.classes.insert(region.classes.end(), extra.begin(), extra.end());
-      region.nodes.push_back(*next);
-      if (region.classes.size() > max_landmarks_) region.classes = CoverOf(region.nodes);
-      if (region.nodes.size() > 1 && region.classes.size() > max_landmarks_) {
-        region.nodes.pop_back();
-        region.classes = before;
-        Restart(before);
-        break;
+      region.nodes.push_back(next);
+      if (region.classes.size() > max_landmarks_) {
+        region.classes = CoverOf(region.nodes);
+        if (region.nodes.size() > 1 && region.classes.size() > max_landmarks_) {
+          region.nodes.pop_back();
+          region.classes = before;
+          break;
+        }
+        Restart(region.classes);
       }
-      Restart(region.classes);
-      is_divided_[*next] = 1;
-      for (const int32_t node : neighbours[*next]) border.push_back(node);
+      is_divided_[next] = 1;
+      for (const int32_t node : neighbours[next]) border.push_back(node);
       std::sort(border.begin(), border.end());
       border.erase(std::unique(border.begin(), border.end()), border.end());
       std::erase_if(border, [&](int32_t node) { return IsDivided(node); });
-      next.reset();
+      next = kNoNode;
       for (const int32_t node : border) {
-        if (!next || Lack(node) < Lack(*next)) next = node;
+        if (next == kNoNode || Lack(node) < Lack(next)) next = node;
       }
     }
     return region;
@@ -171,10 +169,27 @@ class Divider {
 
   // A small cover of these nodes alone.
   std::vector<size_t> CoverOf(const std::vector<int32_t>& nodes) const {
-    CoverProblem problem{.of_class = &kept_of_class_};
-    problem.demands.assign(problem_.demands.size(), 0);
-    for (const int32_t node : nodes) problem.demands[node] = problem_.demands[node];
-    return CoverFast(problem);
+    std::vector<size_t> num_sights(keep_.size(), 0);
+    for (const int32_t node : nodes) {
+      for (const auto& [i, probability] : of_node_[node]) ++num_sights[i];
+    }
+    std::vector<size_t> classes, place(keep_.size());
+    for (size_t i = 0; i < num_sights.size(); ++i) {
+      if (num_sights[i] == 0) continue;
+      place[i] = classes.size();
+      classes.push_back(i);
+    }
+    std::vector<std::vector<ExpectedMatch>> of_class(classes.size());
+    for (size_t n = 0; n < classes.size(); ++n) of_class[n].reserve(num_sights[classes[n]]);
+    CoverProblem problem{.of_class = &of_class};
+    for (size_t n = 0; n < nodes.size(); ++n) {
+      problem.demands.push_back(problem_.demands[nodes[n]]);
+      for (const auto& [i, probability] : of_node_[nodes[n]])
+        of_class[place[i]].push_back({static_cast<int32_t>(n), probability});
+    }
+    std::vector<size_t> cover = CoverFast(problem);
+    for (size_t& i : cover) i = classes[i];
+    return cover;
   }
 
   // A region that grows gets another.
@@ -182,24 +197,42 @@ class Divider {
     return {region.nodes[0], region.nodes.size()};
   }
 
+  // Of what the node and those not yet divided lack, how much a class would meet.
+  double GainFor(int32_t node, size_t i) const {
+    double gain = 0;
+    for (const ExpectedMatch& match : (*problem_.of_class)[i]) {
+      if (match.view == node || is_divided_[match.view] == 0)
+        gain += std::clamp<double>(lacking_[match.view], 0, match.probability);
+    }
+    return gain;
+  }
+
   // Takes the landmarks that the node lacks: those first that meet most of what nodes around it lack, too.
+  // Gains never grow: an earlier one is a bound.
   std::vector<size_t> ExtraFor(int32_t node) {
     std::vector<size_t> extra;
-    while (lacking_[node] > kMetTolerance) {
-      double most = 0;
-      std::optional<size_t> best;
-      for (const auto& [i, probability] : of_node_[node]) {
-        if (is_in_[i] != 0) continue;
-        double gain = 0;
-        for (const ExpectedMatch& match : (*problem_.of_class)[i]) {
-          if (match.view == node || is_divided_[match.view] == 0)
-            gain += std::clamp<double>(lacking_[match.view], 0, match.probability);
-        }
-        if (gain > most) most = gain, best = i;
+    if (!(lacking_[node] > kMetTolerance)) return extra;
+    using Candidate = std::pair<double, size_t>;  // a bound of its gain; class
+    const auto worse = [](const Candidate& a, const Candidate& b) {
+      return a.first != b.first ? a.first < b.first : a.second > b.second;
+    };
+    std::vector<Candidate> heap;
+    for (const auto& [i, probability] : of_node_[node]) {
+      if (is_in_[i] == 0) heap.emplace_back(GainFor(node, i), i);
+    }
+    std::make_heap(heap.begin(), heap.end(), worse);
+    while (!heap.empty() && lacking_[node] > kMetTolerance) {
+      std::pop_heap(heap.begin(), heap.end(), worse);
+      heap.back().first = GainFor(node, heap.back().second);
+      if (worse(heap.back(), heap.front())) {
+        std::push_heap(heap.begin(), heap.end(), worse);
+        continue;
       }
-      if (!best) break;
-      Take(*best);
-      extra.push_back(*best);
+      const auto [gain, i] = heap.back();
+      heap.pop_back();
+      if (!(gain > 0)) break;
+      Take(i);
+      extra.push_back(i);
     }
     return extra;
   }
@@ -207,7 +240,6 @@ class Divider {
   const CoverProblem& problem_;
   const std::vector<char>& keep_;
   size_t max_landmarks_;
-  std::vector<std::vector<ExpectedMatch>> kept_of_class_;
   std::vector<std::vector<std::pair<size_t, float>>> of_node_;
   std::vector<char> is_divided_;
   std::vector<double> lacking_;  // per node, of the region that grows

@@ -38,7 +38,8 @@ class KeypointGrid {
            col <= Clamp(pixel.x() + radius_px, num_columns_); ++col) {
         for (const KeypointIdx i : cells_[static_cast<size_t>(row) * num_columns_ + col]) {
           const Keypoint& keypoint = query_.features.keypoints[i];
-          if (std::hypot(keypoint.x - pixel.x(), keypoint.y - pixel.y()) <= radius_px) visit(i);
+          const double dx = keypoint.x - pixel.x(), dy = keypoint.y - pixel.y();
+          if (dx * dx + dy * dy <= radius_px * radius_px) visit(i);
         }
       }
     }

@@ -234,7 +234,7 @@ PromiseOptions PromiseOptionsOf(const EmitMapOptions& options) {
 // The rows of the map with the landmarks that trials choose, and what they found.
 Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& arguments, const Inputs& inputs,
                                                         const CommandEnvironment& environment) {
-  EmitMapOptions options = arguments.options;
+  const EmitMapOptions& options = arguments.options;
   if (arguments.matches_path.empty()) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -248,12 +248,13 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
   const Promises* promises = nullptr;
   const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
                             int descriptor_bits) -> Result<MapRows> {
-    options.descriptor_bits = descriptor_bits;
     const bool is_whole = classes.images.size() == inputs.classes.images.size();
-    options.visual_map = arguments.options.visual_map && is_whole;
+    EmitMapOptions of_this = options;
+    of_this.descriptor_bits = descriptor_bits;
+    of_this.visual_map = options.visual_map && is_whole;
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                            MakeRows(inputs, classes, is_whole ? inputs.parts : PartsOf(classes, inputs.parts),
-                                    options, &keep, promises, environment.num_threads));
+                                    of_this, &keep, promises, environment.num_threads));
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep, reason), inputs, &rows));
     return rows;
   };

@@ -206,9 +206,9 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
                     .descriptor_bits = options.descriptor_bits};
   const std::vector<size_t> sizes = Ladder(classes.classes.size());
   const std::vector<int> bits_to_try = FewestBitsFirst(options.descriptor_bits);
-  const auto num_halvings = static_cast<int64_t>(std::ceil(std::log2(sizes.size())));
-  progress.Begin("trying how few landmarks will do",
-                 static_cast<int64_t>(kMaxNumRounds + bits_to_try.size()) + num_halvings + 1, "steps");
+  const auto num_halvings = static_cast<int64_t>(std::ceil(std::log2(sizes.size() + 1)));
+  progress.Begin("trying how few landmarks will do", static_cast<int64_t>(kMaxNumRounds) + num_halvings + 2,
+                 "steps");
   Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, options.max_num_left_out,
                                        options.limits, emit, num_threads, progress);
   if (!trials.ok()) {
@@ -234,13 +234,10 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   };
   size_t num_kept = classes.classes.size();
   for (const int bits : bits_to_try) {
-    // All of them in the most bits will do.  More landmarks hardly ever do worse: the fewest by bisection.
-    size_t too_few = 0, enough = sizes.size() - 1;  // below `too_few` none will do
-    if (bits < options.descriptor_bits) {
-      CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, attempt(sizes.back(), bits));
-      if (!will_do(trial)) continue;
-      fitted.trial = trial;
-    }
+    // More landmarks hardly ever do worse: the fewest by bisection.  All of them in the most bits will do; in
+    // fewer bits perhaps none.
+    const bool is_most = bits == options.descriptor_bits;
+    size_t too_few = 0, enough = sizes.size() - (is_most ? 1 : 0);  // below `too_few` none will do
     while (too_few < enough) {
       const size_t middle = (too_few + enough) / 2;
       CAIRN_ASSIGN_OR_RETURN(const LeftOutTrial trial, attempt(sizes[middle], bits));
@@ -251,6 +248,7 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
         too_few = middle + 1;
       }
     }
+    if (enough == sizes.size()) continue;
     num_kept = sizes[enough];
     fitted.descriptor_bits = bits;
     break;

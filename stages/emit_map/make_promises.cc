@@ -18,7 +18,7 @@ namespace {
 constexpr double kReachableRatio = 0.9;
 
 // The bound is then within a hundredth of the best that the dual can prove.
-constexpr int kBoundIterations = 200;
+constexpr int kBoundIterations = 150;
 
 std::vector<PromiseOutcome> Outcomes(const std::vector<PromiseTrial>& fared, const PromiseModel& model,
                                      const PromiseTerms& terms) {

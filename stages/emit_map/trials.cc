@@ -1,5 +1,6 @@
 #include "stages/emit_map/trials.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
@@ -37,47 +38,66 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
                             Progress& progress) {
   Trials trials(emit, limits, num_threads);
   CAIRN_ASSIGN_OR_RETURN(const auto rounds, ChooseLeftOut(classes, max_num_left_out));
-  for (const LeftOutImages& round : rounds) {
+  trials.parts_.resize(rounds.size());
+  CAIRN_RETURN_IF_ERROR(trials.ForParts([&](Part& part, size_t round, int threads) -> Status {
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
-    CAIRN_ASSIGN_OR_RETURN(LeftOutSurvey left_out, LeaveOutImages(classes, matches_path, round));
+    CAIRN_ASSIGN_OR_RETURN(LeftOutSurvey left_out, LeaveOutImages(classes, matches_path, rounds[round]));
     // The survey stays where it is: what is learnt from it refers to it.
-    auto survey = std::make_unique<LeftOutSurvey>(std::move(left_out));
-    const MatchModel model(survey->classes, {}, num_threads);
-    std::vector<size_t> pool = PoolIn(*survey, classes, may_keep);
-    std::vector<std::vector<ClassMatch>> matches(survey->images.size());
-    ParallelFor(static_cast<int64_t>(matches.size()), num_threads, [&](int64_t i) {
-      matches[i] =
-          model.At(survey->images[i].camera, survey->images[i].cam_from_world, MatchModel::Where::kThere);
+    part.survey = std::make_unique<LeftOutSurvey>(std::move(left_out));
+    const LeftOutSurvey& survey = *part.survey;
+    const MatchModel model(survey.classes, {}, threads);
+    part.pool = PoolIn(survey, classes, may_keep);
+    part.matches.resize(survey.images.size());
+    ParallelFor(static_cast<int64_t>(part.matches.size()), threads, [&](int64_t i) {
+      part.matches[i] =
+          model.At(survey.images[i].camera, survey.images[i].cam_from_world, MatchModel::Where::kThere);
     });
-    LandmarkOrder order(survey->classes, model.OfViews(num_threads), pool, {}, num_threads);
-    LandmarkSights sights(survey->classes, KeypointErrors());
-    trials.parts_.push_back({std::move(survey), std::move(pool), std::move(order), std::move(sights),
-                             model.distance().depth(), std::move(matches)});
+    part.order.emplace(survey.classes, model.OfViews(threads), part.pool, LandmarkOrderOptions(), threads);
+    part.sights.emplace(survey.classes, KeypointErrors());
+    part.depth = model.distance().depth();
     progress.Advance();
-  }
+    return Ok();
+  }));
   progress.Advance(static_cast<int64_t>(kMaxNumRounds - rounds.size()));
   return trials;
 }
 
+Status Trials::ForParts(const std::function<Status(Part&, size_t, int)>& body) {
+  const size_t num_threads = NumThreads(num_threads_);
+  const size_t num_parts = std::max<size_t>(1, parts_.size());
+  const auto threads_each = static_cast<int>((num_threads + num_parts - 1) / num_parts);
+  std::vector<Status> statuses(parts_.size());
+  ParallelFor(static_cast<int64_t>(parts_.size()), num_threads_,
+              [&](int64_t i) { statuses[i] = body(parts_[i], i, threads_each); });
+  for (const Status& status : statuses) CAIRN_RETURN_IF_ERROR(status);
+  return Ok();
+}
+
 Result<LeftOutTrial> Trials::Try(size_t n, int descriptor_bits) {
-  LeftOutTrial sum;
-  for (Part& part : parts_) {
+  std::vector<LeftOutTrial> of_parts(parts_.size());
+  std::vector<std::vector<PromiseTrial>> fared(parts_.size());
+  CAIRN_RETURN_IF_ERROR(ForParts([&](Part& part, size_t p, int threads) -> Status {
     const Classes& classes = part.survey->classes;
     const std::vector<TrialImage>& images = part.survey->images;
     const std::vector<char> keep =
-        MarkThese(n < part.pool.size() ? part.order.First(n) : part.pool, classes.classes.size());
-    LeftOutTrial trial;
+        MarkThese(n < part.pool.size() ? part.order->First(n) : part.pool, classes.classes.size());
+    LeftOutTrial& trial = of_parts[p];
     trial.images.resize(images.size());
     if (!part.pool.empty()) {
       CAIRN_ASSIGN_OR_RETURN(MapRows rows, (*emit_)(classes, keep, descriptor_bits));
-      CAIRN_ASSIGN_OR_RETURN(trial, TryLeftOutImages(std::move(rows), images, limits_, num_threads_));
+      CAIRN_ASSIGN_OR_RETURN(trial, TryLeftOutImages(std::move(rows), images, limits_, threads));
     }
     for (size_t i = 0; i < images.size(); ++i) {
-      fared_.push_back({ExpectationOf(part.sights, part.matches[i], keep, images[i].cam_from_world,
-                                      images[i].camera.MeanFocal(), part.depth),
-                        trial.images[i].is_right, trial.images[i].num_inliers, trial.images[i].error_m});
+      fared[p].push_back({ExpectationOf(*part.sights, part.matches[i], keep, images[i].cam_from_world,
+                                        images[i].camera.MeanFocal(), part.depth),
+                          trial.images[i].is_right, trial.images[i].num_inliers, trial.images[i].error_m});
     }
-    sum.Add(trial);
+    return Ok();
+  }));
+  LeftOutTrial sum;
+  for (size_t p = 0; p < parts_.size(); ++p) {
+    sum.Add(of_parts[p]);
+    fared_.insert(fared_.end(), fared[p].begin(), fared[p].end());
   }
   return sum;
 }

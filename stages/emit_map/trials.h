@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,8 @@
 namespace cairn::emit_map {
 
 // Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these) and
-// this many bits per descriptor value: EmitMap and all that is added to a map after it.
+// this many bits per descriptor value: EmitMap and all that is added to a map after it.  Called from several
+// threads at once.
 using EmitKept = std::function<Result<MapRows>(const Classes& classes, const std::vector<char>& keep,
                                                int descriptor_bits)>;
 
@@ -48,14 +50,17 @@ class Trials {
   struct Part {
     std::unique_ptr<LeftOutSurvey> survey;
     std::vector<size_t> pool;
-    LandmarkOrder order;
-    LandmarkSights sights;
-    double depth;
+    std::optional<LandmarkOrder> order;
+    std::optional<LandmarkSights> sights;
+    double depth = 0;
     std::vector<std::vector<ClassMatch>> matches;  // per tried image
   };
 
   Trials(const EmitKept& emit, const LeftOutLimits& limits, int num_threads)
       : emit_(&emit), limits_(limits), num_threads_(num_threads) {}
+
+  // Several parts at once, each with its share of the threads; the first part's error.
+  Status ForParts(const std::function<Status(Part& part, size_t p, int num_threads)>& body);
 
   const EmitKept* emit_;
   LeftOutLimits limits_;

@@ -89,7 +89,7 @@ TEST(PoseInformation, GainsAreThoseOfTheMatrices) {
       sights.push_back({view, *root});
       const Matrix6d more = matrices[view] + root->transpose() * *root;
       determinant_gain += std::log(more.determinant() / matrices[view].determinant());
-      EXPECT_NEAR(information.PlaceGain(sights.back()), std::log(trace(matrices[view]) / trace(more)), 1e-8);
+      EXPECT_NEAR(information.PlaceRatio(view, *root), trace(more) / trace(matrices[view]), 1e-8);
       matrices[view] = more;
     }
     EXPECT_NEAR(information.DeterminantGain(sights), determinant_gain, 1e-7);
@@ -100,7 +100,7 @@ TEST(PoseInformation, GainsAreThoseOfTheMatrices) {
 TEST(PoseInformation, WhatSaysNothingGainsNothing) {
   PoseInformation information(1, 1, 30);
   const SightInformation none{0, Eigen::Matrix<double, 2, 6>::Zero()};
-  EXPECT_EQ(information.PlaceGain(none), 0);
+  EXPECT_EQ(information.PlaceRatio(0, none.root), 1);
   EXPECT_EQ(information.DeterminantGain({none}), 0);
 }
 
