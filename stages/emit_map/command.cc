@@ -189,9 +189,10 @@ std::string RecallText(const FittedSize& fitted) {
   if (fitted.trial_of_all.NumTried() == 0) return "no survey image was left out to try it on";
   return fmt::format(
       "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
-      "everything",
+      "everything, image by image {:.2f} times as large",
       fitted.trial.NumTried(), fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
-      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM());
+      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM(),
+      ErrorRatio(fitted.trial, fitted.trial_of_all));
 }
 
 std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const EmitMapOptions& options) {

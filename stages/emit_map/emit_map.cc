@@ -299,7 +299,8 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .max = 1},
       {.name = "max_error_ratio",
        .value = &options->max_error_ratio,
-       .help = "fewest landmarks: largest growth of the median error of left-out images",
+       .help = "fewest landmarks: how many times as large errors of left-out images may be as with all of "
+               "them, geometric mean",
        .min = 1},
       {.name = "promise_matches",
        .value = &options->promise_matches,

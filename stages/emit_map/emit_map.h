@@ -35,9 +35,9 @@ struct EmitMapOptions {
   double left_out_max_error_m = 0.1;
   double left_out_max_error_deg = 5;
   // "fewest": of the left-out images that all landmarks localize, the part that must stay localized, and the
-  // largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
+  // largest growth of their errors, a geometric mean.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.35;
+  double max_error_ratio = 1.25;
   // What maps promise whose landmarks are chosen by trial, at every place and heading of the survey: that
   // with this probability, so many landmarks are matched and the pose is within the limits above
   // (core/promise). REQUIRES: >= 1; in (0, 1)

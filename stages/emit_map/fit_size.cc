@@ -20,7 +20,7 @@ constexpr double kClearMargin = 0.03;
 constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
 // ChooseFewest tries numbers of landmarks that grow by this factor.
-constexpr double kLadderFactor = 1.2;
+constexpr double kLadderFactor = 1.12;
 constexpr double kFewestLandmarks = 50;
 // Placeholders for figures of the self-test, which are added later: more than check_map has, with
 // longer names.
@@ -230,7 +230,7 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   }
   const auto will_do = [&](const LeftOutTrial& trial) {
     return trial.NumRight() >= options.min_recall_ratio * fitted.trial_of_all.NumRight() &&
-           trial.MedianErrorM() <= options.max_error_ratio * fitted.trial_of_all.MedianErrorM();
+           ErrorRatio(trial, fitted.trial_of_all) <= options.max_error_ratio;
   };
   size_t num_kept = classes.classes.size();
   for (const int bits : bits_to_try) {

@@ -25,9 +25,9 @@ struct FitSizeOptions {
   size_t max_num_left_out = 48;
   LeftOutLimits limits;
   // ChooseFewest: of the left-out images that the map of everything localizes, the part that must stay
-  // localized, and the largest growth of their median error.  REQUIRES: in [0, 1]; >= 1
+  // localized, and the largest growth of their errors (ErrorRatio).  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.35;
+  double max_error_ratio = 1.25;
   PromiseOptions promise;
 };
 
@@ -57,9 +57,9 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
 
 // The fewest landmarks with which left-out images are localized as often and nearly as well as with all of
 // them (min_recall_ratio, max_error_ratio), in the fewest bits that allow it, and what else it takes to keep
-// the promise at every node.  All, untried, where the survey
-// is too small to try anything: fewer than twelve images, or fewer than `kMinNumRight` left-out ones that the
-// map of everything localizes.  Errors: those of LeaveOutImages and `emit`; Cancelled.
+// the promise at every node.  All, untried, where the survey is too small to try anything: fewer than twelve
+// images, or fewer than `kMinNumRight` left-out ones that the map of everything localizes.  Errors: those of
+// LeaveOutImages and `emit`; Cancelled.
 inline constexpr int kMinNumRight = 8;
 Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& matches_path, const EmitKept& emit,
                                 const FitSizeOptions& options, int num_threads, Progress& progress);

@@ -79,6 +79,12 @@ struct LeftOutTrial {
   double MeanMargin() const;
   double MedianErrorM() const;  // of those localized right; 0 where there are none
 };
+
+// How many times as large the errors of `trial` are as those of `reference`, on the same images in the same
+// order: the geometric mean over the images that both localize right; 1 where there are none.  Unlike a ratio
+// of medians, it changes by little where few images change.
+double ErrorRatio(const LeftOutTrial& trial, const LeftOutTrial& reference);
+
 struct LeftOutLimits {
   double max_error_m = 0.1;
   double max_error_deg = 5;

@@ -17,7 +17,7 @@ namespace {
 // hardly any robot matches.
 constexpr double kReachableRatio = 0.9;
 
-// The bound is then within a hundredth of the best that the dual can prove.
+// The bound is then within a fiftieth of the best that the dual can prove.
 constexpr int kBoundIterations = 150;
 
 std::vector<PromiseOutcome> Outcomes(const std::vector<PromiseTrial>& fared, const PromiseModel& model,
