@@ -189,10 +189,9 @@ std::string RecallText(const FittedSize& fitted) {
   if (fitted.trial_of_all.NumTried() == 0) return "no survey image was left out to try it on";
   return fmt::format(
       "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
-      "everything, image by image {:.2f} times as large",
+      "everything",
       fitted.trial.NumTried(), fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
-      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM(),
-      ErrorRatio(fitted.trial, fitted.trial_of_all));
+      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM());
 }
 
 std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const EmitMapOptions& options) {
@@ -264,6 +263,7 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
                                    .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},
                                    .min_recall_ratio = options.min_recall_ratio,
                                    .max_error_ratio = options.max_error_ratio,
+                                   .least_error_m = options.least_error_ratio * options.left_out_max_error_m,
                                    .promise = PromiseOptionsOf(options)};
   CAIRN_ASSIGN_OR_RETURN(
       const FittedSize fitted,

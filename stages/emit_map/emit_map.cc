@@ -302,6 +302,11 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .help = "fewest landmarks: how many times as large errors of left-out images may be as with all of "
                "them, geometric mean",
        .min = 1},
+      {.name = "least_error_ratio",
+       .value = &options->least_error_ratio,
+       .help = "fewest landmarks: errors below this part of left_out_max_error_m count as it",
+       .min = 1e-6,
+       .max = 1},
       {.name = "promise_matches",
        .value = &options->promise_matches,
        .help = "what the map promises at every place and heading: at least so many matched landmarks, within "
@@ -361,8 +366,9 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",
        .min = 0}};
-  AddCondition({"landmarks", {"fewest"}}, {"min_recall_ratio", "max_error_ratio"}, &table);
-  AddCondition({"max_bytes", {"0"}}, {"min_recall_ratio", "max_error_ratio"}, &table);
+  AddCondition({"landmarks", {"fewest"}}, {"min_recall_ratio", "max_error_ratio", "least_error_ratio"},
+               &table);
+  AddCondition({"max_bytes", {"0"}}, {"min_recall_ratio", "max_error_ratio", "least_error_ratio"}, &table);
   AddCondition({"visual_map", {"true"}}, {"max_num_sights", "bad_model_px"}, &table);
   return table;
 }

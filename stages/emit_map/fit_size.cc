@@ -230,7 +230,7 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   }
   const auto will_do = [&](const LeftOutTrial& trial) {
     return trial.NumRight() >= options.min_recall_ratio * fitted.trial_of_all.NumRight() &&
-           ErrorRatio(trial, fitted.trial_of_all) <= options.max_error_ratio;
+           ErrorRatio(trial, fitted.trial_of_all, options.least_error_m) <= options.max_error_ratio;
   };
   size_t num_kept = classes.classes.size();
   for (const int bits : bits_to_try) {

@@ -19,7 +19,6 @@ constexpr size_t kMinNumSurveyImages = 12;
 constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 constexpr int kPlentyOfInliers = 50;
 constexpr size_t kMinNumObservations = 2;
-constexpr double kLeastError = 1e-9;  // an error of nothing would make every other infinitely larger
 
 Result<Features> ReadFeatures(SQLite::Database& database, ImageId image_id) {
   Features features;
@@ -200,13 +199,13 @@ double LeftOutTrial::MedianErrorM() const {
   return errors_m.empty() ? 0 : UpperMedian(std::move(errors_m));
 }
 
-double ErrorRatio(const LeftOutTrial& trial, const LeftOutTrial& reference) {
+double ErrorRatio(const LeftOutTrial& trial, const LeftOutTrial& reference, double least_error_m) {
   double sum_of_logs = 0;
   int num = 0;
   for (size_t i = 0; i < trial.images.size(); ++i) {
     const LeftOutResult &ours = trial.images[i], &theirs = reference.images[i];
     if (!ours.is_right || !theirs.is_right) continue;
-    sum_of_logs += std::log(std::max(ours.error_m, kLeastError) / std::max(theirs.error_m, kLeastError));
+    sum_of_logs += std::log(std::max(ours.error_m, least_error_m) / std::max(theirs.error_m, least_error_m));
     ++num;
   }
   return num == 0 ? 1 : std::exp(sum_of_logs / num);

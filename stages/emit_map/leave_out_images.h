@@ -82,8 +82,9 @@ struct LeftOutTrial {
 
 // How many times as large the errors of `trial` are as those of `reference`, on the same images in the same
 // order: the geometric mean over the images that both localize right; 1 where there are none.  Unlike a ratio
-// of medians, it changes by little where few images change.
-double ErrorRatio(const LeftOutTrial& trial, const LeftOutTrial& reference);
+// of medians, it changes by little where few images change.  Smaller errors count as `least_error_m`.
+// REQUIRES: least_error_m > 0
+double ErrorRatio(const LeftOutTrial& trial, const LeftOutTrial& reference, double least_error_m);
 
 struct LeftOutLimits {
   double max_error_m = 0.1;

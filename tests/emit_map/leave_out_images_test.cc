@@ -130,16 +130,17 @@ TEST(ChooseLeftOut, SurveysOfOneViewTryNothingAndSmallOnesAreRefused) {
 TEST(ErrorRatio, IsTheGeometricMeanOverImagesThatBothLocalize) {
   const LeftOutTrial reference{.images = {{true, 0.01, 9}, {true, 0.02, 9}, {true, 0.5, 9}, {}}};
   const LeftOutTrial trial{.images = {{true, 0.02, 9}, {true, 0.16, 9}, {}, {true, 0.5, 9}}};
-  EXPECT_NEAR(ErrorRatio(trial, reference), 4, 1e-12);  // 2 and 8 times as large
-  EXPECT_NEAR(ErrorRatio(reference, trial), 0.25, 1e-12);
-  EXPECT_DOUBLE_EQ(ErrorRatio(trial, trial), 1);
-  EXPECT_DOUBLE_EQ(ErrorRatio({.images = {{true, 0.1, 9}, {}}}, {.images = {{}, {true, 0.1, 9}}}), 1);
+  EXPECT_NEAR(ErrorRatio(trial, reference, 1e-9), 4, 1e-12);  // 2 and 8 times as large
+  EXPECT_NEAR(ErrorRatio(reference, trial, 1e-9), 0.25, 1e-12);
+  EXPECT_DOUBLE_EQ(ErrorRatio(trial, trial, 1e-9), 1);
+  EXPECT_DOUBLE_EQ(ErrorRatio({.images = {{true, 0.1, 9}, {}}}, {.images = {{}, {true, 0.1, 9}}}, 1e-9), 1);
 }
 
-TEST(ErrorRatio, AnErrorOfNothingCountsAsANanometre) {
-  const LeftOutTrial exact{.images = {{true, 0, 9}}}, off{.images = {{true, 1e-7, 9}}};
-  EXPECT_NEAR(ErrorRatio(off, exact), 100, 1e-9);
-  EXPECT_NEAR(ErrorRatio(exact, off), 0.01, 1e-12);
+TEST(ErrorRatio, ErrorsBelowTheLeastCountAsIt) {
+  const LeftOutTrial exact{.images = {{true, 0, 9}}}, off{.images = {{true, 0.1, 9}}};
+  EXPECT_NEAR(ErrorRatio(off, exact, 0.001), 100, 1e-9);
+  EXPECT_NEAR(ErrorRatio(exact, off, 0.001), 0.01, 1e-12);
+  EXPECT_DOUBLE_EQ(ErrorRatio(off, exact, 0.2), 1);
 }
 
 TEST(LeftOutTrial, SumsUpAndCountsFiftyInliersAtMost) {
