@@ -12,7 +12,7 @@ namespace cairn {
 
 struct LandmarkOrderOptions {
   // As many matches as a robot needs to be localized for certain.  REQUIRES: > 0
-  double enough_matches = 10;
+  double enough_matches = 20;
   KeypointErrors keypoints;
 };
 

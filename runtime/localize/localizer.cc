@@ -12,6 +12,7 @@
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/accept.h"
 #include "runtime/localize/estimate.h"
+#include "runtime/localize/guided.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
@@ -371,30 +372,32 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     return localization;
   };
   const LandmarkSet* landmarks = &matched;
+  Pose pose = cam_from_world;
   std::shared_ptr<const LandmarkSet> covisible;
   if (options_.match.guided_num_images > 0) {
     CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
                            CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match));
     CAIRN_ASSIGN_OR_RETURN(covisible, map_->Gather(std::move(seen), false));
-    std::vector<Correspondence> guided = MatchGuided(query, *covisible, cam_from_world, options_.match);
-    if (guided.size() >= matches.size()) {
-      const double sigmas = options_.accept.min_guided_sigmas;
-      const double by_chance =
-          sigmas > 0 ? GuidedByChance(query, *covisible, cam_from_world, options_.match) : 0;
-      if (static_cast<double>(guided.size()) < by_chance + sigmas * std::sqrt(by_chance)) {
+    GuidedMatches guided =
+        MatchGuidedInRounds(query, *covisible, cam_from_world, options_.match, options_.refine);
+    if (guided.matches.size() >= matches.size()) {
+      Verdict verdict = JudgeGuided(
+          {.num_found = static_cast<int>(guided.matches.size()),
+           .num_in_view = NumInView(query, *covisible, guided.cam_from_world),
+           .num_by_chance = GuidedByChance(query, *covisible, guided.cam_from_world, options_.match),
+           .is_sure = localization.num_unguided_inliers >= options_.sure_num_unguided_inliers},
+          options_.accept);
+      if (verdict.reason != NoFix::kNone) {
         localization.num_inliers = 0;
-        return fail(
-            NoFix::kTooFewInliers,
-            fmt::format("{} landmarks are where the pose says, and beside it there are {:.0f}: no more "
-                        "than by chance",
-                        guided.size(), by_chance));
+        return fail(verdict.reason, std::move(verdict.message));
       }
-      matches = std::move(guided);
+      matches = std::move(guided.matches);
+      pose = guided.cam_from_world;
       landmarks = covisible.get();
     }
   }
   const auto refined =
-      RefinePoseWithCovariance(MakeMeasurements(query, *landmarks, matches), cam_from_world, options_.refine);
+      RefinePoseWithCovariance(MakeMeasurements(query, *landmarks, matches), pose, options_.refine);
   if (!refined)
     return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
   const std::vector<Correspondence> inliers = Select(matches, refined->inliers);

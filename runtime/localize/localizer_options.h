@@ -59,6 +59,9 @@ struct MatchOptions {
   // Landmarks looked for are those of this many survey images, which share most inliers with the query; 0: no
   // guided matching.  REQUIRES: >= 0
   int guided_num_images = 12;
+  // Most rounds of guided matching: what one finds refines the pose for the next, as long as that finds more.
+  // REQUIRES: >= 1
+  int guided_max_num_rounds = 4;
 };
 OptionTable DescribeOptions(MatchOptions* options);
 
@@ -116,6 +119,12 @@ struct AcceptOptions {
   // (GuidedByChance), it must find more than c + min_guided_sigmas sqrt(c) at these (as many standard
   // deviations of a Poisson number).  0: not tested.  REQUIRES: >= 0
   double min_guided_sigmas = 5.5;
+  // Where fewer than sure_num_unguided_inliers matches led to the pose: what it finds of the landmarks in
+  // view must be likelier by this, a natural logarithm, if a right pose finds min_found_ratio of them at
+  // least than if it is by chance (FoundLogOdds).  A part of the image alone may look like another place:
+  // then most of what should be around it is missing.  min_found_ratio = 0: not tested.  REQUIRES: in [0, 1)
+  double min_found_ratio = 0.25;
+  double min_found_log_odds = 5;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells.  REQUIRES: >= 1
   int spread_grid = 6;

@@ -20,14 +20,4 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
 Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
                                                     const MatchOptions& options);
 
-// Correspondences of landmarks with keypoints near their projections at `cam_from_world`: per landmark the
-// keypoint with the smallest descriptor angle, per keypoint the best such landmark.  Ascending by keypoint.
-std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
-                                        const Pose& cam_from_world, const MatchOptions& options);
-
-// How many MatchGuided finds where there is nothing to be found: the mean over four ways of looking for each
-// landmark beside its projection, four times as far off as it is looked for at all.
-double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
-                      const MatchOptions& options);
-
 }  // namespace cairn

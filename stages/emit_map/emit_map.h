@@ -37,10 +37,10 @@ struct EmitMapOptions {
   // "fewest": of the left-out images that all landmarks localize, the part that must stay localized, and the
   // largest growth of their errors, a geometric mean.  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.25;
+  double max_error_ratio = 1.1;
   // Errors below this part of left_out_max_error_m count as it: no landmarks are spent on what no robot
   // notices.  REQUIRES: in (0, 1]
-  double least_error_ratio = 0.005;
+  double least_error_ratio = 0.01;
   // What maps promise whose landmarks are chosen by trial, at every place and heading of the survey: that
   // with this probability, so many landmarks are matched and the pose is within the limits above
   // (core/promise). REQUIRES: >= 1; in (0, 1)

@@ -27,8 +27,8 @@ struct FitSizeOptions {
   // ChooseFewest: of the left-out images that the map of everything localizes, the part that must stay
   // localized, and the largest growth of their errors (ErrorRatio).  REQUIRES: in [0, 1]; >= 1
   double min_recall_ratio = 0.99;
-  double max_error_ratio = 1.25;
-  double least_error_m = 0.0005;  // smaller ones count as this.  REQUIRES: > 0
+  double max_error_ratio = 1.1;
+  double least_error_m = 0.001;  // smaller ones count as this.  REQUIRES: > 0
   PromiseOptions promise;
 };
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "runtime/localize/guided.h"
 #include "runtime/localize/localizer.h"
-#include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/synthetic_room.h"
@@ -81,6 +81,40 @@ TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
   const Wall wall = MakeWall(false, {}, 0.1);  // 20 px: looked for within 61
   EXPECT_EQ(MatchGuided(wall.query, wall.landmarks, {}, {}).size(), size_t{kSide * kSide});
   EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
+}
+
+TEST(MatchGuidedInRounds, WhatIsFoundRefinesThePoseAndLeadsToTheRest) {
+  // A turn about the optical axis moves the corners by 15 px and the middle by 2: 10 px are looked at.
+  const Wall wall = MakeWall(false, {});
+  const Pose turned{Eigen::Quaterniond(Eigen::AngleAxisd(0.06, Eigen::Vector3d::UnitZ())), {0, 0, 0}};
+  const size_t num_found = MatchGuided(wall.query, wall.landmarks, turned, {}).size();
+  EXPECT_LT(num_found, size_t{kSide * kSide});
+  EXPECT_GT(num_found, size_t{kSide * kSide / 2});
+  const GuidedMatches once =
+      MatchGuidedInRounds(wall.query, wall.landmarks, turned, {.guided_max_num_rounds = 1}, {});
+  EXPECT_EQ(once.matches.size(), num_found);
+  EXPECT_EQ(RotationErrorDeg(once.cam_from_world, turned), 0);
+  const GuidedMatches more = MatchGuidedInRounds(wall.query, wall.landmarks, turned, {}, {});
+  EXPECT_EQ(more.matches.size(), size_t{kSide * kSide});
+  EXPECT_LT(RotationErrorDeg(more.cam_from_world, {}), 1e-3);
+}
+
+TEST(MatchGuidedInRounds, StopsWhereNoMoreIsFound) {
+  const Wall wall = MakeWall(false, {});
+  const GuidedMatches all = MatchGuidedInRounds(wall.query, wall.landmarks, {}, {}, {});
+  EXPECT_EQ(all.matches.size(), size_t{kSide * kSide});
+  EXPECT_EQ(RotationErrorDeg(all.cam_from_world, {}), 0);            // as it was given
+  const Pose elsewhere{Eigen::Quaterniond::Identity(), {0, 0, -3}};  // all behind the camera
+  EXPECT_TRUE(MatchGuidedInRounds(wall.query, wall.landmarks, elsewhere, {}, {}).matches.empty());
+}
+
+TEST(NumInView, CountsWhatIsProjectedIntoTheImage) {
+  const Wall wall = MakeWall(false, {});
+  EXPECT_EQ(NumInView(wall.query, wall.landmarks, {}), kSide * kSide);
+  // 1 m aside are 200 px: of the columns at 325, 375, ... two are beyond 600.
+  EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {1, 0, 0}}), 6 * kSide);
+  EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {0, -1, 0}}), 6 * kSide);
+  EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {0, 0, -3}}), 0);
 }
 
 TEST(Localizer, FixOfWhatIsNoMoreThanByChanceIsRefused) {
