@@ -1,19 +1,14 @@
-// The C API (runtime/c_api/cairn.h) over the C++ one: handles looked up, structs checked and converted,
-// errors kept per thread.
+// The C API (runtime/c_api/cairn.h) over the C++ one: versions and names, maps, localizers.
 #include <algorithm>
-#include <array>
-#include <atomic>
-#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "core/base/no_throw.h"
-#include "core/options/find_option.h"
 #include "runtime/c_api/cairn.h"
-#include "runtime/c_api/handles.h"
+#include "runtime/c_api/calls.h"
+#include "runtime/c_api/structs.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/update_map.h"
@@ -24,71 +19,18 @@ namespace cairn {
 namespace {
 
 static_assert(CAIRN_OTHER_MAP == static_cast<int>(ErrorCode::kOtherMap));
-static_assert(CAIRN_AMBIGUOUS == static_cast<int>(NoFix::kAmbiguous));
 
-struct OpenLocalizer {
+struct OpenLocalizer : OfOneThread {
+  static constexpr const char* kName = "localizer";
+  static constexpr const char* kOnePer = "thread";
   std::shared_ptr<const Map> map;
   std::unique_ptr<Localizer> localizer;
   std::shared_ptr<const VisualMap> visual;  // once it was asked for
-  std::atomic<bool> is_in_use = false;
 };
 
-Handles<cairn_map, const Map, 1, 2>& Maps() {
-  static auto* maps = new Handles<cairn_map, const Map, 1, 2>;  // outlives what other libraries do at exit
-  return *maps;
-}
-
-Handles<cairn_localizer, OpenLocalizer, 2, 2>& Localizers() {
-  static auto* localizers = new Handles<cairn_localizer, OpenLocalizer, 2, 2>;
+Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>& OpenLocalizers() {
+  static auto* localizers = new Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>;
   return *localizers;
-}
-
-std::string& LastError() {
-  thread_local std::string message;
-  return message;
-}
-
-// Runs a function's body; its error becomes the code, its sentence this thread's last one.
-template <typename Body>
-int32_t Call(const char* function, Body&& body) {
-  const Status status = WithoutExceptions(function, [&]() -> Status { return body(); });
-  if (status.ok()) return CAIRN_OK;
-  const std::string& message = status.error().message;
-  LastError() = message.starts_with(function) ? message : std::string(function) + ": " + message;
-  return static_cast<int32_t>(status.error().code);
-}
-
-template <typename... Args>
-Error Misuse(fmt::format_string<Args...> format, Args&&... args) {
-  return MakeError(ErrorCode::kInvalidArgument, format, std::forward<Args>(args)...);
-}
-
-// Checks that a struct is given and at least as long as the first release's, `least`: later ones only grow.
-template <typename Struct>
-Status CheckStruct(const Struct* value, const char* name, size_t least = sizeof(Struct)) {
-  if (value == nullptr) return Misuse("{} is NULL", name);
-  if (value->size < least)
-    return Misuse("{}->size is {}, expected at least {}: set it to sizeof *{} before the call", name,
-                  value->size, least, name);
-  return Ok();
-}
-
-// Copies as much of a result as the caller has room for; its size field stays.
-template <typename Struct>
-void Return(Struct result, Struct* to) {
-  result.size = to->size;
-  std::memcpy(to, &result, std::min(to->size, sizeof(Struct)));
-}
-
-// Cuts a text where a UTF-8 character begins.
-template <size_t kNumBytes>
-void CopyText(const std::string& text, char (&to)[kNumBytes]) {
-  size_t length = std::min(text.size(), kNumBytes - 1);
-  if (length < text.size()) {
-    while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
-  }
-  std::memcpy(to, text.data(), length);
-  to[length] = 0;
 }
 
 // What the caller requires of a map that is opened or that an update brings.
@@ -123,125 +65,6 @@ Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
   return given;
 }
 
-Result<std::shared_ptr<const Map>> FindMap(const cairn_map* handle) {
-  if (auto map = Maps().Find(handle)) return map;
-  return Misuse("map is {}", handle == nullptr ? "NULL" : "not an open map: it was closed, or never opened");
-}
-
-Result<std::shared_ptr<OpenLocalizer>> FindLocalizer(const cairn_localizer* handle) {
-  if (auto localizer = Localizers().Find(handle)) return localizer;
-  return Misuse("localizer is {}",
-                handle == nullptr ? "NULL" : "not a localizer: it was destroyed, or never created");
-}
-
-// Holds a localizer for one thread.
-class Use {
- public:
-  static Result<Use> Begin(const cairn_localizer* handle) {
-    CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<OpenLocalizer> localizer, FindLocalizer(handle));
-    if (localizer->is_in_use.exchange(true, std::memory_order_acquire))
-      return MakeError(ErrorCode::kBusy,
-                       "another thread is using this localizer; create one per thread, they share the map");
-    return Use(std::move(localizer));
-  }
-  Use(Use&&) noexcept = default;
-  ~Use() {
-    if (localizer_) localizer_->is_in_use.store(false, std::memory_order_release);
-  }
-  OpenLocalizer* operator->() const { return localizer_.get(); }
-
- private:
-  explicit Use(std::shared_ptr<OpenLocalizer> localizer) : localizer_(std::move(localizer)) {}
-  std::shared_ptr<OpenLocalizer> localizer_;
-};
-
-// A longer stride is an overflowed sum, not a distance between rows.
-constexpr size_t kMaxStrideBytes = size_t{1} << 31;
-
-// The caller's pixels, not copied.
-Result<cv::Mat> PixelsOf(const cairn_image* image) {
-  CAIRN_RETURN_IF_ERROR(CheckStruct(image, "image"));
-  if (image->pixels == nullptr) return Misuse("image->pixels is NULL");
-  if (image->width <= 0 || image->height <= 0 || image->width > 65536 || image->height > 65536)
-    return Misuse("an image of {} x {} px; both must be in 1 .. 65536", image->width, image->height);
-  const size_t width = static_cast<size_t>(image->width);
-  const size_t stride = image->stride == 0 ? width : image->stride;
-  if (stride < width)
-    return Misuse("image->stride is {} bytes, but a row has {}; grey pixels take a byte each", stride, width);
-  if (stride > kMaxStrideBytes)
-    return Misuse("image->stride is {} bytes; at most {} from one row to the next", stride, kMaxStrideBytes);
-  return cv::Mat(image->height, image->width, CV_8UC1, const_cast<uint8_t*>(image->pixels), stride);
-}
-
-Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey) {
-  if (given == nullptr) return map.CameraForSize(grey.cols, grey.rows);
-  CAIRN_RETURN_IF_ERROR(CheckStruct(given, "camera"));
-  if (given->num_params < 0 || given->num_params > CAIRN_MAX_CAMERA_PARAMS)
-    return Misuse("camera->num_params is {}; no model has more than {}", given->num_params,
-                  CAIRN_MAX_CAMERA_PARAMS);
-  Camera camera;
-  CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromId(given->model));
-  camera.width = given->width;
-  camera.height = given->height;
-  camera.params.assign(given->params, given->params + given->num_params);
-  return camera;
-}
-
-Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given) {
-  if (given == nullptr) return std::optional<PosePrior>();
-  CAIRN_RETURN_IF_ERROR(CheckStruct(given, "prior"));
-  const double* q = given->rotation_wxyz;
-  const double* t = given->translation_m;
-  PosePrior prior = {.cam_from_world = {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), {t[0], t[1], t[2]}},
-                     .sigma_m = given->sigma_m,
-                     .sigma_deg = given->sigma_deg};
-  const double norm = prior.cam_from_world.rotation.norm();
-  if (!(std::abs(norm - 1) < 1e-3))
-    return Misuse("prior->rotation_wxyz has the length {}; expected a unit quaternion, w first", norm);
-  if (!prior.cam_from_world.translation.allFinite()) return Misuse("prior->translation_m is not finite");
-  if (!(prior.sigma_m > 0 && prior.sigma_deg > 0 && std::isfinite(prior.sigma_m + prior.sigma_deg)))
-    return Misuse("prior->sigma_m is {} and sigma_deg {}; both must be positive", prior.sigma_m,
-                  prior.sigma_deg);
-  prior.cam_from_world.rotation.normalize();
-  return std::optional(prior);
-}
-
-cairn_fix FixOf(const Localization& found) {
-  cairn_fix fix = CAIRN_FIX_INIT;
-  fix.has_fix = found.has_fix();
-  fix.reason = static_cast<int32_t>(found.reason);
-  fix.region = found.region;
-  fix.num_features = found.num_features;
-  fix.num_matches = found.num_matches;
-  fix.num_inliers = found.num_inliers;
-  CopyText(found.message, fix.message);
-  if (!found.has_fix()) return fix;
-  const Eigen::Quaterniond& q = found.cam_from_world.rotation;
-  const Eigen::Vector3d center = found.cam_from_world.Center();
-  const std::array<double, 4> wxyz = {q.w(), q.x(), q.y(), q.z()};
-  std::copy(wxyz.begin(), wxyz.end(), fix.rotation_wxyz);
-  for (int i = 0; i < 3; ++i) {
-    fix.translation_m[i] = found.cam_from_world.translation[i];
-    fix.center_m[i] = center[i];
-  }
-  for (int i = 0; i < 36; ++i) fix.covariance[i] = found.covariance(i / 6, i % 6);
-  return fix;
-}
-
-cairn_floor_fix FloorFixFromPose(const VisualPose& found) {
-  cairn_floor_fix fix = CAIRN_FLOOR_FIX_INIT;
-  fix.has_fix = found.flag == VisualFlag::kNone;
-  fix.num_matches = found.num_matches;
-  fix.num_agreeing = found.num_agreeing;
-  for (int i = 0; i < 9; ++i) fix.covariance[i] = found.covariance(i / 3, i % 3);
-  CopyText(found.message, fix.message);
-  if (!fix.has_fix) return fix;
-  fix.position_m[0] = found.position.x();
-  fix.position_m[1] = found.position.y();
-  fix.heading_deg = found.heading_deg;
-  return fix;
-}
-
 }  // namespace
 }  // namespace cairn
 
@@ -256,6 +79,11 @@ const char* cairn_error_name(int32_t code) {
 
 const char* cairn_reason_name(int32_t reason) {
   return reason < CAIRN_FIX || reason > CAIRN_AMBIGUOUS ? "unknown" : NoFixName(static_cast<NoFix>(reason));
+}
+
+const char* cairn_scope_name(int32_t scope) {
+  return scope < CAIRN_SCOPE_PRIOR || scope > CAIRN_SCOPE_VOTES ? "unknown"
+                                                                : ScopeName(static_cast<Scope>(scope));
 }
 
 const char* cairn_last_error(void) { return LastError().c_str(); }
@@ -288,7 +116,7 @@ int32_t cairn_map_open(const char* path, const cairn_map_options* options, cairn
     if (map == nullptr) return Misuse("map is NULL: there is no place for the handle");
     CAIRN_ASSIGN_OR_RETURN(const GivenOptions given, OptionsOf(options));
     CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Map> open, Map::Open(path, given.map));
-    *map = Maps().Add(std::move(open));
+    *map = OpenMaps().Add(std::move(open));
     return Ok();
   });
 }
@@ -328,7 +156,7 @@ int32_t cairn_map_camera_for_size(const cairn_map* map, int32_t width, int32_t h
 
 int32_t cairn_map_close(cairn_map* map) {
   return Call("cairn_map_close", [&]() -> Status {
-    if (map != nullptr && !Maps().Remove(map)) return FindMap(map).error();
+    if (map != nullptr && !OpenMaps().Remove(map)) return FindMap(map).error();
     return Ok();
   });
 }
@@ -340,43 +168,37 @@ int32_t cairn_localizer_create(const cairn_map* map, cairn_localizer** localizer
     auto created = std::make_shared<OpenLocalizer>();
     CAIRN_ASSIGN_OR_RETURN(created->map, FindMap(map));
     created->localizer = std::make_unique<Localizer>(created->map);
-    *localizer = Localizers().Add(std::move(created));
+    *localizer = OpenLocalizers().Add(std::move(created));
     return Ok();
   });
 }
 
 int32_t cairn_localizer_set_option(cairn_localizer* localizer, const char* name, const char* value) {
   return Call("cairn_localizer_set_option", [&]() -> Status {
-    if (name == nullptr || value == nullptr) return Misuse("{} is NULL", name == nullptr ? "name" : "value");
-    CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
     LocalizerOptions options = used->localizer->options();
-    const OptionTable table = DescribeOptions(&options);
-    CAIRN_ASSIGN_OR_RETURN(const Option* const option,
-                           FindOption(table, name, "`cairn localize --help` lists them"));
-    CAIRN_RETURN_IF_ERROR(SetOption(*option, value));
+    CAIRN_RETURN_IF_ERROR(SetOptionByName(DescribeOptions(&options), name, value));
     used->localizer = std::make_unique<Localizer>(used->map, options);
     return Ok();
   });
 }
 
 int32_t cairn_localizer_destroy(cairn_localizer* localizer) {
-  return Call("cairn_localizer_destroy", [&]() -> Status {
-    if (localizer != nullptr && !Localizers().Remove(localizer)) return FindLocalizer(localizer).error();
-    return Ok();
-  });
+  return Call("cairn_localizer_destroy",
+              [&]() -> Status { return DestroyObject(OpenLocalizers(), localizer); });
 }
 
 int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, const cairn_camera* camera,
                        const cairn_prior* prior, cairn_fix* fix) {
   return Call("cairn_localize", [&]() -> Status {
-    CAIRN_RETURN_IF_ERROR(CheckStruct(fix, "fix"));
-    Return(FixOf({}), fix);  // after an error the caller must not find the previous fix
-    CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
+    CAIRN_RETURN_IF_ERROR(CheckFix(fix));
+    Return(FixFrom({}), fix);  // after an error the caller must not find the previous fix
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
     CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->Localize(grey, chosen, believed));
-    Return(FixOf(found), fix);
+    Return(FixFrom(found), fix);
     return Ok();
   });
 }
@@ -384,9 +206,9 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
 int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
                                 const cairn_camera* camera, cairn_floor_fix* fix) {
   return Call("cairn_localize_on_floor", [&]() -> Status {
-    CAIRN_RETURN_IF_ERROR(CheckStruct(fix, "fix"));
+    CAIRN_RETURN_IF_ERROR(CheckFix(fix));
     Return(cairn_floor_fix CAIRN_FLOOR_FIX_INIT, fix);
-    CAIRN_ASSIGN_OR_RETURN(const Use used, Use::Begin(localizer));
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     if (!used->visual) {
@@ -395,7 +217,7 @@ int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* i
     CAIRN_ASSIGN_OR_RETURN(const Query query, used->localizer->QueryFromImage(grey, chosen));
     CAIRN_ASSIGN_OR_RETURN(const auto seen, used->visual->Match(query));
     CAIRN_ASSIGN_OR_RETURN(const VisualPose found, EstimateVisualPose(*used->visual, seen));
-    Return(FloorFixFromPose(found), fix);
+    Return(FloorFixFrom(found, Scope::kAll), fix);
     return Ok();
   });
 }

@@ -1,15 +1,16 @@
-/* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, hand it grey pixels.
+/* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, or a tracker for frames
+ * in order, and hand it grey pixels.
  *
  * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
  * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
- * crashes it: null pointers, handles that were closed or never opened, sizes that do not fit, a localizer
- * used by two threads at once.
+ * crashes it: null pointers, handles that were closed or never opened, sizes that do not fit, a localizer or
+ * tracker used by two threads at once.
  *
  * ABI: a program built with this header runs with every later libcairn-runtime.so.0.  Functions are only
  * added.  Structs begin with their size and only grow at their end: set `size` to sizeof the struct before
  * every call (CAIRN_FIX_INIT and the like do), and the library touches no more than that.
  *
- * Threads: a map is shared by all, a localizer is for one thread at a time.
+ * Threads: a map is shared by all, a localizer or tracker is for one thread at a time.
  * Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x right, y down;
  * poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the frame of the
  * surveyed capture.
@@ -41,7 +42,7 @@ enum {
   CAIRN_NO_DATA = 6,
   CAIRN_IO = 7,
   CAIRN_GATE = 8,
-  CAIRN_BUSY = 9, /* another thread is using this localizer */
+  CAIRN_BUSY = 9, /* another thread is using this localizer or tracker */
   CAIRN_CANCELLED = 10,
   CAIRN_EMPTY_FILE = 11,
   CAIRN_TRUNCATED = 12,
@@ -72,9 +73,21 @@ enum {
   CAIRN_AMBIGUOUS = 9 /* another place explains the image nearly as well */
 };
 
+/* Which landmarks an image was matched with.  Append-only. */
+enum {
+  CAIRN_SCOPE_PRIOR = 0,   /* of survey images near the prior */
+  CAIRN_SCOPE_REGIONS = 1, /* of the regions of survey images that look alike */
+  CAIRN_SCOPE_IMAGES = 2,  /* of these images themselves */
+  CAIRN_SCOPE_ALL = 3,     /* of the whole map */
+  CAIRN_SCOPE_TRACK = 4,   /* a tracker's: of where it expects the camera */
+  CAIRN_SCOPE_VOTES = 5    /* a tracker's, lost: of the regions that landmarks in view vote for */
+};
+
 /* Handles.  They are numbers, not addresses: a closed one is never mistaken for another. */
 typedef struct cairn_map cairn_map;
 typedef struct cairn_localizer cairn_localizer;
+typedef struct cairn_tracker cairn_tracker;
+typedef struct cairn_visual_tracker cairn_visual_tracker;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -158,34 +171,38 @@ typedef struct cairn_fix {
   int32_t num_features, num_matches, num_inliers;
   char
       message[CAIRN_MESSAGE_BYTES]; /* why there is no fix: found and needed; cut to fit, always with a NUL */
+  int32_t scope;                    /* CAIRN_SCOPE_ALL, ...: which landmarks it was matched with */
+  int32_t reserved;                 /* 0 */
 } cairn_fix;
-#define CAIRN_FIX_INIT                                             \
-  {                                                                \
-    sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, { 0 } \
-  }
+#define CAIRN_FIX_INIT \
+  { sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, {0}, 0, 0 }
 
 /* A place on the floor, from how landmarks look from different places (maps with a visual map). */
 typedef struct cairn_floor_fix {
   size_t size;
   int32_t has_fix;
   int32_t num_matches, num_agreeing;
-  int32_t reserved;
+  int32_t scope;        /* CAIRN_SCOPE_ALL; a tracker's: _TRACK or _VOTES too */
   double position_m[2]; /* floor frame */
   double heading_deg;   /* counter-clockwise from +x, [0, 360) */
-  double covariance[9]; /* 3 x 3: x m, y m, heading rad; without a fix that of the whole survey */
+  /* 3 x 3: x m, y m, heading rad; without a fix that of the whole survey (a tracker: x, y of its belief). */
+  double covariance[9];
   char message[CAIRN_MESSAGE_BYTES];
+  /* With a fix or without: where the camera is on average over all that is possible, floor frame, and how
+   * much that leaves open.  Of this image, or of a tracker's belief after it. */
+  double mean_m[2];
+  double entropy; /* nats, over places */
 } cairn_floor_fix;
-#define CAIRN_FLOOR_FIX_INIT                                \
-  {                                                         \
-    sizeof(cairn_floor_fix), 0, 0, 0, 0, {0}, 0, {0}, { 0 } \
-  }
+#define CAIRN_FLOOR_FIX_INIT \
+  { sizeof(cairn_floor_fix), 0, 0, 0, 0, {0}, 0, {0}, {0}, {0}, 0 }
 
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
-/* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES; "unknown" for any other
- * number. */
+/* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES, "track" for CAIRN_SCOPE_TRACK;
+ * "unknown" for any other number. */
 CAIRN_API const char* cairn_error_name(int32_t code);
 CAIRN_API const char* cairn_reason_name(int32_t reason);
+CAIRN_API const char* cairn_scope_name(int32_t scope);
 /* The message of this thread's last failed call: says what was found and what to do.  Never NULL; valid until
  * this thread's next call of the library. */
 CAIRN_API const char* cairn_last_error(void);
@@ -197,7 +214,7 @@ CAIRN_API int32_t cairn_map_describe(const cairn_map* map, cairn_map_description
 /* The survey's camera of this image size.  CAIRN_NOT_FOUND when none or more than one has it. */
 CAIRN_API int32_t cairn_map_camera_for_size(const cairn_map* map, int32_t width, int32_t height,
                                             cairn_camera* camera);
-/* Localizers of the map stay usable.  NULL is allowed; a handle that is already closed gives
+/* Localizers and trackers of the map stay usable.  NULL is allowed; a handle that is already closed gives
  * CAIRN_INVALID_ARGUMENT. */
 CAIRN_API int32_t cairn_map_close(cairn_map* map);
 
@@ -214,6 +231,43 @@ CAIRN_API int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* 
  */
 CAIRN_API int32_t cairn_localize_on_floor(cairn_localizer* localizer, const cairn_image* image,
                                           const cairn_camera* camera, cairn_floor_fix* fix);
+
+/* Frame after frame: a tracker looks only for the landmarks near where it expects the camera, and finds it
+ * again, as if the frame were the first, when it is not there: fix->scope says which.  One for each camera;
+ * the same frames, the same fixes.
+ *
+ * There are two, as there are two ways to localize an image, and not one with a choice: only the one on the
+ * floor takes odometry, only the one in space predicts a pose, and their answers are different structs.
+ *
+ * cairn_tracker follows a camera in space, by a constant velocity. */
+CAIRN_API int32_t cairn_tracker_create(const cairn_map* map, cairn_tracker** tracker);
+/* Any option that `cairn localize --sequence` takes, as text: ("step_sigma_m", "0.3"), ("min_num_inliers",
+ * "9").  The tracker forgets the frames before. */
+CAIRN_API int32_t cairn_tracker_set_option(cairn_tracker* tracker, const char* name, const char* value);
+/* The next frame.  `camera` NULL: the survey's camera of the image's size.  A frame without a fix is no
+ * error; after an error *fix has no fix, and the tracker is as before. */
+CAIRN_API int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image,
+                                      const cairn_camera* camera, cairn_fix* fix);
+/* Where the next frame is expected.  *is_expected 0: the tracker is lost, and *prior is CAIRN_PRIOR_INIT. */
+CAIRN_API int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cairn_prior* prior);
+CAIRN_API int32_t cairn_tracker_destroy(cairn_tracker* tracker);
+
+/* cairn_visual_tracker follows a robot on the floor, by the visual map.  CAIRN_NOT_FOUND where the map has
+ * none. */
+CAIRN_API int32_t cairn_visual_tracker_create(const cairn_map* map, cairn_visual_tracker** tracker);
+/* Any option that `cairn localize --sequence --estimator visual-map` reads: ("unknown_way_sigma_m", "0.5"),
+ * ("max_image_side_px", "512").  The tracker forgets the frames before; after an error it is as before. */
+CAIRN_API int32_t cairn_visual_tracker_set_option(cairn_visual_tracker* tracker, const char* name,
+                                                  const char* value);
+/* Odometry: since the last frame the robot drove this far ahead and to the left, in its frame at the start,
+ * and then turned to the left.  Several calls before a frame add up.  Without any, it may have gone anywhere
+ * within unknown_way_sigma_m. */
+CAIRN_API int32_t cairn_visual_tracker_move(cairn_visual_tracker* tracker, double ahead_m, double left_m,
+                                            double turn_left_rad);
+/* The next frame; as cairn_tracker_track.  Without a fix the belief is what there is: mean_m, covariance. */
+CAIRN_API int32_t cairn_visual_tracker_track(cairn_visual_tracker* tracker, const cairn_image* image,
+                                             const cairn_camera* camera, cairn_floor_fix* fix);
+CAIRN_API int32_t cairn_visual_tracker_destroy(cairn_visual_tracker* tracker);
 
 /* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
  * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one

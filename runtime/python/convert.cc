@@ -58,11 +58,18 @@ cv::Mat PixelsOf(const py::array& image) {
                  const_cast<void*>(image.data()), stride);
 }
 
-void SetFromPython(const OptionTable& table, const std::string& name, const py::handle& value) {
-  const Option* const option = ValueOrThrow(FindOption(table, name, "`cairn localize --help` lists them"));
-  const std::string text = py::isinstance<py::bool_>(value) ? (py::cast<bool>(value) ? "true" : "false")
-                                                            : py::cast<std::string>(py::str(value));
-  ThrowIfError(SetOption(*option, text));
+void SetFromPython(const OptionTable& table, const py::kwargs& given) {
+  for (const auto& [key, value] : given) {
+    const Option* const option =
+        ValueOrThrow(FindOption(table, py::cast<std::string>(key), "`cairn localize --help` lists them"));
+    const std::string text = py::isinstance<py::bool_>(value) ? (py::cast<bool>(value) ? "true" : "false")
+                                                              : py::cast<std::string>(py::str(value));
+    ThrowIfError(SetOption(*option, text));
+  }
+}
+
+Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera>& given) {
+  return given ? *given : ValueOrThrow(map.CameraForSize(grey.cols, grey.rows));
 }
 
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
@@ -82,44 +89,45 @@ PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<
   return {.cam_from_world = {q.normalized(), t}, .sigma_m = sigma_m, .sigma_deg = sigma_deg};
 }
 
+py::array_t<double> RotationArray(const Eigen::Quaterniond& rotation) {
+  return VectorArray(Eigen::Vector4d(rotation.w(), rotation.x(), rotation.y(), rotation.z()));
+}
+
+py::array_t<double> VectorArray(const Eigen::Ref<const Eigen::VectorXd>& vector) {
+  py::array_t<double> numbers(vector.size());
+  auto view = numbers.mutable_unchecked<1>();
+  for (Eigen::Index i = 0; i < vector.size(); ++i) view(i) = vector[i];
+  return numbers;
+}
+
+py::array_t<double> MatrixArray(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  py::array_t<double> numbers({matrix.rows(), matrix.cols()});
+  auto view = numbers.mutable_unchecked<2>();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) view(i, j) = matrix(i, j);
+  return numbers;
+}
+
 py::object RotationOf(const Localization& found) {
   if (!found.has_fix()) return py::none();
-  py::array_t<double> numbers(4);
-  const Eigen::Quaterniond& q = found.cam_from_world.rotation;
-  auto view = numbers.mutable_unchecked<1>();
-  view(0) = q.w();
-  view(1) = q.x();
-  view(2) = q.y();
-  view(3) = q.z();
-  return numbers;
+  return RotationArray(found.cam_from_world.rotation);
 }
 
 py::object VectorOf(const Localization& found, const Eigen::Vector3d& vector) {
   if (!found.has_fix()) return py::none();
-  py::array_t<double> numbers(3);
-  auto view = numbers.mutable_unchecked<1>();
-  for (int i = 0; i < 3; ++i) view(i) = vector[i];
-  return numbers;
+  return VectorArray(vector);
 }
 
 py::object MatrixOf(const Localization& found) {
   if (!found.has_fix()) return py::none();
-  py::array_t<double> numbers({4, 4});
-  auto view = numbers.mutable_unchecked<2>();
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   matrix.topRows<3>() = found.cam_from_world.Matrix();
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j) view(i, j) = matrix(i, j);
-  return numbers;
+  return MatrixArray(matrix);
 }
 
 py::object CovarianceOf(const Localization& found) {
   if (!found.has_fix()) return py::none();
-  py::array_t<double> numbers({6, 6});
-  auto view = numbers.mutable_unchecked<2>();
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) view(i, j) = found.covariance(i, j);
-  return numbers;
+  return MatrixArray(found.covariance);
 }
 
 }  // namespace cairn

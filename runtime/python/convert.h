@@ -1,6 +1,7 @@
 #pragma once
 
 #include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,12 +41,21 @@ void BindErrors(pybind11::module_& module);
 // another dtype and a ValueError for another shape or order, which say what was found.
 cv::Mat PixelsOf(const pybind11::array& image);
 
-// Sets an option from a keyword argument.  Throws cairn.Error for an unknown name or a value out of range.
-void SetFromPython(const OptionTable& table, const std::string& name, const pybind11::handle& value);
+// Sets options from keyword arguments.  Throws cairn.Error for an unknown name or a value out of range.
+void SetFromPython(const OptionTable& table, const pybind11::kwargs& given);
+
+// None given: the survey's camera of the image's size.  Throws cairn.Error where the map has none, or
+// several.
+Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera>& given);
 
 // Throws a ValueError for an invalid rotation or number.
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg);
+
+// New arrays: w x y z, (n,) and (m, n).
+pybind11::array_t<double> RotationArray(const Eigen::Quaterniond& rotation);
+pybind11::array_t<double> VectorArray(const Eigen::Ref<const Eigen::VectorXd>& vector);
+pybind11::array_t<double> MatrixArray(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 
 // Of a fix, as new arrays; None without a fix.
 pybind11::object RotationOf(const Localization& found);

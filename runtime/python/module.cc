@@ -1,7 +1,5 @@
 // The Python module's native part, cairn._cairn: what runtime/python/cairn/__init__.py makes public.
-#include <cmath>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -12,16 +10,13 @@
 #include "runtime/localize/localizer.h"
 #include "runtime/map/update_map.h"
 #include "runtime/python/convert.h"
+#include "runtime/python/objects.h"
+#include "runtime/python/trackers.h"
 
 namespace py = pybind11;
 
 namespace cairn {
 namespace {
-
-struct PyMap {
-  std::shared_ptr<const Map> map;
-  std::string path;
-};
 
 // As bytes: names of files need not be text.
 std::string PathOf(const py::object& path) {
@@ -57,13 +52,11 @@ PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::op
   return {ValueOrThrow(Map::Open(name, options)), name};
 }
 
-// A localizer of one thread; its use from two threads at once is detected.
 class PyLocalizer {
  public:
   PyLocalizer(const PyMap& map, const py::kwargs& given) : map_(map.map) {
     LocalizerOptions options;
-    const OptionTable table = DescribeOptions(&options);
-    for (const auto& [key, value] : given) SetFromPython(table, py::cast<std::string>(key), value);
+    SetFromPython(DescribeOptions(&options), given);
     localizer_ = std::make_unique<Localizer>(map_, options);
   }
 
@@ -71,19 +64,14 @@ class PyLocalizer {
                         const std::optional<PosePrior>& prior) {
     const cv::Mat grey = PixelsOf(image);
     const py::gil_scoped_release release;
-    const std::unique_lock use(is_in_use_, std::try_to_lock);
-    if (!use)
-      throw PythonError(
-          MakeError(ErrorCode::kBusy,
-                    "another thread is using this localizer; make one per thread, they share the map"));
-    const Camera chosen = camera ? *camera : ValueOrThrow(map_->CameraForSize(grey.cols, grey.rows));
-    return ValueOrThrow(localizer_->Localize(grey, chosen, prior));
+    const auto used = one_thread_.Use();
+    return ValueOrThrow(localizer_->Localize(grey, CameraFor(*map_, grey, camera), prior));
   }
 
  private:
   std::shared_ptr<const Map> map_;
   std::unique_ptr<Localizer> localizer_;
-  std::mutex is_in_use_;
+  OneThread one_thread_{"localizer", "thread"};
 };
 
 }  // namespace
@@ -91,26 +79,6 @@ class PyLocalizer {
 
 namespace pybind11::detail {
 
-// Hands out objects only after __init__: pybind11 itself gives objects of CLASS.__new__(CLASS)
-// uninitialised memory.
-template <typename T>
-struct ConstructedCaster : type_caster_base<T> {
-  bool load(handle source, bool convert) {
-    if (isinstance<T>(source) &&
-        !reinterpret_cast<instance*>(source.ptr())->get_value_and_holder().holder_constructed()) {
-      throw type_error(fmt::format("{}: __init__ has not been called", Py_TYPE(source.ptr())->tp_name));
-    }
-    return type_caster_base<T>::load(source, convert);
-  }
-};
-template <>
-struct type_caster<cairn::PyMap> : ConstructedCaster<cairn::PyMap> {};
-template <>
-struct type_caster<cairn::Camera> : ConstructedCaster<cairn::Camera> {};
-template <>
-struct type_caster<cairn::PosePrior> : ConstructedCaster<cairn::PosePrior> {};
-template <>
-struct type_caster<cairn::Localization> : ConstructedCaster<cairn::Localization> {};
 template <>
 struct type_caster<cairn::PyLocalizer> : ConstructedCaster<cairn::PyLocalizer> {};
 
@@ -194,7 +162,18 @@ void BindMap(py::module_& module) {
 void BindLocalizer(py::module_& module) {
   py::class_<PosePrior>(module, "Prior")
       .def(py::init(&MakePrior), py::arg("rotation_wxyz"), py::arg("translation"), py::kw_only(),
-           py::arg("sigma_m") = 1.0, py::arg("sigma_deg") = 10.0);
+           py::arg("sigma_m") = 1.0, py::arg("sigma_deg") = 10.0)
+      .def_property_readonly(
+          "rotation_wxyz", [](const PosePrior& self) { return RotationArray(self.cam_from_world.rotation); })
+      .def_property_readonly(
+          "translation", [](const PosePrior& self) { return VectorArray(self.cam_from_world.translation); })
+      .def_readonly("sigma_m", &PosePrior::sigma_m)
+      .def_readonly("sigma_deg", &PosePrior::sigma_deg)
+      .def("__repr__", [](const PosePrior& self) {
+        const Eigen::Vector3d center = self.cam_from_world.Center();
+        return fmt::format("<cairn.Prior at ({:.3f}, {:.3f}, {:.3f}) m, +- {:g} m, {:g} deg>", center.x(),
+                           center.y(), center.z(), self.sigma_m, self.sigma_deg);
+      });
   py::class_<Localization>(module, "Fix")
       .def("__bool__", &Localization::has_fix)
       .def_property_readonly("reason", [](const Localization& self) { return NoFixName(self.reason); })
@@ -213,6 +192,7 @@ void BindLocalizer(py::module_& module) {
       .def_readonly("num_matches", &Localization::num_matches)
       .def_readonly("num_inliers", &Localization::num_inliers)
       .def_readonly("candidates", &Localization::candidates)
+      .def_readonly("voted_regions", &Localization::voted_regions)
       .def("__repr__", [](const Localization& self) {
         if (!self.has_fix())
           return fmt::format("<cairn.Fix: none, {}: {}>", NoFixName(self.reason), self.message);
@@ -235,4 +215,5 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindMap(module);
   cairn::BindUpdates(module);
   cairn::BindLocalizer(module);
+  cairn::BindTrackers(module);
 }

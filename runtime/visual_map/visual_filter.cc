@@ -1,5 +1,6 @@
 #include "runtime/visual_map/visual_filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -18,6 +19,8 @@ constexpr double kBinRad = 2 * std::numbers::pi / kNumBins;
 constexpr double kCellVariance = 1.0 / 12;
 // Cells farther off than this many standard deviations get nothing.
 constexpr double kReachSigmas = 3;
+// A turn less certain than this may have ended in any direction: more bins would only take time.
+constexpr double kUnknownTurnRad = 2 * std::numbers::pi;
 // Beliefs below this part of the largest do not move.
 constexpr double kLeastShare = 1e-9;
 
@@ -43,7 +46,8 @@ struct TurnKernel {
 };
 
 TurnKernel KernelOf(double turn_rad, double sigma_rad) {
-  const double variance = sigma_rad * sigma_rad + kCellVariance * kBinRad * kBinRad;
+  const double bounded_rad = std::min(sigma_rad, kUnknownTurnRad);
+  const double variance = bounded_rad * bounded_rad + kCellVariance * kBinRad * kBinRad;
   const auto reach = static_cast<int>(std::ceil(kReachSigmas * std::sqrt(variance) / kBinRad));
   TurnKernel kernel{.first = static_cast<int>(std::lround(turn_rad / kBinRad)) - reach};
   double sum = 0;
@@ -86,9 +90,9 @@ std::vector<double> VisualFilter::AtPlaces() const {
 }
 
 Status VisualFilter::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
-  if (!way_m.allFinite() || !std::isfinite(turn_left_rad))
+  if (!std::isfinite(way_m.squaredNorm()) || !std::isfinite(turn_left_rad))
     return MakeError(ErrorCode::kInvalidArgument,
-                     "visual map: the odometry's way or turn is not a finite number");
+                     "visual map: the odometry's way or turn is not a finite number, or too large");
   const double cell_variance = kCellVariance * map_->spacing_m() * map_->spacing_m();
   Shift(way_m,
         std::pow(options_.odometry_way_ratio * way_m.norm(), 2) + std::pow(options_.odometry_sigma_m, 2) +

@@ -29,7 +29,7 @@ class VisualFilter {
                         const VisualEstimateOptions& estimate_options = {});
 
   // The robot drove: ahead and to the left (m, in its frame at the start), and turned left (rad).
-  // Errors: InvalidArgument for a number that is not finite.
+  // Errors: InvalidArgument for a number that is not finite, or a way whose square is not.
   Status Move(const Eigen::Vector2d& way_m, double turn_left_rad);
   // It drove, and nobody counted: standard deviations of its way, per axis, and of its turn.  Errors:
   // InvalidArgument for a number that is negative or not finite.

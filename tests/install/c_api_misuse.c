@@ -153,12 +153,69 @@ static void CheckFixes(cairn_localizer* localizer, const cairn_image* image) {
   free(wide);
 }
 
+static void CheckTrackers(const char* path, const cairn_image* image) {
+  cairn_map* map = NULL;
+  cairn_localizer* localizer = NULL;
+  cairn_tracker* tracker = (cairn_tracker*)&map;
+  cairn_visual_tracker* visual = (cairn_visual_tracker*)&map;
+  cairn_fix fix = CAIRN_FIX_INIT;
+  cairn_floor_fix floor_fix = CAIRN_FLOOR_FIX_INIT;
+  cairn_prior prior = CAIRN_PRIOR_INIT;
+  int32_t is_expected = -1;
+  CHECK_ERROR(cairn_tracker_create(NULL, &tracker), CAIRN_INVALID_ARGUMENT, "map is NULL");
+  CHECK(tracker == NULL);
+  CHECK(cairn_map_open(path, NULL, &map) == CAIRN_OK && cairn_localizer_create(map, &localizer) == CAIRN_OK);
+  CHECK_ERROR(cairn_tracker_create(map, NULL), CAIRN_INVALID_ARGUMENT, "tracker is NULL");
+  CHECK_ERROR(cairn_visual_tracker_create(map, NULL), CAIRN_INVALID_ARGUMENT, "tracker is NULL");
+  CHECK_ERROR(cairn_visual_tracker_create(map, &visual), CAIRN_NOT_FOUND, "visual map");
+  CHECK(visual == NULL);
+  CHECK(cairn_tracker_create(map, &tracker) == CAIRN_OK);
+  CHECK(cairn_map_close(map) == CAIRN_OK); /* the tracker keeps what it needs */
+
+  CHECK_ERROR(cairn_tracker_track(NULL, image, NULL, &fix), CAIRN_INVALID_ARGUMENT, "tracker is NULL");
+  CHECK_ERROR(cairn_tracker_track(tracker, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT, "image is NULL");
+  CHECK_ERROR(cairn_tracker_track(tracker, image, NULL, NULL), CAIRN_INVALID_ARGUMENT, "fix is NULL");
+  CHECK_ERROR(cairn_tracker_predict(tracker, NULL, &prior), CAIRN_INVALID_ARGUMENT, "is_expected is NULL");
+  CHECK_ERROR(cairn_tracker_predict(tracker, &is_expected, NULL), CAIRN_INVALID_ARGUMENT, "prior is NULL");
+  CHECK_ERROR(cairn_tracker_set_option(tracker, NULL, "1"), CAIRN_INVALID_ARGUMENT, "name is NULL");
+  CHECK_ERROR(cairn_tracker_set_option(tracker, "step_sigma_m", NULL), CAIRN_INVALID_ARGUMENT,
+              "value is NULL");
+  CHECK_ERROR(cairn_visual_tracker_track(NULL, image, NULL, &floor_fix), CAIRN_INVALID_ARGUMENT,
+              "visual tracker is NULL");
+  CHECK_ERROR(cairn_visual_tracker_track(NULL, image, NULL, NULL), CAIRN_INVALID_ARGUMENT, "fix is NULL");
+  CHECK_ERROR(cairn_visual_tracker_move(NULL, 0, 0, 0), CAIRN_INVALID_ARGUMENT, "visual tracker is NULL");
+  CHECK_ERROR(cairn_visual_tracker_set_option(NULL, "tracked_ratio", "1"), CAIRN_INVALID_ARGUMENT,
+              "visual tracker is NULL");
+  CHECK(cairn_tracker_destroy(NULL) == CAIRN_OK && cairn_visual_tracker_destroy(NULL) == CAIRN_OK);
+
+  /* Other kinds of handle. */
+  CHECK_ERROR(cairn_tracker_track((cairn_tracker*)localizer, image, NULL, &fix), CAIRN_INVALID_ARGUMENT,
+              "not a tracker");
+  CHECK_ERROR(cairn_localize((cairn_localizer*)tracker, image, NULL, NULL, &fix), CAIRN_INVALID_ARGUMENT,
+              "not a localizer");
+  CHECK_ERROR(cairn_visual_tracker_track((cairn_visual_tracker*)tracker, image, NULL, &floor_fix),
+              CAIRN_INVALID_ARGUMENT, "not a visual tracker");
+  CHECK(cairn_localizer_destroy(localizer) == CAIRN_OK);
+
+  CHECK(cairn_tracker_track(tracker, image, NULL, &fix) == CAIRN_OK && fix.has_fix == 1);
+  CHECK(cairn_tracker_track(tracker, image, NULL, &fix) == CAIRN_OK && fix.scope == CAIRN_SCOPE_TRACK);
+  CHECK(cairn_tracker_predict(tracker, &is_expected, &prior) == CAIRN_OK && is_expected == 1);
+  CHECK(cairn_tracker_destroy(tracker) == CAIRN_OK);
+  CHECK_ERROR(cairn_tracker_track(tracker, image, NULL, &fix), CAIRN_INVALID_ARGUMENT, "destroyed");
+  CHECK(fix.has_fix == 0);
+  CHECK_ERROR(cairn_tracker_predict(tracker, &is_expected, &prior), CAIRN_INVALID_ARGUMENT, "destroyed");
+  CHECK(is_expected == 0 && prior.sigma_m == 1);
+  CHECK_ERROR(cairn_tracker_destroy(tracker), CAIRN_INVALID_ARGUMENT, "destroyed");
+}
+
 int main(int argc, char** argv) {
   int width = 0, height = 0;
   uint8_t* pixels = argc == 3 ? ReadPgm(argv[2], &width, &height) : NULL;
   if (pixels == NULL) return fprintf(stderr, "usage: c_api_misuse MAP IMAGE.pgm\n"), 2;
   CHECK(strcmp(cairn_error_name(CAIRN_CORRUPT), "corrupt") == 0);
   CHECK(strcmp(cairn_error_name(4711), "unknown") == 0 && strcmp(cairn_reason_name(-1), "unknown") == 0);
+  CHECK(strcmp(cairn_scope_name(CAIRN_SCOPE_VOTES), "votes") == 0 &&
+        strcmp(cairn_scope_name(6), "unknown") == 0);
   CHECK(strlen(cairn_version()) >= 5);
   CheckMaps(argv[1]);
 
@@ -174,6 +231,7 @@ int main(int argc, char** argv) {
   image.height = height;
   CheckBadImages(localizer, &image);
   CheckFixes(localizer, &image);
+  CheckTrackers(argv[1], &image);
 
   CHECK_ERROR(cairn_localizer_set_option(localizer, "min_num_inlier", "9"), CAIRN_INVALID_ARGUMENT,
               "'min_num_inliers'");

@@ -28,7 +28,7 @@ if [ -n "$foreign" ]; then
   echo "$library exports what is not its own: $foreign" >&2
   exit 1
 fi
-for name in 'cairn::Map::Open(' 'cairn::Localizer::Localize(' 'cairn::RegionTracker::Track(' 'cairn::EstimateVisualPose('; do
+for name in 'cairn::Map::Open(' 'cairn::Localizer::Localize(' 'cairn::RegionTracker::Track(' 'cairn::EstimateVisualPose(' 'cairn::VisualTracker::See('; do
   nm -D --defined-only -C "$library" | grep -qF "$name" || { echo "$library does not export $name" >&2; exit 1; }
 done
 echo "$library: $(stat -Lc %s "$library") bytes; links" $needed

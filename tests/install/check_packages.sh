@@ -37,7 +37,7 @@ inside() { chroot "$system" "$@"; }
 # Nothing of this outlives the test: no need to wait for the disk.
 echo force-unsafe-io > "$system/etc/dpkg/dpkg.cfg.d/unsafe"
 mkdir "$system/packages"
-cp "$folder"/*.deb "$poster/poster.cairn" "$poster/poster.pgm" "$sources/runtime/examples/robot/where.py" "$system/packages"
+cp "$folder"/*.deb "$poster/poster.cairn" "$poster/poster.pgm" "$example/where.py" "$example/pgm.py" "$system/packages"
 inside find / -xdev -path /packages -prune -o -path '*cairn*' -print > "$folder/before"
 
 install() {  # names of packages

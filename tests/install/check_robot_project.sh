@@ -29,6 +29,8 @@ expect "$folder/robot/build/where_cc"
 # Python and what CMake builds find the library by themselves; what pkg-config builds, where the system looks.
 module=$(find "$root" -type d -name cairn -path '*-packages/cairn')
 PYTHONPATH=$(dirname "$module") expect "$folder/robot/where.py"
+PYTHONPATH=$(dirname "$module") "$folder/robot/follow.py" "$poster/drive.cairn" "$poster"/[0-4].pgm | grep -q ', track$'
+"$folder/robot/build/follow_c" "$poster/drive.cairn" 0.1 "$poster"/[0-4].pgm | grep -q ', track$'
 export PKG_CONFIG_PATH="$lib/pkgconfig" LD_LIBRARY_PATH="$lib"
 cd "$folder/robot"
 cc -std=c11 -Wall -Wextra -Werror -pedantic where.c -o where_c $(pkg-config --cflags --libs cairn-runtime)

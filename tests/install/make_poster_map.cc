@@ -1,4 +1,5 @@
-// Writes the poster's map and two pictures, of it and of nothing:  make_poster_map FOLDER
+// Writes the poster's map and two pictures, of it and of nothing, and the map, pictures (0.pgm, 1.pgm, ...)
+// and odometry of a drive:  make_poster_map FOLDER
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -6,7 +7,23 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/blocks/map_rows.h"
-#include "tests/runtime/localize/poster_scene.h"
+#include "tests/install/poster_drive.h"
+
+namespace {
+
+bool WriteDrive(const std::string& folder) {
+  const cairn::PosterDrive drive;
+  std::ofstream odometry(folder + "/odometry.txt");
+  odometry << "# metres ahead, metres to the left, degrees turned to the left\n";
+  for (size_t i = 0; i < drive.frames().size(); ++i) {
+    const cairn::DriveFrame& frame = drive.frames()[i];
+    odometry << frame.ahead_m << " 0 0\n";
+    if (!cv::imwrite(folder + "/" + std::to_string(i) + ".pgm", frame.picture)) return false;
+  }
+  return odometry.flush() && cairn::WriteMapRows(drive.rows(), folder + "/drive.cairn").ok();
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace cairn;
@@ -18,6 +35,6 @@ int main(int argc, char** argv) {
     return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 1;
   const cv::Mat blank(scene.camera.height, scene.camera.width, CV_8UC1, cv::Scalar(90));
   const bool written = cv::imwrite(folder + "/poster.pgm", RenderPoster(scene, PosterQueryPose())) &&
-                       cv::imwrite(folder + "/blank.pgm", blank);
+                       cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder);
   return written ? 0 : 1;
 }

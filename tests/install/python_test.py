@@ -116,6 +116,151 @@ class Localizing(Poster):
         self.assertEqual(set(codes), {0, 9})  # fixes, and busy
 
 
+class Following(unittest.TestCase):
+    """The drive of make_poster_map: five frames ahead, then carried away, where it stands."""
+
+    CARRIED = 5
+
+    @classmethod
+    def setUpClass(cls):
+        cls.map = cairn.Map.open(POSTER / "drive.cairn")
+        cls.frames = [POSTER / f"{i}.pgm" for i in range(7)]
+        lines = (POSTER / "odometry.txt").read_text().splitlines()
+        cls.odometry = [[float(word) for word in line.split()] for line in lines if not line.startswith("#")]
+
+    def printed(self, *words):
+        run = subprocess.run([PROGRAM, "localize", POSTER / "drive.cairn", *self.frames, "--sequence", *words],
+                             capture_output=True, check=True, text=True)
+        return [json.loads(line) for line in run.stdout.splitlines()]
+
+    def test_in_space_gives_the_programs_poses_bit_for_bit(self):
+        tracker = cairn.Tracker(self.map)
+        self.assertIsNone(tracker.predict())
+        for i, (frame, expected) in enumerate(zip(self.frames, self.printed())):
+            fix = tracker.track(read_pgm(frame))
+            self.assertTrue(fix)
+            self.assertEqual(fix.rotation_wxyz.tolist(), expected["rotation_wxyz"])
+            self.assertEqual(fix.translation.tolist(), expected["translation_m"])
+            self.assertEqual(fix.covariance.T.ravel().tolist(), expected["covariance"])
+            self.assertEqual(fix.num_inliers, expected["num_inliers"])
+            self.assertEqual(fix.scope, expected["scope"])
+            self.assertEqual(fix.scope, "votes" if i in (0, self.CARRIED) else "track")
+            self.assertEqual(fix.voted_regions, expected.get("voted_regions", []))
+            expected_next = tracker.predict()
+            self.assertGreater(expected_next.sigma_m, 0)
+            self.assertGreater(expected_next.sigma_deg, 0)
+        # It stands there, and what is predicted is of use to a localizer.
+        numpy.testing.assert_allclose(expected_next.rotation_wxyz, fix.rotation_wxyz, atol=1e-12)
+        numpy.testing.assert_allclose(expected_next.translation, fix.translation, atol=1e-12)
+        self.assertTrue(cairn.Localizer(self.map).localize(read_pgm(self.frames[-1]), prior=expected_next))
+
+    def test_on_the_floor_gives_the_programs_places_bit_for_bit(self):
+        tracker = cairn.VisualTracker(self.map)
+        printed = self.printed("--estimator", "visual-map", "--odometry", POSTER / "odometry.txt")
+        for i, (frame, moved, expected) in enumerate(zip(self.frames, self.odometry, printed)):
+            if i > 0:
+                tracker.move(*moved)
+            fix = tracker.track(read_pgm(frame))
+            self.assertTrue(fix)
+            self.assertEqual(fix.reason, "none")
+            self.assertEqual(fix.position.tolist(), expected["floor_m"])
+            self.assertEqual(fix.heading_deg, expected["heading_deg"])
+            self.assertEqual(fix.covariance.T.ravel().tolist(), expected["covariance"])
+            self.assertEqual(fix.mean.tolist(), expected["mean_m"])
+            self.assertEqual(fix.entropy, expected["entropy"])
+            self.assertEqual(fix.scope, expected["scope"])
+            self.assertEqual(fix.regions, expected["regions"])
+            self.assertEqual(fix.num_matches, expected["num_matches"])
+            self.assertEqual(fix.num_agreeing, expected["num_agreeing"])
+        numpy.testing.assert_allclose(fix.position, [-0.3, 0.5], atol=0.05)  # where it was carried to
+        self.assertIn("deg", repr(fix))
+
+    def test_without_a_fix_there_is_a_reason_and_on_the_floor_a_belief(self):
+        blank = read_pgm(POSTER / "blank.pgm")
+        tracker, visual = cairn.Tracker(self.map), cairn.VisualTracker(self.map)
+        tracker.track(read_pgm(self.frames[2]))
+        visual.track(read_pgm(self.frames[2]))
+        fix = tracker.track(blank)
+        self.assertFalse(fix)
+        self.assertEqual(fix.reason, "too_few_features")
+        visual.move(ahead_m=0, left_m=0, turn_left_rad=0)
+        on_floor = visual.track(blank)
+        self.assertFalse(on_floor)
+        self.assertEqual(on_floor.reason, "too_few_matches")
+        self.assertIn("landmarks", on_floor.message)
+        self.assertIsNone(on_floor.position)
+        self.assertIsNone(on_floor.heading_deg)
+        numpy.testing.assert_allclose(on_floor.mean, [-0.7, -0.4], atol=0.15)
+        self.assertGreater(on_floor.entropy, 0)
+        self.assertEqual(on_floor.covariance.shape, (3, 3))
+        self.assertIn("too_few_matches", repr(on_floor))
+
+    def test_options_reach_the_trackers(self):
+        first = read_pgm(self.frames[0])
+        self.assertFalse(cairn.Tracker(self.map, min_num_inliers=100000).track(first))
+        tracker = cairn.Tracker(self.map, step_sigma_m=2, max_prior_sigma_m=9)
+        tracker.track(first)
+        self.assertEqual(tracker.predict().sigma_m, 2)
+        self.assertFalse(cairn.VisualTracker(self.map, min_num_agreeing=100000).track(first))
+        with self.assertRaisesRegex(cairn.Error, "did you mean 'step_sigma_m'"):
+            cairn.Tracker(self.map, step_sigma=1)
+        with self.assertRaisesRegex(cairn.Error, "kidnapped_ratio"):
+            cairn.VisualTracker(self.map, kidnapped_ratio=2)
+        with self.assertRaisesRegex(cairn.Error, "min_num_inliers"):  # which a visual tracker does not read
+            cairn.VisualTracker(self.map, min_num_inliers=9)
+
+    def test_bad_arguments_are_refused_and_change_nothing(self):
+        tracker, visual = cairn.Tracker(self.map), cairn.VisualTracker(self.map)
+        first, second = (read_pgm(frame) for frame in self.frames[:2])
+        tracker.track(first)
+        visual.track(first)
+        for one in tracker, visual:
+            with self.assertRaisesRegex(TypeError, "float32"):
+                one.track(first.astype(numpy.float32))
+            with self.assertRaisesRegex(ValueError, "one channel"):
+                one.track(numpy.dstack([first] * 3))
+            with self.assertRaises(cairn.Error) as caught:
+                one.track(first[:100])
+            self.assertEqual(caught.exception.name, "not_found")
+            self.assertEqual(one.track(second, camera=self.map.camera_for_size(320, 240)).scope, "track")
+        with self.assertRaises(cairn.Error) as caught:
+            visual.move(float("nan"), 0, 0)
+        self.assertEqual(caught.exception.name, "invalid_argument")
+        with self.assertRaises(TypeError):
+            visual.move(0.1)
+        with self.assertRaises(cairn.Error) as caught:
+            cairn.VisualTracker(cairn.Map.open(POSTER / "poster.cairn"))
+        self.assertEqual(caught.exception.name, "not_found")
+        for kind in cairn.Tracker, cairn.VisualTracker:
+            with self.assertRaises(TypeError):
+                kind("drive.cairn")
+
+    def test_two_threads_at_once_get_busy(self):
+        image = read_pgm(self.frames[0])
+        for tracker in cairn.Tracker(self.map), cairn.VisualTracker(self.map):
+            codes = []
+
+            def track():
+                for _ in range(5):
+                    try:
+                        codes.append(0 if tracker.track(image) else -1)
+                    except cairn.Error as error:
+                        codes.append(error.code)
+            threads = [threading.Thread(target=track) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            self.assertEqual(set(codes), {0, 9})  # fixes, and busy: the interpreter's lock is free meanwhile
+
+    def test_a_tracker_outlives_its_map(self):
+        map = cairn.Map.open(POSTER / "drive.cairn")
+        tracker, visual = cairn.Tracker(map), cairn.VisualTracker(map)
+        del map
+        self.assertTrue(tracker.track(read_pgm(self.frames[0])))
+        self.assertTrue(visual.track(read_pgm(self.frames[0])))
+
+
 class Refusing(Poster):
     def refused(self, image, kind, *words):
         with self.assertRaises(kind) as caught:
@@ -185,14 +330,24 @@ class Refusing(Poster):
                 lambda: cairn.Map.__new__(cairn.Map).camera_for_size(320, 240),
                 lambda: self.localizer.localize(self.image, camera=cairn.Camera.__new__(cairn.Camera)),
                 lambda: self.localizer.localize(self.image, prior=cairn.Prior.__new__(cairn.Prior)),
-                lambda: bool(cairn.Fix.__new__(cairn.Fix))]
-        for example in self.map, self.map.camera_for_size(320, 240), made:
+                lambda: bool(cairn.Fix.__new__(cairn.Fix)),
+                lambda: bool(cairn.FloorFix.__new__(cairn.FloorFix)),
+                lambda: cairn.Tracker(cairn.Map.__new__(cairn.Map)),
+                lambda: cairn.Tracker.__new__(cairn.Tracker).track(self.image),
+                lambda: cairn.Tracker.__new__(cairn.Tracker).predict(),
+                lambda: cairn.VisualTracker(cairn.Map.__new__(cairn.Map)),
+                lambda: cairn.VisualTracker.__new__(cairn.VisualTracker).track(self.image),
+                lambda: cairn.VisualTracker.__new__(cairn.VisualTracker).move(0, 0, 0),
+                lambda: cairn.Tracker(self.map).track(self.image, camera=cairn.Camera.__new__(cairn.Camera))]
+        on_floor = cairn.VisualTracker(cairn.Map.open(POSTER / "drive.cairn")).track(self.image)
+        prior = cairn.Prior([1, 0, 0, 0], [0, 0, 0])
+        for example in self.map, self.map.camera_for_size(320, 240), made, on_floor, prior:
             kind = type(example)
             uses.append(lambda kind=kind: repr(kind.__new__(kind)))
             for name, value in vars(kind).items():
                 if isinstance(value, property):
                     uses.append(lambda kind=kind, name=name: getattr(kind.__new__(kind), name))
-        self.assertGreater(len(uses), 20)
+        self.assertGreater(len(uses), 40)
         for use in uses:
             with self.assertRaisesRegex(TypeError, "__init__ has not been called"):
                 use()

@@ -1,21 +1,9 @@
 #!/usr/bin/python3
 """Where is this picture?  where.py MAP IMAGE.pgm"""
-import re
 import sys
 
 import cairn
-import numpy
-
-
-def read_pgm(path):
-    """A grey picture from a binary PGM file of 8 bits; a robot takes its camera's pixels instead."""
-    with open(path, "rb") as file:
-        contents = file.read()
-    width, height, offset = 0, 0, 0
-    if header := re.match(rb"P5\s+(\d+)\s+(\d+)\s+255\s", contents):
-        width, height, offset = int(header[1]), int(header[2]), header.end()
-    return numpy.frombuffer(contents, numpy.uint8, width * height, offset).reshape(height, width)
-
+from pgm import read_pgm
 
 if len(sys.argv) != 3:
     sys.exit("usage: where.py MAP IMAGE.pgm (8-bit grey)")

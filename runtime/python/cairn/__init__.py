@@ -6,8 +6,36 @@
     if fix:
         print(fix.center, fix.covariance)   # metres; rotation (rad), translation (m)
 
+Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
+
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
 """
-from ._cairn import Camera, Error, Fix, Localizer, Map, Prior, __version__, roll_back_map, update_map
+from ._cairn import (
+    Camera,
+    Error,
+    Fix,
+    FloorFix,
+    Localizer,
+    Map,
+    Prior,
+    Tracker,
+    VisualTracker,
+    __version__,
+    roll_back_map,
+    update_map,
+)
 
-__all__ = ["Camera", "Error", "Fix", "Localizer", "Map", "Prior", "__version__", "roll_back_map", "update_map"]
+__all__ = [
+    "Camera",
+    "Error",
+    "Fix",
+    "FloorFix",
+    "Localizer",
+    "Map",
+    "Prior",
+    "Tracker",
+    "VisualTracker",
+    "__version__",
+    "roll_back_map",
+    "update_map",
+]

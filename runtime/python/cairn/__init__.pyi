@@ -69,6 +69,18 @@ class Prior:
         sigma_m: float = 1.0,
         sigma_deg: float = 10.0,
     ) -> None: ...
+    @property
+    def rotation_wxyz(self) -> NDArray[np.float64]:
+        """cam_from_world, a unit quaternion: (4,)"""
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """cam_from_world, metres: (3,)"""
+    @property
+    def sigma_m(self) -> float:
+        """Of the camera's place, per axis"""
+    @property
+    def sigma_deg(self) -> float:
+        """Of its rotation"""
 
 @final
 class Fix:
@@ -99,7 +111,8 @@ class Fix:
     def region(self) -> int:
         """The one with most inliers; -1: none"""
     @property
-    def scope(self) -> Literal["prior", "regions", "images", "all", "track"]: ...
+    def scope(self) -> Literal["prior", "regions", "images", "all", "track", "votes"]:
+        """Which landmarks it was matched with.  "track", "votes": a tracker's, following and lost"""
     @property
     def num_features(self) -> int: ...
     @property
@@ -109,6 +122,45 @@ class Fix:
     @property
     def candidates(self) -> list[int]:
         """Survey images (their ids), most alike first"""
+    @property
+    def voted_regions(self) -> list[int]:
+        """A tracker's, lost: regions with enough of their landmarks in view, most first"""
+
+@final
+class FloorFix:
+    """A fix on the floor (true), or the reason for none (false)."""
+
+    def __bool__(self) -> bool: ...
+    @property
+    def reason(self) -> str:
+        """"none" for a fix, else "too_few_matches", "one_spot", "disagree", "outside""""
+    @property
+    def message(self) -> str: ...
+    @property
+    def position(self) -> NDArray[np.float64] | None:
+        """Floor frame, metres: (2,); None without a fix"""
+    @property
+    def heading_deg(self) -> float | None:
+        """Counter-clockwise from +x, [0, 360); None without a fix"""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """x (m), y (m), heading (rad): (3, 3).  Without a fix, x and y of the belief"""
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Of the belief after this image, with a fix or without: floor frame, metres: (2,)"""
+    @property
+    def entropy(self) -> float:
+        """Of the belief over places, nats"""
+    @property
+    def scope(self) -> Literal["all", "track", "votes"]:
+        """Which landmarks it was matched with"""
+    @property
+    def regions(self) -> list[int]:
+        """Of "track" and "votes": whose landmarks these are"""
+    @property
+    def num_matches(self) -> int: ...
+    @property
+    def num_agreeing(self) -> int: ...
 
 @final
 class Localizer:
@@ -123,6 +175,40 @@ class Localizer:
 
         `camera` None: the survey's camera of the image's size.  Releases the interpreter's lock meanwhile.
         """
+
+@final
+class Tracker:
+    """Follows a camera in space, frame after frame, and finds it again when it was carried away.
+
+    One per camera: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
+        """`options`: any that `cairn localize --sequence` takes, such as step_sigma_m=0.3 or min_num_inliers=9."""
+    def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
+        """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
+    def predict(self) -> Prior | None:
+        """Where the next frame is expected; None when lost."""
+
+@final
+class VisualTracker:
+    """Follows a robot on the floor, frame after frame, by the map's visual map and its odometry.
+
+    One per camera: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
+        """`options`: any that `cairn localize --sequence --estimator visual-map` reads, such as unknown_way_sigma_m=0.5.
+
+        Raises Error: not_found (the map has no visual map).
+        """
+    def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
+        """Since the last frame the robot drove this far, in its frame at the start, and then turned.
+
+        Several calls before a frame add up.  Without any, it may have gone anywhere within unknown_way_sigma_m.
+        """
+    def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> FloorFix:
+        """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
 
 def update_map(
     map: str | PathLike[str], delta: str | PathLike[str], *, public_key: bytes | None = None, name: str = "",

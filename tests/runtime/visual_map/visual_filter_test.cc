@@ -91,8 +91,24 @@ TEST(VisualFilter, OdometryThatIsNoNumberIsAnError) {
   VisualFilter filter(Room().visual);
   EXPECT_EQ(filter.Move({std::nan(""), 0}, 0).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(filter.Move({0, 0}, std::nan("")).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(filter.Move({1e200, 0}, 0).error().code, ErrorCode::kInvalidArgument);  // its square is infinite
   ASSERT_TRUE(filter.Move({1000, 0}, 0).ok());  // out of the survey: nothing is known again
   for (const double share : filter.AtPlaces()) EXPECT_NEAR(share, 1.0 / 63, 1e-12);
+}
+
+// Its kernel had as many bins as its standard deviation, 5 % of 1e12 rad: more than can be counted, and all
+// was forgotten.
+TEST(VisualFilter, ATurnOfManyCirclesLeavesTheHeadingOpenAndThePlaceKnown) {
+  VisualFilter filter(Room().visual);
+  ASSERT_TRUE(filter.See(Room().room.SeenLandmarks(VisualRoom::PoseAt({2, 2}, 0))).ok());
+  const std::vector<double> before = filter.AtPlaces();
+  ASSERT_TRUE(filter.Move({0, 0}, 1e12).ok());
+  const std::vector<double> after = filter.AtPlaces();
+  for (size_t place = 0; place < before.size(); ++place) {
+    EXPECT_NEAR(after[place], before[place], 1e-6) << place;
+    const double share = filter.AtHeading(static_cast<int32_t>(place), 200, 45);
+    EXPECT_NEAR(share, after[place] * 19 / 72, 0.01) << place;  // bins of 5 degrees
+  }
 }
 
 TEST(Compare, PutsAFixInSpaceOnTheFloor) {

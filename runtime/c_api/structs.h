@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+
+#include <opencv2/core/mat.hpp>
+
+#include "core/base/error.h"
+#include "core/camera/camera.h"
+#include "runtime/c_api/cairn.h"
+#include "runtime/localize/localization.h"
+#include "runtime/map/map.h"
+#include "runtime/visual_map/visual_estimate.h"
+
+// Between the structs of the C API and the runtime's types.
+namespace cairn {
+
+// The caller's pixels, not copied.
+Result<cv::Mat> PixelsOf(const cairn_image* image);
+
+// NULL: the survey's camera of the image's size.
+Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey);
+
+// NULL: none.
+Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given);
+cairn_prior PriorFrom(const PosePrior& prior);
+
+// Callers built with an earlier release give the fields that it had.
+Status CheckFix(const cairn_fix* fix);
+Status CheckFix(const cairn_floor_fix* fix);
+cairn_fix FixFrom(const Localization& found);
+cairn_floor_fix FloorFixFrom(const VisualPose& found, Scope scope);
+
+}  // namespace cairn

@@ -1,0 +1,283 @@
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <numbers>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/c_api/cairn.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/localize/region_tracker.h"
+#include "runtime/visual_map/visual_tracker.h"
+#include "tests/install/poster_drive.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+const PosterDrive& Drive() {
+  static const PosterDrive drive;
+  return drive;
+}
+
+const cv::Mat& Blank() {
+  static const cv::Mat blank(240, 320, CV_8UC1, cv::Scalar(90));
+  return blank;
+}
+
+cairn_image ImageOf(const cv::Mat& picture) {
+  cairn_image image = CAIRN_IMAGE_INIT;
+  image.pixels = picture.data;
+  image.width = picture.cols;
+  image.height = picture.rows;
+  image.stride = picture.step;
+  return image;
+}
+
+void ExpectSamePose(const double (&rotation_wxyz)[4], const double (&translation_m)[3], const Pose& pose) {
+  EXPECT_EQ(Eigen::Vector4d(rotation_wxyz),
+            Eigen::Vector4d(pose.rotation.w(), pose.rotation.x(), pose.rotation.y(), pose.rotation.z()));
+  EXPECT_EQ(Eigen::Vector3d(translation_m), pose.translation);
+}
+
+void ExpectSame(const cairn_fix& fix, const Localization& expected) {
+  ASSERT_EQ(fix.has_fix, expected.has_fix());
+  EXPECT_EQ(fix.reason, static_cast<int32_t>(expected.reason));
+  EXPECT_STREQ(cairn_scope_name(fix.scope), ScopeName(expected.scope));
+  EXPECT_EQ(fix.region, expected.region);
+  EXPECT_EQ(fix.num_inliers, expected.num_inliers);
+  if (!expected.has_fix()) return;
+  ExpectSamePose(fix.rotation_wxyz, fix.translation_m, expected.cam_from_world);
+  EXPECT_EQ(Matrix6d(fix.covariance), expected.covariance.transpose());  // rows here, columns in Eigen
+}
+
+void ExpectSame(const cairn_floor_fix& fix, const VisualPose& expected, Scope scope) {
+  ASSERT_EQ(fix.has_fix, expected.flag == VisualFlag::kNone);
+  EXPECT_STREQ(cairn_scope_name(fix.scope), ScopeName(scope));
+  EXPECT_EQ(fix.num_matches, expected.num_matches);
+  EXPECT_EQ(fix.num_agreeing, expected.num_agreeing);
+  EXPECT_EQ(Eigen::Matrix3d(fix.covariance), expected.covariance.transpose());
+  EXPECT_EQ(Eigen::Vector2d(fix.mean_m), expected.mean);
+  EXPECT_EQ(fix.entropy, expected.entropy);
+  if (!fix.has_fix) return;
+  EXPECT_EQ(Eigen::Vector2d(fix.position_m), expected.position);
+  EXPECT_EQ(fix.heading_deg, expected.heading_deg);
+}
+
+// The drive's map.  It is closed before a test uses what was made of it, which goes on.
+class CTrackers : public testing::Test {
+ protected:
+  CTrackers() {
+    const std::string path = testing::TempDir() + "/c_api_drive.cairn";
+    EXPECT_TRUE(WriteMapRows(Drive().rows(), path).ok());
+    map_ = *Map::Open(path);
+    cairn_map* map = nullptr;
+    EXPECT_EQ(cairn_map_open(path.c_str(), nullptr, &map), CAIRN_OK) << cairn_last_error();
+    EXPECT_EQ(cairn_tracker_create(map, &tracker_), CAIRN_OK) << cairn_last_error();
+    EXPECT_EQ(cairn_visual_tracker_create(map, &visual_), CAIRN_OK) << cairn_last_error();
+    EXPECT_EQ(cairn_map_close(map), CAIRN_OK);
+  }
+  ~CTrackers() override {
+    EXPECT_EQ(cairn_tracker_destroy(tracker_), CAIRN_OK);
+    EXPECT_EQ(cairn_visual_tracker_destroy(visual_), CAIRN_OK);
+  }
+
+  cairn_fix Track(int frame) {
+    const cairn_image image = ImageOf(Drive().frames()[frame].picture);
+    cairn_fix fix = CAIRN_FIX_INIT;
+    EXPECT_EQ(cairn_tracker_track(tracker_, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+    return fix;
+  }
+  cairn_floor_fix TrackOnFloor(int frame) {
+    const cairn_image image = ImageOf(Drive().frames()[frame].picture);
+    cairn_floor_fix fix = CAIRN_FLOOR_FIX_INIT;
+    EXPECT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+    return fix;
+  }
+  Camera QueryCamera() const { return *map_->CameraForSize(320, 240); }
+  Query QueryOf(int frame) const {
+    return *Localizer(map_).QueryFromImage(Drive().frames()[frame].picture, QueryCamera());
+  }
+
+  std::shared_ptr<const Map> map_;
+  cairn_tracker* tracker_ = nullptr;
+  cairn_visual_tracker* visual_ = nullptr;
+};
+
+TEST_F(CTrackers, InSpaceGiveTheFixesOfTheCxxTrackerBitForBit) {
+  RegionTracker tracker(map_);
+  cairn_prior prior = CAIRN_PRIOR_INIT;
+  int32_t is_expected = -1;
+  ASSERT_EQ(cairn_tracker_predict(tracker_, &is_expected, &prior), CAIRN_OK);
+  EXPECT_EQ(is_expected, 0);
+  for (int i = 0; i < static_cast<int>(Drive().frames().size()); ++i) {
+    const DriveFrame& frame = Drive().frames()[i];
+    const cairn_fix fix = Track(i);
+    ExpectSame(fix, *tracker.Track(frame.picture, QueryCamera()));
+    ASSERT_TRUE(fix.has_fix) << i << ": " << fix.message;
+    EXPECT_LT((Eigen::Vector3d(fix.center_m) - frame.cam_from_world.Center()).norm(), 0.05) << i;
+    EXPECT_EQ(fix.scope, i == 0 || i == PosterDrive::kCarried ? CAIRN_SCOPE_VOTES : CAIRN_SCOPE_TRACK) << i;
+    ASSERT_EQ(cairn_tracker_predict(tracker_, &is_expected, &prior), CAIRN_OK);
+    ASSERT_EQ(is_expected, 1);
+    ExpectSamePose(prior.rotation_wxyz, prior.translation_m, tracker.Prediction()->cam_from_world);
+    EXPECT_EQ(prior.sigma_m, tracker.Prediction()->sigma_m);
+    EXPECT_EQ(prior.sigma_deg, tracker.Prediction()->sigma_deg);
+  }
+}
+
+TEST_F(CTrackers, OnTheFloorGiveTheFixesOfTheCxxTrackerBitForBit) {
+  auto tracker = *VisualTracker::Make(map_);
+  for (int i = 0; i < static_cast<int>(Drive().frames().size()); ++i) {
+    const DriveFrame& frame = Drive().frames()[i];
+    if (i > 0) {
+      ASSERT_EQ(cairn_visual_tracker_move(visual_, frame.ahead_m, 0, 0), CAIRN_OK);
+      ASSERT_TRUE(tracker.Move({frame.ahead_m, 0}, 0).ok());
+    }
+    const cairn_floor_fix fix = TrackOnFloor(i);
+    const TrackedVisualPose expected = *tracker.See(QueryOf(i));
+    ExpectSame(fix, expected.pose, expected.scope);
+    ASSERT_TRUE(fix.has_fix) << i << ": " << fix.message;
+    const Eigen::Vector2d at = frame.cam_from_world.Center().head<2>();
+    EXPECT_LT((Eigen::Vector2d(fix.position_m) - at).norm(), 0.1) << i;
+    EXPECT_EQ(fix.scope, i == 0 ? CAIRN_SCOPE_VOTES : CAIRN_SCOPE_TRACK) << i;
+  }
+  // Where the image shows nothing, the odometry alone decides.
+  ASSERT_EQ(cairn_visual_tracker_move(visual_, 0.2, -0.1, 0.5), CAIRN_OK);
+  ASSERT_TRUE(tracker.Move({0.2, -0.1}, 0.5).ok());
+  const cairn_image image = ImageOf(Blank());
+  cairn_floor_fix fix = CAIRN_FLOOR_FIX_INIT;
+  ASSERT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+  const TrackedVisualPose expected = *tracker.See(*Localizer(map_).QueryFromImage(Blank(), QueryCamera()));
+  EXPECT_EQ(fix.has_fix, 0);
+  ExpectSame(fix, expected.pose, expected.scope);
+}
+
+// A blank image has no fix, and the belief stays near where the robot was: nearer if it says that it stood.
+TEST_F(CTrackers, OnTheFloorWithoutAFixGiveTheBelief) {
+  const cairn_image image = ImageOf(Blank());
+  cairn_floor_fix stands = CAIRN_FLOOR_FIX_INIT, drives = CAIRN_FLOOR_FIX_INIT;
+  const cairn_floor_fix before = TrackOnFloor(2);
+  ASSERT_EQ(cairn_visual_tracker_move(visual_, 0, 0, 0), CAIRN_OK);
+  ASSERT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &stands), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(stands.has_fix, 0);
+  EXPECT_THAT(stands.message, HasSubstr("landmarks"));
+  EXPECT_LT((Eigen::Vector2d(stands.mean_m) - Eigen::Vector2d(before.mean_m)).norm(), 0.1);
+  EXPECT_GT(stands.entropy, before.entropy);
+  ASSERT_TRUE(TrackOnFloor(2).has_fix);
+  ASSERT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &drives), CAIRN_OK) << cairn_last_error();
+  EXPECT_GT(drives.entropy, stands.entropy + 0.5);
+  EXPECT_GT(drives.covariance[0], stands.covariance[0]);
+}
+
+TEST_F(CTrackers, OptionsAreThoseThatTheTrackerReadsAndBeginAnew) {
+  Track(0);
+  EXPECT_EQ(Track(1).scope, CAIRN_SCOPE_TRACK);
+  EXPECT_EQ(cairn_tracker_set_option(tracker_, "step_sigma", "1"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("'step_sigma_m'"));
+  EXPECT_EQ(cairn_tracker_set_option(tracker_, "step_sigma_m", "-1"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(Track(2).scope, CAIRN_SCOPE_TRACK);
+  // Of the tracker, of the vote and of the localizer.
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "step_sigma_m", "2"), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "max_prior_sigma_m", "9"), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "min_num_votes", "5"), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(Track(2).scope, CAIRN_SCOPE_VOTES);
+  EXPECT_EQ(Track(PosterDrive::kCarried).scope, CAIRN_SCOPE_TRACK);  // 2 m are near enough now
+  ASSERT_EQ(cairn_tracker_set_option(tracker_, "min_num_inliers", "100000"), CAIRN_OK);
+  EXPECT_EQ(Track(2).has_fix, 0);
+
+  // On the floor: of features, of the visual map, of the tracker and its vote, of the filter, of the
+  // estimate.
+  TrackOnFloor(0);
+  EXPECT_EQ(cairn_visual_tracker_set_option(visual_, "min_num_inliers", "9"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_visual_tracker_set_option(visual_, "kidnapped_ratio", "2"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(TrackOnFloor(1).scope, CAIRN_SCOPE_TRACK);
+  for (const char* name : {"max_num_features", "keypoint_sigma_px", "model_budget_mib", "tracked_ratio",
+                           "min_num_votes", "kidnapped_ratio"}) {
+    EXPECT_EQ(cairn_visual_tracker_set_option(visual_, name, "1"), CAIRN_OK) << cairn_last_error();
+  }
+  EXPECT_EQ(TrackOnFloor(1).has_fix, 0);  // one feature
+  EXPECT_EQ(cairn_visual_tracker_set_option(visual_, "max_num_features", "4000"), CAIRN_OK);
+  EXPECT_EQ(cairn_visual_tracker_set_option(visual_, "min_num_agreeing", "100000"), CAIRN_OK);
+  EXPECT_EQ(TrackOnFloor(1).has_fix, 0);
+}
+
+TEST_F(CTrackers, AfterAnErrorTheyAreAsBefore) {
+  RegionTracker tracker(map_);
+  auto visual = *VisualTracker::Make(map_);
+  for (int i = 0; i < 3; ++i) {
+    cairn_image image = ImageOf(Drive().frames()[i].picture);
+    image.height = 100;
+    cairn_fix fix = CAIRN_FIX_INIT;
+    fix.has_fix = 1;
+    EXPECT_EQ(cairn_tracker_track(tracker_, &image, nullptr, &fix), CAIRN_NOT_FOUND);
+    EXPECT_EQ(fix.has_fix, 0);
+    cairn_camera camera = CAIRN_CAMERA_INIT;  // of this size, which is not the survey's
+    camera.width = 320;
+    camera.height = 100;
+    camera.num_params = 3;
+    camera.params[0] = 280;
+    cairn_floor_fix floor_fix = CAIRN_FLOOR_FIX_INIT;
+    floor_fix.has_fix = 1;
+    EXPECT_EQ(cairn_visual_tracker_track(visual_, &image, &camera, &floor_fix), CAIRN_UNSUPPORTED);
+    EXPECT_EQ(floor_fix.has_fix, 0);
+    EXPECT_EQ(cairn_visual_tracker_move(visual_, std::nan(""), 0, 0), CAIRN_INVALID_ARGUMENT);
+    EXPECT_EQ(cairn_visual_tracker_move(visual_, 0, 0, HUGE_VAL), CAIRN_INVALID_ARGUMENT);
+    ExpectSame(Track(i), *tracker.Track(Drive().frames()[i].picture, QueryCamera()));
+    const TrackedVisualPose expected = *visual.See(QueryOf(i));
+    ExpectSame(TrackOnFloor(i), expected.pose, expected.scope);
+  }
+}
+
+TEST_F(CTrackers, UsedByTwoThreadsAtOnceAreBusy) {
+  std::atomic<int> num_fixes = 0, num_busy = 0, num_other = 0;
+  const auto count = [&](int32_t code, int32_t has_fix) {
+    ++(code == CAIRN_OK && has_fix ? num_fixes : code == CAIRN_BUSY ? num_busy : num_other);
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&] {
+      const cairn_image image = ImageOf(Drive().frames()[0].picture);
+      for (int repeat = 0; repeat < 5; ++repeat) {
+        cairn_fix fix = CAIRN_FIX_INIT;
+        const int32_t code = cairn_tracker_track(tracker_, &image, nullptr, &fix);
+        count(code, fix.has_fix);
+        cairn_floor_fix floor_fix = CAIRN_FLOOR_FIX_INIT;
+        const int32_t floor_code = cairn_visual_tracker_track(visual_, &image, nullptr, &floor_fix);
+        count(floor_code, floor_fix.has_fix);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_GT(num_fixes, 0);
+  EXPECT_GT(num_busy, 0);
+  EXPECT_EQ(num_other, 0);
+}
+
+// A program built before there were trackers knows no scope and no belief.
+TEST_F(CTrackers, ShorterFixesOfEarlierReleasesAreEnough) {
+  const cairn_image image = ImageOf(Drive().frames()[0].picture);
+  cairn_fix fix;
+  std::memset(&fix, 0xff, sizeof(fix));
+  fix.size = offsetof(cairn_fix, scope);
+  ASSERT_EQ(cairn_tracker_track(tracker_, &image, nullptr, &fix), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(fix.has_fix, 1);
+  EXPECT_EQ(fix.scope, -1);
+  fix.size = offsetof(cairn_fix, scope) - 1;
+  EXPECT_EQ(cairn_tracker_track(tracker_, &image, nullptr, &fix), CAIRN_INVALID_ARGUMENT);
+  cairn_floor_fix floor_fix;
+  std::memset(&floor_fix, 0xff, sizeof(floor_fix));
+  floor_fix.size = offsetof(cairn_floor_fix, mean_m);
+  ASSERT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &floor_fix), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(floor_fix.has_fix, 1);
+  EXPECT_TRUE(std::isnan(floor_fix.entropy));  // not written
+  floor_fix.size = offsetof(cairn_floor_fix, mean_m) - 1;
+  EXPECT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &floor_fix), CAIRN_INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace cairn
