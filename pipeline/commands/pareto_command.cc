@@ -24,7 +24,7 @@
 #include "pipeline/build/run_make.h"
 #include "pipeline/program/stop_signal.h"
 #include "pipeline/report/pareto_picture.h"
-#include "stages/emit_map/fit_size.h"
+#include "stages/emit_map/choose/fit_size.h"
 
 namespace cairn::pipeline {
 namespace {

@@ -18,9 +18,9 @@
 #include "core/line/program_version.h"
 #include "core/plan/views_database.h"
 #include "core/world/dropped_items.h"
+#include "stages/emit_map/choose/fit_size.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
-#include "stages/emit_map/fit_size.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 

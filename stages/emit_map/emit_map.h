@@ -13,7 +13,7 @@
 #include "core/world/decomposition.h"
 #include "core/world/feature_class.h"
 #include "core/world/world.h"
-#include "stages/emit_map/make_promises.h"
+#include "stages/emit_map/choose/make_promises.h"
 
 namespace cairn::emit_map {
 
@@ -24,10 +24,10 @@ namespace cairn::emit_map {
 // ([Sala06 §III]).
 struct EmitMapOptions {
   // "fewest": the fewest with which left-out survey images are localized as with all (ChooseFewest in
-  // fit_size.h); "regions": the classes that regions keep; "all": every class.
+  // choose/fit_size.h); "regions": the classes that regions keep; "all": every class.
   std::string landmarks = "fewest";
   // Most bytes of the sealed map, 0: no limit.  Of the classes that could become landmarks ("fewest": of
-  // all), the map keeps those with which left-out survey images are localized best (fit_size.h).
+  // all), the map keeps those with which left-out survey images are localized best (choose/fit_size.h).
   // REQUIRES: >= 0
   int max_bytes = 0;
   // A left-out image counts as localized within this distance of its place, metres (the map's units where
@@ -88,7 +88,7 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // name, seed, options or hashes: those are the caller's.  Pure. O(observations).  Errors: InvalidArgument
 // (inputs that do not belong together: a region's feature, a feature's class or a station's image does not
 // exist; documents = "kept" without kept images; landmarks = "fewest" without `keep`: which these are is
-// found by trials, fit_size.h), NoData (no class is kept).
+// found by trials, choose/fit_size.h), NoData (no class is kept).
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr,

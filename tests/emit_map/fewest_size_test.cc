@@ -1,4 +1,4 @@
-#include "stages/emit_map/fewest_size.h"
+#include "stages/emit_map/choose/fewest_size.h"
 
 #include <gtest/gtest.h>
 

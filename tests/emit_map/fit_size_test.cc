@@ -1,4 +1,4 @@
-#include "stages/emit_map/fit_size.h"
+#include "stages/emit_map/choose/fit_size.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/emit_map/leave_out_images.h"
+#include "stages/emit_map/choose/leave_out_images.h"
 
 #include <algorithm>
 #include <set>

@@ -10,9 +10,9 @@
 #include "core/blocks/map_rows.h"
 #include "core/world/feature_class.h"
 #include "core/world/world.h"
-#include "stages/emit_map/leave_out_images.h"
-#include "stages/emit_map/make_promises.h"
-#include "stages/emit_map/trials.h"
+#include "stages/emit_map/choose/leave_out_images.h"
+#include "stages/emit_map/choose/make_promises.h"
+#include "stages/emit_map/choose/trials.h"
 
 namespace cairn::emit_map {
 

@@ -1,4 +1,4 @@
-#include "stages/emit_map/trials.h"
+#include "stages/emit_map/choose/trials.h"
 
 #include <algorithm>
 #include <set>

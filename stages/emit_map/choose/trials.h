@@ -15,7 +15,7 @@
 #include "core/promise/landmark_sights.h"
 #include "core/promise/promise_model.h"
 #include "core/world/feature_class.h"
-#include "stages/emit_map/leave_out_images.h"
+#include "stages/emit_map/choose/leave_out_images.h"
 
 namespace cairn::emit_map {
 

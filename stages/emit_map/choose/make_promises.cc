@@ -1,4 +1,4 @@
-#include "stages/emit_map/make_promises.h"
+#include "stages/emit_map/choose/make_promises.h"
 
 #include <algorithm>
 #include <cmath>

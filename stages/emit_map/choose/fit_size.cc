@@ -1,4 +1,4 @@
-#include "stages/emit_map/fit_size.h"
+#include "stages/emit_map/choose/fit_size.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <map>
 
 #include "core/blocks/map_rows.h"
-#include "stages/emit_map/fewest_size.h"
+#include "stages/emit_map/choose/fewest_size.h"
 
 namespace cairn::emit_map {
 namespace {
