@@ -185,23 +185,29 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
   return rows;
 }
 
-std::string RecallText(const FittedSize& fitted) {
+double LeastErrorM(const EmitMapOptions& options) {
+  return options.least_error_ratio * options.left_out_max_error_m;
+}
+
+std::string RecallText(const FittedSize& fitted, const EmitMapOptions& options) {
   if (fitted.trial_of_all.NumTried() == 0) return "no survey image was left out to try it on";
+  const double least_error_m = LeastErrorM(options);
   return fmt::format(
       "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
-      "everything",
+      "everything; image by image {:.2f} times as large, where less than {:.2g} counts as that",
       fitted.trial.NumTried(), fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
-      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM());
+      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM(),
+      ErrorRatio(fitted.trial, fitted.trial_of_all, least_error_m), least_error_m);
 }
 
 std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const EmitMapOptions& options) {
   if (options.max_bytes == 0) {
     return fmt::format("emit_map: the fewest landmarks: {} bits a descriptor value; {}\n",
-                       fitted.descriptor_bits, RecallText(fitted));
+                       fitted.descriptor_bits, RecallText(fitted, options));
   }
   if (fitted.promises) {
     return fmt::format("emit_map: at most {} bytes: {} bits a descriptor value; {}\n", options.max_bytes,
-                       fitted.descriptor_bits, RecallText(fitted));
+                       fitted.descriptor_bits, RecallText(fitted, options));
   }
   const SizeGuarantee guarantee = GuaranteeOf(rows);
   return fmt::format(
@@ -209,7 +215,7 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const E
       "{} of {} stations see fewer than k = {}; {}\n",
       options.max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks,
       guarantee.num_stations_below_k, rows.stations.size(), rows.k,
-      fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted));
+      fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted, options));
 }
 
 std::string PromiseText(const MapPromise& promise) {
@@ -263,7 +269,7 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
                                    .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},
                                    .min_recall_ratio = options.min_recall_ratio,
                                    .max_error_ratio = options.max_error_ratio,
-                                   .least_error_m = options.least_error_ratio * options.left_out_max_error_m,
+                                   .least_error_m = LeastErrorM(options),
                                    .promise = PromiseOptionsOf(options)};
   CAIRN_ASSIGN_OR_RETURN(
       const FittedSize fitted,
