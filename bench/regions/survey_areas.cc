@@ -99,7 +99,8 @@ std::string Text(double x, double y, const std::string& text, const char* anchor
 std::string AreasPicture(const Areas& before, const Areas& after, const Stations& stations) {
   constexpr int kNumColumns = 4, kNumRows = 3;
   constexpr double kCellPx = 9, kGapPx = 34;
-  int min_column = 0, max_column = 0, min_row = 0, max_row = 0;
+  auto [min_column, min_row] = stations.cells.at(0);  // a world has stations
+  int max_column = min_column, max_row = min_row;
   for (const auto& [column, row] : stations.cells) {
     min_column = std::min(min_column, column);
     max_column = std::max(max_column, column);
