@@ -251,9 +251,8 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
   CAIRN_ASSIGN_OR_RETURN(const std::vector<char> may_keep, KeptClasses(inputs.classes, inputs.parts.world,
                                                                        inputs.parts.decomposition, options));
   const DropReason reason = options.max_bytes > 0 ? DropReason::kOverBudget : DropReason::kNotNeeded;
-  const Promises* promises = nullptr;
-  const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep,
-                            int descriptor_bits) -> Result<MapRows> {
+  const EmitKept emit = [&](const Classes& classes, const std::vector<char>& keep, int descriptor_bits,
+                            const Promises* promises) -> Result<MapRows> {
     const bool is_whole = classes.images.size() == inputs.classes.images.size();
     EmitMapOptions of_this = options;
     of_this.descriptor_bits = descriptor_bits;
@@ -278,8 +277,8 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
                     TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress)
           : ChooseFewest(inputs.classes, arguments.matches_path, emit, fit_options, environment.num_threads,
                          *environment.progress));
-  if (fitted.promises) promises = &*fitted.promises;
-  CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits));
+  CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits,
+                                            fitted.promises ? &*fitted.promises : nullptr));
   std::string text = GuaranteeText(rows, fitted, arguments.options);
   if (fitted.promises) text += PromiseText(fitted.promises->findings);
   return std::pair(std::move(rows), std::move(text));

@@ -192,6 +192,28 @@ TEST_F(MapSize, ParetoWritesTableAndPictureAndStopsWhereNothingFits) {
 
 // A drive on which places are seen two or three times: with the images that are left out to try a size on,
 // classes vanish that the world and its regions name.
+// A lattice of many places and headings, whose promises take more than the last half per cent of the map.
+TEST_F(MapSize, WhatIsPromisedCountsToo) {
+  WriteTinyRecipe(Path("many.toml"));
+  ReplaceInFile(Path("many.toml"), "spacing_m = 0.7", "spacing_m = 0.5");
+  const ProgramRun run = Run("cairn pareto many.toml -o many.cairn --sizes 80000,60000 --progress none");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::ifstream rows(Path("many.pareto.csv"));
+  std::string line;
+  std::getline(rows, line);
+  ASSERT_THAT(line, testing::StartsWith("max_bytes,bytes,"));
+  std::getline(rows, line);  // without a limit
+  for (const int max_bytes : {80000, 60000}) {
+    ASSERT_TRUE(std::getline(rows, line));
+    int at_most = 0, num_bytes = 0;
+    char comma = 0;
+    std::istringstream(line) >> at_most >> comma >> num_bytes;
+    EXPECT_EQ(at_most, max_bytes);
+    EXPECT_LE(num_bytes, max_bytes);
+    EXPECT_GE(num_bytes, max_bytes * 9 / 10);
+  }
+}
+
 TEST_F(MapSize, SurveyOfFewObservationsFitsItsBytesToo) {
   std::string recipe =
       "name = \"few\"\n[simulate]\nsurvey = \"driven\"\nwidth_m = 5.5\ndepth_m = 6\nnum_rooms = 2\n"

@@ -21,6 +21,8 @@ constexpr double kClearMargin = 0.03;
 // The search for a size ends at this part of the limit.
 constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
+// So often a map with its promise is made; the first is mostly a little too large.
+constexpr int kMaxNumPromises = 4;
 // ChooseFewest tries numbers of landmarks that grow by this factor, and so many more to each side of the
 // first that will do.
 constexpr double kLadderFactor = 1.3;
@@ -34,12 +36,18 @@ constexpr int kFewestBits = 3;
 constexpr int kNumFigures = 30;
 constexpr size_t kFigureNameBytes = 26;
 constexpr size_t kCheckMapOptionsBytes = 2048;
+constexpr int kMaxNumBins = 8;  // of CalibrationCurve
 
 // Bytes of the file including its self-test.
 Result<int64_t> SealedBytes(MapRows rows, const std::string& scratch_path) {
   for (int i = 0; i < kNumFigures; ++i)
     rows.self_test[fmt::format("{:a>{}}", i, kFigureNameBytes)] = 1.0 / (i + 3);
   rows.stage_options["check_map"] = std::string(kCheckMapOptionsBytes, 'a');
+  if (rows.findings.promise) {
+    rows.findings.promise->held_out.clear();
+    for (int i = 0; i < kMaxNumBins; ++i)
+      rows.findings.promise->held_out.push_back({1.0 / (kMaxNumBins + 1 - i), 1000, 1000, 0.9});
+  }
   rows.findings.self_test_regions.clear();
   for (RegionIdx region = kOutsideRegions; region < static_cast<RegionIdx>(rows.regions.size()); ++region)
     rows.findings.self_test_regions.push_back(
@@ -53,23 +61,23 @@ Result<int64_t> SealedBytes(MapRows rows, const std::string& scratch_path) {
 
 class SizeFitter {
  public:
-  SizeFitter(const EmitKept& emit, const FitSizeOptions& options, std::string scratch_path,
-             Progress& progress)
-      : emit_(emit), options_(options), scratch_path_(std::move(scratch_path)), progress_(progress) {}
+  SizeFitter(const EmitKept& emit, std::string scratch_path, Progress& progress)
+      : emit_(emit), scratch_path_(std::move(scratch_path)), progress_(progress) {}
 
-  // The largest number of first classes of `order` that fit; 0: not even one.
+  // The largest number of first classes of `order` that fit into so many bytes; 0: not even one.
   Result<size_t> MostThatFit(const Classes& classes, const std::vector<size_t>& order, int bits,
-                             int64_t* num_bytes) {
+                             int64_t max_bytes, int64_t* num_bytes) {
     const auto measure = [&](size_t n) -> Result<int64_t> {
-      CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit_(classes, FirstOf(order, n, classes.classes.size()), bits));
+      CAIRN_ASSIGN_OR_RETURN(MapRows rows,
+                             emit_(classes, FirstOf(order, n, classes.classes.size()), bits, nullptr));
       return SealedBytes(std::move(rows), scratch_path_);
     };
     CAIRN_ASSIGN_OR_RETURN(int64_t fewest_bytes, measure(1));
     least_bytes_ = std::min(least_bytes_, fewest_bytes);
-    if (fewest_bytes > options_.max_bytes) return size_t{0};
+    if (fewest_bytes > max_bytes) return size_t{0};
     CAIRN_ASSIGN_OR_RETURN(int64_t most_bytes, measure(order.size()));
     *num_bytes = most_bytes;
-    if (most_bytes <= options_.max_bytes) return order.size();
+    if (most_bytes <= max_bytes) return order.size();
     // Bytes grow roughly in proportion: aim a little below the limit, then narrow down.
     size_t fits = 1, too_many = order.size();
     *num_bytes = fewest_bytes;
@@ -78,20 +86,20 @@ class SizeFitter {
         return MakeError(ErrorCode::kCancelled, "fitting the map's size was stopped");
       const double per_landmark =
           static_cast<double>(most_bytes - fewest_bytes) / static_cast<double>(too_many - fits);
-      const double room = (1 + kNearLimitRatio) / 2 * static_cast<double>(options_.max_bytes) -
-                          static_cast<double>(fewest_bytes);
+      const double room =
+          (1 + kNearLimitRatio) / 2 * static_cast<double>(max_bytes) - static_cast<double>(fewest_bytes);
       const auto step = static_cast<int64_t>(room / per_landmark);
       const size_t n =
           fits + static_cast<size_t>(std::clamp<int64_t>(step, 1, static_cast<int64_t>(too_many - fits) - 1));
       CAIRN_ASSIGN_OR_RETURN(const int64_t bytes, measure(n));
-      if (bytes > options_.max_bytes) {
+      if (bytes > max_bytes) {
         too_many = n;
         most_bytes = bytes;
         continue;
       }
       fits = n;
       *num_bytes = fewest_bytes = bytes;
-      if (static_cast<double>(bytes) >= kNearLimitRatio * static_cast<double>(options_.max_bytes)) break;
+      if (static_cast<double>(bytes) >= kNearLimitRatio * static_cast<double>(max_bytes)) break;
     }
     return fits;
   }
@@ -107,7 +115,6 @@ class SizeFitter {
 
  private:
   const EmitKept& emit_;
-  const FitSizeOptions& options_;
   std::string scratch_path_;
   Progress& progress_;
   int64_t least_bytes_ = std::numeric_limits<int64_t>::max();
@@ -176,7 +183,7 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
                            const std::string& matches_path, const EmitKept& emit,
                            const FitSizeOptions& options, const std::string& scratch_path, int num_threads,
                            Progress& progress) {
-  SizeFitter fitter(emit, options, scratch_path, progress);
+  SizeFitter fitter(emit, scratch_path, progress);
   const std::vector<size_t> pool = Pool(may_keep);
   std::vector<int> bits_tried;
   for (const int bits : kBits) {
@@ -189,7 +196,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   std::vector<size_t> num_that_fit;
   int64_t num_bytes = 0;
   for (const int bits : bits_tried) {
-    CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, order, bits, &num_bytes));
+    CAIRN_ASSIGN_OR_RETURN(const size_t n,
+                           fitter.MostThatFit(classes, order, bits, options.max_bytes, &num_bytes));
     num_that_fit.push_back(n);
     if (n == pool.size()) break;  // all fit: no reason for fewer bits
   }
@@ -227,10 +235,25 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
     fitted.descriptor_bits = bits_tried[i];
   }
   progress.End();
-  CAIRN_ASSIGN_OR_RETURN(const size_t n,
-                         fitter.MostThatFit(classes, order, fitted.descriptor_bits, &fitted.num_bytes));
+  // What the promise and its regions take is known when they are made: then fewer landmarks fit.
+  int64_t room = options.max_bytes;
+  for (int round = 0; round < kMaxNumPromises; ++round) {
+    CAIRN_ASSIGN_OR_RETURN(
+        const size_t n, fitter.MostThatFit(classes, order, fitted.descriptor_bits, room, &fitted.num_bytes));
+    if (n == 0) break;
+    fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
+    fitted.promises = maker.Promise(fitted.keep, trials.fared(), options.promise);
+    CAIRN_ASSIGN_OR_RETURN(MapRows rows,
+                           emit(classes, fitted.keep, fitted.descriptor_bits, &*fitted.promises));
+    CAIRN_ASSIGN_OR_RETURN(fitted.num_bytes, SealedBytes(std::move(rows), scratch_path));
+    if (fitted.num_bytes <= options.max_bytes) return fitted;
+    room -= fitted.num_bytes - options.max_bytes;
+  }
+  // There is no room for a promise.
+  fitted.promises.reset();
+  CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, order, fitted.descriptor_bits,
+                                                            options.max_bytes, &fitted.num_bytes));
   fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
-  fitted.promises = maker.Promise(fitted.keep, trials.fared(), options.promise);
   return fitted;
 }
 

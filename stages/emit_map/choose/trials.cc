@@ -84,7 +84,7 @@ Result<LeftOutTrial> Trials::Try(size_t n, int descriptor_bits) {
     LeftOutTrial& trial = of_parts[p];
     trial.images.resize(images.size());
     if (!part.pool.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(MapRows rows, (*emit_)(classes, keep, descriptor_bits));
+      CAIRN_ASSIGN_OR_RETURN(MapRows rows, (*emit_)(classes, keep, descriptor_bits, nullptr));
       CAIRN_ASSIGN_OR_RETURN(trial, TryLeftOutImages(std::move(rows), images, limits_, threads));
     }
     for (size_t i = 0; i < images.size(); ++i) {

@@ -16,14 +16,15 @@
 #include "core/promise/promise_model.h"
 #include "core/world/feature_class.h"
 #include "stages/emit_map/choose/leave_out_images.h"
+#include "stages/emit_map/choose/make_promises.h"
 
 namespace cairn::emit_map {
 
-// Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these) and
-// this many bits per descriptor value: EmitMap and all that is added to a map after it.  Called from several
-// threads at once.
+// Makes the whole map, without its self-test, with the landmarks that `keep` marks (per class of these), this
+// many bits per descriptor value and, where they are given, these promises: EmitMap and all that is added to
+// a map after it.  Called from several threads at once.
 using EmitKept = std::function<Result<MapRows>(const Classes& classes, const std::vector<char>& keep,
-                                               int descriptor_bits)>;
+                                               int descriptor_bits, const Promises* promises)>;
 
 // Per class, whether it is among these.
 std::vector<char> MarkThese(const std::vector<size_t>& chosen, size_t num_classes);
