@@ -23,6 +23,7 @@ constexpr double kNearLimitRatio = 0.995;
 constexpr int kMaxNumMeasurements = 10;
 // So often a map with its promise is made; the first is mostly a little too large.
 constexpr int kMaxNumPromises = 4;
+constexpr int64_t kPromiseMargin = 200;  // half a per cent
 // ChooseFewest tries numbers of landmarks that grow by this factor, and so many more to each side of the
 // first that will do.
 constexpr double kLadderFactor = 1.3;
@@ -247,7 +248,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
                            emit(classes, fitted.keep, fitted.descriptor_bits, &*fitted.promises));
     CAIRN_ASSIGN_OR_RETURN(fitted.num_bytes, SealedBytes(std::move(rows), scratch_path));
     if (fitted.num_bytes <= options.max_bytes) return fitted;
-    room -= fitted.num_bytes - options.max_bytes;
+    // And a little: regions of fewer landmarks are others, and may take more.
+    room -= fitted.num_bytes - options.max_bytes + options.max_bytes / kPromiseMargin;
   }
   // There is no room for a promise.
   fitted.promises.reset();
