@@ -238,10 +238,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   progress.End();
   // What the promise and its regions take is known when they are made: then fewer landmarks fit.
   int64_t room = options.max_bytes;
-  for (int round = 0; round < kMaxNumPromises; ++round) {
-    CAIRN_ASSIGN_OR_RETURN(
-        const size_t n, fitter.MostThatFit(classes, order, fitted.descriptor_bits, room, &fitted.num_bytes));
-    if (n == 0) break;
+  size_t n = num_that_fit[best];
+  for (int round = 0; round < kMaxNumPromises && n > 0; ++round) {
     fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
     fitted.promises = maker.Promise(fitted.keep, trials.fared(), options.promise);
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
@@ -250,11 +248,12 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
     if (fitted.num_bytes <= options.max_bytes) return fitted;
     // And a little: regions of fewer landmarks are others, and may take more.
     room -= fitted.num_bytes - options.max_bytes + options.max_bytes / kPromiseMargin;
+    CAIRN_ASSIGN_OR_RETURN(n, fitter.MostThatFit(classes, order, fitted.descriptor_bits, room, &num_bytes));
   }
   // There is no room for a promise.
   fitted.promises.reset();
-  CAIRN_ASSIGN_OR_RETURN(const size_t n, fitter.MostThatFit(classes, order, fitted.descriptor_bits,
-                                                            options.max_bytes, &fitted.num_bytes));
+  CAIRN_ASSIGN_OR_RETURN(
+      n, fitter.MostThatFit(classes, order, fitted.descriptor_bits, options.max_bytes, &fitted.num_bytes));
   fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
   return fitted;
 }
