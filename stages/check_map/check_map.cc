@@ -12,6 +12,7 @@
 #include "core/capture/image_file.h"
 #include "core/features/sift.h"
 #include "runtime/localize/refine.h"
+#include "stages/check_map/truth_fit.h"
 
 namespace cairn::check_map {
 namespace {
@@ -40,11 +41,11 @@ Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const 
 }
 
 HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
-                       const LocalizerOptions& options) {
+                       const CheckMapOptions& options) {
   HeldOutResult result;
   result.name = image.name;
   result.true_cam_from_world = image.cam_from_world;
-  Result<Localization> localization = LocalizeTimed(map, image, options, &result);
+  Result<Localization> localization = LocalizeTimed(map, image, options.localizer, &result);
   if (!localization.ok()) {
     result.rejected = localization.error().message;
     return result;
@@ -55,9 +56,42 @@ HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage
     result.error_m = CenterErrorM(found, *image.cam_from_world);
     result.error_deg = RotationErrorDeg(found, *image.cam_from_world);
     const Vector6d error = PerturbationBetween(found, *image.cam_from_world);
-    result.nees = error.dot(result.localization.covariance.inverse() * error);
+    Matrix6d covariance = result.localization.covariance;
+    const auto truth_variance = [](double given, double of_survey) {
+      return std::pow(given < 0 ? of_survey : given, 2);
+    };
+    covariance.diagonal().head<3>().array() +=
+        truth_variance(RadFromDeg(options.truth_sigma_deg), RadFromDeg(map->head().stated_pose_sigma_deg));
+    covariance.diagonal().tail<3>().array() +=
+        truth_variance(options.truth_sigma_m, map->head().stated_pose_sigma_m);
+    result.nees = error.dot(covariance.inverse() * error);
   }
   return result;
+}
+
+// What remains of the errors when the frames of truth and map are fitted to each other.
+void SummarizeFits(const std::vector<HeldOutResult>& images, std::map<std::string, double>* figures) {
+  std::vector<FixAndTruth> fixes;
+  for (const HeldOutResult& image : images) {
+    if (image.has_fix() && image.true_cam_from_world)
+      fixes.push_back({image.localization.cam_from_world, *image.true_cam_from_world});
+  }
+  for (const auto& [prefix, with_offset] : {std::pair("similarity", false), std::pair("rig", true)}) {
+    const std::optional<TruthFit> fit = FitTruth(fixes, with_offset);
+    if (!fit) return;
+    const auto set = [&](const char* name, double value) {
+      (*figures)[fmt::format("{}_{}", prefix, name)] = value;
+    };
+    set("median_error_m", Quantile(fit->errors_m, 0.5));
+    set("median_error_deg", Quantile(fit->errors_deg, 0.5));
+    set("p90_error_m", Quantile(fit->errors_m, 0.9));
+    set("p90_error_deg", Quantile(fit->errors_deg, 0.9));
+    set("scale", fit->truth_from_map.scale);
+    if (with_offset) {
+      set("offset_m", fit->truth_cam_from_cam.Center().norm());
+      set("offset_deg", RotationErrorDeg(fit->truth_cam_from_cam, Pose()));
+    }
+  }
 }
 
 void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOptions& options,
@@ -98,6 +132,7 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
   const double band = 1.96 * std::sqrt(2 * 6 / num_fixes);  // chi-square of 6 degrees of freedom: variance 12
   f["nees_low"] = std::max(0.0, 6 - band);
   f["nees_high"] = 6 + band;
+  SummarizeFits(images, figures);
 }
 
 // Reports the first region with enough images that is below its gate.
@@ -170,6 +205,16 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
                "stations' spacing is at none",
        .min = 0},
   };
+  table.push_back({.name = "truth_sigma_m",
+                   .value = &o->truth_sigma_m,
+                   .help = "standard deviation of the true places, m per axis; below 0: that of the survey's "
+                           "stated poses",
+                   .min = -1});
+  table.push_back({.name = "truth_sigma_deg",
+                   .value = &o->truth_sigma_deg,
+                   .help = "the same of the true rotations, degrees per axis; below 0: that of the survey's "
+                           "stated poses",
+                   .min = -1});
   table.push_back({.name = "plan_must_fit",
                    .value = &o->plan_must_fit,
                    .help = "gate: where the map has a floor plan, its walls must fit the landmarks"});
@@ -197,7 +242,7 @@ Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
   progress.Begin("localizing", static_cast<int64_t>(images.size()), "images");
   ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
-    report.images[i] = TryImage(map, images[i], options.localizer);
+    report.images[i] = TryImage(map, images[i], options);
     progress.Advance();
   });
   progress.End();

@@ -45,6 +45,10 @@ struct CheckMapOptions {
   double scan_x_m = 0;
   double scan_y_m = 0;
   double scan_heading_deg = 0;
+  // Standard deviation per axis of the true poses, which the normalised error counts beside the fix's own
+  // covariance; below 0: as the survey's stated poses were found to err, for truth of the same source.
+  double truth_sigma_m = -1;
+  double truth_sigma_deg = -1;
   LocalizerOptions localizer;
 };
 OptionTable DescribeOptions(CheckMapOptions* options);
@@ -83,7 +87,8 @@ struct CheckMapReport {
   //   num_held_out, num_localized, localized_ratio, median_error_m, median_error_deg, p90_error_m,
   //   p90_error_deg, within_5cm_5deg_ratio, within_10cm_2deg_ratio, within_10cm_5deg_ratio, num_gross_errors,
   //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees
-  //   of freedom)
+  //   of freedom); similarity_ and rig_: median and 90th percentile of what remains when a similarity between
+  //   the frames of truth and map is fitted, and an offset between their cameras too (truth_fit.h)
   // and of a map whose retrieval finds kept images alone, beside the same map's with all
   // images (AddFullFigures):
   //   num_by_retrieval, all_images_num_by_retrieval: fixes from landmarks that retrieval led to, not from all

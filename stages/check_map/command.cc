@@ -1,5 +1,6 @@
 #include "stages/check_map/command.h"
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -25,6 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Focal lengths that differ by less may be two statements about one camera.
+constexpr double kSameFocalRatio = 0.1;
+
 struct Arguments {
   std::string map_path;
   std::string queries_path;
@@ -38,7 +42,8 @@ struct Arguments {
   OptionArguments option_arguments;
 };
 
-// The map's camera (its intrinsics may be refined) if it is the same one, else the capture's.
+// What the map's images showed of the camera, if it is the same one as far as its statement tells; else the
+// capture's.
 Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const MapHead& rows) {
   const auto given = capture.cameras.find(image.camera_id);
   if (given == capture.cameras.end()) {
@@ -46,8 +51,9 @@ Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const
                      image.name, image.camera_id);
   }
   for (const Camera& camera : rows.cameras) {
-    if (camera.camera_id == image.camera_id && camera.model == given->second.model &&
-        camera.width == given->second.width && camera.height == given->second.height) {
+    if (camera.camera_id == image.camera_id && camera.width == given->second.width &&
+        camera.height == given->second.height &&
+        std::abs(camera.MeanFocal() / given->second.MeanFocal() - 1) < kSameFocalRatio) {
       return camera;
     }
   }
@@ -261,8 +267,8 @@ Command CheckMapCommand() {
             arguments->option_arguments.Add(
                 parser, DescribeOptions(&arguments->options),
                 {"gross_error_m", "gross_error_deg", "min_localized_ratio", "min_precision_ratio",
-                 "min_region_localized_ratio", "min_region_precision_ratio", "plan_must_fit", "scan_x_m",
-                 "scan_y_m", "scan_heading_deg"});
+                 "min_region_localized_ratio", "min_region_precision_ratio", "plan_must_fit", "truth_sigma_m",
+                 "truth_sigma_deg", "scan_x_m", "scan_y_m", "scan_heading_deg"});
           },
       .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); },
       .stage = "check_map",

@@ -128,6 +128,21 @@ std::string ReportText(const PrintedReport& report) {
                                      Text(figure("median_error_deg"), 1, 3)));
     line("90th percentile", fmt::format("{} cm, {} deg", Text(figure("p90_error_m"), 0.01, 2),
                                         Text(figure("p90_error_deg"), 1, 3)));
+    for (const auto& [prefix, name] :
+         {std::pair("similarity", "after a similarity"), std::pair("rig", "and a camera offset")}) {
+      const auto fitted = [&](const char* suffix) {
+        return figure(fmt::format("{}_{}", prefix, suffix).c_str());
+      };
+      if (!fitted("scale")) continue;
+      line(name, fmt::format("{} cm, {} deg; 90 %: {} cm, {} deg; scale {}{}",
+                             Text(fitted("median_error_m"), 0.01, 2), Text(fitted("median_error_deg"), 1, 3),
+                             Text(fitted("p90_error_m"), 0.01, 2), Text(fitted("p90_error_deg"), 1, 3),
+                             Text(fitted("scale"), 1, 4),
+                             fitted("offset_m")
+                                 ? fmt::format(", offset {} cm, {} deg", Text(fitted("offset_m"), 0.01, 1),
+                                               Text(fitted("offset_deg"), 1, 2))
+                                 : ""));
+    }
     line("within 5 cm, 5 deg", Text(figure("within_5cm_5deg_ratio"), 0.01, 1) + " %");
     line("within 10 cm, 2 deg", Text(figure("within_10cm_2deg_ratio"), 0.01, 1) + " %");
     line("within 10 cm, 5 deg", Text(figure("within_10cm_5deg_ratio"), 0.01, 1) + " %");

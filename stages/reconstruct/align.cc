@@ -191,14 +191,6 @@ Status CheckSpread(const std::vector<PositionTarget>& targets) {
 
 }  // namespace
 
-Pose TransformPose(const Similarity& world_from_model, const Pose& cam_from_model) {
-  Pose pose;
-  pose.rotation = (cam_from_model.rotation * world_from_model.rotation.conjugate()).normalized();
-  pose.translation =
-      world_from_model.scale * cam_from_model.translation - pose.rotation * world_from_model.translation;
-  return pose;
-}
-
 Result<Alignment> AlignToPositions(const std::vector<PositionTarget>& targets,
                                    const Eigen::Vector3d& up_model, double up_sigma_deg) {
   CAIRN_RETURN_IF_ERROR(CheckSpread(targets));

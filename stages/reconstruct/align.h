@@ -7,22 +7,9 @@
 
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/similarity.h"
 
 namespace cairn::reconstruct {
-
-// world = scale * rotation * model + translation: from the frame of a reconstruction to the map's.
-struct Similarity {
-  double scale = 1;
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
-    return scale * (rotation * point) + translation;
-  }
-};
-
-// The pose of the same camera in the new frame.
-Pose TransformPose(const Similarity& world_from_model, const Pose& cam_from_model);
 
 // A known position of a camera, with standard deviations per axis, metres.
 struct PositionTarget {
