@@ -1,7 +1,7 @@
 -- classes.db: the feature classes of a capture with refined poses, output of group_classes.
 -- Blobs are little-endian; class and image ids are the opaque ids of the capture's COLMAP database.
 PRAGMA application_id = 0x6372636c;  -- 'crcl'
-PRAGMA user_version = 1;
+PRAGMA user_version = 2;
 
 CREATE TABLE cameras (
   camera_id INTEGER PRIMARY KEY,
@@ -9,6 +9,16 @@ CREATE TABLE cameras (
   width     INTEGER NOT NULL,  -- px
   height    INTEGER NOT NULL,  -- px
   params    BLOB    NOT NULL,  -- float64[]; as refined
+  has_focal_prior INTEGER NOT NULL
+);
+
+-- As the capture states them, where refined ones are others.
+CREATE TABLE stated_cameras (
+  camera_id INTEGER PRIMARY KEY,
+  model     INTEGER NOT NULL,
+  width     INTEGER NOT NULL,
+  height    INTEGER NOT NULL,
+  params    BLOB    NOT NULL,
   has_focal_prior INTEGER NOT NULL
 );
 
@@ -33,7 +43,9 @@ CREATE TABLE alignment (
   camera_from_given BLOB NOT NULL,  -- float64[7], as images.refined
   -- how far refined poses moved from the stated ones, root mean square per axis; 0: poses as stated
   stated_pose_sigma_m   REAL NOT NULL,
-  stated_pose_sigma_deg REAL NOT NULL
+  stated_pose_sigma_deg REAL NOT NULL,
+  -- which part of its variance a keypoint shares with the others of its image
+  keypoint_correlation REAL NOT NULL
 );
 
 CREATE TABLE dropped (

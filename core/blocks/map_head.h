@@ -61,8 +61,14 @@ struct MapHead {
   // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
+  // Which part of its variance a keypoint shares with the others of its image: n of them say as much as
+  // n / (1 + n / 2 * this) independent ones.  0: not measured.
+  double keypoint_correlation = 0;
 
   std::vector<Camera> cameras;  // ascending camera_id
+  // Cameras as the capture states them, where the survey's images showed that they are others; ascending
+  // camera_id, each of which `cameras` has.
+  std::vector<Camera> stated_cameras;
 };
 
 // As CheckMapRows (core/blocks/map_rows.h), of the head alone.

@@ -205,6 +205,20 @@ Status CheckMapHead(const MapHead& head) {
       !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
     return Invalid("the noise of the stated poses is not a valid number");
   }
+  if (!(head.keypoint_correlation >= 0 && head.keypoint_correlation <= 1))
+    return Invalid("the correlation of keypoints is not in 0 .. 1");
+  for (size_t i = 0; i < head.stated_cameras.size(); ++i) {
+    const Camera& stated = head.stated_cameras[i];
+    CAIRN_RETURN_IF_ERROR(CheckCamera(stated));
+    const auto is_same = [&](const Camera& camera) {
+      return camera.camera_id == stated.camera_id && camera.width == stated.width &&
+             camera.height == stated.height;
+    };
+    if (std::none_of(head.cameras.begin(), head.cameras.end(), is_same) ||
+        (i > 0 && stated.camera_id <= head.stated_cameras[i - 1].camera_id)) {
+      return Invalid("stated camera {} is out of order, or no camera of the map", stated.camera_id);
+    }
+  }
   if (head.documents != "all" && head.documents != "kept")
     return Invalid("documents = '{}', expected all or kept", head.documents);
   for (const auto& [name, value] : head.self_test) {

@@ -1,5 +1,6 @@
 #include "core/map/map_head_tables.h"
 
+#include <algorithm>
 #include <array>
 
 #include "core/base/blob.h"
@@ -96,6 +97,36 @@ Status ReadNumber(const Texts& meta, const char* key, const std::string& path, T
   return Corrupt(path, "table meta: {} '{}' is not a number that fits", key, row->second);
 }
 
+constexpr char kStatedCamera[] = "stated_camera_";
+
+// Rows stated_camera_ID: MODEL WIDTH HEIGHT PARAMS..., as in COLMAP's cameras.txt.
+Status ReadStatedCameras(const Texts& meta, const std::string& path, MapHead* head) {
+  for (auto row = meta.lower_bound(kStatedCamera); row != meta.end() && row->first.starts_with(kStatedCamera);
+       ++row) {
+    const auto corrupt = [&] {
+      return Corrupt(path, "table meta: {} '{}' is not a camera", row->first, row->second);
+    };
+    Camera camera;
+    const std::vector<std::string> words = SplitWords(row->second);
+    if (words.size() < 3 || !ParseNumber(row->first.substr(sizeof(kStatedCamera) - 1), &camera.camera_id) ||
+        !ParseNumber(words[1], &camera.width) || !ParseNumber(words[2], &camera.height)) {
+      return corrupt();
+    }
+    const Result<CameraModel> model = CameraModelFromName(words[0]);
+    if (!model.ok()) return corrupt();
+    camera.model = *model;
+    camera.params.resize(words.size() - 3);
+    for (size_t i = 3; i < words.size(); ++i) {
+      if (!ParseNumber(words[i], &camera.params[i - 3])) return corrupt();
+    }
+    if (!CheckCamera(camera).ok()) return corrupt();
+    head->stated_cameras.push_back(std::move(camera));
+  }
+  std::sort(head->stated_cameras.begin(), head->stated_cameras.end(),
+            [](const Camera& a, const Camera& b) { return a.camera_id < b.camera_id; });
+  return Ok();
+}
+
 Status DecodeMeta(Texts meta, const std::string& path, MapHead* head) {
   head->name = meta["name"];
   head->writer = meta["writer"];
@@ -124,6 +155,8 @@ Status DecodeMeta(Texts meta, const std::string& path, MapHead* head) {
                    meta["stated_pose_sigma_m"], meta["stated_pose_sigma_deg"]);
   }
   CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "epoch", path, &head->epoch));
+  CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "keypoint_correlation", path, &head->keypoint_correlation));
+  CAIRN_RETURN_IF_ERROR(ReadStatedCameras(meta, path, head));
   if (meta.count("findings")) head->findings_hash = meta["findings"];
   return ReadFrame(std::move(meta), path, &head->frame);
 }
@@ -170,6 +203,16 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
   }
   if (!head.findings_hash.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"findings", head.findings_hash}});
+  }
+  if (head.keypoint_correlation != 0) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+               {{"keypoint_correlation", fmt::format("{}", head.keypoint_correlation)}});
+  }
+  for (const Camera& camera : head.stated_cameras) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+               {{fmt::format("{}{}", kStatedCamera, camera.camera_id),
+                 fmt::format("{} {} {} {}", CameraModelName(camera.model), camera.width, camera.height,
+                             fmt::join(camera.params, " "))}});
   }
   if (!head.sessions.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",

@@ -66,22 +66,46 @@ Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& pat
   return feature_class;
 }
 
+void InsertCameras(SQLite::Database& database, const std::string& table, const std::vector<Camera>& cameras) {
+  SQLite::Statement row(database, "INSERT INTO " + table + " VALUES (?, ?, ?, ?, ?, ?)");
+  for (const Camera& camera : cameras) {
+    row.bind(1, camera.camera_id);
+    row.bind(2, static_cast<int>(camera.model));
+    row.bind(3, camera.width);
+    row.bind(4, camera.height);
+    row.bind(5, camera.params.data(), static_cast<int>(camera.params.size() * sizeof(double)));
+    row.bind(6, camera.has_focal_prior ? 1 : 0);
+    row.exec();
+    row.reset();
+  }
+}
+
+Result<std::vector<Camera>> SelectCameras(SQLite::Database& database, const std::string& table,
+                                          const std::string& path) {
+  std::vector<Camera> cameras;
+  SQLite::Statement row(database, "SELECT camera_id, model, width, height, params, has_focal_prior FROM " +
+                                      table + " ORDER BY 1");
+  while (row.executeStep()) {
+    Camera camera;
+    camera.camera_id = row.getColumn(0).getUInt();
+    CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromId(row.getColumn(1).getInt()));
+    camera.width = row.getColumn(2).getInt();
+    camera.height = row.getColumn(3).getInt();
+    CAIRN_ASSIGN_OR_RETURN(camera.params, BlobToVector<double>(row.getColumn(4), path + ": " + table));
+    camera.has_focal_prior = row.getColumn(5).getInt() != 0;
+    CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
 }  // namespace
 
 Status WriteClasses(const Classes& classes, const std::string& path,
                     const std::vector<DroppedItem>& dropped_items) {
   return WriteDatabase(path, kClassesSql, [&](SQLite::Database& database) -> Status {
-    SQLite::Statement camera_row(database, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, ?)");
-    for (const Camera& camera : classes.cameras) {
-      camera_row.bind(1, camera.camera_id);
-      camera_row.bind(2, static_cast<int>(camera.model));
-      camera_row.bind(3, camera.width);
-      camera_row.bind(4, camera.height);
-      camera_row.bind(5, camera.params.data(), static_cast<int>(camera.params.size() * sizeof(double)));
-      camera_row.bind(6, camera.has_focal_prior ? 1 : 0);
-      camera_row.exec();
-      camera_row.reset();
-    }
+    InsertCameras(database, "cameras", classes.cameras);
+    InsertCameras(database, "stated_cameras", classes.stated_cameras);
     SQLite::Statement image_row(database, "INSERT INTO images VALUES (?, ?, ?, ?, ?)");
     for (const SurveyImage& image : classes.images) {
       image_row.bind(1, image.image_id);
@@ -106,10 +130,11 @@ Status WriteClasses(const Classes& classes, const std::string& path,
       class_row.exec();
       class_row.reset();
     }
-    SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?)");
+    SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?, ?)");
     BindArray(alignment_row, 1, ArrayFromPose(classes.camera_from_given));
     alignment_row.bind(2, classes.stated_pose_sigma_m);
     alignment_row.bind(3, classes.stated_pose_sigma_deg);
+    alignment_row.bind(4, classes.keypoint_correlation);
     alignment_row.exec();
     SQLite::Statement dropped_row(database, "INSERT INTO dropped VALUES (?, ?)");
     for (const auto& [reason, num_classes] : classes.dropped) {
@@ -136,25 +161,15 @@ Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum) {
 Result<Classes> ReadClasses(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<Classes> {
-    if (!HasTable(database, "classes")) {
+    if (!HasTable(database, "classes") || !HasTable(database, "stated_cameras")) {
       return MakeError(ErrorCode::kUnsupported,
-                       "{}: has no table 'classes'; expected the output of group-classes", path);
+                       "{}: has no tables 'classes' and 'stated_cameras'; expected the output of this "
+                       "program's group-classes",
+                       path);
     }
     Classes classes;
-    SQLite::Statement camera_row(
-        database, "SELECT camera_id, model, width, height, params, has_focal_prior FROM cameras ORDER BY 1");
-    while (camera_row.executeStep()) {
-      Camera camera;
-      camera.camera_id = camera_row.getColumn(0).getUInt();
-      CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromId(camera_row.getColumn(1).getInt()));
-      camera.width = camera_row.getColumn(2).getInt();
-      camera.height = camera_row.getColumn(3).getInt();
-      CAIRN_ASSIGN_OR_RETURN(camera.params,
-                             BlobToVector<double>(camera_row.getColumn(4), path + ": cameras"));
-      camera.has_focal_prior = camera_row.getColumn(5).getInt() != 0;
-      CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
-      classes.cameras.push_back(camera);
-    }
+    CAIRN_ASSIGN_OR_RETURN(classes.cameras, SelectCameras(database, "cameras", path));
+    CAIRN_ASSIGN_OR_RETURN(classes.stated_cameras, SelectCameras(database, "stated_cameras", path));
     std::set<ImageId> image_ids;
     SQLite::Statement image_row(database,
                                 "SELECT image_id, name, camera_id, refined, given FROM images ORDER BY 1");
@@ -180,13 +195,16 @@ Result<Classes> ReadClasses(const std::string& path) {
       classes.classes.push_back(std::move(feature_class));
     }
     SQLite::Statement alignment_row(
-        database, "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg FROM alignment");
+        database,
+        "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg, keypoint_correlation "
+        "FROM alignment");
     if (alignment_row.executeStep()) {
       CAIRN_ASSIGN_OR_RETURN(const PoseArray pose,
                              ArrayFromColumn<7>(alignment_row.getColumn(0), path + ": alignment"));
       classes.camera_from_given = PoseFromArray(pose);
       classes.stated_pose_sigma_m = alignment_row.getColumn(1).getDouble();
       classes.stated_pose_sigma_deg = alignment_row.getColumn(2).getDouble();
+      classes.keypoint_correlation = alignment_row.getColumn(3).getDouble();
     }
     SQLite::Statement dropped_row(database, "SELECT reason, num_classes FROM dropped ORDER BY 1");
     while (dropped_row.executeStep())

@@ -48,7 +48,8 @@ using DropCounts = std::map<std::string, int64_t>;
 
 // What group_classes knows of a capture: images in their refined poses, cameras, and the feature classes.
 struct Classes {
-  std::vector<Camera> cameras;  // ascending camera_id; intrinsics as refined
+  std::vector<Camera> cameras;         // ascending camera_id; intrinsics as refined
+  std::vector<Camera> stated_cameras;  // the same as the capture states them, where they are others
   std::vector<SurveyImage>
       images;  // ascending image_id; all posed images of the capture, with classes or without
   std::vector<FeatureClass> classes;  // ascending class_id
@@ -60,6 +61,9 @@ struct Classes {
   // against them.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
+  // Which part of a keypoint's variance it shares with the others of its image (KeypointNoise of
+  // group_classes); 0: not measured.
+  double keypoint_correlation = 0;
   DropCounts dropped;  // classes, by reason
 };
 

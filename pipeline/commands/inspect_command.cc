@@ -130,6 +130,20 @@ nlohmann::ordered_json PromiseJson(const MapPromise& promise) {
           {"held_out", CurveJson(promise.held_out)}};
 }
 
+std::string CameraText(const Camera& camera) {
+  return fmt::format("{} {} x {} px, {:.6g}", CameraModelName(camera.model), camera.width, camera.height,
+                     fmt::join(camera.params, ", "));
+}
+
+// Each camera by its number, and as it was stated where the survey's images showed that it is another.
+nlohmann::ordered_json CamerasJson(const MapRows& rows) {
+  auto json = nlohmann::ordered_json::object();
+  for (const Camera& camera : rows.cameras) json[std::to_string(camera.camera_id)] = CameraText(camera);
+  for (const Camera& stated : rows.stated_cameras)
+    json[fmt::format("{} as stated", stated.camera_id)] = CameraText(stated);
+  return json;
+}
+
 nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t num_bytes,
                                const std::vector<std::pair<std::string, int64_t>>& tables) {
   size_t num_postings = 0, num_edges = rows.station_edges.size(), num_uncovered = 0, num_region_landmarks = 0;
@@ -162,6 +176,9 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"num_uncovered_stations", num_uncovered},
                                  {"num_images", rows.images.size()},
                                  {"num_cameras", rows.cameras.size()},
+                                 {"stated_poses_moved_m", rows.stated_pose_sigma_m},
+                                 {"stated_poses_moved_deg", rows.stated_pose_sigma_deg},
+                                 {"keypoint_correlation", rows.keypoint_correlation},
                                  {"num_appearance_nodes", rows.appearance.size()},
                                  {"num_kept_nodes", num_kept},
                                  {"documents", rows.documents},
@@ -178,6 +195,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                       {"altitude_m", rows.frame.anchor->altitude_m}};
   }
   if (rows.lower_bound) json["lower_bound"] = *rows.lower_bound;
+  json["cameras"] = CamerasJson(rows);
   json["sessions"] = SessionsJson(rows);
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;

@@ -87,10 +87,12 @@ struct RefineOptions {
   // Squared whitened residual, over the estimated noise, up to which a measurement is an inlier: chi-square
   // of 2 degrees of freedom at 99 %.  REQUIRES: > 0
   double inlier_chi_square = 9.21;
-  // Factor on the reported covariance: errors of neighbouring keypoints and landmarks are correlated, which
-  // the normal matrix ignores.  Measured on the demo, where it brings the normalised error squared from 10.7
-  // to its 6 degrees of freedom.  REQUIRES: > 0
-  double covariance_scale = 1.8;
+  // Factor on the reported covariance.  REQUIRES: > 0
+  double covariance_scale = 1;
+  // Which part of its variance a keypoint shares with the others of its image: the covariance of n inliers is
+  // 1 + n / 2 * this times as large as the normal matrix says.  0: what the map's survey showed.
+  // REQUIRES: in [0, 1]
+  double keypoint_correlation = 0;
   // Errors that more landmarks do not average out (survey poses, intrinsics): added to the covariance of the
   // camera's place, m, and of its rotation, degrees, as standard deviations per axis.  REQUIRES: >= 0
   double systematic_sigma_m = 0;

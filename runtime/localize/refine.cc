@@ -208,6 +208,12 @@ OptionTable DescribeOptions(RefineOptions* o) {
        .value = &o->covariance_scale,
        .help = "factor on the reported covariance",
        .min = 1e-9},
+      {.name = "keypoint_correlation",
+       .value = &o->keypoint_correlation,
+       .help = "part of its variance that a keypoint shares with the others of its image; 0: what the map's "
+               "survey showed",
+       .min = 0,
+       .max = 1},
       {.name = "systematic_sigma_m",
        .value = &o->systematic_sigma_m,
        .help = "error of the camera's place that landmarks do not average out, m per axis",
@@ -278,7 +284,9 @@ std::optional<RefinedPose> RefinePoseWithCovariance(const std::vector<PoseMeasur
     return std::nullopt;
   refined.cam_from_world = *pose;
   refined.covariance = factors.solve(Matrix6d::Identity());
-  refined.covariance *= options.covariance_scale * truncation * refined.noise_variance;
+  const double dispersion =
+      1 + 0.5 * static_cast<double>(refined.inliers.size()) * options.keypoint_correlation;
+  refined.covariance *= options.covariance_scale * dispersion * truncation * refined.noise_variance;
   refined.covariance = 0.5 * (refined.covariance + refined.covariance.transpose()).eval();
   AddSystematic(options, &refined.covariance);
   if (!refined.covariance.allFinite()) return std::nullopt;

@@ -425,7 +425,9 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   rows.camera_from_given = classes.camera_from_given;
   rows.stated_pose_sigma_m = classes.stated_pose_sigma_m;
   rows.stated_pose_sigma_deg = classes.stated_pose_sigma_deg;
+  rows.keypoint_correlation = classes.keypoint_correlation;
   rows.cameras = classes.cameras;
+  rows.stated_cameras = classes.stated_cameras;
   CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
   CAIRN_RETURN_IF_ERROR(
       AddStations(world, promises != nullptr ? std::vector<StationIdx>() : decomposition.uncovered, &rows));

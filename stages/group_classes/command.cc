@@ -1,5 +1,9 @@
 #include "stages/group_classes/command.h"
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "core/line/memory.h"
 #include "stages/group_classes/group_classes.h"
 
@@ -16,6 +20,53 @@ struct Arguments {
   GroupClassesOptions options;
   OptionArguments option_arguments;
 };
+
+// What was found out about poses and cameras, a line each.
+std::string AdjustmentText(const GroupClassesResult& result, const MatchedFeatures& matched) {
+  if (!result.poses_refined) {
+    return fmt::format("group_classes: poses and cameras as stated, reprojection error {:.2f} px\n",
+                       result.final_rms_px);
+  }
+  const SurveyFindings& findings = result.findings;
+  const Classes& classes = result.classes;
+  std::string text = fmt::format("group_classes: reprojection error {:.2f} -> {:.2f} px; ",
+                                 result.initial_rms_px, result.final_rms_px);
+  if (findings.pose_gain > 0) {
+    text += fmt::format(
+        "stated poses err by {:.2f} cm, {:.3f} deg each and drift by {:.2f} cm, {:.3f} deg in a metre "
+        "(square "
+        "root); they were moved by {:.1f} cm, {:.2f} deg an axis\n",
+        100 * findings.noise.own_m, findings.noise.own_deg, 100 * findings.noise.walk_m,
+        findings.noise.walk_deg, 100 * classes.stated_pose_sigma_m, classes.stated_pose_sigma_deg);
+  } else {
+    text += "stated poses are exact as far as the images tell, and stay\n";
+  }
+  if (findings.has_offset) {
+    const Pose& offset = classes.camera_from_given;
+    text += fmt::format("group_classes: the cameras are {:.1f} cm, {:.2f} deg off the stated poses\n",
+                        100 * offset.translation.norm(), RotationErrorDeg(offset, Pose()));
+  }
+  for (size_t c = 0; c < findings.cameras.size(); ++c) {
+    const CameraFinding& finding = findings.cameras[c];
+    if (finding.variant.empty()) continue;
+    const Camera& camera = classes.cameras[c];
+    std::vector<std::string> params;
+    for (size_t p = 0; p < camera.params.size(); ++p) {
+      const auto free = std::find(finding.free.begin(), finding.free.end(), static_cast<int>(p));
+      const size_t k = free - finding.free.begin();
+      params.push_back(k < finding.sigma.size()
+                           ? fmt::format("{:.6g} +- {:.2g}", camera.params[p], finding.sigma[k])
+                           : fmt::format("{:.6g}", camera.params[p]));
+    }
+    text += fmt::format(
+        "group_classes: camera {} differs in {} from what is stated ({}): {} {}; left-out keypoints' "
+        "variance "
+        "is {:.1f} % smaller\n",
+        camera.camera_id, finding.variant, CameraModelName(matched.cameras.at(camera.camera_id).model),
+        CameraModelName(camera.model), fmt::join(params, ", "), 100 * finding.gain);
+  }
+  return text;
+}
 
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
@@ -42,20 +93,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   *environment.out << fmt::format("group_classes: {} tracks, {} classes kept, dropped: {}\n",
                                   result.num_tracks, classes.classes.size(),
                                   dropped.empty() ? "none" : dropped);
-  if (result.poses_refined) {
-    const Pose& offset = classes.camera_from_given;
-    *environment.out << fmt::format("group_classes: poses refined, reprojection error {:.2f} -> {:.2f} px, ",
-                                    result.initial_rms_px, result.final_rms_px);
-    *environment.out << fmt::format(
-        "offset {:.1f} cm / {:.2f} deg, stated poses off by {:.1f} cm / {:.2f} deg an axis, focal length x "
-        "{:.4f}\n",
-        100 * offset.translation.norm(), RotationErrorDeg(offset, Pose()), 100 * classes.stated_pose_sigma_m,
-        classes.stated_pose_sigma_deg,
-        classes.cameras.front().FocalX() / matched.cameras.begin()->second.FocalX());
-  } else {
-    *environment.out << fmt::format("group_classes: poses as stated, reprojection error {:.2f} px\n",
-                                    result.final_rms_px);
-  }
+  *environment.out << AdjustmentText(result, matched);
   return Ok();
 }
 

@@ -5,49 +5,12 @@
 #include <optional>
 #include <set>
 
-#include "core/base/parallel.h"
-#include "core/camera/panorama.h"
-#include "core/camera/pixel_ray.h"
 #include "core/files/database.h"
 #include "stages/group_classes/make_classes.h"
-#include "stages/group_classes/union_matches.h"
+#include "stages/group_classes/tracks/union_matches.h"
 
 namespace cairn::group_classes {
 namespace {
-
-// The posed images, contiguous, and what triangulation needs of each.
-struct PosedImages {
-  std::vector<int> feature_idx;  // index into MatchedFeatures::images
-  std::vector<const Camera*> cameras;
-  std::vector<int> camera_idx;
-  std::vector<std::vector<std::optional<PixelRay>>> rays;  // per keypoint, by the unrefined camera
-  std::vector<Pose> stated;
-  int num_images() const { return static_cast<int>(stated.size()); }
-};
-
-PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture, int num_threads) {
-  std::map<std::string, Pose> poses;
-  for (const CaptureImage& image : capture.images) {
-    if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
-  }
-  PosedImages posed;
-  for (size_t i = 0; i < matched.images.size(); ++i) {
-    const std::optional<Pose> pose = FindPose(poses, matched.images[i].name);
-    if (!pose) continue;
-    posed.feature_idx.push_back(static_cast<int>(i));
-    const auto camera = matched.cameras.find(matched.images[i].camera_id);
-    posed.cameras.push_back(&camera->second);
-    posed.camera_idx.push_back(static_cast<int>(std::distance(matched.cameras.begin(), camera)));
-    posed.stated.push_back(*pose);
-  }
-  posed.rays.resize(posed.num_images());
-  ParallelFor(posed.num_images(), num_threads, [&](int64_t i) {
-    for (const Keypoint& keypoint : matched.features[posed.feature_idx[i]].keypoints) {
-      posed.rays[i].push_back(MakePixelRay(*posed.cameras[i], Eigen::Vector2d(keypoint.x, keypoint.y)));
-    }
-  });
-  return posed;
-}
 
 std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed,
                                int64_t* num_conflicts) {
@@ -71,74 +34,6 @@ std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages
     }
   }
   return UnionMatches(num_keypoints, std::move(matches), num_conflicts);
-}
-
-// State of the poses while they are refined.
-struct PoseState {
-  std::vector<Pose> poses;
-  std::vector<double> focal_ratios;  // per camera
-  Pose camera_from_given;
-};
-
-std::vector<PosedRay> RaysOf(const Track& track, const PosedImages& posed, const PoseState& state) {
-  std::vector<PosedRay> rays;
-  for (const TrackElement& element : track) {
-    const int i = element.image_idx;
-    const double ratio = state.focal_ratios[posed.camera_idx[i]];
-    const PixelRay& ray = *posed.rays[i][element.keypoint_idx];
-    rays.push_back({state.poses[i], ratio == 1 ? ray : WithFocalRatio(ray, ratio)});
-  }
-  return rays;
-}
-
-std::vector<Triangulation> TriangulateAll(const std::vector<Track>& tracks, const PosedImages& posed,
-                                          const PoseState& state, const TriangulateOptions& options,
-                                          int num_threads) {
-  std::vector<Triangulation> triangulations(tracks.size());
-  ParallelFor(static_cast<int64_t>(tracks.size()), num_threads,
-              [&](int64_t t) { triangulations[t] = Triangulate(RaysOf(tracks[t], posed, state), options); });
-  return triangulations;
-}
-
-double RmsErrorPx(const std::vector<Triangulation>& triangulations) {
-  double total = 0, count = 0;
-  for (const Triangulation& t : triangulations) {
-    if (t.outcome != TriangulateOutcome::kOk) continue;
-    total += t.rms_error_px * t.rms_error_px * static_cast<double>(t.inliers.size());
-    count += static_cast<double>(t.inliers.size());
-  }
-  return count > 0 ? std::sqrt(total / count) : 0;
-}
-
-bool IsPinhole(const Camera& camera) {
-  return camera.model == CameraModel::kPinhole || camera.model == CameraModel::kSimplePinhole;
-}
-
-void Refine(const MatchedFeatures& matched, const std::vector<Track>& tracks,
-            const std::vector<Triangulation>& triangulations, const PosedImages& posed,
-            const RefinePosesOptions& options, PoseState* state) {
-  PoseProblem problem;
-  problem.stated_poses = posed.stated;
-  problem.camera_idx = posed.camera_idx;
-  for (const auto& [camera_id, camera] : matched.cameras)
-    problem.is_focal_refined.push_back(IsPinhole(camera));
-  problem.poses = state->poses;
-  problem.focal_ratios = state->focal_ratios;
-  problem.camera_from_given = state->camera_from_given;
-  for (size_t t = 0; t < tracks.size(); ++t) {
-    if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
-    const int point_idx = static_cast<int>(problem.points.size());
-    problem.points.push_back(triangulations[t].position);
-    for (const int i : triangulations[t].inliers) {
-      const TrackElement& element = tracks[t][i];
-      problem.observations.push_back(
-          {element.image_idx, point_idx, *posed.rays[element.image_idx][element.keypoint_idx]});
-    }
-  }
-  RefinePoses(options, &problem);
-  state->poses = problem.poses;
-  state->focal_ratios = problem.focal_ratios;
-  state->camera_from_given = problem.camera_from_given;
 }
 
 // Images without a pose, and pairs that have one of them.
@@ -175,7 +70,6 @@ void MeasurePoseNoise(Classes* classes) {
 
 OptionTable DescribeOptions(GroupClassesOptions* o) {
   TriangulateOptions& t = o->triangulation;
-  RefinePosesOptions& r = o->refinement;
   OptionTable table = {
       {.name = "min_num_observations",
        .value = &t.min_num_observations,
@@ -192,73 +86,28 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
        .max = 180},
       {.name = "refine_poses",
        .value = &o->refine_poses,
-       .help = "refine the survey's poses; auto: all but reconstructed ones, when the first triangulation's "
-               "error exceeds auto_refine_error_px",
+       .help = "adjust the survey's poses and cameras to its images; auto: all but those of a reconstruction",
        .choices = {"auto", "always", "never"}},
-      {.name = "auto_refine_error_px",
-       .value = &o->auto_refine_error_px,
-       .help =
-           "refine_poses = auto: root mean square reprojection error from which poses are refined, pixels",
-       .min = 1e-3},
       {.name = "initial_reprojection_error_px",
        .value = &o->initial_reprojection_error_px,
        .help = "largest reprojection error in the first triangulation, pixels",
        .min = 1e-3},
-      {.name = "num_rounds",
-       .value = &o->num_rounds,
-       .help = "rounds of refinement and new triangulation",
-       .min = 1,
-       .max = 100},
-      {.name = "pose_sigma_m",
-       .value = &r.pose_sigma_m,
-       .help = "standard deviation of the stated poses, metres",
-       .min = 1e-6},
-      {.name = "pose_sigma_deg",
-       .value = &r.pose_sigma_deg,
-       .help = "standard deviation of the stated poses, degrees",
-       .min = 1e-6},
-      {.name = "keypoint_sigma_px",
-       .value = &r.keypoint_sigma_px,
-       .help = "standard deviation of a keypoint, pixels",
-       .min = 1e-3},
-      {.name = "refine_camera_offset",
-       .value = &r.refine_camera_offset,
-       .help = "refine one rigid offset between all stated poses and their cameras"},
-      {.name = "offset_sigma_m",
-       .value = &r.offset_sigma_m,
-       .help = "standard deviation of that offset, metres",
-       .min = 1e-6},
-      {.name = "offset_sigma_deg",
-       .value = &r.offset_sigma_deg,
-       .help = "standard deviation of that offset, degrees",
-       .min = 1e-6},
-      {.name = "refine_focal",
-       .value = &r.refine_focal,
-       .help = "refine the focal length of pinhole cameras"},
-      {.name = "focal_sigma_ratio",
-       .value = &r.focal_sigma_ratio,
-       .help = "standard deviation of the refined over the stated focal length",
-       .min = 1e-6},
-      {.name = "max_num_iterations",
-       .value = &r.max_num_iterations,
-       .help = "most iterations of a round's solver",
-       .min = 1},
-      {.name = "min_separation_ratio",
+  };
+  OptionTable adjustment = DescribeOptions(&o->adjustment);
+  std::vector<std::string> names;
+  for (const Option& option : adjustment) names.push_back(option.name);
+  table.insert(table.end(), adjustment.begin(), adjustment.end());
+  AddCondition({"refine_poses", {"auto", "always"}}, names, &table);
+  for (Option option :
+       OptionTable{{.name = "min_separation_ratio",
        .value = &o->ambiguity.min_separation_ratio,
        .help = "classes closer in feature space than this many of their radii are ambiguous; 0: none are",
        .min = 0},
-      {.name = "max_duplicate_distance_m",
-       .value = &o->ambiguity.max_duplicate_distance_m,
-       .help = "look-alikes closer than this are one scene feature found twice, metres",
-       .min = 0},
-  };
-  AddCondition({"refine_poses", {"auto"}}, {"auto_refine_error_px"}, &table);
-  AddCondition({"refine_poses", {"auto", "always"}},
-               {"num_rounds", "pose_sigma_m", "pose_sigma_deg", "refine_camera_offset", "offset_sigma_m",
-                "offset_sigma_deg", "refine_focal", "focal_sigma_ratio", "max_num_iterations"},
-               &table);
-  AddCondition({"refine_camera_offset", {"true"}}, {"offset_sigma_m", "offset_sigma_deg"}, &table);
-  AddCondition({"refine_focal", {"true"}}, {"focal_sigma_ratio"}, &table);
+                   {.name = "max_duplicate_distance_m",
+                   .value = &o->ambiguity.max_duplicate_distance_m,
+                   .help = "look-alikes closer than this are one scene feature found twice, metres",
+                   .min = 0}})
+    table.push_back(std::move(option));
   return table;
 }
 
@@ -309,7 +158,7 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress) {
-  const PosedImages posed = CollectPosedImages(matched, capture, num_threads);
+  PosedImages posed = CollectPosedImages(matched, capture, num_threads);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
                      "{}: no image has a pose, but landmarks are triangulated from posed images; give an "
@@ -320,45 +169,44 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   const std::vector<Track> tracks = BuildTracks(matched, posed, &result.num_conflicts);
   result.num_tracks = static_cast<int64_t>(tracks.size());
 
-  PoseState state{posed.stated, std::vector<double>(matched.cameras.size(), 1.0), Pose()};
-  progress.Begin("group classes", 2 + options.num_rounds, "rounds");
+  progress.Begin("group classes", 4, "steps");
   TriangulateOptions first = options.triangulation;
   first.max_reprojection_error_px =
       std::max(options.initial_reprojection_error_px, first.max_reprojection_error_px);
-  std::vector<Triangulation> triangulations = TriangulateAll(tracks, posed, state, first, num_threads);
+  std::vector<Triangulation> triangulations = TriangulateTracks(tracks, posed, first, num_threads);
   result.initial_rms_px = RmsErrorPx(triangulations);
   progress.Advance();
   const bool is_reconstructed = capture.frame && capture.frame->is_reconstructed;
   result.poses_refined =
-      options.refine_poses == "always" || (options.refine_poses == "auto" && !is_reconstructed &&
-                                           result.initial_rms_px > options.auto_refine_error_px);
+      options.refine_poses == "always" || (options.refine_poses == "auto" && !is_reconstructed);
   if (result.poses_refined) {
-    for (int round = 0; round < options.num_rounds && !progress.Cancelled(); ++round) {
-      Refine(matched, tracks, triangulations, posed, options.refinement, &state);
-      triangulations = TriangulateAll(tracks, posed, state, options.triangulation, num_threads);
-      progress.Advance();
-    }
+    result.findings =
+        AdjustSurvey(matched, tracks, first, options.triangulation, options.adjustment, num_threads, &posed);
   } else {
-    triangulations = TriangulateAll(tracks, posed, state, options.triangulation, num_threads);
-    progress.Advance(options.num_rounds);
+    result.findings.keypoints =
+        MeasureSurvey(matched, tracks, options.triangulation, options.adjustment, num_threads, posed);
   }
+  progress.Advance();
+  triangulations = TriangulateTracks(tracks, posed, options.triangulation, num_threads);
+  progress.Advance();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while grouping classes");
   result.final_rms_px = RmsErrorPx(triangulations);
 
   Classes& classes = result.classes;
-  int camera_idx = 0;
-  for (auto [camera_id, camera] : matched.cameras) {
-    const double ratio = state.focal_ratios[camera_idx++];
-    if (IsPinhole(camera)) {
-      for (int f = 0; f < (camera.model == CameraModel::kPinhole ? 2 : 1); ++f) camera.params[f] *= ratio;
-    }
-    classes.cameras.push_back(camera);
+  classes.cameras = posed.cameras;
+  for (const auto& [camera_id, stated] : matched.cameras) {
+    const auto found =
+        std::find_if(classes.cameras.begin(), classes.cameras.end(),
+                     [&](const Camera& camera) { return camera.camera_id == stated.camera_id; });
+    if (found->model != stated.model || found->params != stated.params)
+      classes.stated_cameras.push_back(stated);
   }
+  classes.keypoint_correlation = result.findings.keypoints.correlation;
   for (int i = 0; i < posed.num_images(); ++i) {
     const DatabaseImage& image = matched.images[posed.feature_idx[i]];
-    classes.images.push_back({image.image_id, image.name, image.camera_id, state.poses[i], posed.stated[i]});
+    classes.images.push_back({image.image_id, image.name, image.camera_id, posed.poses[i], posed.stated[i]});
   }
-  classes.camera_from_given = state.camera_from_given;
+  classes.camera_from_given = posed.camera_from_given;
   MeasurePoseNoise(&classes);
   ListUnposed(matched, posed, &result.dropped_items);
   MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes, &result.dropped_items);

@@ -11,41 +11,32 @@
 #include "core/options/options.h"
 #include "core/world/dropped_items.h"
 #include "core/world/feature_class.h"
+#include "stages/group_classes/adjust/adjust_survey.h"
 #include "stages/group_classes/find_ambiguous.h"
-#include "stages/group_classes/refine_poses.h"
-#include "stages/group_classes/triangulate.h"
+#include "stages/group_classes/tracks/posed_images.h"
+#include "stages/group_classes/tracks/triangulate.h"
 
 namespace cairn::group_classes {
 
 // Turns keypoints that match into feature classes: one per scene feature, with its place in space and one
 // descriptor.  Before: match_features.  After: filter_visibility, emit_map.  Implements [Sala06 §VI-B]
 // (equivalence classes, ambiguity).  Differs from it: keypoints are joined by verified matches
-// (union_matches.h), not by distance in feature space alone; classes are triangulated from the survey's
-// poses, which are themselves refined as far as their stated noise allows (refine_poses.h); a class whose
+// (tracks/union_matches.h), not by distance in feature space alone; classes are triangulated from the survey's
+// poses and cameras, which are themselves adjusted as far as the images show that they are wrong
+// (adjust/adjust_survey.h); a class whose
 // look-alike lies at the same place is that place's duplicate, not ambiguous.
 struct GroupClassesOptions {
   TriangulateOptions triangulation;
-  // "never": the stated poses are exact.  "always": refine them.  "auto": refine when the first
-  // triangulation's root mean square error exceeds auto_refine_error_px; reconstructed poses, which already
-  // are the optimum of such an adjustment, are never refined.
+  // "never": the stated poses and cameras are exact.  "always": adjust them (adjust/adjust_survey.h). "auto":
+  // all but those of a reconstruction, which already are the optimum of such an adjustment.
   std::string refine_poses = "auto";
-  double auto_refine_error_px = 1.0;  // REQUIRES: > 0
   // Largest reprojection error in the first triangulation, before poses are refined, pixels.  REQUIRES: > 0
   double initial_reprojection_error_px = 12.0;
-  // Rounds of refinement, each followed by a new triangulation.  REQUIRES: >= 1
-  int num_rounds = 2;
-  RefinePosesOptions refinement;
+  AdjustSurveyOptions adjustment;
   FindAmbiguousOptions ambiguity;
 };
 OptionTable DescribeOptions(GroupClassesOptions* options);
 
-// What the stage needs of matches.db.
-struct MatchedFeatures {
-  std::map<CameraId, Camera> cameras;
-  std::vector<DatabaseImage> images;        // ascending image_id
-  std::vector<Features> features;           // per image
-  std::vector<TwoViewGeometry> geometries;  // ascending pair
-};
 Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path);
 
 struct GroupClassesResult {
@@ -59,6 +50,7 @@ struct GroupClassesResult {
   double initial_rms_px = 0;
   double final_rms_px = 0;
   bool poses_refined = false;
+  SurveyFindings findings;  // where they were
 };
 
 // Pure; same result for any thread count.  Classes are ascending by their first observation.  Errors:

@@ -36,11 +36,10 @@ std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& t
 }
 
 FeatureClass ClassOf(const MatchedFeatures& matched, const Track& track, const Triangulation& triangulation,
-                     const std::vector<int>& matched_idx, const GroupClassesOptions& options,
-                     ClassAppearance* appearance) {
+                     const std::vector<int>& matched_idx, ClassAppearance* appearance) {
   FeatureClass feature_class;
   feature_class.position = triangulation.position;
-  feature_class.covariance = triangulation.covariance * std::pow(options.refinement.keypoint_sigma_px, 2);
+  feature_class.covariance = triangulation.covariance;
   feature_class.reprojection_error_px = triangulation.rms_error_px;
   std::vector<const uint8_t*> descriptors;
   for (const int i : triangulation.inliers) {
@@ -77,8 +76,8 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
       drop(t, ReasonOf(tracks[t], triangulations[t], options.triangulation));
       continue;
     }
-    candidates.push_back({t, ClassOf(matched, tracks[t], triangulations[t], matched_idx, options,
-                                     &appearances.emplace_back())});
+    candidates.push_back(
+        {t, ClassOf(matched, tracks[t], triangulations[t], matched_idx, &appearances.emplace_back())});
   }
   const std::vector<Ambiguity> ambiguity = FindAmbiguous(appearances, options.ambiguity);
   for (size_t i = 0; i < candidates.size(); ++i) {

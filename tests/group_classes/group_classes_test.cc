@@ -28,8 +28,10 @@ struct SurveyNoise {
   double pixel = 0.3;
   double pose_m = 0;
   double pose_deg = 0;
-  Pose offset;             // true camera_from_given
-  double focal_ratio = 1;  // true over stated
+  Pose offset;                      // true camera_from_given
+  double focal_ratio = 1;           // true over stated
+  double walk_m = 0, walk_deg = 0;  // drift from one image to the next
+  double k1 = 0;                    // true distortion, of a camera that is stated without
 };
 
 Survey MakeSurvey(const SurveyNoise& noise) {
@@ -45,7 +47,12 @@ Survey MakeSurvey(const SurveyNoise& noise) {
   Camera true_camera = camera;
   true_camera.params[0] *= noise.focal_ratio;
   true_camera.params[1] *= noise.focal_ratio;
-  Random random(11);
+  if (noise.k1 != 0) {
+    true_camera.model = CameraModel::kSimpleRadial;
+    true_camera.params = {true_camera.params[0], 320, 240, noise.k1};
+  }
+  Random random(11), drift_random(12);
+  Pose drift;  // world_from_drifted world
   std::vector<Eigen::Matrix<uint8_t, 1, kDescriptorDim>> looks;
   for (int p = 0; p < kPoints; ++p) {
     survey.points.emplace_back(random.Uniform(-3, 3), random.Uniform(-1.2, 1.2), random.Uniform(2, 4));
@@ -71,6 +78,17 @@ Survey MakeSurvey(const SurveyNoise& noise) {
                                                             Eigen::Vector3d::Unit(i % 3))) *
                        stated.rotation)
                           .normalized();
+    if (i > 0 && (noise.walk_m > 0 || noise.walk_deg > 0)) {
+      const auto step = [&](double sigma) {
+        return Eigen::Vector3d(drift_random.Normal(0, sigma), drift_random.Normal(0, sigma),
+                               drift_random.Normal(0, sigma));
+      };
+      const Eigen::Vector3d turn_by = step(RadFromDeg(noise.walk_deg));
+      const Pose error{Eigen::Quaterniond(Eigen::AngleAxisd(turn_by.norm(), turn_by.normalized())),
+                       step(noise.walk_m)};
+      drift = drift * (given.Inverse() * error * given);
+    }
+    stated = stated * drift;
     const std::string name = fmt::format("image{:02d}.png", i);
     survey.capture.images.push_back({name, 1, stated});
     survey.matched.images.push_back({static_cast<ImageId>(i + 1), name, 1});
@@ -123,10 +141,18 @@ double MedianPointError(const Survey& survey, const Classes& classes) {
   return errors[errors.size() / 2];
 }
 
-TEST(GroupClasses, ExactPosesGiveTheTruePoints) {
+TEST(GroupClasses, ExactPosesAndCamerasStayWhatTheyAre) {
   const Survey survey = MakeSurvey({});
   const GroupClassesResult result = Group(survey);
-  EXPECT_FALSE(result.poses_refined);
+  EXPECT_EQ(result.findings.pose_gain, 0);
+  EXPECT_FALSE(result.findings.has_offset);
+  for (const SurveyImage& image : result.classes.images) {
+    EXPECT_EQ(image.cam_from_world.translation, image.given_cam_from_world.translation);
+    EXPECT_EQ(image.cam_from_world.rotation.coeffs(), image.given_cam_from_world.rotation.coeffs());
+  }
+  EXPECT_EQ(result.classes.cameras[0].params, survey.matched.cameras.at(1).params);
+  EXPECT_TRUE(result.classes.stated_cameras.empty());
+  EXPECT_EQ(result.classes.stated_pose_sigma_m, 0);
   EXPECT_GT(result.classes.classes.size(), 200u);
   EXPECT_LT(MedianPointError(survey, result.classes), 0.01);
   EXPECT_LT(result.final_rms_px, 0.6);
@@ -135,7 +161,7 @@ TEST(GroupClasses, ExactPosesGiveTheTruePoints) {
 TEST(GroupClasses, NoisyPosesAreRefinedTowardsTheTruth) {
   const Survey survey = MakeSurvey({.pose_m = 0.01, .pose_deg = 0.25});
   const GroupClassesResult result = Group(survey);
-  ASSERT_TRUE(result.poses_refined);
+  ASSERT_GT(result.findings.pose_gain, 0);
   EXPECT_LT(result.final_rms_px, 0.8);
   double stated = 0, refined = 0;
   for (size_t i = 0; i < survey.true_poses.size(); ++i) {
@@ -155,14 +181,51 @@ TEST(GroupClasses, ConstantOffsetAndFocalLengthAreFound) {
   const Survey survey = MakeSurvey(noise);
   GroupClassesOptions options;
   options.initial_reprojection_error_px = 30;
-  options.refinement.refine_focal = true;
-  options.refinement.pose_sigma_m = 0.005;
-  options.refinement.pose_sigma_deg = 0.1;
   const GroupClassesResult result = Group(survey, options);
-  ASSERT_TRUE(result.poses_refined);
+  ASSERT_TRUE(result.findings.has_offset);
   EXPECT_LT((result.classes.camera_from_given.translation - noise.offset.translation).norm(), 0.01);
   EXPECT_LT(RotationErrorDeg(result.classes.camera_from_given, noise.offset), 0.2);
   EXPECT_NEAR(result.classes.cameras[0].FocalX(), 510, 3);
+  ASSERT_EQ(result.classes.stated_cameras.size(), 1u);
+  EXPECT_EQ(result.classes.stated_cameras[0].FocalX(), 500);
+}
+
+// Means of the errors of a survey's poses, without an offset and the world's frame.
+double MeanErrorDeg(const Survey& survey, const Classes& classes, bool stated) {
+  double sum = 0;
+  int count = 0;
+  for (size_t i = 0; i < survey.true_poses.size(); ++i) {
+    for (size_t j = 0; j < i; ++j, ++count) {
+      const auto pose = [&](size_t k) {
+        return stated ? classes.images[k].given_cam_from_world : classes.images[k].cam_from_world;
+      };
+      sum += RotationErrorDeg(pose(i) * pose(j).Inverse(),
+                              survey.true_poses[i] * survey.true_poses[j].Inverse());
+    }
+  }
+  return sum / count;
+}
+
+TEST(GroupClasses, DriftIsFoundAndStraightened) {
+  const Survey survey = MakeSurvey({.walk_m = 0.01, .walk_deg = 0.4});
+  const GroupClassesResult result = Group(survey);
+  ASSERT_GT(result.findings.pose_gain, 0);
+  EXPECT_GT(result.findings.noise.walk_deg, 3 * result.findings.noise.own_deg);
+  EXPECT_LT(MeanErrorDeg(survey, result.classes, false), 0.2 * MeanErrorDeg(survey, result.classes, true));
+}
+
+TEST(GroupClasses, LensThatNobodyStatedIsFound) {
+  const Survey survey = MakeSurvey({.k1 = -0.12});
+  GroupClassesOptions options;
+  options.initial_reprojection_error_px = 30;
+  const GroupClassesResult result = Group(survey, options);
+  ASSERT_EQ(result.findings.cameras.size(), 1u);
+  const Camera& camera = result.classes.cameras[0];
+  ASSERT_EQ(camera.model, CameraModel::kSimpleRadial) << result.findings.cameras[0].variant;
+  EXPECT_NEAR(camera.params[3], -0.12, 0.01);
+  EXPECT_EQ(result.findings.pose_gain, 0);
+  options.adjustment.refine_cameras = false;
+  EXPECT_TRUE(Group(survey, options).classes.stated_cameras.empty());
 }
 
 TEST(GroupClasses, SameResultForAnyNumberOfThreads) {

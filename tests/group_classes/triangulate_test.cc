@@ -1,4 +1,4 @@
-#include "stages/group_classes/triangulate.h"
+#include "stages/group_classes/tracks/triangulate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

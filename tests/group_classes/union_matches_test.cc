@@ -1,4 +1,4 @@
-#include "stages/group_classes/union_matches.h"
+#include "stages/group_classes/tracks/union_matches.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

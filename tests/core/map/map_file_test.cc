@@ -35,6 +35,10 @@ MapRows ExampleRows() {
   rows.floor_from_world.rotation = Eigen::Quaterniond(0.9, 0.1, -0.3, 0.2).normalized();
   rows.stated_pose_sigma_m = 0.02;
   rows.stated_pose_sigma_deg = 1.5;
+  rows.keypoint_correlation = 0.0123456789;
+  rows.stated_cameras = {rows.cameras[0]};
+  rows.stated_cameras[0].model = CameraModel::kSimplePinhole;
+  rows.stated_cameras[0].params = {301.23456789, 1.0 / 3, 240};
   rows.frame.anchor = GeodeticPosition{55.7, 13.2, 40.5};
   rows.frame.source = "gps";
   rows.frame.is_reconstructed = true;
@@ -64,6 +68,12 @@ TEST(MapFile, RoundTripKeepsEverything) {
   }
   EXPECT_EQ(read->stated_pose_sigma_m, 0.02);
   EXPECT_EQ(read->stated_pose_sigma_deg, 1.5);
+  EXPECT_EQ(read->keypoint_correlation, 0.0123456789);
+  ASSERT_EQ(read->stated_cameras.size(), 1u);
+  EXPECT_EQ(read->stated_cameras[0].camera_id, written.cameras[0].camera_id);
+  EXPECT_EQ(read->stated_cameras[0].model, CameraModel::kSimplePinhole);
+  EXPECT_EQ(read->stated_cameras[0].width, written.cameras[0].width);
+  EXPECT_EQ(read->stated_cameras[0].params, written.stated_cameras[0].params);
   ASSERT_TRUE(read->frame.anchor);
   EXPECT_EQ(read->frame.anchor->latitude_deg, 55.7);
   EXPECT_EQ(read->frame.anchor->longitude_deg, 13.2);

@@ -29,7 +29,7 @@ std::shared_ptr<const Map> RoomMap() {
 // The synthetic rooms' errors are independent of each other: no factor for those that are not.
 LocalizerOptions IndependentErrors() {
   LocalizerOptions options;
-  options.refine.covariance_scale = 1;
+  options.refine.keypoint_correlation = 1e-12;
   return options;
 }
 
@@ -122,6 +122,40 @@ TEST(Localizer, NoiseOfTheSurveysPosesWidensTheCovariance) {
     EXPECT_NEAR(std::sqrt(added[i]), RadFromDeg(1), 1e-6);
     EXPECT_NEAR(std::sqrt(added[3 + i]), 0.03, 1e-6);
   }
+}
+
+TEST(Localizer, KeypointsThatErrTogetherWidenTheCovariance) {
+  MapRows rows = Room().rows;
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  LocalizerOptions plain;
+  plain.refine.keypoint_correlation = 1e-12;
+  const auto without = *Localizer(RoomMap(), plain).LocalizeFeatures(features, Room().camera);
+  rows.keypoint_correlation = 0.05;
+  const auto with = *Localizer(*Map::FromRows(rows)).LocalizeFeatures(features, Room().camera);
+  ASSERT_TRUE(with.has_fix());
+  ASSERT_EQ(with.num_inliers, without.num_inliers);
+  EXPECT_NEAR(with.covariance(0, 0) / without.covariance(0, 0), 1 + 0.025 * with.num_inliers, 1e-3);
+  // A map that does not say: the factor that was measured on the demo.
+  const auto unmeasured = *Localizer(RoomMap()).LocalizeFeatures(features, Room().camera);
+  EXPECT_NEAR(unmeasured.covariance(0, 0) / without.covariance(0, 0), 1.8, 1e-3);
+}
+
+TEST(Localizer, AStatedCameraIsTheOneThatTheSurveyFound) {
+  MapRows rows = Room().rows;
+  Camera stated = Room().camera;
+  stated.params[0] *= 1.05;
+  Camera other = stated;
+  other.params[0] += 1;
+  rows.stated_cameras = {stated};
+  const auto map = *Map::FromRows(rows);
+  const Features features = RenderFeatures(Room(), PoseAt({0, 0, 1.2}, 30), {}, 3);
+  const auto as_found = *Localizer(map).LocalizeFeatures(features, Room().camera);
+  const auto as_stated = *Localizer(map).LocalizeFeatures(features, stated);
+  const auto as_other = *Localizer(map).LocalizeFeatures(features, other);
+  ASSERT_TRUE(as_found.has_fix());
+  ASSERT_TRUE(as_stated.has_fix());
+  EXPECT_EQ(as_stated.cam_from_world.translation, as_found.cam_from_world.translation);
+  EXPECT_TRUE(!as_other.has_fix() || CenterErrorM(as_other.cam_from_world, as_found.cam_from_world) > 1e-3);
 }
 
 TEST(ChanceOfInlier, IsADiscsShareWhereLandmarksSpreadAndLargeWhereTheyCrowd) {

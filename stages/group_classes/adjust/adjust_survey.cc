@@ -1,0 +1,583 @@
+#include "stages/group_classes/adjust/adjust_survey.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+#include "core/base/parallel.h"
+#include "core/camera/panorama.h"
+#include "core/capture/sessions.h"
+
+namespace cairn::group_classes {
+namespace {
+
+// A turn by a radian lets a tracker drift as a metre of way does; between surveys it starts anew.
+constexpr double kMetresPerRadian = 1, kMetresBetweenSurveys = 10, kMinWayM = 1e-4;
+// Fewest residuals of a component that keypoints must determine before it is learnt, as a part of all.
+constexpr double kMinDeterminedRatio = 0.02, kMinDetermined = 3;
+constexpr double kOverRelaxation = 1.5;
+constexpr double kMinSigmaM = 1e-6, kMinSigmaDeg = 1e-5;
+// Chi-square of 6 degrees of freedom beyond which an offset is one: 1 in 10^5 by chance.
+constexpr double kOffsetChiSquare = 33;
+// A larger model of a camera is taken if left-out keypoints gain this many standard errors, and this part.
+constexpr double kMinGainSigmas = 2, kMinGain = 1e-3, kMinGainOfShared = 0.5;
+constexpr double kFarOffGain = 0.3;
+constexpr int kMinNumCameraImages = 5;
+// Fewest images of a camera that are learnt from, where it has as many.
+constexpr size_t kMinNumLearnt = 24;
+
+class SurveyAdjuster {
+ public:
+  SurveyAdjuster(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                 const TriangulateOptions& triangulate, const AdjustSurveyOptions& options, int num_threads,
+                 PosedImages* posed)
+      : matched_(matched),
+        tracks_(tracks),
+        triangulate_(triangulate),
+        options_(options),
+        num_threads_(num_threads),
+        posed_(*posed),
+        stated_cameras_(posed->cameras) {
+    findings_.cameras.resize(posed_.cameras.size());
+    findings_.has_offset = options.refine_camera_offset;
+    MakeImages();
+  }
+
+  // Learns the noise, the cameras, whether there is an offset, and whether the poses need be moved at all.
+  SurveyFindings Learn(const std::vector<Triangulation>& triangulations) {
+    Select(triangulations);
+    Adjust(nullptr);
+    LearnNoise();
+    if (options_.refine_cameras && ChooseCameras()) {
+      LearnNoise();
+      // Again, by poses that a camera far off has not bent.
+      const auto is_far_off = [](const CameraFinding& camera) { return camera.gain > kFarOffGain; };
+      if (std::any_of(findings_.cameras.begin(), findings_.cameras.end(), is_far_off) && ChooseCameras())
+        LearnNoise();
+    }
+    if (findings_.has_offset && evidence_.offset_chi_square < kOffsetChiSquare) {
+      findings_.has_offset = false;
+      problem_.is_offset_free = false;
+      problem_.camera_from_given = Pose();
+      LearnNoise();
+    }
+    for (size_t c = 0; c < findings_.cameras.size(); ++c) {
+      findings_.cameras[c].camera = posed_.cameras[c];
+      if (c < evidence_.camera_sigma.size()) findings_.cameras[c].sigma = evidence_.camera_sigma[c];
+    }
+    findings_.noise = problem_.noise;
+    findings_.camera_from_given = problem_.camera_from_given;
+    const LeftOut as_stated = LeaveOut(AsStated(problem_.camera_from_given));
+    const auto [gain, error] = GainOf(as_stated, LeaveOut(problem_), -1);
+    if (IsGain(gain, error)) findings_.pose_gain = gain;
+    if (findings_.pose_gain == 0 && findings_.has_offset) {
+      // Poses that are exact make the least offset significant; but it must explain something.
+      const auto [of_offset, error_of_offset] = GainOf(LeaveOut(AsStated(Pose())), as_stated, -1);
+      if (!IsGain(of_offset, error_of_offset)) {
+        findings_.has_offset = false;
+        findings_.camera_from_given = Pose();
+      }
+    }
+    return findings_;
+  }
+
+  KeypointNoise Measure(const std::vector<Triangulation>& triangulations) {
+    Select(triangulations);
+    return MeasureKeypointNoise(problem_, scales_);
+  }
+
+  // Adjusts everything by what was learnt.
+  void Apply(const SurveyFindings& findings) {
+    is_learning_ = false;
+    findings_ = findings;
+    problem_.noise = findings.noise;
+    problem_.is_offset_free = findings.has_offset;
+    problem_.camera_from_given = findings.camera_from_given;
+    for (size_t c = 0; c < findings.cameras.size(); ++c) posed_.cameras[c] = findings.cameras[c].camera;
+    for (size_t c = 0; c < variants_.size(); ++c) {
+      for (size_t v = 0; v < candidates_[c].size(); ++v) {
+        if (candidates_[c][v].name == findings.cameras[c].variant) variants_[c] = static_cast<int>(v);
+      }
+    }
+    MakeRays(matched_, num_threads_, &posed_);
+    const Pose offset = findings.camera_from_given;
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      posed_.poses[i] = offset * posed_.stated[i];
+      problem_.images[i].cam_from_world = posed_.poses[i];
+    }
+    posed_.camera_from_given = offset;
+    if (findings.pose_gain == 0) return;
+    TriangulateOptions first = triangulate_;
+    first.max_reprojection_error_px = std::max(first.max_reprojection_error_px, 12.0);
+    Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
+    for (int round = 0; round < 2; ++round) Adjust(nullptr);
+    KeepFrame();
+  }
+
+ private:
+  void MakeImages() {
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      BundleProblem::Image image;
+      image.camera_idx = posed_.camera_idx[i];
+      image.stated = image.cam_from_world = image.drifted = posed_.stated[i];
+      if (i > 0) image.way_m = Way(i - 1, i);
+      problem_.images.push_back(image);
+    }
+    problem_.is_offset_free = findings_.has_offset;
+    problem_.offset_sigma_m = options_.offset_sigma_m;
+    problem_.offset_sigma_deg = options_.offset_sigma_deg;
+    problem_.cameras.resize(posed_.cameras.size());
+    variants_.assign(posed_.cameras.size(), 0);
+    for (const Camera& camera : stated_cameras_)
+      candidates_.push_back(CameraVariants(camera, options_.camera_prior));
+    // Views of a panorama have the camera that they were rendered with.
+    std::vector<int> num_images(posed_.cameras.size(), 0);
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      int& count = num_images[posed_.camera_idx[i]];
+      ++count;
+      if (ParsePanoramaViewName(NameOf(i))) count = -posed_.num_images();
+    }
+    for (size_t c = 0; c < candidates_.size(); ++c) {
+      if (num_images[c] < kMinNumCameraImages) candidates_[c].resize(1);
+    }
+  }
+
+  const std::string& NameOf(int i) const { return matched_.images[posed_.feature_idx[i]].name; }
+  const Keypoint& KeypointOf(const TrackElement& element) const {
+    return matched_.features[posed_.feature_idx[element.image_idx]].keypoints[element.keypoint_idx];
+  }
+
+  double Way(int a, int b) const {
+    const auto view_a = ParsePanoramaViewName(NameOf(a)), view_b = ParsePanoramaViewName(NameOf(b));
+    if (view_a && view_b && view_a->panorama_name == view_b->panorama_name) return kMinWayM;
+    const auto session = [](const std::string& name) { return name.substr(0, name.find('/') + 1); };
+    const double way = CenterErrorM(posed_.stated[a], posed_.stated[b]) +
+                       kMetresPerRadian * RadFromDeg(RotationErrorDeg(posed_.stated[a], posed_.stated[b])) +
+                       (session(NameOf(a)) == session(NameOf(b)) ? 0 : kMetresBetweenSurveys);
+    return std::max(kMinWayM, way);
+  }
+
+  // The longest tracks with which every image has enough keypoints.
+  void Select(const std::vector<Triangulation>& triangulations) {
+    std::vector<size_t> order;
+    for (size_t t = 0; t < tracks_.size(); ++t) {
+      if (triangulations[t].outcome == TriangulateOutcome::kOk) order.push_back(t);
+    }
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return triangulations[a].inliers.size() > triangulations[b].inliers.size();
+    });
+    std::vector<int> count(posed_.num_images(), 0);
+    selected_.clear();
+    std::vector<Triangulation> chosen;
+    for (const size_t t : order) {
+      const auto is_wanted = [&](int i) {
+        return count[tracks_[t][i].image_idx] < options_.num_keypoints_adjusted;
+      };
+      if (std::none_of(triangulations[t].inliers.begin(), triangulations[t].inliers.end(), is_wanted))
+        continue;
+      for (const int i : triangulations[t].inliers) ++count[tracks_[t][i].image_idx];
+      selected_.push_back(tracks_[t]);
+      chosen.push_back(triangulations[t]);
+    }
+    Fill(chosen);
+  }
+
+  // Observations and points of the selected tracks.
+  void Fill(const std::vector<Triangulation>& triangulations) {
+    problem_.observations.clear();
+    problem_.points.clear();
+    scales_.clear();
+    for (size_t t = 0; t < selected_.size(); ++t) {
+      if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
+      const int point_idx = static_cast<int>(problem_.points.size());
+      problem_.points.push_back(triangulations[t].position);
+      for (const int i : triangulations[t].inliers) {
+        const TrackElement& element = selected_[t][i];
+        const Keypoint& keypoint = KeypointOf(element);
+        BundleProblem::Observation observation;
+        observation.image_idx = element.image_idx;
+        observation.point_idx = point_idx;
+        observation.pixel = {keypoint.x, keypoint.y};
+        observation.ray = *posed_.rays[element.image_idx][element.keypoint_idx];
+        problem_.observations.push_back(std::move(observation));
+        scales_.push_back(keypoint.scale);
+      }
+    }
+    SetCameras(variants_, false, &problem_);
+    SetKeypointNoise();
+  }
+
+  void SetKeypointNoise() {
+    std::vector<double> count(problem_.images.size(), 0);
+    for (size_t i = 0; i < problem_.observations.size(); ++i) {
+      problem_.observations[i].sigma_px = findings_.keypoints.SigmaPx(scales_[i]);
+      ++count[problem_.observations[i].image_idx];
+    }
+    for (size_t i = 0; i < problem_.images.size(); ++i)
+      problem_.images[i].dispersion = findings_.keypoints.Dispersion(count[i]);
+  }
+
+  // The variants' parameters as blocks about the cameras as stated, where `afresh`, or as they are.
+  void SetCameras(const std::vector<int>& variants, bool afresh, BundleProblem* problem) const {
+    for (size_t c = 0; c < variants.size(); ++c) {
+      const CameraVariant& variant = candidates_[c][variants[c]];
+      CameraBlock& block = problem->cameras[c];
+      block = {variant.free, {}, variant.sigma, std::vector<double>(variant.free.size(), 0.0)};
+      const double gradient = FocalGradient(static_cast<int>(c)) / (NumFocals(variant.camera.model));
+      for (size_t k = 0; k < variant.free.size(); ++k) {
+        const int p = variant.free[k];
+        block.prior.push_back(afresh ? 0 : variant.camera.params[p] - posed_.cameras[c].params[p]);
+        if (p < NumFocals(variant.camera.model))
+          block.prior[k] -= gradient * variant.sigma[k] * variant.sigma[k];
+      }
+      block.difference_sigma = variant.difference_sigma;
+      if (block.difference_sigma > 0) block.difference_prior = block.prior[0] - block.prior[1];
+    }
+    for (BundleProblem::Observation& observation : problem->observations) {
+      const int c = problem->images[observation.image_idx].camera_idx;
+      const Camera& camera = afresh ? candidates_[c][variants[c]].camera : posed_.cameras[c];
+      if (afresh) {
+        if (const auto ray = MakePixelRay(camera, observation.pixel)) observation.ray = *ray;
+      }
+      observation.camera = {};
+      if (!problem->cameras[c].free.empty())
+        observation.camera = SensitivityOf(camera, observation.pixel, problem->cameras[c].free);
+    }
+  }
+
+  // An adjustment that finds poses and focal length together makes that too long: a longer one moves pixels
+  // as far by smaller, more likely turns.  What is likely of the focal length alone, poses integrated out,
+  // has the term - n ln f, n = turns up or sideways that keypoints determine; this is its gradient, to be
+  // shared by the focal lengths, 1 / px.
+  double FocalGradient(int camera) const {
+    const double num_turns = 2.0 / 3 * (evidence_.own_deg.num_determined + evidence_.walk_deg.num_determined);
+    const auto of_camera = std::count(posed_.camera_idx.begin(), posed_.camera_idx.end(), camera);
+    return num_turns * static_cast<double>(of_camera) / std::max(1, posed_.num_images()) /
+           posed_.cameras[camera].MeanFocal();
+  }
+
+  void Adjust(BundleEvidence* evidence) {
+    AdjustBundle({.max_num_iterations = options_.max_num_iterations}, &problem_, evidence);
+    for (int i = 0; i < posed_.num_images(); ++i) posed_.poses[i] = problem_.images[i].cam_from_world;
+    bool changed = false;
+    for (size_t c = 0; c < problem_.cameras.size(); ++c) {
+      const CameraBlock& block = problem_.cameras[c];
+      for (size_t k = 0; k < block.free.size(); ++k) {
+        posed_.cameras[c].params[block.free[k]] += block.delta[k];
+        changed = true;
+      }
+    }
+    if (changed) MakeRays(matched_, num_threads_, &posed_);
+    if (is_learning_) findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
+    Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
+  }
+
+  void LearnNoise() {
+    for (int round = 0; round < options_.num_rounds; ++round) {
+      Adjust(&evidence_);
+      double change = 0;
+      const auto learn = [&](const NoiseEvidence& evidence, double least, double* sigma) {
+        const double few = std::max(kMinDetermined, kMinDeterminedRatio * evidence.num_residuals);
+        if (!(evidence.num_determined >= few)) return;
+        const double ratio =
+            std::clamp(std::sqrt(evidence.sum_of_squares / evidence.num_determined), 0.05, 20.0);
+        // MacKay's step is too short by far where a component vanishes.
+        const double learnt = std::max(least, *sigma * std::pow(ratio, kOverRelaxation));
+        change = std::max(change, std::abs(std::log(learnt / *sigma)));
+        *sigma = learnt;
+      };
+      learn(evidence_.own_m, kMinSigmaM, &problem_.noise.own_m);
+      learn(evidence_.own_deg, kMinSigmaDeg, &problem_.noise.own_deg);
+      learn(evidence_.walk_m, kMinSigmaM, &problem_.noise.walk_m);
+      learn(evidence_.walk_deg, kMinSigmaDeg, &problem_.noise.walk_deg);
+      if (change < 0.1) break;
+    }
+  }
+
+  // Left-out keypoints' squared errors, cut off where outliers begin: sums per image.
+  struct LeftOut {
+    std::vector<double> sum;
+  };
+
+  LeftOut TryVariants(const std::vector<int>& variants) const {
+    BundleProblem problem = problem_;
+    SetCameras(variants, true, &problem);
+    return LeaveOut(std::move(problem));
+  }
+
+  LeftOut LeaveOut(BundleProblem problem) const {
+    // One keypoint of each track of four or more.
+    std::vector<BundleProblem::Observation> kept, left_out;
+    for (size_t begin = 0; begin < problem.observations.size();) {
+      size_t end = begin;
+      while (end < problem.observations.size() &&
+             problem.observations[end].point_idx == problem.observations[begin].point_idx)
+        ++end;
+      const size_t out =
+          end - begin >= 4
+              ? begin + static_cast<size_t>(problem.observations[begin].point_idx) % (end - begin)
+              : end;
+      for (size_t i = begin; i < end; ++i)
+        (i == out ? left_out : kept).push_back(std::move(problem.observations[i]));
+      begin = end;
+    }
+    problem.observations = std::move(kept);
+    AdjustBundle({.max_num_iterations = options_.max_num_iterations}, &problem, nullptr);
+    LeftOut result{std::vector<double>(problem.images.size(), 0)};
+    constexpr double kMaxSquare = 16;
+    for (const BundleProblem::Observation& observation : left_out) {
+      const double whitened =
+          ResidualOf(problem, observation).squaredNorm() / (observation.sigma_px * observation.sigma_px);
+      result.sum[observation.image_idx] += std::min(whitened, kMaxSquare);
+    }
+    return result;
+  }
+
+  // The problem with the poses that are stated, and this offset.
+  BundleProblem AsStated(const Pose& camera_from_given) const {
+    BundleProblem problem = problem_;
+    problem.noise = {kMinSigmaM, kMinSigmaDeg, kMinSigmaM, kMinSigmaDeg};
+    problem.is_offset_free = false;
+    problem.camera_from_given = camera_from_given;
+    for (BundleProblem::Image& image : problem.images) {
+      image.cam_from_world = camera_from_given * image.stated;
+      image.drifted = image.stated;
+    }
+    return problem;
+  }
+
+  // Returns whether a camera is another one now.
+  bool ChooseCameras() {
+    size_t num_variants = 1;
+    for (const auto& of_camera : candidates_) num_variants = std::max(num_variants, of_camera.size());
+    if (num_variants == 1) return false;
+    std::vector<LeftOut> tried(num_variants);
+    ParallelFor(static_cast<int64_t>(num_variants), num_threads_, [&](int64_t v) {
+      std::vector<int> variants;
+      for (const auto& of_camera : candidates_)
+        variants.push_back(static_cast<int>(std::min<size_t>(v, of_camera.size() - 1)));
+      tried[v] = TryVariants(variants);
+    });
+    bool changed = false;
+    for (size_t c = 0; c < candidates_.size(); ++c) {
+      int best = 0;
+      double gain_of_best = 0;
+      for (size_t v = 1; v < candidates_[c].size(); ++v) {
+        const auto [gain, error] = GainOf(tried[best], tried[v], static_cast<int>(c));
+        if (IsGain(gain, error)) {
+          best = static_cast<int>(v);
+          gain_of_best = GainOf(tried[0], tried[v], static_cast<int>(c)).first;
+        }
+      }
+      findings_.cameras[c].variant = candidates_[c][best].name;
+      findings_.cameras[c].free = candidates_[c][best].free;
+      findings_.cameras[c].gain = gain_of_best;
+      if (best == variants_[c]) continue;
+      changed = true;
+      variants_[c] = best;
+      posed_.cameras[c] = candidates_[c][best].camera;
+    }
+    if (changed) {
+      MakeRays(matched_, num_threads_, &posed_);
+      Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
+      Adjust(nullptr);
+    }
+    return changed;
+  }
+
+  // Whether it is more than chance, and worth it beside the part that an image's keypoints share.
+  bool IsGain(double gain, double error) const {
+    return gain > kMinGainOfShared * findings_.keypoints.correlation + kMinGain &&
+           gain > kMinGainSigmas * error;
+  }
+
+  // By which part the variance of a camera's (-1: of all cameras') left-out keypoints is smaller, and the
+  // standard error over images.
+  std::pair<double, double> GainOf(const LeftOut& before, const LeftOut& after, int camera) const {
+    double sum_before = 0, sum_difference = 0, sum_squares = 0;
+    for (size_t i = 0; i < problem_.images.size(); ++i) {
+      if (camera >= 0 && problem_.images[i].camera_idx != camera) continue;
+      const double difference = before.sum[i] - after.sum[i];
+      sum_before += before.sum[i];
+      sum_difference += difference;
+      sum_squares += difference * difference;
+    }
+    if (!(sum_before > 0)) return {0, 0};
+    return {sum_difference / sum_before, std::sqrt(sum_squares) / sum_before};
+  }
+
+  // Turns and moves everything so that the stated poses, freed from drift, are where they were stated, in the
+  // mean: a walk has no frame of its own.
+  void KeepFrame() {
+    Eigen::Matrix4d turns = Eigen::Matrix4d::Zero();
+    for (const BundleProblem::Image& image : problem_.images) {
+      const Eigen::Quaterniond turn = image.stated.rotation.conjugate() * image.drifted.rotation;
+      turns += turn.coeffs() * turn.coeffs().transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(turns);
+    const Eigen::Quaterniond stated_from_drifted(Eigen::Vector4d(solver.eigenvectors().col(3)));
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+    for (const BundleProblem::Image& image : problem_.images)
+      shift += image.stated.Center() - stated_from_drifted * image.drifted.Center();
+    const Pose frame{stated_from_drifted.normalized(), shift / std::max<double>(1, problem_.images.size())};
+    const Pose back = frame.Inverse();
+    for (int i = 0; i < posed_.num_images(); ++i) posed_.poses[i] = problem_.images[i].cam_from_world * back;
+    posed_.camera_from_given = problem_.camera_from_given;
+  }
+
+  const MatchedFeatures& matched_;
+  const std::vector<Track>& tracks_;
+  const TriangulateOptions& triangulate_;
+  const AdjustSurveyOptions& options_;
+  int num_threads_;
+  PosedImages& posed_;
+  std::vector<Camera> stated_cameras_;
+  std::vector<std::vector<CameraVariant>> candidates_;  // per camera
+  std::vector<int> variants_;                           // per camera: the one taken
+  std::vector<Track> selected_;
+  std::vector<double> scales_;  // per observation
+  BundleProblem problem_;
+  BundleEvidence evidence_;
+  SurveyFindings findings_;
+  bool is_learning_ = true;
+};
+
+// The images that noise and cameras are learnt from: of each camera two runs of successive ones.
+std::vector<int> ImagesToLearnFrom(const PosedImages& posed, int num_images) {
+  std::vector<std::vector<int>> of_camera(posed.cameras.size());
+  for (int i = 0; i < posed.num_images(); ++i) of_camera[posed.camera_idx[i]].push_back(i);
+  const auto num_used = std::count_if(of_camera.begin(), of_camera.end(),
+                                      [](const std::vector<int>& images) { return !images.empty(); });
+  const size_t each = std::max<size_t>(kMinNumLearnt, num_images / std::max<int64_t>(1, num_used));
+  std::vector<int> chosen;
+  for (const std::vector<int>& images : of_camera) {
+    const size_t length = each / 2;
+    if (images.size() <= each) {
+      chosen.insert(chosen.end(), images.begin(), images.end());
+      continue;
+    }
+    for (const size_t part : {1, 3}) {
+      const size_t middle = part * images.size() / 4;
+      const size_t begin = middle > length / 2 ? middle - length / 2 : 0;
+      for (size_t i = begin; i < std::min(begin + length, images.size()); ++i) chosen.push_back(images[i]);
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+// A part of a survey, with the tracks that two of its images see.
+struct SubSurvey {
+  PosedImages posed;
+  std::vector<Track> tracks;
+};
+
+SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images) {
+  SubSurvey sub;
+  sub.posed.cameras = all.cameras;
+  std::vector<int> new_idx(all.num_images(), -1);
+  for (const int i : images) {
+    new_idx[i] = sub.posed.num_images();
+    sub.posed.feature_idx.push_back(all.feature_idx[i]);
+    sub.posed.camera_idx.push_back(all.camera_idx[i]);
+    sub.posed.stated.push_back(all.stated[i]);
+    sub.posed.poses.push_back(all.poses[i]);
+    sub.posed.rays.push_back(all.rays[i]);
+  }
+  for (const Track& track : tracks) {
+    Track kept;
+    for (const TrackElement& element : track) {
+      if (new_idx[element.image_idx] >= 0) kept.push_back({new_idx[element.image_idx], element.keypoint_idx});
+    }
+    if (kept.size() >= 2) sub.tracks.push_back(std::move(kept));
+  }
+  return sub;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(AdjustSurveyOptions* o) {
+  OptionTable table = {
+      {.name = "refine_cameras",
+       .value = &o->refine_cameras,
+       .help = "find out which parameters of the cameras differ from what is stated"},
+      {.name = "focal_sigma_ratio",
+       .value = &o->camera_prior.focal_sigma_ratio,
+       .help = "standard deviation of a stated focal length, as a part of it",
+       .min = 1e-6},
+      {.name = "principal_point_sigma_ratio",
+       .value = &o->camera_prior.principal_point_sigma_ratio,
+       .help = "standard deviation of a stated principal point, as a part of the image's width",
+       .min = 1e-6},
+      {.name = "distortion_sigma",
+       .value = &o->camera_prior.distortion_sigma,
+       .help = "standard deviation of a distortion coefficient",
+       .min = 1e-6},
+      {.name = "calibrated_ratio",
+       .value = &o->camera_prior.calibrated_ratio,
+       .help = "these are this many times smaller for a camera that is stated with distortion",
+       .min = 1},
+      {.name = "refine_camera_offset",
+       .value = &o->refine_camera_offset,
+       .help = "find one rigid offset between all stated poses and their cameras"},
+      {.name = "offset_sigma_m",
+       .value = &o->offset_sigma_m,
+       .help = "standard deviation of that offset, metres",
+       .min = 1e-6},
+      {.name = "offset_sigma_deg",
+       .value = &o->offset_sigma_deg,
+       .help = "standard deviation of that offset, degrees",
+       .min = 1e-6},
+      {.name = "num_keypoints_adjusted",
+       .value = &o->num_keypoints_adjusted,
+       .help = "keypoints of an image that decide on poses and cameras",
+       .min = 10},
+      {.name = "num_images_learnt",
+       .value = &o->num_images_learnt,
+       .help = "images from which the noise of poses and the cameras are learnt",
+       .min = 10,
+       .max = 1000},
+      {.name = "num_rounds",
+       .value = &o->num_rounds,
+       .help = "most rounds in which the noise of the stated poses is learnt",
+       .min = 1,
+       .max = 100},
+      {.name = "max_num_iterations",
+       .value = &o->max_num_iterations,
+       .help = "most iterations of a round's solver",
+       .min = 1},
+  };
+  AddCondition({"refine_cameras", {"true"}},
+               {"focal_sigma_ratio", "principal_point_sigma_ratio", "distortion_sigma", "calibrated_ratio"},
+               &table);
+  AddCondition({"refine_camera_offset", {"true"}}, {"offset_sigma_m", "offset_sigma_deg"}, &table);
+  return table;
+}
+
+KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                            const TriangulateOptions& triangulate, const AdjustSurveyOptions& options,
+                            int num_threads, const PosedImages& posed) {
+  SubSurvey sub = Restrict(posed, tracks, ImagesToLearnFrom(posed, options.num_images_learnt));
+  const std::vector<Triangulation> triangulations =
+      TriangulateTracks(sub.tracks, sub.posed, triangulate, num_threads);
+  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, &sub.posed)
+      .Measure(triangulations);
+}
+
+SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                            const TriangulateOptions& first, const TriangulateOptions& triangulate,
+                            const AdjustSurveyOptions& options, int num_threads, PosedImages* posed) {
+  SubSurvey sub = Restrict(*posed, tracks, ImagesToLearnFrom(*posed, options.num_images_learnt));
+  const std::vector<Triangulation> triangulations =
+      TriangulateTracks(sub.tracks, sub.posed, first, num_threads);
+  const SurveyFindings findings =
+      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, &sub.posed)
+          .Learn(triangulations);
+  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, posed).Apply(findings);
+  return findings;
+}
+
+}  // namespace cairn::group_classes

@@ -1,0 +1,437 @@
+#include "stages/group_classes/adjust/bundle.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <ceres/ceres.h>
+#include <Eigen/LU>
+#include <Eigen/Sparse>
+
+#include "core/geometry/vector_geometry.h"
+#include "stages/group_classes/adjust/evidence.h"
+
+namespace cairn::group_classes {
+namespace {
+
+constexpr size_t kPoseSize = 7;  // quaternion x, y, z, w; translation
+using PoseManifold = ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
+
+void StorePose(const Pose& pose, double* block) {
+  Eigen::Map<Eigen::Vector4d> rotation(block);
+  Eigen::Map<Eigen::Vector3d> translation(block + 4);
+  rotation = pose.rotation.coeffs();
+  translation = pose.translation;
+}
+
+Pose LoadPose(const double* block) {
+  return {Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(block)).normalized(),
+          Eigen::Map<const Eigen::Vector3d>(block + 4)};
+}
+
+// Reprojection of a point, in units of the keypoint's standard deviation, with analytic derivatives.
+class ReprojectionCost : public ceres::CostFunction {
+ public:
+  ReprojectionCost(const BundleProblem::Observation& observation, const CameraBlock& camera)
+      : ray_(observation.ray), camera_(observation.camera), weight_(1 / observation.sigma_px) {
+    set_num_residuals(2);
+    *mutable_parameter_block_sizes() = {7, 3};
+    if (!camera.free.empty())
+      mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.free.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Map<const Eigen::Quaterniond> q(parameters[0]);
+    const Eigen::Map<const Eigen::Vector3d> translation(parameters[0] + 4), point(parameters[1]);
+    const Eigen::Matrix3d rotation = q.toRotationMatrix();
+    const Eigen::Vector3d x = rotation * point + translation;
+    const double depth = ray_.normal.dot(x);
+    if (!(std::abs(depth) > 1e-12)) return false;
+    Eigen::Map<Eigen::Vector2d> residual(residuals);
+    residual = weight_ / depth * (ray_.pixel_from_plane * x);
+    Eigen::Matrix<double, 2, 3> from_x;
+    from_x = (weight_ * ray_.pixel_from_plane - residual * ray_.normal.transpose()) / depth;
+    const size_t num_free = camera_.by_param.size();
+    const Eigen::Vector2d before = residual;
+    Eigen::Matrix2d growth = Eigen::Matrix2d::Identity();
+    for (size_t p = 0; p < num_free; ++p) {
+      residual += parameters[2][p] * (weight_ * camera_.by_param[p] + camera_.growth[p] * before);
+      growth += parameters[2][p] * camera_.growth[p];
+    }
+    from_x = (growth * from_x).eval();
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) {
+      // x = p + 2 w (v x p) + 2 v x (v x p) + t of a unit quaternion (v, w).
+      const Eigen::Vector3d v = q.vec();
+      Eigen::Matrix<double, 3, 7> x_from_pose;
+      x_from_pose.leftCols<3>() =
+          -2 * q.w() * CrossMatrix(point) + 2 * (v.dot(point) * Eigen::Matrix3d::Identity() +
+                                                 v * point.transpose() - 2 * point * v.transpose());
+      x_from_pose.col(3) = 2 * v.cross(point);
+      x_from_pose.rightCols<3>().setIdentity();
+      Eigen::Map<Eigen::Matrix<double, 2, 7, Eigen::RowMajor>> out(jacobians[0]);
+      out = from_x * x_from_pose;
+    }
+    if (jacobians[1] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> out(jacobians[1]);
+      out = from_x * rotation;
+    }
+    if (num_free > 0 && jacobians[2] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> out(
+          jacobians[2], 2, static_cast<Eigen::Index>(num_free));
+      for (size_t p = 0; p < num_free; ++p) {
+        out.col(static_cast<Eigen::Index>(p)) = weight_ * camera_.by_param[p] + camera_.growth[p] * before;
+      }
+    }
+    return true;
+  }
+
+ private:
+  const PixelRay& ray_;
+  const CameraSensitivity& camera_;
+  double weight_;
+};
+
+template <typename T>
+struct PoseView {
+  explicit PoseView(const T* array) : rotation(array), translation(array + 4) {}
+  Eigen::Map<const Eigen::Quaternion<T>> rotation;
+  Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation;
+};
+
+template <typename T>
+Eigen::Matrix<T, 3, 1> RotationVector(const Eigen::Quaternion<T>& q) {
+  return (q.w() < T(0) ? T(-2) : T(2)) * q.vec();
+}
+
+// A camera's pose against the one that the drifted stated pose and the offset give: rotation, centre.
+struct OwnErrorCost {
+  double sigma_rad, sigma_m;
+  template <typename T>
+  bool operator()(const T* pose, const T* drifted, const T* offset, T* residual) const {
+    const PoseView<T> a(pose), d(drifted), o(offset);
+    const Eigen::Quaternion<T> q = o.rotation * d.rotation;
+    const Eigen::Matrix<T, 3, 1> t = o.rotation * d.translation + o.translation;
+    const Eigen::Quaternion<T> difference = a.rotation * q.conjugate();
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
+    out.template head<3>() = RotationVector(difference) / T(sigma_rad);
+    // In the camera's frame.
+    out.template tail<3>() = (a.translation - difference * t) / T(sigma_m);
+    return true;
+  }
+};
+
+// The motion between two drifted poses against the stated one.
+struct WalkCost {
+  Pose motion;  // stated, later_from_earlier
+  double sigma_rad, sigma_m;
+  template <typename T>
+  bool operator()(const T* earlier, const T* later, T* residual) const {
+    const PoseView<T> a(earlier), b(later);
+    const Eigen::Quaternion<T> q = b.rotation * a.rotation.conjugate();
+    const Eigen::Matrix<T, 3, 1> t = b.translation - q * a.translation;
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
+    out.template head<3>() =
+        RotationVector(Eigen::Quaternion<T>(q * motion.rotation.conjugate().cast<T>())) / T(sigma_rad);
+    out.template tail<3>() = (t - motion.translation.cast<T>()) / T(sigma_m);
+    return true;
+  }
+};
+
+struct OffsetPriorCost {
+  double sigma_rad, sigma_m;
+  template <typename T>
+  bool operator()(const T* offset, T* residual) const {
+    for (int i = 0; i < 3; ++i) {
+      residual[i] = T(2) * offset[i] / T(sigma_rad);
+      residual[3 + i] = offset[4 + i] / T(sigma_m);
+    }
+    return true;
+  }
+};
+
+// A linear cost over one camera's change.
+class CameraPrior : public ceres::CostFunction {
+ public:
+  explicit CameraPrior(const CameraBlock& camera) : camera_(camera) {
+    set_num_residuals(static_cast<int>(NumRows(camera)));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.free.size()));
+  }
+
+  static size_t NumRows(const CameraBlock& camera) {
+    return camera.free.size() + (camera.difference_sigma > 0 ? 1 : 0);
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const size_t n = camera_.free.size();
+    const double* delta = parameters[0];
+    for (size_t i = 0; i < n; ++i) residuals[i] = (delta[i] - camera_.prior[i]) / camera_.sigma[i];
+    if (camera_.difference_sigma > 0)
+      residuals[n] = (delta[0] - delta[1] - camera_.difference_prior) / camera_.difference_sigma;
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    std::fill_n(jacobians[0], NumRows(camera_) * n, 0.0);
+    for (size_t i = 0; i < n; ++i) jacobians[0][i * n + i] = 1 / camera_.sigma[i];
+    if (camera_.difference_sigma > 0) {
+      jacobians[0][n * n] = 1 / camera_.difference_sigma;
+      jacobians[0][n * n + 1] = -1 / camera_.difference_sigma;
+    }
+    return true;
+  }
+
+ private:
+  const CameraBlock& camera_;
+};
+
+// The whole problem in Ceres, over copies of the poses.
+class CeresBundle {
+ public:
+  CeresBundle(const BundleOptions& options, BundleProblem* problem)
+      : options_(options), bundle_(*problem), num_images_(problem->images.size()), problem_(Unchecked()) {
+    AddParameters();
+    for (const BundleProblem::Observation& observation : bundle_.observations) AddObservation(observation);
+    for (size_t i = 0; i < bundle_.images.size(); ++i) AddStatedPose(i);
+    if (bundle_.is_offset_free) {
+      other_blocks_.push_back(problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<OffsetPriorCost, 6, 7>(
+              new OffsetPriorCost{RadFromDeg(bundle_.offset_sigma_deg), bundle_.offset_sigma_m}),
+          nullptr, Offset()));
+    }
+    for (size_t c = 0; c < bundle_.cameras.size(); ++c) {
+      const CameraBlock& camera = bundle_.cameras[c];
+      if (camera.free.empty()) continue;
+      other_blocks_.push_back(problem_.AddResidualBlock(new CameraPrior(camera), nullptr, Delta(c)));
+    }
+  }
+
+  bool Solve() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_SCHUR;
+    options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+    options.linear_solver_ordering = ordering_;
+    options.num_threads = 1;
+    options.max_num_iterations = options_.max_num_iterations;
+    options.function_tolerance = options_.function_tolerance;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    for (size_t i = 0; i < num_images_; ++i) {
+      bundle_.images[i].cam_from_world = LoadPose(CamFromWorld(i));
+      bundle_.images[i].drifted = LoadPose(Drifted(i));
+    }
+    bundle_.camera_from_given = LoadPose(Offset());
+    for (size_t c = 0; c < bundle_.cameras.size(); ++c)
+      std::copy_n(Delta(c), bundle_.cameras[c].delta.size(), bundle_.cameras[c].delta.begin());
+    return summary.termination_type == ceres::CONVERGENCE;
+  }
+
+  BundleEvidence FindEvidence() {
+    ceres::Problem::EvaluateOptions evaluate;
+    for (Eigen::Vector3d& point : bundle_.points) evaluate.parameter_blocks.push_back(point.data());
+    int column = 0;
+    const auto add = [&](double* block, int size) {
+      evaluate.parameter_blocks.push_back(block);
+      return std::exchange(column, column + size);
+    };
+    for (size_t i = 0; i < num_images_; ++i) add(CamFromWorld(i), 6);
+    for (size_t i = 1; i < num_images_; ++i) add(Drifted(i), 6);
+    const int offset_column = bundle_.is_offset_free ? add(Offset(), 6) : -1;
+    std::vector<int> camera_columns;
+    for (size_t c = 0; c < bundle_.cameras.size(); ++c) {
+      const auto size = static_cast<int>(bundle_.cameras[c].free.size());
+      camera_columns.push_back(size == 0 ? -1 : add(Delta(c), size));
+    }
+    // Rows of the stated poses first.
+    evaluate.residual_blocks = stated_pose_blocks_;
+    evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), other_blocks_.begin(),
+                                    other_blocks_.end());
+    std::vector<double> residuals;
+    ceres::CRSMatrix matrix;
+    problem_.Evaluate(evaluate, nullptr, &residuals, nullptr, &matrix);
+    const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> jacobian(
+        matrix.num_rows, matrix.num_cols, static_cast<Eigen::Index>(matrix.values.size()), matrix.rows.data(),
+        matrix.cols.data(), matrix.values.data());
+    const ReducedSystem system(jacobian, static_cast<int>(bundle_.points.size()));
+    BundleEvidence evidence;
+    if (!system.ok()) return evidence;
+    for (const bool is_walk : {false, true}) {
+      for (const bool is_rotation : {false, true}) {
+        std::vector<int> rows;
+        NoiseEvidence found;
+        for (size_t block = 0; block < stated_pose_blocks_.size(); ++block) {
+          if (is_walk_block_[block] != is_walk) continue;
+          for (int k = 0; k < 3; ++k) {
+            rows.push_back(static_cast<int>(6 * block) + (is_rotation ? k : 3 + k));
+            found.sum_of_squares += residuals[rows.back()] * residuals[rows.back()];
+          }
+        }
+        found.num_residuals = static_cast<double>(rows.size());
+        found.num_determined = found.num_residuals - system.Trace(rows);
+        (is_walk ? (is_rotation ? evidence.walk_deg : evidence.walk_m)
+                 : (is_rotation ? evidence.own_deg : evidence.own_m)) = found;
+      }
+    }
+    if (offset_column >= 0) {
+      // Tangent of the quaternion: half the rotation.
+      Eigen::Matrix<double, 6, 1> offset;
+      offset << bundle_.camera_from_given.rotation.vec() *
+                    (bundle_.camera_from_given.rotation.w() < 0 ? -1 : 1),
+          bundle_.camera_from_given.translation;
+      evidence.offset_chi_square = offset.dot(system.Covariance(offset_column, 6).inverse() * offset);
+    }
+    for (size_t c = 0; c < bundle_.cameras.size(); ++c) {
+      std::vector<double>& sigma = evidence.camera_sigma.emplace_back();
+      if (camera_columns[c] < 0) continue;
+      const auto size = static_cast<int>(bundle_.cameras[c].free.size());
+      const Eigen::MatrixXd covariance = system.Covariance(camera_columns[c], size);
+      for (int i = 0; i < size; ++i) sigma.push_back(std::sqrt(covariance(i, i)));
+    }
+    return evidence;
+  }
+
+ private:
+  static ceres::Problem::Options Unchecked() {
+    ceres::Problem::Options options;
+    options.disable_all_safety_checks = true;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  double* CamFromWorld(size_t image) { return &values_[kPoseSize * image]; }
+  double* Drifted(size_t image) { return &values_[kPoseSize * (num_images_ + image)]; }
+  double* Offset() { return &values_[kPoseSize * 2 * num_images_]; }
+  double* Delta(size_t camera) { return &values_[first_delta_[camera]]; }
+
+  void AddParameters() {
+    first_delta_.push_back(kPoseSize * (2 * num_images_ + 1));
+    for (const CameraBlock& camera : bundle_.cameras)
+      first_delta_.push_back(first_delta_.back() + camera.free.size());
+    values_.resize(first_delta_.back() + 1);
+    for (Eigen::Vector3d& point : bundle_.points) {
+      problem_.AddParameterBlock(point.data(), 3);
+      ordering_->AddElementToGroup(point.data(), 0);
+    }
+    const auto add_pose = [&](const Pose& pose, double* block) {
+      StorePose(pose, block);
+      problem_.AddParameterBlock(block, kPoseSize, &manifold_);
+      ordering_->AddElementToGroup(block, 1);
+    };
+    for (size_t i = 0; i < num_images_; ++i) {
+      const BundleProblem::Image& image = bundle_.images[i];
+      add_pose(image.cam_from_world, CamFromWorld(i));
+      add_pose(image.drifted, Drifted(i));
+      losses_.push_back(std::make_unique<ceres::ScaledLoss>(new ceres::CauchyLoss(options_.loss_scale),
+                                                            1 / image.dispersion, ceres::TAKE_OWNERSHIP));
+    }
+    add_pose(bundle_.camera_from_given, Offset());
+    if (!bundle_.is_offset_free) problem_.SetParameterBlockConstant(Offset());
+    if (num_images_ > 0) problem_.SetParameterBlockConstant(Drifted(0));
+    for (size_t c = 0; c < bundle_.cameras.size(); ++c) {
+      const CameraBlock& camera = bundle_.cameras[c];
+      if (camera.free.empty()) continue;
+      std::copy(camera.delta.begin(), camera.delta.end(), Delta(c));
+      problem_.AddParameterBlock(Delta(c), static_cast<int>(camera.free.size()));
+      ordering_->AddElementToGroup(Delta(c), 1);
+    }
+  }
+
+  void AddObservation(const BundleProblem::Observation& observation) {
+    const int camera_idx = bundle_.images[observation.image_idx].camera_idx;
+    const CameraBlock& camera = bundle_.cameras[camera_idx];
+    std::vector<double*> blocks = {CamFromWorld(observation.image_idx),
+                                   bundle_.points[observation.point_idx].data()};
+    if (!camera.free.empty()) blocks.push_back(Delta(camera_idx));
+    other_blocks_.push_back(problem_.AddResidualBlock(new ReprojectionCost(observation, camera),
+                                                      losses_[observation.image_idx].get(), blocks));
+  }
+
+  void AddStatedPose(size_t i) {
+    const BundleProblem::Image& image = bundle_.images[i];
+    const PoseNoise& noise = bundle_.noise;
+    stated_pose_blocks_.push_back(
+        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<OwnErrorCost, 6, 7, 7, 7>(
+                                      new OwnErrorCost{RadFromDeg(noise.own_deg), noise.own_m}),
+                                  nullptr, CamFromWorld(i), Drifted(i), Offset()));
+    is_walk_block_.push_back(false);
+    if (i == 0) return;
+    const double root = std::sqrt(image.way_m);
+    stated_pose_blocks_.push_back(
+        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<WalkCost, 6, 7, 7>(
+                                      new WalkCost{image.stated * bundle_.images[i - 1].stated.Inverse(),
+                                                   RadFromDeg(noise.walk_deg) * root, noise.walk_m * root}),
+                                  nullptr, Drifted(i - 1), Drifted(i)));
+    is_walk_block_.push_back(true);
+  }
+
+  BundleOptions options_;
+  BundleProblem& bundle_;
+  size_t num_images_;
+  // All parameters but the points, in one piece: Ceres orders them by their addresses, and another order is
+  // another rounding.
+  std::vector<double> values_;
+  std::vector<size_t> first_delta_;                           // per camera
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // per image
+  PoseManifold manifold_;
+  ceres::Problem problem_;
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_ =
+      std::make_shared<ceres::ParameterBlockOrdering>();
+  std::vector<ceres::ResidualBlockId> other_blocks_, stated_pose_blocks_;
+  std::vector<bool> is_walk_block_;  // per block of a stated pose
+};
+
+}  // namespace
+
+CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,
+                                const std::vector<int>& params) {
+  constexpr double kStepPx = 1;
+  // The pixel and its neighbours: right, left, lower, upper.
+  const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(kStepPx, 0),
+                                                  Eigen::Vector2d(-kStepPx, 0), Eigen::Vector2d(0, kStepPx),
+                                                  Eigen::Vector2d(0, -kStepPx)};
+  CameraSensitivity sensitivity;
+  sensitivity.by_param.assign(params.size(), Eigen::Vector2d::Zero());
+  sensitivity.growth.assign(params.size(), Eigen::Matrix2d::Zero());
+  std::array<std::optional<Eigen::Vector3d>, 5> bearings;
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    bearings[i] = BearingFromImage(camera, pixel + offsets[i]);
+    if (!bearings[i]) return sensitivity;
+  }
+  for (size_t p = 0; p < params.size(); ++p) {
+    const double step = 1e-6 * std::max(1.0, std::abs(camera.params[params[p]]));
+    Camera less = camera, more = camera;
+    less.params[params[p]] -= step;
+    more.params[params[p]] += step;
+    std::array<Eigen::Vector2d, 5> derivatives;
+    for (size_t i = 0; i < bearings.size(); ++i) {
+      const auto a = ImageFromCamera(less, *bearings[i]), b = ImageFromCamera(more, *bearings[i]);
+      derivatives[i] = a && b ? Eigen::Vector2d((*b - *a) / (2 * step)) : Eigen::Vector2d::Zero().eval();
+    }
+    sensitivity.by_param[p] = derivatives[0];
+    sensitivity.growth[p].col(0) = (derivatives[1] - derivatives[2]) / (2 * kStepPx);
+    sensitivity.growth[p].col(1) = (derivatives[3] - derivatives[4]) / (2 * kStepPx);
+  }
+  return sensitivity;
+}
+
+Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Observation& observation) {
+  const BundleProblem::Image& image = problem.images[observation.image_idx];
+  const CameraBlock& camera = problem.cameras[image.camera_idx];
+  const Eigen::Vector2d before =
+      observation.ray.Residual(image.cam_from_world * problem.points[observation.point_idx]);
+  Eigen::Vector2d residual = before;
+  for (size_t p = 0; p < camera.free.size(); ++p)
+    residual += camera.delta[p] * (observation.camera.by_param[p] + observation.camera.growth[p] * before);
+  return residual;
+}
+
+bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence) {
+  CeresBundle bundle(options, problem);
+  const bool converged = bundle.Solve();
+  if (evidence != nullptr) *evidence = bundle.FindEvidence();
+  return converged;
+}
+
+}  // namespace cairn::group_classes

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera/pixel_ray.h"
+#include "core/capture/capture.h"
+#include "core/colmap/colmap_database.h"
+#include "core/features/features.h"
+#include "stages/group_classes/tracks/triangulate.h"
+#include "stages/group_classes/tracks/union_matches.h"
+
+namespace cairn::group_classes {
+
+// What the stage needs of matches.db.
+struct MatchedFeatures {
+  std::map<CameraId, Camera> cameras;
+  std::vector<DatabaseImage> images;        // ascending image_id
+  std::vector<Features> features;           // per image
+  std::vector<TwoViewGeometry> geometries;  // ascending pair
+};
+
+// The survey's images that have a pose, contiguous: as stated, and as they are known by now.
+struct PosedImages {
+  std::vector<int> feature_idx;  // index into MatchedFeatures::images
+  std::vector<int> camera_idx;
+  std::vector<Camera> cameras;  // ascending camera_id; of images without a pose too
+  std::vector<Pose> stated;
+  std::vector<Pose> poses;
+  Pose camera_from_given;
+  std::vector<std::vector<std::optional<PixelRay>>> rays;  // per image and keypoint, by `cameras`
+  int num_images() const { return static_cast<int>(stated.size()); }
+};
+
+PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture, int num_threads);
+
+// Makes the rays again: the cameras have changed.
+void MakeRays(const MatchedFeatures& matched, int num_threads, PosedImages* posed);
+
+// Each track triangulated from the images' poses.
+std::vector<Triangulation> TriangulateTracks(const std::vector<Track>& tracks, const PosedImages& posed,
+                                             const TriangulateOptions& options, int num_threads);
+
+// Root mean square reprojection error of the keypoints kept, pixels; 0 without any.
+double RmsErrorPx(const std::vector<Triangulation>& triangulations);
+
+}  // namespace cairn::group_classes

@@ -1,0 +1,228 @@
+#include "stages/group_classes/adjust/bundle.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include "core/base/random.h"
+#include "stages/group_classes/adjust/camera_models.h"
+#include "stages/group_classes/adjust/evidence.h"
+
+namespace cairn::group_classes {
+namespace {
+
+Camera Lens() {
+  Camera camera;
+  camera.model = CameraModel::kOpenCv;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {500, 510, 322, 238, -0.1, 0.03, 0.002, -0.001};
+  return camera;
+}
+
+std::vector<int> AllParams(const Camera& camera) {
+  std::vector<int> params;
+  for (size_t p = 0; p < camera.params.size(); ++p) params.push_back(static_cast<int>(p));
+  return params;
+}
+
+// A residual of a few pixels, by the camera before a change and the sensitivity, against the changed camera.
+TEST(CameraSensitivity, ResidualsFollowAChangedCamera) {
+  const Camera camera = Lens();
+  Camera changed = camera;
+  const std::vector<double> change = {4, 3, 2, -2, 0.01, -0.004, 0.001, 0.001};
+  for (size_t p = 0; p < change.size(); ++p) changed.params[p] += change[p];
+  for (const Eigen::Vector2d& pixel :
+       {Eigen::Vector2d(60, 70), Eigen::Vector2d(330, 220), Eigen::Vector2d(600, 430)}) {
+    const auto ray = MakePixelRay(camera, pixel);
+    const CameraSensitivity sensitivity = SensitivityOf(camera, pixel, AllParams(camera));
+    const Eigen::Vector3d point = 3 * *BearingFromImage(camera, pixel + Eigen::Vector2d(3, -2));
+    const Eigen::Vector2d before = ray->Residual(point);
+    Eigen::Vector2d residual = before;
+    for (size_t p = 0; p < change.size(); ++p)
+      residual += change[p] * (sensitivity.by_param[p] + sensitivity.growth[p] * before);
+    EXPECT_LT((residual - (*ImageFromCamera(changed, point) - pixel)).norm(), 0.05) << pixel.transpose();
+    // What the growth is there for: a longer focal length stretches residuals.
+    EXPECT_NEAR(sensitivity.growth[0](0, 0), 1.0 / 500, 3e-4);
+  }
+}
+
+// 12 cameras in a circle that look at points in its middle.
+struct Circle {
+  std::vector<Pose> poses;
+  std::vector<Eigen::Vector3d> points;
+  BundleProblem problem;
+};
+
+Circle MakeCircle(const Camera& seen_by, const Camera& stated, double noise_px, std::vector<int> free) {
+  Circle circle;
+  Random random(4);
+  for (int j = 0; j < 150; ++j)
+    circle.points.emplace_back(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
+  BundleProblem& problem = circle.problem;
+  problem.points = circle.points;
+  problem.is_offset_free = false;
+  problem.noise = {1e-5, 1e-4, 1e-5, 1e-4};
+  for (int i = 0; i < 12; ++i) {
+    Pose pose;
+    pose.rotation = Eigen::AngleAxisd(-0.5 * i, Eigen::Vector3d::UnitY());
+    pose.translation = {0, 0, 2.2 + 0.5 * (i % 3)};  // distances differ: they tell the focal length
+    circle.poses.push_back(pose);
+    BundleProblem::Image image;
+    image.stated = image.cam_from_world = image.drifted = pose;
+    image.way_m = 1.5;
+    problem.images.push_back(image);
+  }
+  CameraBlock block;
+  block.free = free;
+  block.prior.assign(free.size(), 0);
+  block.delta.assign(free.size(), 0);
+  for (const int p : free) block.sigma.push_back(p < 4 ? 50 : 0.5);
+  problem.cameras = {block};
+  for (int j = 0; j < 150; ++j) {
+    for (int i = 0; i < 12; ++i) {
+      const auto pixel = ImageFromCamera(seen_by, circle.poses[i] * circle.points[j]);
+      if (!pixel) continue;
+      BundleProblem::Observation o;
+      o.image_idx = i;
+      o.point_idx = j;
+      o.pixel = *pixel + Eigen::Vector2d(random.Normal(0, noise_px), random.Normal(0, noise_px));
+      const auto ray = MakePixelRay(stated, o.pixel);
+      if (!ray) continue;
+      o.ray = *ray;
+      o.camera = SensitivityOf(stated, o.pixel, free);
+      o.sigma_px = noise_px;
+      problem.observations.push_back(o);
+    }
+  }
+  return circle;
+}
+
+// The estimate is as far off as its standard deviation says, at any noise: without the growth of residuals
+// a focal length comes out too long, by more the larger the noise is.
+TEST(AdjustBundle, FocalLengthIsNotFoundTooLong) {
+  const Camera camera = Lens();
+  for (const double noise_px : {0.3, 1.5}) {
+    double sum = 0;
+    Circle circle = MakeCircle(camera, camera, noise_px, {0, 1});
+    BundleEvidence evidence;
+    EXPECT_TRUE(AdjustBundle({}, &circle.problem, &evidence));
+    ASSERT_EQ(evidence.camera_sigma.size(), 1u);
+    for (int p = 0; p < 2; ++p) {
+      EXPECT_LT(std::abs(circle.problem.cameras[0].delta[p]), 3 * evidence.camera_sigma[0][p]) << noise_px;
+      sum += evidence.camera_sigma[0][p];
+    }
+    EXPECT_LT(sum, 20 * noise_px);  // and that is not vacuous
+  }
+}
+
+TEST(AdjustBundle, MovedPosesAndPointsReturn) {
+  const Camera camera = Lens();
+  Circle circle = MakeCircle(camera, camera, 0.1, {});
+  Random random(8);
+  circle.problem.noise = {0.05, 2, 0.05, 2};
+  for (size_t i = 1; i < circle.poses.size(); ++i) {
+    Pose& pose = circle.problem.images[i].cam_from_world;
+    pose.translation += 0.02 * Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+    pose.rotation = (Eigen::AngleAxisd(0.01 * random.Normal(0, 1), Eigen::Vector3d::UnitX()) * pose.rotation)
+                        .normalized();
+  }
+  for (Eigen::Vector3d& point : circle.problem.points)
+    point += 0.02 * Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+  EXPECT_TRUE(AdjustBundle({}, &circle.problem, nullptr));
+  for (size_t i = 0; i < circle.poses.size(); ++i) {
+    // The frame of all may move.
+    const Pose found =
+        circle.problem.images[i].cam_from_world * circle.problem.images[0].cam_from_world.Inverse();
+    const Pose truth = circle.poses[i] * circle.poses[0].Inverse();
+    EXPECT_LT(CenterErrorM(found, truth), 0.01);
+    EXPECT_LT(RotationErrorDeg(found, truth), 0.05);
+  }
+}
+
+TEST(AdjustBundle, EvidenceCountsWhatKeypointsDetermine) {
+  const Camera camera = Lens();
+  for (const auto& [own, is_determined] : {std::pair(0.5, true), std::pair(1e-7, false)}) {
+    Circle circle = MakeCircle(camera, camera, 0.5, {});
+    circle.problem.noise = {own, own * 50, 1e-7, 1e-6};
+    BundleEvidence evidence;
+    AdjustBundle({}, &circle.problem, &evidence);
+    EXPECT_EQ(evidence.own_m.num_residuals, 36);
+    EXPECT_EQ(evidence.walk_deg.num_residuals, 33);
+    if (is_determined) {
+      EXPECT_GT(evidence.own_m.num_determined, 25);
+      EXPECT_LT(evidence.own_m.sum_of_squares, 1);
+    } else {
+      EXPECT_LT(evidence.own_m.num_determined, 0.1);
+    }
+    EXPECT_LT(evidence.walk_m.num_determined, 0.1);
+  }
+}
+
+TEST(ReducedSystem, TracesAndCovariancesAreThoseOfTheWholeSystem) {
+  // Two points, three other parameters; rows of keypoints, then rows of the others alone.
+  Random random(2);
+  constexpr int kRows = 24, kColumns = 9;
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(kRows, kColumns);
+  for (int row = 0; row < kRows; ++row) {
+    const bool has_point = row >= 4;
+    for (int c = 6; c < kColumns; ++c) dense(row, c) = random.Normal(0, 1);
+    for (int c = 0; c < 3 && has_point; ++c) dense(row, 3 * (row % 2) + c) = random.Normal(0, 1);
+  }
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> sparse = dense.sparseView();
+  const ReducedSystem system(sparse, 2);
+  ASSERT_TRUE(system.ok());
+  const Eigen::MatrixXd covariance = (dense.transpose() * dense).inverse();
+  EXPECT_LT((system.Covariance(1, 2) - covariance.block<2, 2>(7, 7)).norm(), 1e-6 * covariance.norm());
+  const Eigen::MatrixXd rows = dense.topRows(4);
+  EXPECT_NEAR(system.Trace({0, 1, 2, 3}), (rows * covariance * rows.transpose()).trace(), 0.25);
+  EXPECT_NEAR(system.Trace({2}), (rows.row(2) * covariance * rows.row(2).transpose())(0, 0), 1e-6);
+}
+
+TEST(CameraVariants, GrowFromAsStatedAndKeepIt) {
+  for (const CameraModel model :
+       {CameraModel::kSimplePinhole, CameraModel::kPinhole, CameraModel::kSimpleRadial, CameraModel::kRadial,
+        CameraModel::kOpenCv, CameraModel::kOpenCvFisheye, CameraModel::kFullOpenCv, CameraModel::kFov,
+        CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye, CameraModel::kThinPrismFisheye}) {
+    Camera stated;
+    stated.model = model;
+    stated.width = 640;
+    stated.height = 480;
+    stated.params.assign(NumCameraParams(model), 0.01);
+    for (int i = 0; i < NumFocals(model); ++i) stated.params[i] = 500;
+    stated.params[NumFocals(model)] = 322;
+    stated.params[NumFocals(model) + 1] = 238;
+    const std::vector<CameraVariant> variants = CameraVariants(stated, {});
+    ASSERT_GE(variants.size(), 2u) << CameraModelName(model);
+    EXPECT_TRUE(variants[0].free.empty());
+    for (const CameraVariant& variant : variants) {
+      ASSERT_TRUE(CheckCamera(variant.camera).ok()) << CameraModelName(model) << " " << variant.name;
+      EXPECT_EQ(variant.free.size(), variant.sigma.size());
+      EXPECT_TRUE(std::is_sorted(variant.free.begin(), variant.free.end()));
+      // The same lens in the wider model.
+      const Eigen::Vector3d point(0.3, -0.4, 1);
+      EXPECT_LT((*ImageFromCamera(variant.camera, point) - *ImageFromCamera(stated, point)).norm(), 1e-9)
+          << CameraModelName(model) << " " << variant.name;
+    }
+  }
+  Camera panorama;
+  panorama.model = CameraModel::kEquirectangular;
+  EXPECT_EQ(CameraVariants(panorama, {}).size(), 1u);
+}
+
+TEST(CameraVariants, ACalibratedCameraIsTrustedMore) {
+  Camera pinhole = Lens(), guessed = GuessCamera(1, 640, 480);
+  pinhole.model = CameraModel::kPinhole;
+  pinhole.params.resize(4);
+  const auto focal_sigma = [](const Camera& camera) {
+    for (const CameraVariant& variant : CameraVariants(camera, {})) {
+      if (variant.name == "f") return variant.sigma[0] / camera.FocalX();
+    }
+    return 0.0;
+  };
+  EXPECT_NEAR(focal_sigma(pinhole), 0.03, 1e-9);
+  EXPECT_NEAR(focal_sigma(Lens()), 0.003, 1e-9);
+  EXPECT_NEAR(focal_sigma(guessed), 0.3, 1e-9);
+}
+
+}  // namespace
+}  // namespace cairn::group_classes
