@@ -118,20 +118,20 @@ TEST_F(SealedMap, OldFormatIsRefusedWithTheWayOut) {
 }
 
 TEST_F(SealedMap, InspectStatesTheFormatOfTheFile) {
-  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6"}) {
+  for (const std::string version : {"2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6", "2.7"}) {
     const ProgramRun run = RunShell("cairn inspect --json " GOLDEN_DIR "/map_" + version + ".cairn");
     EXPECT_THAT(run.out, HasSubstr("\"format\": \"" + version + "\"")) << run.err;
   }
 }
 
 TEST_F(SealedMap, EveryEarlierFormatIsMigratedToTodays) {
-  for (const std::string version : {"1.0", "2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6"}) {
+  for (const std::string version : {"1.0", "2.0", "2.1", "2.2", "2.3", "2.4", "2.5", "2.6", "2.7"}) {
     const std::string migrated = Path("migrated_" + version + ".cairn");
     const ProgramRun run = RunShell("cairn migrate " GOLDEN_DIR "/map_" + version + ".cairn -o " + migrated);
     ASSERT_EQ(run.exit_code, 0) << run.err;
-    EXPECT_THAT(run.out, HasSubstr("as version 2.6, not signed"));
+    EXPECT_THAT(run.out, HasSubstr("as version 2.7, not signed"));
     EXPECT_EQ(RunShell("cairn verify " + migrated).exit_code, 0) << version;
-    EXPECT_THAT(RunShell("cairn inspect --json " + migrated).out, HasSubstr("\"format\": \"2.6\""));
+    EXPECT_THAT(RunShell("cairn inspect --json " + migrated).out, HasSubstr("\"format\": \"2.7\""));
   }
 }
 

@@ -143,5 +143,20 @@ TEST(GoldenMap, Version2_6IsRead) {
   EXPECT_EQ(*rows->findings.promise, FullRows().findings.promise);
 }
 
+// Version 2.7: that of 2.6 with a camera that differs from what is stated, and keypoints that err together.
+TEST(GoldenMap, Version2_7IsRead) {
+  const Result<MapRows> rows = ReadMapRows(GOLDEN_DIR "/map_2.7.cairn");
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ(rows->keypoint_correlation, 0.0625);
+  ASSERT_EQ(rows->stated_cameras.size(), 1u);
+  EXPECT_EQ(rows->stated_cameras[0].camera_id, rows->cameras[0].camera_id);
+  EXPECT_EQ(rows->stated_cameras[0].model, CameraModel::kPinhole);
+  EXPECT_THAT(rows->stated_cameras[0].params, ElementsAre(101.5, 102.25, 99, 51));
+  const Result<MapRows> before = ReadMapRows(GOLDEN_DIR "/map_2.6.cairn");
+  EXPECT_EQ(rows->descriptors, before->descriptors);
+  EXPECT_TRUE(before->stated_cameras.empty());
+  EXPECT_EQ(before->keypoint_correlation, 0);
+}
+
 }  // namespace
 }  // namespace cairn
