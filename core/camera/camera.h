@@ -58,6 +58,10 @@ struct Camera {
 // Errors: InvalidArgument for a wrong number of parameters, a size or focal length that is not positive, NaN.
 Status CheckCamera(const Camera& camera);
 
+// COLMAP's words MODEL WIDTH HEIGHT PARAMS... from words[first] on; camera_id is left at 1.  Errors: Corrupt
+// (not such words), Unsupported (model), those of CheckCamera.
+Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t first);
+
 // A pinhole camera that nobody calibrated: f = 1.2 max(w, h), principal point in the middle,
 // has_focal_prior false.
 Camera GuessCamera(CameraId camera_id, int width, int height);

@@ -23,6 +23,10 @@ struct PixelRay {
   Eigen::Matrix<double, 2, 3> pixel_from_plane = Eigen::Matrix<double, 2, 3>::Zero();
 
   Eigen::Vector2d Residual(const Eigen::Vector3d& x) const { return pixel_from_plane * x / normal.dot(x); }
+  // d residual / d x
+  Eigen::Matrix<double, 2, 3> ResidualByPoint(const Eigen::Vector3d& x) const {
+    return (pixel_from_plane - Residual(x) * normal.transpose()) / normal.dot(x);
+  }
 };
 
 // The ray of a pixel.  Nothing where the model has none, or at the very fold of its distortion.

@@ -9,38 +9,6 @@
 #include "core/files/file.h"
 
 namespace cairn {
-namespace {
-
-// Fields MODEL WIDTH HEIGHT PARAMS... from words[first] on.
-Result<Camera> CameraFromWords(const std::vector<std::string>& words, size_t first) {
-  if (words.size() < first + 3) {
-    return MakeError(ErrorCode::kCorrupt, "expected MODEL WIDTH HEIGHT PARAMS, found {} fields",
-                     words.size() - first);
-  }
-  Camera camera;
-  CAIRN_ASSIGN_OR_RETURN(camera.model, CameraModelFromName(words[first]));
-  uint32_t width = 0, height = 0;
-  if (!ParseNumber(words[first + 1], &width) || !ParseNumber(words[first + 2], &height)) {
-    return MakeError(ErrorCode::kCorrupt, "image size '{} x {}' is not two positive integers",
-                     words[first + 1], words[first + 2]);
-  }
-  camera.width = static_cast<int>(std::min(width, 1u << 30));
-  camera.height = static_cast<int>(std::min(height, 1u << 30));
-  for (size_t i = first + 3; i < words.size(); ++i) {
-    double param = 0;
-    if (!ParseNumber(words[i], &param)) {
-      return MakeError(ErrorCode::kCorrupt, "camera parameter '{}' is not a number", words[i]);
-    }
-    camera.params.push_back(param);
-  }
-  // Some programs repeat a panorama's size as its parameters.
-  const bool repeats_size = camera.params == std::vector<double>{double(width), double(height)};
-  if (camera.model == CameraModel::kEquirectangular && repeats_size) camera.params.clear();
-  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
-  return camera;
-}
-
-}  // namespace
 
 Result<Camera> ParseCamera(const std::string& text) {
   std::string spaced = text;

@@ -103,24 +103,10 @@ constexpr char kStatedCamera[] = "stated_camera_";
 Status ReadStatedCameras(const Texts& meta, const std::string& path, MapHead* head) {
   for (auto row = meta.lower_bound(kStatedCamera); row != meta.end() && row->first.starts_with(kStatedCamera);
        ++row) {
-    const auto corrupt = [&] {
+    Result<Camera> camera = CameraFromWords(SplitWords(row->second), 0);
+    if (!camera.ok() || !ParseNumber(row->first.substr(sizeof(kStatedCamera) - 1), &camera->camera_id))
       return Corrupt(path, "table meta: {} '{}' is not a camera", row->first, row->second);
-    };
-    Camera camera;
-    const std::vector<std::string> words = SplitWords(row->second);
-    if (words.size() < 3 || !ParseNumber(row->first.substr(sizeof(kStatedCamera) - 1), &camera.camera_id) ||
-        !ParseNumber(words[1], &camera.width) || !ParseNumber(words[2], &camera.height)) {
-      return corrupt();
-    }
-    const Result<CameraModel> model = CameraModelFromName(words[0]);
-    if (!model.ok()) return corrupt();
-    camera.model = *model;
-    camera.params.resize(words.size() - 3);
-    for (size_t i = 3; i < words.size(); ++i) {
-      if (!ParseNumber(words[i], &camera.params[i - 3])) return corrupt();
-    }
-    if (!CheckCamera(camera).ok()) return corrupt();
-    head->stated_cameras.push_back(std::move(camera));
+    head->stated_cameras.push_back(std::move(*camera));
   }
   std::sort(head->stated_cameras.begin(), head->stated_cameras.end(),
             [](const Camera& a, const Camera& b) { return a.camera_id < b.camera_id; });

@@ -77,33 +77,9 @@ Localization Better(Localization first, Localization second, const AcceptOptions
   return first;
 }
 
-Status CheckQueryCamera(const Camera& camera) {
-  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
-  if (camera.model != CameraModel::kEquirectangular) return Ok();
-  return MakeError(ErrorCode::kUnsupported,
-                   "localize: a panorama is not localized as a whole; cut it into pinhole views first");
-}
-
 // Factor on the covariance of fixes in maps that do not say how keypoints err together: measured on the demo,
 // where it brings the normalised error squared from 10.7 to its 6 degrees of freedom.
 constexpr double kUnmeasuredScale = 1.8;
-
-// The camera that the survey's images showed a stated one to be; others stay what they are.
-Camera AsFound(const MapHead& head, const Camera& camera) {
-  const auto is_stated = [&](const Camera& stated) {
-    return stated.model == camera.model && stated.width == camera.width && stated.height == camera.height &&
-           stated.params == camera.params;
-  };
-  const Camera* match = nullptr;
-  for (const Camera& stated : head.stated_cameras) {
-    if (is_stated(stated) && (match == nullptr || stated.camera_id == camera.camera_id)) match = &stated;
-  }
-  if (match == nullptr) return camera;
-  for (const Camera& found : head.cameras) {
-    if (found.camera_id == match->camera_id) return found;
-  }
-  return camera;
-}
 
 }  // namespace
 

@@ -37,6 +37,29 @@ OptionTable DescribeOptions(MeasurementOptions* o) {
            .min = 0}};
 }
 
+Status CheckQueryCamera(const Camera& camera) {
+  CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
+  if (camera.model != CameraModel::kEquirectangular) return Ok();
+  return MakeError(ErrorCode::kUnsupported,
+                   "localize: a panorama is not localized as a whole; cut it into pinhole views first");
+}
+
+Camera AsFound(const MapHead& head, const Camera& camera) {
+  const auto is_stated = [&](const Camera& stated) {
+    return stated.model == camera.model && stated.width == camera.width && stated.height == camera.height &&
+           stated.params == camera.params;
+  };
+  const Camera* match = nullptr;
+  for (const Camera& stated : head.stated_cameras) {
+    if (is_stated(stated) && (match == nullptr || stated.camera_id == camera.camera_id)) match = &stated;
+  }
+  if (match == nullptr) return camera;
+  for (const Camera& found : head.cameras) {
+    if (found.camera_id == match->camera_id) return found;
+  }
+  return camera;
+}
+
 Query MakeQuery(Features features, const Camera& camera, const MeasurementOptions& options) {
   Query query;
   query.camera = camera;

@@ -5,7 +5,9 @@
 
 #include <Eigen/Core>
 
+#include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/blocks/map_head.h"
 #include "core/camera/camera.h"
 #include "core/features/features.h"
 #include "core/features/packed_descriptors.h"
@@ -14,6 +16,13 @@
 namespace cairn {
 
 struct LandmarkSet;  // runtime/map/landmark_set.h
+
+// Whether images of such a camera can be localized.  Errors: those of CheckCamera, Unsupported (a panorama).
+Status CheckQueryCamera(const Camera& camera);
+
+// The camera that the survey's images showed a stated one to be; others stay what they are.  Of several that
+// were stated alike, the one with the same number.
+Camera AsFound(const MapHead& head, const Camera& camera);
 
 // A keypoint of the query as a ray: the rest of localization needs no camera model, to first order.
 struct QueryRay {

@@ -98,16 +98,15 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
   for (const Option& option : adjustment) names.push_back(option.name);
   table.insert(table.end(), adjustment.begin(), adjustment.end());
   AddCondition({"refine_poses", {"auto", "always"}}, names, &table);
-  for (Option option :
-       OptionTable{{.name = "min_separation_ratio",
+  table.push_back(
+      {.name = "min_separation_ratio",
        .value = &o->ambiguity.min_separation_ratio,
        .help = "classes closer in feature space than this many of their radii are ambiguous; 0: none are",
-       .min = 0},
-                   {.name = "max_duplicate_distance_m",
+       .min = 0});
+  table.push_back({.name = "max_duplicate_distance_m",
                    .value = &o->ambiguity.max_duplicate_distance_m,
                    .help = "look-alikes closer than this are one scene feature found twice, metres",
-                   .min = 0}})
-    table.push_back(std::move(option));
+                   .min = 0});
   return table;
 }
 
@@ -180,8 +179,8 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   result.poses_refined =
       options.refine_poses == "always" || (options.refine_poses == "auto" && !is_reconstructed);
   if (result.poses_refined) {
-    result.findings =
-        AdjustSurvey(matched, tracks, first, options.triangulation, options.adjustment, num_threads, &posed);
+    result.findings = AdjustSurvey(matched, tracks, first, options.triangulation, options.adjustment,
+                                   num_threads, progress, &posed);
   } else {
     result.findings.keypoints =
         MeasureSurvey(matched, tracks, options.triangulation, options.adjustment, num_threads, posed);
@@ -194,12 +193,11 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
 
   Classes& classes = result.classes;
   classes.cameras = posed.cameras;
+  auto found = classes.cameras.begin();
   for (const auto& [camera_id, stated] : matched.cameras) {
-    const auto found =
-        std::find_if(classes.cameras.begin(), classes.cameras.end(),
-                     [&](const Camera& camera) { return camera.camera_id == stated.camera_id; });
     if (found->model != stated.model || found->params != stated.params)
       classes.stated_cameras.push_back(stated);
+    ++found;
   }
   classes.keypoint_correlation = result.findings.keypoints.correlation;
   for (int i = 0; i < posed.num_images(); ++i) {

@@ -8,7 +8,8 @@
 
 #include "core/base/parallel.h"
 #include "core/camera/panorama.h"
-#include "core/capture/sessions.h"
+#include "stages/group_classes/adjust/left_out.h"
+#include "stages/group_classes/tracks/sub_survey.h"
 
 namespace cairn::group_classes {
 namespace {
@@ -25,21 +26,20 @@ constexpr double kOffsetChiSquare = 33;
 constexpr double kMinGainSigmas = 2, kMinGain = 1e-3, kMinGainOfShared = 0.5;
 constexpr double kFarOffGain = 0.3;
 constexpr int kMinNumCameraImages = 5;
-// Fewest images of a camera that are learnt from, where it has as many.
-constexpr size_t kMinNumLearnt = 24;
 
 class SurveyAdjuster {
  public:
   SurveyAdjuster(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                  const TriangulateOptions& triangulate, const AdjustSurveyOptions& options, int num_threads,
-                 PosedImages* posed)
+                 const Progress& progress, PosedImages* posed)
       : matched_(matched),
         tracks_(tracks),
         triangulate_(triangulate),
         options_(options),
+        bundle_options_{.max_num_iterations = options.max_num_iterations},
         num_threads_(num_threads),
-        posed_(*posed),
-        stated_cameras_(posed->cameras) {
+        progress_(progress),
+        posed_(*posed) {
     findings_.cameras.resize(posed_.cameras.size());
     findings_.has_offset = options.refine_camera_offset;
     MakeImages();
@@ -69,13 +69,13 @@ class SurveyAdjuster {
     }
     findings_.noise = problem_.noise;
     findings_.camera_from_given = problem_.camera_from_given;
-    const LeftOut as_stated = LeaveOut(AsStated(problem_.camera_from_given));
-    const auto [gain, error] = GainOf(as_stated, LeaveOut(problem_), -1);
-    if (IsGain(gain, error)) findings_.pose_gain = gain;
+    const LeftOutErrors as_stated = LeaveOut(bundle_options_, AsStated(problem_.camera_from_given));
+    const LeftOutGain gain = GainOf(problem_, as_stated, LeaveOut(bundle_options_, problem_), -1);
+    if (IsGain(gain)) findings_.pose_gain = gain.part;
     if (findings_.pose_gain == 0 && findings_.has_offset) {
       // Poses that are exact make the least offset significant; but it must explain something.
-      const auto [of_offset, error_of_offset] = GainOf(LeaveOut(AsStated(Pose())), as_stated, -1);
-      if (!IsGain(of_offset, error_of_offset)) {
+      const LeftOutErrors without = LeaveOut(bundle_options_, AsStated(Pose()));
+      if (!IsGain(GainOf(problem_, without, as_stated, -1))) {
         findings_.has_offset = false;
         findings_.camera_from_given = Pose();
       }
@@ -89,7 +89,7 @@ class SurveyAdjuster {
   }
 
   // Adjusts everything by what was learnt.
-  void Apply(const SurveyFindings& findings) {
+  void Apply(const SurveyFindings& findings, const TriangulateOptions& first) {
     is_learning_ = false;
     findings_ = findings;
     problem_.noise = findings.noise;
@@ -101,7 +101,9 @@ class SurveyAdjuster {
         if (candidates_[c][v].name == findings.cameras[c].variant) variants_[c] = static_cast<int>(v);
       }
     }
-    MakeRays(matched_, num_threads_, &posed_);
+    const auto is_as_stated = [](const CameraFinding& camera) { return camera.variant.empty(); };
+    if (!std::all_of(findings.cameras.begin(), findings.cameras.end(), is_as_stated))
+      MakeRays(matched_, num_threads_, &posed_);
     const Pose offset = findings.camera_from_given;
     for (int i = 0; i < posed_.num_images(); ++i) {
       posed_.poses[i] = offset * posed_.stated[i];
@@ -109,10 +111,8 @@ class SurveyAdjuster {
     }
     posed_.camera_from_given = offset;
     if (findings.pose_gain == 0) return;
-    TriangulateOptions first = triangulate_;
-    first.max_reprojection_error_px = std::max(first.max_reprojection_error_px, 12.0);
     Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
-    for (int round = 0; round < 2; ++round) Adjust(nullptr);
+    for (int round = 0; round < 2 && !progress_.Cancelled(); ++round) Adjust(nullptr);
     KeepFrame();
   }
 
@@ -130,7 +130,7 @@ class SurveyAdjuster {
     problem_.offset_sigma_deg = options_.offset_sigma_deg;
     problem_.cameras.resize(posed_.cameras.size());
     variants_.assign(posed_.cameras.size(), 0);
-    for (const Camera& camera : stated_cameras_)
+    for (const Camera& camera : posed_.cameras)
       candidates_.push_back(CameraVariants(camera, options_.camera_prior));
     // Views of a panorama have the camera that they were rendered with.
     std::vector<int> num_images(posed_.cameras.size(), 0);
@@ -152,10 +152,10 @@ class SurveyAdjuster {
   double Way(int a, int b) const {
     const auto view_a = ParsePanoramaViewName(NameOf(a)), view_b = ParsePanoramaViewName(NameOf(b));
     if (view_a && view_b && view_a->panorama_name == view_b->panorama_name) return kMinWayM;
-    const auto session = [](const std::string& name) { return name.substr(0, name.find('/') + 1); };
+    const auto folder = [](const std::string& name) { return name.substr(0, name.find('/') + 1); };
     const double way = CenterErrorM(posed_.stated[a], posed_.stated[b]) +
                        kMetresPerRadian * RadFromDeg(RotationErrorDeg(posed_.stated[a], posed_.stated[b])) +
-                       (session(NameOf(a)) == session(NameOf(b)) ? 0 : kMetresBetweenSurveys);
+                       (folder(NameOf(a)) == folder(NameOf(b)) ? 0 : kMetresBetweenSurveys);
     return std::max(kMinWayM, way);
   }
 
@@ -259,7 +259,7 @@ class SurveyAdjuster {
   }
 
   void Adjust(BundleEvidence* evidence) {
-    AdjustBundle({.max_num_iterations = options_.max_num_iterations}, &problem_, evidence);
+    AdjustBundle(bundle_options_, &problem_, evidence);
     for (int i = 0; i < posed_.num_images(); ++i) posed_.poses[i] = problem_.images[i].cam_from_world;
     bool changed = false;
     for (size_t c = 0; c < problem_.cameras.size(); ++c) {
@@ -275,7 +275,7 @@ class SurveyAdjuster {
   }
 
   void LearnNoise() {
-    for (int round = 0; round < options_.num_rounds; ++round) {
+    for (int round = 0; round < options_.num_rounds && !progress_.Cancelled(); ++round) {
       Adjust(&evidence_);
       double change = 0;
       const auto learn = [&](const NoiseEvidence& evidence, double least, double* sigma) {
@@ -296,43 +296,10 @@ class SurveyAdjuster {
     }
   }
 
-  // Left-out keypoints' squared errors, cut off where outliers begin: sums per image.
-  struct LeftOut {
-    std::vector<double> sum;
-  };
-
-  LeftOut TryVariants(const std::vector<int>& variants) const {
+  LeftOutErrors TryVariants(const std::vector<int>& variants) const {
     BundleProblem problem = problem_;
     SetCameras(variants, true, &problem);
-    return LeaveOut(std::move(problem));
-  }
-
-  LeftOut LeaveOut(BundleProblem problem) const {
-    // One keypoint of each track of four or more.
-    std::vector<BundleProblem::Observation> kept, left_out;
-    for (size_t begin = 0; begin < problem.observations.size();) {
-      size_t end = begin;
-      while (end < problem.observations.size() &&
-             problem.observations[end].point_idx == problem.observations[begin].point_idx)
-        ++end;
-      const size_t out =
-          end - begin >= 4
-              ? begin + static_cast<size_t>(problem.observations[begin].point_idx) % (end - begin)
-              : end;
-      for (size_t i = begin; i < end; ++i)
-        (i == out ? left_out : kept).push_back(std::move(problem.observations[i]));
-      begin = end;
-    }
-    problem.observations = std::move(kept);
-    AdjustBundle({.max_num_iterations = options_.max_num_iterations}, &problem, nullptr);
-    LeftOut result{std::vector<double>(problem.images.size(), 0)};
-    constexpr double kMaxSquare = 16;
-    for (const BundleProblem::Observation& observation : left_out) {
-      const double whitened =
-          ResidualOf(problem, observation).squaredNorm() / (observation.sigma_px * observation.sigma_px);
-      result.sum[observation.image_idx] += std::min(whitened, kMaxSquare);
-    }
-    return result;
+    return LeaveOut(bundle_options_, std::move(problem));
   }
 
   // The problem with the poses that are stated, and this offset.
@@ -353,7 +320,7 @@ class SurveyAdjuster {
     size_t num_variants = 1;
     for (const auto& of_camera : candidates_) num_variants = std::max(num_variants, of_camera.size());
     if (num_variants == 1) return false;
-    std::vector<LeftOut> tried(num_variants);
+    std::vector<LeftOutErrors> tried(num_variants);
     ParallelFor(static_cast<int64_t>(num_variants), num_threads_, [&](int64_t v) {
       std::vector<int> variants;
       for (const auto& of_camera : candidates_)
@@ -363,17 +330,12 @@ class SurveyAdjuster {
     bool changed = false;
     for (size_t c = 0; c < candidates_.size(); ++c) {
       int best = 0;
-      double gain_of_best = 0;
       for (size_t v = 1; v < candidates_[c].size(); ++v) {
-        const auto [gain, error] = GainOf(tried[best], tried[v], static_cast<int>(c));
-        if (IsGain(gain, error)) {
-          best = static_cast<int>(v);
-          gain_of_best = GainOf(tried[0], tried[v], static_cast<int>(c)).first;
-        }
+        if (IsGain(GainOf(problem_, tried[best], tried[v], static_cast<int>(c)))) best = static_cast<int>(v);
       }
       findings_.cameras[c].variant = candidates_[c][best].name;
       findings_.cameras[c].free = candidates_[c][best].free;
-      findings_.cameras[c].gain = gain_of_best;
+      findings_.cameras[c].gain = GainOf(problem_, tried[0], tried[best], static_cast<int>(c)).part;
       if (best == variants_[c]) continue;
       changed = true;
       variants_[c] = best;
@@ -388,24 +350,9 @@ class SurveyAdjuster {
   }
 
   // Whether it is more than chance, and worth it beside the part that an image's keypoints share.
-  bool IsGain(double gain, double error) const {
-    return gain > kMinGainOfShared * findings_.keypoints.correlation + kMinGain &&
-           gain > kMinGainSigmas * error;
-  }
-
-  // By which part the variance of a camera's (-1: of all cameras') left-out keypoints is smaller, and the
-  // standard error over images.
-  std::pair<double, double> GainOf(const LeftOut& before, const LeftOut& after, int camera) const {
-    double sum_before = 0, sum_difference = 0, sum_squares = 0;
-    for (size_t i = 0; i < problem_.images.size(); ++i) {
-      if (camera >= 0 && problem_.images[i].camera_idx != camera) continue;
-      const double difference = before.sum[i] - after.sum[i];
-      sum_before += before.sum[i];
-      sum_difference += difference;
-      sum_squares += difference * difference;
-    }
-    if (!(sum_before > 0)) return {0, 0};
-    return {sum_difference / sum_before, std::sqrt(sum_squares) / sum_before};
+  bool IsGain(const LeftOutGain& gain) const {
+    return gain.part > kMinGainOfShared * findings_.keypoints.correlation + kMinGain &&
+           gain.part > kMinGainSigmas * gain.standard_error;
   }
 
   // Turns and moves everything so that the stated poses, freed from drift, are where they were stated, in the
@@ -431,9 +378,10 @@ class SurveyAdjuster {
   const std::vector<Track>& tracks_;
   const TriangulateOptions& triangulate_;
   const AdjustSurveyOptions& options_;
+  BundleOptions bundle_options_;
   int num_threads_;
+  const Progress& progress_;
   PosedImages& posed_;
-  std::vector<Camera> stated_cameras_;
   std::vector<std::vector<CameraVariant>> candidates_;  // per camera
   std::vector<int> variants_;                           // per camera: the one taken
   std::vector<Track> selected_;
@@ -444,82 +392,14 @@ class SurveyAdjuster {
   bool is_learning_ = true;
 };
 
-// The images that noise and cameras are learnt from: of each camera two runs of successive ones.
-std::vector<int> ImagesToLearnFrom(const PosedImages& posed, int num_images) {
-  std::vector<std::vector<int>> of_camera(posed.cameras.size());
-  for (int i = 0; i < posed.num_images(); ++i) of_camera[posed.camera_idx[i]].push_back(i);
-  const auto num_used = std::count_if(of_camera.begin(), of_camera.end(),
-                                      [](const std::vector<int>& images) { return !images.empty(); });
-  const size_t each = std::max<size_t>(kMinNumLearnt, num_images / std::max<int64_t>(1, num_used));
-  std::vector<int> chosen;
-  for (const std::vector<int>& images : of_camera) {
-    const size_t length = each / 2;
-    if (images.size() <= each) {
-      chosen.insert(chosen.end(), images.begin(), images.end());
-      continue;
-    }
-    for (const size_t part : {1, 3}) {
-      const size_t middle = part * images.size() / 4;
-      const size_t begin = middle > length / 2 ? middle - length / 2 : 0;
-      for (size_t i = begin; i < std::min(begin + length, images.size()); ++i) chosen.push_back(images[i]);
-    }
-  }
-  std::sort(chosen.begin(), chosen.end());
-  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
-  return chosen;
-}
-
-// A part of a survey, with the tracks that two of its images see.
-struct SubSurvey {
-  PosedImages posed;
-  std::vector<Track> tracks;
-};
-
-SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images) {
-  SubSurvey sub;
-  sub.posed.cameras = all.cameras;
-  std::vector<int> new_idx(all.num_images(), -1);
-  for (const int i : images) {
-    new_idx[i] = sub.posed.num_images();
-    sub.posed.feature_idx.push_back(all.feature_idx[i]);
-    sub.posed.camera_idx.push_back(all.camera_idx[i]);
-    sub.posed.stated.push_back(all.stated[i]);
-    sub.posed.poses.push_back(all.poses[i]);
-    sub.posed.rays.push_back(all.rays[i]);
-  }
-  for (const Track& track : tracks) {
-    Track kept;
-    for (const TrackElement& element : track) {
-      if (new_idx[element.image_idx] >= 0) kept.push_back({new_idx[element.image_idx], element.keypoint_idx});
-    }
-    if (kept.size() >= 2) sub.tracks.push_back(std::move(kept));
-  }
-  return sub;
-}
-
 }  // namespace
 
 OptionTable DescribeOptions(AdjustSurveyOptions* o) {
-  OptionTable table = {
-      {.name = "refine_cameras",
-       .value = &o->refine_cameras,
-       .help = "find out which parameters of the cameras differ from what is stated"},
-      {.name = "focal_sigma_ratio",
-       .value = &o->camera_prior.focal_sigma_ratio,
-       .help = "standard deviation of a stated focal length, as a part of it",
-       .min = 1e-6},
-      {.name = "principal_point_sigma_ratio",
-       .value = &o->camera_prior.principal_point_sigma_ratio,
-       .help = "standard deviation of a stated principal point, as a part of the image's width",
-       .min = 1e-6},
-      {.name = "distortion_sigma",
-       .value = &o->camera_prior.distortion_sigma,
-       .help = "standard deviation of a distortion coefficient",
-       .min = 1e-6},
-      {.name = "calibrated_ratio",
-       .value = &o->camera_prior.calibrated_ratio,
-       .help = "these are this many times smaller for a camera that is stated with distortion",
-       .min = 1},
+  OptionTable table = {{.name = "refine_cameras",
+                        .value = &o->refine_cameras,
+                        .help = "find out which parameters of the cameras differ from what is stated"}};
+  for (Option& option : DescribeOptions(&o->camera_prior)) table.push_back(std::move(option));
+  const OptionTable others = {
       {.name = "refine_camera_offset",
        .value = &o->refine_camera_offset,
        .help = "find one rigid offset between all stated poses and their cameras"},
@@ -550,6 +430,7 @@ OptionTable DescribeOptions(AdjustSurveyOptions* o) {
        .help = "most iterations of a round's solver",
        .min = 1},
   };
+  table.insert(table.end(), others.begin(), others.end());
   AddCondition({"refine_cameras", {"true"}},
                {"focal_sigma_ratio", "principal_point_sigma_ratio", "distortion_sigma", "calibrated_ratio"},
                &table);
@@ -563,20 +444,21 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
   SubSurvey sub = Restrict(posed, tracks, ImagesToLearnFrom(posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, triangulate, num_threads);
-  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, &sub.posed)
+  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, NoProgress(), &sub.posed)
       .Measure(triangulations);
 }
 
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, PosedImages* posed) {
+                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
+                            PosedImages* posed) {
   SubSurvey sub = Restrict(*posed, tracks, ImagesToLearnFrom(*posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, first, num_threads);
   const SurveyFindings findings =
-      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, &sub.posed)
+      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, &sub.posed)
           .Learn(triangulations);
-  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, posed).Apply(findings);
+  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, progress, posed).Apply(findings, first);
   return findings;
 }
 

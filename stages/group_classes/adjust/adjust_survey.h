@@ -59,21 +59,23 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 
 // Finds out from the images how wrong the stated poses and cameras are, and makes them as right as the images
 // allow; exact ones stay what they are.  In turns:
-//   - poses, points, cameras and offset are adjusted together (bundle.h), over long tracks, 200 keypoints an
-//     image;
+//   - poses, points, cameras and offset are adjusted together (bundle.h), over long tracks, 100 keypoints an
+//     image or more;
 //   - what keypoints' errors are is measured by scale, and how much of them an image's keypoints share
 //     (keypoint_noise.h): real images say far less than as many independent keypoints would;
 //   - the four components of the poses' noise are learnt [MacKay 1992]: a standard deviation squared is the
 //     sum of its squared errors over the number of them that keypoints determine;
 //   - the camera's model is chosen by the errors of keypoints that were left out (camera_models.h): a larger
-//     model must make their variance smaller by more than the part that an image's keypoints share, because
-//     so much is explained by what is no camera's;
+//     model must make their variance smaller by more than half the part that an image's keypoints share,
+//     and than chance; what they share is no camera's;
 //   - an offset that is not significant is none.
 // The world frame stays that of the stated poses, in the mean.  Changes poses, cameras, rays and
-// camera_from_given of `posed`.  `triangulations`: of all tracks, by the stated poses.  Pure; same result for
-// any number of threads.  O(images * keypoints adjusted) but for the sparse factorisation of the poses.
+// camera_from_given of `posed`.  `first`: how tracks are triangulated by poses and cameras as stated.  Stops
+// early, with no meaning, when progress is cancelled.  Pure; same result for any number of threads.  O(images
+// * keypoints adjusted) but for the sparse factorisation of the poses.
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, PosedImages* posed);
+                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
+                            PosedImages* posed);
 
 }  // namespace cairn::group_classes

@@ -62,6 +62,27 @@ int NumFocals(CameraModel model) {
   }
 }
 
+OptionTable DescribeOptions(CameraPriorOptions* o) {
+  return {
+      {.name = "focal_sigma_ratio",
+       .value = &o->focal_sigma_ratio,
+       .help = "standard deviation of a stated focal length, as a part of it",
+       .min = 1e-6},
+      {.name = "principal_point_sigma_ratio",
+       .value = &o->principal_point_sigma_ratio,
+       .help = "standard deviation of a stated principal point, as a part of the image's width",
+       .min = 1e-6},
+      {.name = "distortion_sigma",
+       .value = &o->distortion_sigma,
+       .help = "standard deviation of a distortion coefficient",
+       .min = 1e-6},
+      {.name = "calibrated_ratio",
+       .value = &o->calibrated_ratio,
+       .help = "these are this many times smaller for a camera that is stated with distortion",
+       .min = 1},
+  };
+}
+
 std::vector<CameraVariant> CameraVariants(const Camera& stated, const CameraPriorOptions& options) {
   std::vector<CameraVariant> variants = {{.name = "", .camera = stated, .free = {}, .sigma = {}}};
   const auto add = [&](const std::string& name, CameraModel model, bool focal, bool centre,

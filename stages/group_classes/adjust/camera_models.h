@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/camera/camera.h"
+#include "core/options/options.h"
 
 namespace cairn::group_classes {
 
@@ -20,6 +21,7 @@ struct CameraPriorOptions {
   // calibration finds.  REQUIRES: >= 1
   double calibrated_ratio = 10;
 };
+OptionTable DescribeOptions(CameraPriorOptions* options);
 
 // A way in which a camera may differ from what is stated: its model and which of its parameters change.
 struct CameraVariant {

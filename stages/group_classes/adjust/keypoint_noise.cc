@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <optional>
 
 #include <Eigen/Cholesky>
 
@@ -57,8 +58,7 @@ struct PartialPose {
   void Add(const BundleProblem& problem, const BundleProblem::Observation& o, const Eigen::Vector2d& residual,
            double sigma_px) {
     const Eigen::Vector3d x = problem.images[o.image_idx].cam_from_world * problem.points[o.point_idx];
-    const Eigen::Matrix<double, 2, 3> from_x =
-        (o.ray.pixel_from_plane - o.ray.Residual(x) * o.ray.normal.transpose()) / o.ray.normal.dot(x);
+    const Eigen::Matrix<double, 2, 3> from_x = o.ray.ResidualByPoint(x);
     Eigen::Matrix<double, 2, 6> jacobian;
     jacobian << -from_x * CrossMatrix(x), from_x;
     normal += jacobian.transpose() * jacobian / (sigma_px * sigma_px);

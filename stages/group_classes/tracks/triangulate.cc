@@ -56,11 +56,8 @@ void Accumulate(const PosedRay& ray, const Eigen::Vector3d& position, Eigen::Mat
                 Eigen::Vector3d* gradient) {
   const Eigen::Matrix3d R = ray.cam_from_world.rotation.toRotationMatrix();
   const Eigen::Vector3d p = R * position + ray.cam_from_world.translation;
-  const Eigen::Vector3d& normal_axis = ray.ray.normal;
-  const double depth = normal_axis.dot(p);
-  const Eigen::Vector2d residual = ray.ray.pixel_from_plane * p / depth;
-  const Eigen::Matrix<double, 2, 3> jacobian =
-      (ray.ray.pixel_from_plane - residual * normal_axis.transpose()) / depth * R;
+  const Eigen::Vector2d residual = ray.ray.Residual(p);
+  const Eigen::Matrix<double, 2, 3> jacobian = ray.ray.ResidualByPoint(p) * R;
   *normal += jacobian.transpose() * jacobian;
   *gradient += jacobian.transpose() * residual;
 }

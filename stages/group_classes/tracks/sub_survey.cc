@@ -1,0 +1,59 @@
+#include "stages/group_classes/tracks/sub_survey.h"
+
+#include <algorithm>
+
+namespace cairn::group_classes {
+namespace {
+
+// Fewest images of a camera that are learnt from, where it has as many.
+constexpr size_t kMinNumLearnt = 24;
+
+}  // namespace
+
+SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images) {
+  SubSurvey sub;
+  sub.posed.cameras = all.cameras;
+  std::vector<int> new_idx(all.num_images(), -1);
+  for (const int i : images) {
+    new_idx[i] = sub.posed.num_images();
+    sub.posed.feature_idx.push_back(all.feature_idx[i]);
+    sub.posed.camera_idx.push_back(all.camera_idx[i]);
+    sub.posed.stated.push_back(all.stated[i]);
+    sub.posed.poses.push_back(all.poses[i]);
+    sub.posed.rays.push_back(all.rays[i]);
+  }
+  for (const Track& track : tracks) {
+    Track kept;
+    for (const TrackElement& element : track) {
+      if (new_idx[element.image_idx] >= 0) kept.push_back({new_idx[element.image_idx], element.keypoint_idx});
+    }
+    if (kept.size() >= 2) sub.tracks.push_back(std::move(kept));
+  }
+  return sub;
+}
+
+std::vector<int> ImagesToLearnFrom(const PosedImages& posed, int num_images) {
+  std::vector<std::vector<int>> of_camera(posed.cameras.size());
+  for (int i = 0; i < posed.num_images(); ++i) of_camera[posed.camera_idx[i]].push_back(i);
+  const auto num_used = std::count_if(of_camera.begin(), of_camera.end(),
+                                      [](const std::vector<int>& images) { return !images.empty(); });
+  const size_t each = std::max<size_t>(kMinNumLearnt, num_images / std::max<int64_t>(1, num_used));
+  std::vector<int> chosen;
+  for (const std::vector<int>& images : of_camera) {
+    const size_t length = each / 2;
+    if (images.size() <= each) {
+      chosen.insert(chosen.end(), images.begin(), images.end());
+      continue;
+    }
+    for (const size_t part : {1, 3}) {
+      const size_t middle = part * images.size() / 4;
+      const size_t begin = middle > length / 2 ? middle - length / 2 : 0;
+      for (size_t i = begin; i < std::min(begin + length, images.size()); ++i) chosen.push_back(images[i]);
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+}  // namespace cairn::group_classes
