@@ -14,6 +14,9 @@
 #include "core/geometry/vector_geometry.h"
 #include "stages/group_classes/adjust/evidence.h"
 
+// Of OpenMP's runtime, which CHOLMOD brings along; <omp.h> comes with one compiler only.
+extern "C" void omp_set_max_active_levels(int max_levels);
+
 namespace cairn::group_classes {
 namespace {
 
@@ -216,6 +219,9 @@ class CeresBundle {
     options.function_tolerance = options_.function_tolerance;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
+    // CHOLMOD would start four threads for each thread that solves: slower here, and not what --memory
+    // counts.
+    omp_set_max_active_levels(0);
     ceres::Solve(options, &problem_, &summary);
     for (size_t i = 0; i < num_images_; ++i) {
       bundle_.images[i].cam_from_world = LoadPose(CamFromWorld(i));
