@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Compiles redkitchen with cairn and with the installed COLMAP in one run and prints both as tables: seconds of every step,
+# Compiles a capture (by default redkitchen) with cairn and with the installed COLMAP in one run and prints both as tables: seconds of every step,
 # keypoints an image, verified pairs and inliers under one test (count_inliers.cc), bytes, registered queries and their
 # errors.  Everything is computed anew.  COLMAP gets what cairn gets: known poses and intrinsics of the survey; its
-# queries are matched against every survey image and registered one after the other.
+# queries are matched against every survey image and registered one after the other: in the survey as stated, and as
+# COLMAP's bundle_adjuster leaves it with the camera refined (as stated, with one and with four coefficients of distortion),
+# aligned again to the stated camera centres.
 #
-#   bench/redkitchen/compare_colmap.sh [CAPTURE] [WORK]      about 20 minutes on 2 cores, most of them COLMAP's matching
+#   bench/redkitchen/compare_colmap.sh [CAPTURE] [WORK]      about 25 minutes on 2 cores, most of them COLMAP's matching
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 top=$(cd "$here/../.." && pwd)
@@ -20,7 +22,7 @@ if [ ! -x "$count_inliers" ]; then
 fi
 export QT_QPA_PLATFORM=offscreen
 rm -rf "$work"
-mkdir -p "$work"/{known,triangulated,registered,text}
+mkdir -p "$work"/{known,triangulated}
 log=$work/colmap.log
 
 # seconds NAME COMMAND...: runs it, remembers its wall-clock seconds in $work/NAME.s
@@ -36,18 +38,24 @@ of() { cat "$work/$1.s"; }
 names() { awk '!/^#/ && NF >= 10 {print $10}' "$1"; }
 
 echo "== cairn: $("$cairn" --version)"
-# Step by step for the seconds of each, with the options of the recipe, but all pairs, as COLMAP matches them; then the
-# whole line once more, for its sum, with the pairs that it chooses.
+# Step by step for the seconds of each, by default, but all pairs, as COLMAP matches them; then the whole line once more, for
+# its sum, with the pairs that it chooses; and its map with the landmarks of all classes, as COLMAP's model has all points.
 options=$work/cairn.build/options
-"$cairn" stage configure "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
+recipe=$work/recipe.toml
+printf 'name = "compared"\n[capture]\npath = "%s"\n' "$capture" >"$recipe"
+"$cairn" stage configure "$recipe" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" >>"$log" 2>&1
 seconds cairn_extract "$cairn" stage extract-features "$capture" --options "$options/extract_features.toml" \
   -o "$work/features.db" --progress none
 seconds cairn_match "$cairn" stage match-features "$work/features.db" --capture "$capture" \
   --options "$options/match_features.toml" --pairs exhaustive -o "$work/matches.db" --progress none
 seconds cairn_group "$cairn" stage group-classes "$work/matches.db" --capture "$capture" \
   --options "$options/group_classes.toml" -o "$work/classes.db" --progress none
-seconds cairn_compile "$cairn" compile "$top/maps/redkitchen/recipe.toml" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
+seconds cairn_compile "$cairn" compile "$recipe" -o "$work/cairn.cairn" --build-dir "$work/cairn.build" --progress none
 "$cairn" check "$work/cairn.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/cairn.txt"
+echo "== cairn, all classes"
+{ cat "$recipe"; printf '[emit_map]\nlandmarks = "all"\n'; } >"$work/all.toml"
+"$cairn" compile "$work/all.toml" -o "$work/all.cairn" --build-dir "$work/cairn.build" --progress none >>"$log" 2>&1
+"$cairn" check "$work/all.cairn" --queries "$capture/queries.txt" --progress none | tee "$work/all.txt"
 
 echo "== $(colmap help | head -n 1)"
 camera=$(awk '!/^#/ && NF {print; exit}' "$capture/cameras.txt")
@@ -79,10 +87,46 @@ seconds colmap_query_extract colmap feature_extractor --database_path "$database
 while read -r query; do sed "s|^|$query |" "$work/survey.list"; done <"$work/queries.list" >"$work/pairs.list"
 seconds colmap_query_match colmap matches_importer --database_path "$database" --match_list_path "$work/pairs.list" \
   --match_type pairs --SiftMatching.use_gpu 0
-seconds colmap_register colmap image_registrator --database_path "$database" --input_path "$work/triangulated" \
-  --output_path "$work/registered"
-colmap model_converter --input_path "$work/registered" --output_path "$work/text" --output_type TXT >>"$log" 2>&1
-python3 "$here/pose_errors.py" "$capture/queries.txt" "$work/text/images.txt" | tee "$work/colmap.txt"
+# register MODEL: registers the queries in $work/MODEL and prints their errors.
+register() {
+  mkdir -p "$work/$1.registered" "$work/$1.text"
+  colmap image_registrator --database_path "$database" --input_path "$work/$1" --output_path "$work/$1.registered"
+  colmap model_converter --input_path "$work/$1.registered" --output_path "$work/$1.text" --output_type TXT
+}
+print_errors() {
+  echo "COLMAP, $2: $(awk '!/^#/ && NF {$1 = $3 = $4 = ""; print; exit}' "$work/$1.text/cameras.txt")"
+  python3 "$here/pose_errors.py" "$capture/queries.txt" "$work/$1.text/images.txt"
+}
+seconds colmap_register register triangulated
+print_errors triangulated "survey as stated" | tee "$work/colmap.txt"
+# adjust CAMERA_MODEL: the survey with this model of its camera, adjusted and aligned, in $work/adjusted_MODEL.
+awk '!/^#/ && NF >= 10 {
+  n = $5 * $5 + $2 * $2 + $3 * $3 + $4 * $4; w = $2; x = -$3; y = -$4; z = -$5; a = -$6; b = -$7; c = -$8
+  p = 2 * (y * c - z * b); q = 2 * (z * a - x * c); r = 2 * (x * b - y * a)
+  printf "%s %.9f %.9f %.9f\n", $10, a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
+}' "$capture/images.txt" >"$work/centres.txt"
+adjust() {
+  local to=$work/adjusted_$1
+  rm -rf "$to"
+  mkdir -p "$to" "$to.stated" "$to.free"
+  colmap model_converter --input_path "$work/triangulated" --output_path "$to.stated" --output_type TXT
+  # A pinhole's f, cx, cy begin the words of the models with distortion as well; OPENCV has two focal lengths.
+  awk -v model="$1" -v extra="$2" '!/^#/ && NF {
+      if (model == "OPENCV" && $2 == "SIMPLE_PINHOLE") $5 = $5 " " $5
+      $2 = model; print $0 extra; next} {print}' "$to.stated/cameras.txt" >"$to.words"
+  mv "$to.words" "$to.stated/cameras.txt"
+  colmap bundle_adjuster --input_path "$to.stated" --output_path "$to.free" --BundleAdjustment.refine_principal_point "$3"
+  colmap model_aligner --input_path "$to.free" --output_path "$to" --ref_images_path "$work/centres.txt" --ref_is_gps 0 \
+    --robust_alignment_max_error 0.05
+  register "adjusted_$1"
+}
+for words in "$model||0" "SIMPLE_RADIAL| 0|0" "OPENCV| 0 0 0 0|1"; do
+  IFS='|' read -r adjusted extra free_centre <<<"$words"
+  [ "$adjusted" = "$model" ] || [ "${model/SIMPLE_/}" = PINHOLE ] || continue  # what has distortion already is refined as it is
+  [ "$adjusted" != SIMPLE_RADIAL ] || [ "$model" = SIMPLE_PINHOLE ] || continue
+  seconds "colmap_adjust_$adjusted" adjust "$adjusted" "$extra" "$free_centre"
+  print_errors "adjusted_$adjusted" "survey adjusted" | tee -a "$work/colmap.txt"
+done
 
 echo
 echo "== verified matches under one test: those of each program within N px of the essential matrix fitted to them"

@@ -56,9 +56,9 @@ def main():
     def within(cm, deg):
         return 100.0 * sum(1 for c, a in found if 100 * c <= cm and a <= deg) / len(true)
 
-    print(f"{len(found)} of {len(true)} localized; median {quantile(centre, .5):.1f} cm / {quantile(angle, .5):.2f} deg, "
-          f"90 % {quantile(centre, .9):.1f} cm / {quantile(angle, .9):.2f} deg; within 5 cm / 5 deg {within(5, 5):.0f} %, "
-          f"10 cm / 2 deg {within(10, 2):.0f} %, 10 cm / 5 deg {within(10, 5):.0f} %")
+    print(f"{len(found)} of {len(true)} localized; median {quantile(centre, .5):.2f} cm / {quantile(angle, .5):.3f} deg, "
+          f"90 % {quantile(centre, .9):.2f} cm / {quantile(angle, .9):.3f} deg; within 2 cm / 1 deg {within(2, 1):.1f} %, "
+          f"5 cm / 5 deg {within(5, 5):.1f} %, 10 cm / 5 deg {within(10, 5):.1f} %")
 
 
 if __name__ == "__main__":

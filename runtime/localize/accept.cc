@@ -149,8 +149,8 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .min = 0},
       {.name = "max_second_pose_ratio",
        .value = &o->max_second_pose_ratio,
-       .help =
-           "a second pose with this part of the first one's inliers makes it ambiguous; 0: not looked for",
+       .help = "a second pose elsewhere with this part of the first one's inliers, before and after guided "
+               "matching, makes it ambiguous; 0: not looked for",
        .min = 0,
        .max = 1},
       {.name = "num_second_pose_iterations",

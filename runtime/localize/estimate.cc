@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <opencv2/calib3d.hpp>
@@ -102,6 +103,42 @@ std::vector<PoseMeasurement> Select(const std::vector<PoseMeasurement>& measurem
   return selected;
 }
 
+struct ScoredPose {
+  PoseEstimate estimate;
+  double score = 0;  // sum of truncated errors
+};
+
+// The score below which a pose is looked at: better than the last of a full list, and than the best but for
+// a quarter of its inliers.
+double ScoreNeeded(const std::vector<ScoredPose>& best, int max_num_poses, double limit,
+                   int num_measurements) {
+  if (best.empty()) return limit * num_measurements;
+  if (static_cast<int>(best.size()) == max_num_poses) return best.back().score;
+  constexpr double kMaxFewer = 0.25;
+  const double fewer = kMaxFewer * static_cast<double>(best.front().estimate.inliers.size());
+  return std::min(limit * num_measurements, best.front().score + limit * std::max(1.0, fewer));
+}
+
+// Whether they are of the same matches, most of them.
+bool IsSame(const std::vector<int>& a, const std::vector<int>& b) {
+  std::vector<int> both;
+  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));
+  return 10 * both.size() > 9 * std::min(a.size(), b.size());
+}
+
+// Puts a pose into a list by score, unless a better one has the same inliers; worse ones with the same leave.
+void Insert(ScoredPose pose, int max_num_poses, std::vector<ScoredPose>* best) {
+  const auto is_same = [&](const ScoredPose& other) {
+    return IsSame(pose.estimate.inliers, other.estimate.inliers);
+  };
+  const auto at = std::find_if(best->begin(), best->end(),
+                               [&](const ScoredPose& other) { return pose.score < other.score; });
+  if (std::any_of(best->begin(), at, is_same)) return;
+  best->erase(std::remove_if(at, best->end(), is_same), best->end());
+  best->insert(at, std::move(pose));
+  if (static_cast<int>(best->size()) > max_num_poses) best->pop_back();
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(EstimateOptions* o) {
@@ -123,26 +160,32 @@ OptionTable DescribeOptions(EstimateOptions* o) {
        .value = &o->max_num_ransac_iterations,
        .help = "most samples",
        .min = 1},
+      {.name = "max_num_first_poses",
+       .value = &o->max_num_first_poses,
+       .help = "where few matches agree on a pose: most poses that guided matching follows up",
+       .min = 1,
+       .max = 100},
   };
 }
 
-std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
-                                         const EstimateOptions& options, const RefineOptions& refine_options,
-                                         uint64_t seed) {
+std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
+                                        const EstimateOptions& options, const RefineOptions& refine_options,
+                                        uint64_t seed) {
   const int num_measurements = static_cast<int>(measurements.size());
-  if (num_measurements < kMinNumInliers) return std::nullopt;
+  if (num_measurements < kMinNumInliers) return {};
   const double limit = options.max_error_px * options.max_error_px;
-  double best_score = limit * num_measurements;
-  PoseEstimate best;
+  std::vector<ScoredPose> best;  // by score
   Random random(seed);
   RefineOptions local_options = refine_options;
   local_options.max_num_refine_iterations = 5;
   int num_iterations = std::max(options.min_num_ransac_iterations, options.max_num_ransac_iterations);
-  for (best.num_iterations = 0; best.num_iterations < num_iterations; ++best.num_iterations) {
+  int iteration = 0;
+  for (; iteration < num_iterations; ++iteration) {
     const auto sample = DrawSample(num_measurements, random);
     for (const Pose& pose : SolveThreePoints(measurements, sample)) {
-      double score = Score(measurements, pose, limit, best_score);
-      if (score >= best_score) continue;
+      const double needed = ScoreNeeded(best, max_num_poses, limit, num_measurements);
+      double score = Score(measurements, pose, limit, needed);
+      if (score >= needed) continue;
       Pose local = pose;
       std::vector<int> inliers = Inliers(measurements, pose, limit);
       for (int round = 0; round < 3 && inliers.size() >= kMinNumInliers; ++round) {
@@ -153,14 +196,24 @@ std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& mea
         score = refined_score;
         inliers = Inliers(measurements, local, limit);
       }
-      best_score = score;
-      best.cam_from_world = local;
-      best.inliers = std::move(inliers);
-      num_iterations = NumIterations(best.inliers.size(), measurements.size(), options);
+      Insert({{local, std::move(inliers)}, score}, max_num_poses, &best);
+      num_iterations = NumIterations(best.front().estimate.inliers.size(), measurements.size(), options);
     }
   }
-  if (best.inliers.size() < kMinNumInliers) return std::nullopt;
-  return best;
+  std::vector<PoseEstimate> poses;
+  for (ScoredPose& pose : best) {
+    pose.estimate.num_iterations = iteration;
+    if (pose.estimate.inliers.size() >= kMinNumInliers) poses.push_back(std::move(pose.estimate));
+  }
+  return poses;
+}
+
+std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
+                                         const EstimateOptions& options, const RefineOptions& refine_options,
+                                         uint64_t seed) {
+  std::vector<PoseEstimate> poses = EstimatePoses(measurements, 1, options, refine_options, seed);
+  if (poses.empty()) return std::nullopt;
+  return std::move(poses.front());
 }
 
 }  // namespace cairn

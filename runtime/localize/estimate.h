@@ -10,6 +10,8 @@
 
 namespace cairn {
 
+inline constexpr uint64_t kRansacSeed = 0;  // fixed: an image always gives the same answer
+
 struct PoseEstimate {
   Pose cam_from_world;
   std::vector<int> inliers;  // indices of measurements, ascending
@@ -18,8 +20,14 @@ struct PoseEstimate {
 
 // Pose from correspondences of which many are wrong: RANSAC over three points (P3P, OpenCV), truncated
 // squared errors as score, each best pose so far refined over its inliers (LO-RANSAC: Chum, Matas, Kittler,
-// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result.  Nothing when no pose has at
-// least 4 inliers.
+// "Locally Optimized RANSAC", 2003).  Same measurements and seed, same result.
+//
+// Up to so many poses, the best first: no two share more than nine tenths of the fewer inliers, and one
+// that has a quarter fewer inliers than the best may not be found.
+std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& measurements, int max_num_poses,
+                                        const EstimateOptions& options, const RefineOptions& refine_options,
+                                        uint64_t seed);
+// The best of them.  Nothing when no pose has at least 4 inliers.
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
                                          uint64_t seed);

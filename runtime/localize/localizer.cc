@@ -12,6 +12,7 @@
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/accept.h"
 #include "runtime/localize/estimate.h"
+#include "runtime/localize/guided.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"
@@ -22,9 +23,6 @@
 
 namespace cairn {
 namespace {
-
-// Seed of RANSAC: fixed, so that an image always gives the same answer.
-constexpr uint64_t kRansacSeed = 0;
 
 std::vector<int32_t> ImagesOf(const std::vector<Candidate>& candidates) {
   std::vector<int32_t> images;
@@ -55,6 +53,11 @@ Localization Failure(NoFix reason, std::string message) {
   return localization;
 }
 
+bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept) {
+  return CenterErrorM(a, b) > accept.second_pose_distance_m ||
+         RotationErrorDeg(a, b) > accept.second_pose_angle_deg;
+}
+
 // The better of two answers.  Of two fixes the one with more inliers, unless they are at different places and
 // nearly equally good; of two failures the one that came farther says more.
 Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
@@ -66,9 +69,7 @@ Localization Better(Localization first, Localization second, const AcceptOptions
   if (!first.has_fix()) return second;
   if (!second.has_fix()) return first;
   if (second.num_unguided_inliers > first.num_unguided_inliers) std::swap(first, second);
-  const bool differ =
-      CenterErrorM(first.cam_from_world, second.cam_from_world) > accept.second_pose_distance_m ||
-      RotationErrorDeg(first.cam_from_world, second.cam_from_world) > accept.second_pose_angle_deg;
+  const bool differ = AreFarApart(first.cam_from_world, second.cam_from_world, accept);
   const double needed = accept.max_second_pose_ratio * first.num_unguided_inliers;
   if (accept.max_second_pose_ratio <= 0 || !differ || second.num_unguided_inliers < needed) return first;
   first.reason = NoFix::kAmbiguous;
@@ -89,6 +90,14 @@ struct Localizer::Attempt {
   std::vector<LandmarkIdx> landmarks;  // ascending
 };
 
+// What a first pose leads to: its own inliers, or what guided matching finds among the landmarks covisible
+// with them, if that is no less.
+struct Localizer::FollowedUp {
+  int num_unguided_inliers = 0;
+  std::shared_ptr<const LandmarkSet> covisible;  // null: its own inliers
+  GuidedMatches found;
+};
+
 const char* ScopeName(Scope scope) {
   switch (scope) {
     case Scope::kPrior:
@@ -105,40 +114,6 @@ const char* ScopeName(Scope scope) {
       return "votes";
   }
   return "all";
-}
-
-OptionTable DescribeOptions(LocalizerOptions* options) {
-  OptionTable table;
-  for (const OptionTable& part : {DescribeOptions(&options->sift), DescribeOptions(&options->measurement),
-                                  DescribeOptions(&options->retrieve), DescribeOptions(&options->match),
-                                  DescribeOptions(&options->estimate), DescribeOptions(&options->refine),
-                                  DescribeOptions(&options->accept)}) {
-    table.insert(table.end(), part.begin(), part.end());
-  }
-  table.push_back(
-      {.name = "first_landmarks",
-       .value = &options->first_landmarks,
-       .help = "landmarks to match first: of the candidates' regions or of the candidate images; auto: "
-               "regions, unless the map keeps landmarks that no region has",
-       .choices = {"auto", "regions", "images"}});
-  table.push_back(
-      {.name = "exclude_look_alikes",
-       .value = &options->exclude_look_alikes,
-       .help = "withhold a fix while a place that looks alike explains the image nearly as well"});
-  table.push_back({.name = "fall_back_to_all",
-                   .value = &options->fall_back_to_all,
-                   .help = "try all landmarks of the map when those fail"});
-  table.push_back(
-      {.name = "sure_num_unguided_inliers",
-       .value = &options->sure_num_unguided_inliers,
-       .help = "a fix with at least this many unguided inliers is taken without trying more landmarks",
-       .min = 0});
-  table.push_back({.name = "fall_back_max_num_landmarks",
-                   .value = &options->fall_back_max_num_landmarks,
-                   .help = "largest map, in landmarks, in which all are tried",
-                   .min = 0});
-  AddCondition({"fall_back_to_all", {"true"}}, {"fall_back_max_num_landmarks"}, &table);
-  return table;
 }
 
 Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
@@ -355,53 +330,84 @@ Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) 
                             estimate->inliers.size(), matches.size(), log10_chance,
                             accept.min_num_unguided_inliers, accept.max_log10_chance));
   }
-  if (accept.max_second_pose_ratio > 0 && IsAmbiguous(measurements, *estimate)) {
-    return fail(NoFix::kAmbiguous, fmt::format("another pose has at least {:.0f} % as many inliers",
-                                               100 * accept.max_second_pose_ratio));
+  std::vector<PoseEstimate> firsts = {*estimate};
+  if (localization.num_unguided_inliers < options_.sure_num_unguided_inliers) {
+    firsts = EstimatePoses(measurements, options_.estimate.max_num_first_poses, options_.estimate,
+                           options_.refine, kRansacSeed);
+    const auto has_few = [&](const PoseEstimate& first) {
+      return static_cast<int>(first.inliers.size()) < accept.min_num_unguided_inliers;
+    };
+    firsts.erase(std::remove_if(firsts.begin(), firsts.end(), has_few), firsts.end());
   }
+  if (auto second = SecondPose(measurements, *estimate)) firsts.push_back(*std::move(second));
+  return Refine(query, *landmarks, matches, firsts, std::move(localization));
+}
 
-  return Refine(query, *landmarks, Select(matches, estimate->inliers), estimate->cam_from_world,
-                std::move(localization));
+Result<Localizer::FollowedUp> Localizer::FollowUp(const Query& query,
+                                                  const std::vector<Correspondence>& matches,
+                                                  const PoseEstimate& first) const {
+  FollowedUp own{static_cast<int>(first.inliers.size()),
+                 nullptr,
+                 {Select(matches, first.inliers), first.cam_from_world}};
+  if (options_.match.guided_num_images == 0) return own;
+  CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
+                         CovisibleLandmarks(*map_, LandmarksOf(own.found.matches), options_.match));
+  CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const LandmarkSet> covisible, map_->Gather(std::move(seen), false));
+  GuidedMatches guided =
+      MatchGuidedInRounds(query, *covisible, first, options_.match, options_.estimate, options_.refine);
+  if (guided.matches.size() < own.found.matches.size()) return own;
+  return FollowedUp{own.num_unguided_inliers, std::move(covisible), std::move(guided)};
 }
 
 Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& matched,
-                                       std::vector<Correspondence> matches, const Pose& cam_from_world,
+                                       const std::vector<Correspondence>& matches,
+                                       const std::vector<PoseEstimate>& firsts,
                                        Localization localization) const {
   const auto fail = [&](NoFix reason, std::string message) {
     localization.reason = reason;
     localization.message = std::move(message);
     return localization;
   };
-  const LandmarkSet* landmarks = &matched;
-  Pose pose = cam_from_world;
-  std::shared_ptr<const LandmarkSet> covisible;
-  if (options_.match.guided_num_images > 0) {
-    CAIRN_ASSIGN_OR_RETURN(std::vector<LandmarkIdx> seen,
-                           CovisibleLandmarks(*map_, LandmarksOf(matches), options_.match));
-    CAIRN_ASSIGN_OR_RETURN(covisible, map_->Gather(std::move(seen), false));
-    GuidedMatches guided =
-        MatchGuidedInRounds(query, *covisible, cam_from_world, options_.match, options_.refine);
-    if (guided.matches.size() >= matches.size()) {
-      Verdict verdict = JudgeGuided(
-          {.num_found = static_cast<int>(guided.matches.size()),
-           .num_in_view = NumInView(query, *covisible, guided.cam_from_world),
-           .num_by_chance = GuidedByChance(query, *covisible, guided.cam_from_world, options_.match),
-           .is_sure = localization.num_unguided_inliers >= options_.sure_num_unguided_inliers},
-          options_.accept);
-      if (verdict.reason != NoFix::kNone) {
-        localization.num_inliers = 0;
-        return fail(verdict.reason, std::move(verdict.message));
-      }
-      matches = std::move(guided.matches);
-      pose = guided.cam_from_world;
-      landmarks = covisible.get();
+  std::vector<FollowedUp> followed_up;
+  size_t most = 0;
+  for (const PoseEstimate& first : firsts) {
+    CAIRN_ASSIGN_OR_RETURN(FollowedUp next, FollowUp(query, matches, first));
+    followed_up.push_back(std::move(next));
+    if (followed_up.back().found.matches.size() > followed_up[most].found.matches.size())
+      most = followed_up.size() - 1;
+  }
+  const FollowedUp& best = followed_up[most];
+  const auto num_found = static_cast<double>(best.found.matches.size());
+  localization.num_unguided_inliers = best.num_unguided_inliers;
+  for (const FollowedUp& other : followed_up) {
+    const double max_second_pose_ratio = options_.accept.max_second_pose_ratio;
+    if (max_second_pose_ratio > 0 &&
+        static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found &&
+        AreFarApart(other.found.cam_from_world, best.found.cam_from_world, options_.accept)) {
+      return fail(NoFix::kAmbiguous, fmt::format("{} and {} matches agree on poses at different places",
+                                                 best.found.matches.size(), other.found.matches.size()));
     }
   }
-  const auto refined =
-      RefinePoseWithCovariance(MakeMeasurements(query, *landmarks, matches), pose, options_.refine);
-  if (!refined)
-    return fail(NoFix::kUncertain, fmt::format("{} inliers do not determine the pose", matches.size()));
-  const std::vector<Correspondence> inliers = Select(matches, refined->inliers);
+  const LandmarkSet& landmarks = best.covisible ? *best.covisible : matched;
+  if (best.covisible) {
+    Verdict verdict = JudgeGuided(
+        {.num_found = static_cast<int>(best.found.matches.size()),
+         .num_in_view = NumInView(query, landmarks, best.found.cam_from_world),
+         .num_by_chance = GuidedByChance(query, landmarks, best.found.cam_from_world, options_.match),
+         .is_sure = localization.num_unguided_inliers >= options_.sure_num_unguided_inliers},
+        options_.accept);
+    if (verdict.reason != NoFix::kNone) {
+      localization.num_inliers = 0;
+      return fail(verdict.reason, std::move(verdict.message));
+    }
+  }
+  const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, landmarks, best.found.matches),
+                                                best.found.cam_from_world, options_.refine);
+  if (!refined) {
+    return fail(NoFix::kUncertain,
+                fmt::format("{} inliers do not determine the pose", best.found.matches.size()));
+  }
+  const std::vector<Correspondence> inliers = Select(best.found.matches, refined->inliers);
   localization.num_inliers = static_cast<int>(inliers.size());
   const double min_kept_ratio = options_.accept.min_kept_ratio;
   if (localization.num_inliers < min_kept_ratio * localization.num_unguided_inliers) {
@@ -421,28 +427,33 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   return localization;
 }
 
-bool Localizer::IsAmbiguous(const std::vector<PoseMeasurement>& measurements,
-                            const PoseEstimate& first) const {
+std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurement>& measurements,
+                                                  const PoseEstimate& first) const {
   const AcceptOptions& accept = options_.accept;
+  if (accept.max_second_pose_ratio <= 0) return std::nullopt;
   const double needed = accept.max_second_pose_ratio * static_cast<double>(first.inliers.size());
   std::vector<PoseMeasurement> others;
+  std::vector<int> indices;
   size_t next = 0;
   for (size_t i = 0; i < measurements.size(); ++i) {
     if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
       ++next;
     } else {
       others.push_back(measurements[i]);
+      indices.push_back(static_cast<int>(i));
     }
   }
-  if (static_cast<double>(others.size()) < needed) return false;
+  if (static_cast<double>(others.size()) < needed) return std::nullopt;
   EstimateOptions estimate_options = options_.estimate;
   estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
   estimate_options.min_num_ransac_iterations =
       std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
-  const auto second = EstimatePose(others, estimate_options, options_.refine, kRansacSeed);
-  return second && static_cast<double>(second->inliers.size()) >= needed &&
-         (CenterErrorM(first.cam_from_world, second->cam_from_world) > accept.second_pose_distance_m ||
-          RotationErrorDeg(first.cam_from_world, second->cam_from_world) > accept.second_pose_angle_deg);
+  auto second = EstimatePose(others, estimate_options, options_.refine, kRansacSeed);
+  if (!second || static_cast<double>(second->inliers.size()) < needed ||
+      !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
+    return std::nullopt;
+  for (int& i : second->inliers) i = indices[i];
+  return second;
 }
 
 }  // namespace cairn

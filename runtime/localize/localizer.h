@@ -54,6 +54,7 @@ class Localizer {
 
  private:
   struct Attempt;
+  struct FollowedUp;
   // `best`: what was found before.
   Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
                                       Localization best) const;
@@ -63,13 +64,20 @@ class Localizer {
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,
                                             std::vector<ImageId>* candidate_ids) const;
   Result<Localization> Try(const Query& query, const Attempt& attempt) const;
+  // What a first pose, of these matches, leads to.
+  Result<FollowedUp> FollowUp(const Query& query, const std::vector<Correspondence>& matches,
+                              const PoseEstimate& first) const;
+  // The fix of that of these first poses which leads to most, unless one at another place leads to nearly as
+  // much.
   Result<Localization> Refine(const Query& query, const LandmarkSet& matched,
-                              std::vector<Correspondence> matches, const Pose& cam_from_world,
-                              Localization localization) const;
+                              const std::vector<Correspondence>& matches,
+                              const std::vector<PoseEstimate>& firsts, Localization localization) const;
   // `best`, unless a look-alike of its place explains the image nearly as well.
   Result<Localization> ExcludeLookAlikes(const Query& query, const std::optional<PosePrior>& prior,
                                          Localization best) const;
-  bool IsAmbiguous(const std::vector<PoseMeasurement>& measurements, const PoseEstimate& first) const;
+  // A pose at another place that max_second_pose_ratio as many other matches agree on.
+  std::optional<PoseEstimate> SecondPose(const std::vector<PoseMeasurement>& measurements,
+                                         const PoseEstimate& first) const;
 
   std::shared_ptr<const Map> map_;
   LocalizerOptions options_;

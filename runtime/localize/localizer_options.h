@@ -59,6 +59,11 @@ struct MatchOptions {
   // Landmarks looked for are those of this many survey images, which share most inliers with the query; 0: no
   // guided matching.  REQUIRES: >= 0
   int guided_num_images = 12;
+  // Where fewer than guided_sure_num_inliers matches led to a pose: landmarks are first looked for this many
+  // times guided_radius_px from their projections, then half as far, and so on down to it, and each time the
+  // pose is estimated anew.  1: not.  REQUIRES: in [1, 64]
+  double guided_widest = 4;
+  int guided_sure_num_inliers = 40;
   // Most rounds of guided matching: what one finds refines the pose for the next, as long as that finds more.
   // REQUIRES: >= 1
   int guided_max_num_rounds = 4;
@@ -74,6 +79,9 @@ struct EstimateOptions {
   // REQUIRES: >= 1
   int min_num_ransac_iterations = 64;
   int max_num_ransac_iterations = 3000;
+  // Where fewer than sure_num_unguided_inliers matches agree on a pose: up to so many poses, of other
+  // matches, are followed up, and that at which guided matching finds most is the one.  REQUIRES: >= 1
+  int max_num_first_poses = 3;
 };
 OptionTable DescribeOptions(EstimateOptions* options);
 
@@ -137,8 +145,9 @@ struct AcceptOptions {
   double max_sigma_deg = 5;
   // Largest distance from the nearest survey image, m; 0: any.  REQUIRES: >= 0
   double max_distance_from_survey_m = 5;
-  // A second pose that has this part of the first one's inliers, at another place, makes the fix ambiguous;
-  // 0: not looked for.  REQUIRES: in [0, 1]
+  // A second pose at another place that has this part of the first one's inliers is followed up too; if it
+  // leads to this part of what the better of them leads to, the fix is ambiguous.  0: not looked for.
+  // REQUIRES: in [0, 1]
   double max_second_pose_ratio = 0.6;
   // Samples that look for the second pose.  REQUIRES: >= 1
   int num_second_pose_iterations = 200;

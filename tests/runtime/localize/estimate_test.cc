@@ -1,5 +1,8 @@
 #include "runtime/localize/estimate.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
@@ -57,6 +60,50 @@ TEST(Estimate, FourMatchesAreTheLeast) {
   EXPECT_FALSE(EstimatePose(MakeScene(3, 0, 1), {}, {}, 0));
   EXPECT_TRUE(EstimatePose(MakeScene(4, 0, 1), {}, {}, 0));
   EXPECT_FALSE(EstimatePose({}, {}, {}, 0));
+}
+
+// The same points seen from two places.
+TEST(EstimatePoses, BestFirstAndEachOfOtherMatches) {
+  auto measurements = MakeScene(30, 10, 1);
+  const Pose other = Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY())), {0.5, 0, 0}};
+  for (int i = 0; i < 25; ++i) {
+    PoseMeasurement measurement = measurements[i];
+    measurement.ray.ray = (other * (kTruth * measurement.point)).hnormalized();
+    measurements.push_back(measurement);
+  }
+  const auto poses = EstimatePoses(measurements, 2, {}, {}, 0);
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_LT(CenterErrorM(poses[0].cam_from_world, kTruth), 0.05);
+  EXPECT_LT(CenterErrorM(poses[1].cam_from_world, other * kTruth), 0.05);
+  EXPECT_GE(poses[0].inliers.size(), 29u);
+  EXPECT_GE(poses[1].inliers.size(), 25u);
+  // The best is the same however many are asked for.
+  const auto best = EstimatePose(measurements, {}, {}, 0);
+  EXPECT_EQ(best->inliers, poses[0].inliers);
+  EXPECT_LT(CenterErrorM(best->cam_from_world, poses[0].cam_from_world), 1e-3);
+  // No two share more than nine tenths.
+  const auto many = EstimatePoses(measurements, 8, {}, {}, 0);
+  for (size_t a = 0; a < many.size(); ++a) {
+    for (size_t b = 0; b < a; ++b) {
+      std::vector<int> both;
+      std::set_intersection(many[a].inliers.begin(), many[a].inliers.end(), many[b].inliers.begin(),
+                            many[b].inliers.end(), std::back_inserter(both));
+      EXPECT_LE(10 * both.size(), 9 * std::min(many[a].inliers.size(), many[b].inliers.size()));
+    }
+  }
+}
+
+// One that has far fewer is no rival.
+TEST(EstimatePoses, NotOfFarFewerMatches) {
+  auto measurements = MakeScene(30, 0, 1);
+  const Pose other = Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY())), {0.5, 0, 0}};
+  for (int i = 0; i < 15; ++i) {
+    PoseMeasurement measurement = measurements[i];
+    measurement.ray.ray = (other * (kTruth * measurement.point)).hnormalized();
+    measurements.push_back(measurement);
+  }
+  for (const PoseEstimate& pose : EstimatePoses(measurements, 4, {}, {}, 0))
+    EXPECT_LT(CenterErrorM(pose.cam_from_world, kTruth), 0.2) << pose.inliers.size();
 }
 
 TEST(Estimate, EqualPointsGiveNothingOrAPoseThatFitsThem) {

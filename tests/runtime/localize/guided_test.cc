@@ -1,7 +1,9 @@
+#include <numeric>
+
 #include <gtest/gtest.h>
 
+#include "runtime/localize/guided.h"
 #include "runtime/localize/localizer.h"
-#include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/synthetic_room.h"
@@ -83,6 +85,16 @@ TEST(GuidedByChance, UncertainLandmarksAreNotFoundBesideTheirPlaces) {
   EXPECT_EQ(GuidedByChance(wall.query, wall.landmarks, {}, {}), 0);
 }
 
+// A first pose that enough matches led to.
+PoseEstimate FromMany(const Pose& cam_from_world) {
+  return {cam_from_world, std::vector<int>(MatchOptions().guided_sure_num_inliers)};
+}
+
+// One that few led to.
+PoseEstimate FromFew(const Pose& cam_from_world) {
+  return {cam_from_world, std::vector<int>(MatchOptions().guided_sure_num_inliers - 1)};
+}
+
 TEST(MatchGuidedInRounds, WhatIsFoundRefinesThePoseAndLeadsToTheRest) {
   // A turn about the optical axis moves the corners by 15 px and the middle by 2: 10 px are looked at.
   const Wall wall = MakeWall(false, {});
@@ -91,21 +103,52 @@ TEST(MatchGuidedInRounds, WhatIsFoundRefinesThePoseAndLeadsToTheRest) {
   EXPECT_LT(num_found, size_t{kSide * kSide});
   EXPECT_EQ(num_found, size_t{32});  // those within 167 px of the axis
   const GuidedMatches once =
-      MatchGuidedInRounds(wall.query, wall.landmarks, turned, {.guided_max_num_rounds = 1}, {});
+      MatchGuidedInRounds(wall.query, wall.landmarks, FromMany(turned), {.guided_max_num_rounds = 1}, {}, {});
   EXPECT_EQ(once.matches.size(), num_found);
   EXPECT_EQ(RotationErrorDeg(once.cam_from_world, turned), 0);
-  const GuidedMatches more = MatchGuidedInRounds(wall.query, wall.landmarks, turned, {}, {});
+  const GuidedMatches more = MatchGuidedInRounds(wall.query, wall.landmarks, FromMany(turned), {}, {}, {});
   EXPECT_EQ(more.matches.size(), size_t{kSide * kSide});
   EXPECT_LT(RotationErrorDeg(more.cam_from_world, {}), 1e-3);
 }
 
+// So far off that nothing is within 10 px: found within 40, and from there all.
+TEST(MatchGuidedInRounds, AFirstPoseOfFewMatchesIsLookedAroundFirst) {
+  const Wall wall = MakeWall(false, {});
+  const Pose turned{Eigen::Quaterniond(Eigen::AngleAxisd(0.06, Eigen::Vector3d::UnitY())),
+                    {0, 0, 0}};  // 24 px
+  EXPECT_TRUE(MatchGuided(wall.query, wall.landmarks, turned, {}).empty());
+  EXPECT_TRUE(MatchGuidedInRounds(wall.query, wall.landmarks, FromMany(turned), {}, {}, {}).matches.empty());
+  const GuidedMatches found = MatchGuidedInRounds(wall.query, wall.landmarks, FromFew(turned), {}, {}, {});
+  EXPECT_EQ(found.matches.size(), size_t{kSide * kSide});
+  EXPECT_LT(RotationErrorDeg(found.cam_from_world, {}), 1e-3);
+  // Within 20 px there is nothing yet, and 4 times as far is asked for by nobody.
+  EXPECT_TRUE(MatchGuidedInRounds(wall.query, wall.landmarks, FromFew(turned), {.guided_widest = 2}, {}, {})
+                  .matches.empty());
+  // Twice as far it would be found at last, and is as far as the second look goes: 15 px off.
+  const Pose less{Eigen::Quaterniond(Eigen::AngleAxisd(0.0375, Eigen::Vector3d::UnitY())), {0, 0, 0}};
+  EXPECT_EQ(MatchGuidedInRounds(wall.query, wall.landmarks, FromFew(less), {.guided_widest = 2}, {}, {})
+                .matches.size(),
+            size_t{kSide * kSide});
+  EXPECT_TRUE(MatchGuidedInRounds(wall.query, wall.landmarks, FromFew(less), {.guided_widest = 1}, {}, {})
+                  .matches.empty());
+}
+
+// What looks alike lies 24 px beside each landmark: a pose there finds as many as the right one, and stays.
+TEST(MatchGuidedInRounds, LookingAroundLeavesAPoseThatFindsAsMany) {
+  const Wall wall = MakeWall(false, {{24, 0}});
+  const GuidedMatches found = MatchGuidedInRounds(wall.query, wall.landmarks, FromFew({}), {}, {}, {});
+  EXPECT_EQ(found.matches.size(), size_t{kSide * kSide});
+  EXPECT_EQ(RotationErrorDeg(found.cam_from_world, {}), 0);
+}
+
 TEST(MatchGuidedInRounds, StopsWhereNoMoreIsFound) {
   const Wall wall = MakeWall(false, {});
-  const GuidedMatches all = MatchGuidedInRounds(wall.query, wall.landmarks, {}, {}, {});
+  const GuidedMatches all = MatchGuidedInRounds(wall.query, wall.landmarks, FromMany({}), {}, {}, {});
   EXPECT_EQ(all.matches.size(), size_t{kSide * kSide});
   EXPECT_EQ(RotationErrorDeg(all.cam_from_world, {}), 0);            // as it was given
   const Pose elsewhere{Eigen::Quaterniond::Identity(), {0, 0, -3}};  // all behind the camera
-  EXPECT_TRUE(MatchGuidedInRounds(wall.query, wall.landmarks, elsewhere, {}, {}).matches.empty());
+  EXPECT_TRUE(
+      MatchGuidedInRounds(wall.query, wall.landmarks, FromMany(elsewhere), {}, {}, {}).matches.empty());
 }
 
 TEST(NumInView, CountsWhatIsProjectedIntoTheImage) {
@@ -115,6 +158,82 @@ TEST(NumInView, CountsWhatIsProjectedIntoTheImage) {
   EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {1, 0, 0}}), 6 * kSide);
   EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {0, -1, 0}}), 6 * kSide);
   EXPECT_EQ(NumInView(wall.query, wall.landmarks, {Eigen::Quaterniond::Identity(), {0, 0, -3}}), 0);
+}
+
+// An image of the room in which most landmarks stand twice, and match nothing before there is a pose; but
+// some match, at their places, and others as if seen from elsewhere.
+struct TwoPlaces {
+  static constexpr Eigen::Index kNumOfTruth = 10, kNumOfOther = 12;
+  SyntheticRoom room = MakeSyntheticRoom(3);
+  Pose truth = PoseAt({0.5, 0.3, 1.3}, 20);
+  Features seen;
+  Eigen::Index num = 0;  // of landmarks seen from the truth
+  LocalizerOptions options;
+
+  // `as_much`: from elsewhere all can be seen that is there, too.
+  explicit TwoPlaces(bool as_much) {
+    const RenderOptions all = {.detection_ratio = 1, .num_outliers = 0};
+    num = Add(RenderFeatures(room, truth, all, 5), kNumOfTruth, true);
+    Add(RenderFeatures(room, PoseAt({-0.5, 0.2, 1.2}, 200), all, 6), kNumOfOther, as_much);
+  }
+
+  Localization Localize() const {
+    const auto map = Map::FromRows(room.rows);
+    std::vector<LandmarkIdx> landmarks(room.points.size());
+    std::iota(landmarks.begin(), landmarks.end(), 0);
+    const Localizer localizer(*map, options);
+    return *localizer.LocalizeAmong(*localizer.QueryFromFeatures(seen, room.camera), Scope::kAll, landmarks,
+                                    {});
+  }
+
+ private:
+  // The first once, the rest twice or not at all.
+  Eigen::Index Add(const Features& features, Eigen::Index num_matched, bool rest) {
+    const auto num_rows = static_cast<Eigen::Index>(features.keypoints.size());
+    for (Eigen::Index i = 0; i < (rest ? num_rows : num_matched); ++i) {
+      for (int copy = 0; copy < (i < num_matched ? 1 : 2); ++copy) {
+        Keypoint keypoint = features.keypoints[i];
+        if (copy == 1) keypoint.x += keypoint.x < 320 ? 250 : -250;
+        seen.keypoints.push_back(keypoint);
+        seen.descriptors.conservativeResize(static_cast<Eigen::Index>(seen.keypoints.size()), kDescriptorDim);
+        seen.descriptors.bottomRows<1>() = features.descriptors.row(i);
+      }
+    }
+    return num_rows;
+  }
+};
+
+TEST(Localizer, OfSeveralFirstPosesThatCountsWhichFindsMost) {
+  TwoPlaces places(false);
+  ASSERT_GT(places.num, 100);
+  places.options.estimate.max_num_first_poses = 1;
+  places.options.accept.max_second_pose_ratio = 0;
+  const Localization misled = places.Localize();
+  EXPECT_EQ(misled.reason, NoFix::kTooFewInliers) << misled.message;
+  EXPECT_EQ(misled.num_unguided_inliers, TwoPlaces::kNumOfOther);
+  places.options.estimate.max_num_first_poses = 3;
+  const Localization found = places.Localize();
+  ASSERT_TRUE(found.has_fix()) << found.message;
+  EXPECT_LT(CenterErrorM(found.cam_from_world, places.truth), 0.02);
+  EXPECT_EQ(found.num_unguided_inliers, TwoPlaces::kNumOfTruth);
+  EXPECT_GT(found.num_inliers, places.num / 2);
+  // Where enough matches agree, others are not looked at.
+  places.options.sure_num_unguided_inliers = TwoPlaces::kNumOfOther;
+  EXPECT_EQ(places.Localize().num_unguided_inliers, TwoPlaces::kNumOfOther);
+  // A second pose elsewhere always is, if it has this part of the inliers, 10 of 12.
+  places.options.accept.max_second_pose_ratio = 0.8;
+  EXPECT_EQ(places.Localize().num_unguided_inliers, TwoPlaces::kNumOfTruth);
+  EXPECT_TRUE(places.Localize().has_fix());
+  places.options.accept.max_second_pose_ratio = 0.9;
+  EXPECT_EQ(places.Localize().num_unguided_inliers, TwoPlaces::kNumOfOther);
+}
+
+TEST(Localizer, PosesElsewhereThatFindAsMuchAreAmbiguous) {
+  TwoPlaces places(true);
+  const Localization found = places.Localize();
+  EXPECT_EQ(found.reason, NoFix::kAmbiguous) << found.message;
+  places.options.accept.max_second_pose_ratio = 0;
+  EXPECT_EQ(places.Localize().reason, NoFix::kNone);
 }
 
 TEST(Localizer, FixOfWhatIsNoMoreThanByChanceIsRefused) {
