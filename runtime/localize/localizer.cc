@@ -12,7 +12,6 @@
 #include "core/blocks/map_rows.h"
 #include "runtime/localize/accept.h"
 #include "runtime/localize/estimate.h"
-#include "runtime/localize/guided.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/refine.h"

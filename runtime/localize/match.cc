@@ -1,8 +1,159 @@
 #include "runtime/localize/match.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/blocks/map_blocks.h"
+#include "core/camera/pixel_ray.h"
+#include "core/features/descriptor_distance.h"
 #include "core/features/descriptor_matcher.h"
+#include "runtime/localize/refine.h"
 
 namespace cairn {
+namespace {
+
+// Keypoints of the query in square cells, for those near a pixel.
+class KeypointGrid {
+ public:
+  KeypointGrid(const Query& query, double cell_px) : query_(query), cell_px_(cell_px) {
+    num_columns_ = static_cast<int>(query.camera.width / cell_px) + 1;
+    num_rows_ = static_cast<int>(query.camera.height / cell_px) + 1;
+    cells_.resize(static_cast<size_t>(num_columns_) * num_rows_);
+    for (KeypointIdx i = 0; i < query.features.keypoints.size(); ++i) {
+      if (!query.rays[i]) continue;
+      const Keypoint& keypoint = query.features.keypoints[i];
+      cells_[static_cast<size_t>(Clamp(keypoint.y, num_rows_)) * num_columns_ +
+             Clamp(keypoint.x, num_columns_)]
+          .push_back(i);
+    }
+  }
+
+  template <typename Visit>
+  void VisitNear(const Eigen::Vector2d& pixel, double radius_px, const Visit& visit) const {
+    for (int row = Clamp(pixel.y() - radius_px, num_rows_); row <= Clamp(pixel.y() + radius_px, num_rows_);
+         ++row) {
+      for (int col = Clamp(pixel.x() - radius_px, num_columns_);
+           col <= Clamp(pixel.x() + radius_px, num_columns_); ++col) {
+        for (const KeypointIdx i : cells_[static_cast<size_t>(row) * num_columns_ + col]) {
+          const Keypoint& keypoint = query_.features.keypoints[i];
+          const double dx = keypoint.x - pixel.x(), dy = keypoint.y - pixel.y();
+          if (dx * dx + dy * dy <= radius_px * radius_px) visit(i);
+        }
+      }
+    }
+  }
+
+ private:
+  int Clamp(double coordinate, int count) const {
+    return static_cast<int>(std::clamp(coordinate / cell_px_, 0.0, static_cast<double>(count - 1)));
+  }
+
+  const Query& query_;
+  double cell_px_;
+  int num_columns_ = 0;
+  int num_rows_ = 0;
+  std::vector<std::vector<KeypointIdx>> cells_;
+};
+
+bool ScaleFits(const Keypoint& keypoint, const MapLandmark& landmark, double depth_m, double focal_px,
+               double max_ratio) {
+  if (landmark.scale_m <= 0) return true;  // not known
+  const double ratio = keypoint.scale * depth_m / (landmark.scale_m * focal_px);
+  return ratio <= max_ratio && ratio * max_ratio >= 1;
+}
+
+// How far from its projection a landmark, at `point` in the camera's frame, may appear, px.
+double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, const Pose& cam_from_world,
+                    double focal_px, const MatchOptions& options) {
+  if (point.z() <= 0) return options.guided_radius_px;  // beyond 90 degrees no keypoint has a ray
+  Eigen::Matrix<double, 2, 3> ray_from_point;
+  ray_from_point << 1, 0, -point.x() / point.z(), 0, 1, -point.y() / point.z();
+  const Eigen::Matrix<double, 2, 3> pixel_from_world =
+      focal_px / point.z() * ray_from_point * cam_from_world.rotation.toRotationMatrix();
+  const Eigen::Matrix2d covariance = pixel_from_world * landmark.covariance * pixel_from_world.transpose();
+  const double half_trace = 0.5 * covariance.trace();
+  const double largest =
+      half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - covariance.determinant()));
+  return std::sqrt(options.guided_radius_px * options.guided_radius_px +
+                   options.guided_radius_sigmas * options.guided_radius_sigmas * largest);
+}
+
+bool IsInImage(const Eigen::Vector2d& pixel, const Camera& camera) {
+  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width && pixel.y() <= camera.height;
+}
+
+// A landmark where a pose puts it in the image, or beyond its edge.
+struct ProjectedLandmark {
+  size_t k = 0;  // position in the set
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double depth = 0;
+  double radius_px = 0;  // how far from there it is looked for
+};
+
+// Looks for landmarks near their projections at a pose.
+class GuidedSearch {
+ public:
+  GuidedSearch(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+               const MatchOptions& options)
+      : query_(query),
+        landmarks_(landmarks),
+        options_(options),
+        grid_(query, std::max(8.0, options.guided_radius_px)) {
+    const double diagonal_px = std::hypot(query.camera.width, query.camera.height);
+    const double focal_px = query.camera.MeanFocal();
+    for (size_t k = 0; k < landmarks.idx.size(); ++k) {
+      const MapLandmark& landmark = landmarks.landmarks[k];
+      const Eigen::Vector3d point = cam_from_world * landmark.position;
+      if (const auto pixel = ImageFromCamera(query.camera, point)) {
+        projected_.push_back(
+            {k, *pixel, DepthOfScale(query.camera, point),
+             std::min(GuidedRadius(landmark, point, cam_from_world, focal_px, options), diagonal_px)});
+      }
+    }
+  }
+
+  // Each as far beside its projection as so many times its radius, where that is in the image.
+  std::vector<Correspondence> Match(const Eigen::Vector2d& moved_in_radii) const {
+    const double focal_px = query_.camera.MeanFocal();
+    // An angle between RootSIFT vectors of norm 512 as a dot product.
+    const double min_dot = kSquaredDescriptorNorm * std::cos(options_.guided_max_angle_rad);
+    std::map<KeypointIdx, std::pair<int32_t, LandmarkIdx>> best_of_keypoint;  // dot product, landmark
+    for (const ProjectedLandmark& at : projected_) {
+      const Eigen::Vector2d pixel = at.pixel + at.radius_px * moved_in_radii;
+      if (!IsInImage(pixel, query_.camera)) continue;
+      const uint8_t* descriptor = landmarks_.descriptors.row(static_cast<Eigen::Index>(at.k)).data();
+      std::pair<int32_t, int64_t> best{-1, -1};  // dot product, keypoint
+      grid_.VisitNear(pixel, at.radius_px, [&](KeypointIdx i) {
+        if (!ScaleFits(query_.features.keypoints[i], landmarks_.landmarks[at.k], at.depth, focal_px,
+                       options_.guided_max_scale_ratio))
+          return;
+        const int32_t dot = DescriptorDot(query_.features.descriptors.row(i).data(), descriptor);
+        if (dot > best.first || (dot == best.first && i < best.second)) best = {dot, i};
+      });
+      if (best.second < 0 || best.first < min_dot) continue;
+      const LandmarkIdx landmark_idx = landmarks_.idx[at.k];
+      const auto [entry, inserted] =
+          best_of_keypoint.try_emplace(static_cast<KeypointIdx>(best.second), best.first, landmark_idx);
+      if (!inserted && best.first > entry->second.first) entry->second = {best.first, landmark_idx};
+    }
+    std::vector<Correspondence> correspondences;
+    for (const auto& [keypoint, match] : best_of_keypoint)
+      correspondences.push_back({keypoint, match.second});
+    return correspondences;
+  }
+
+ private:
+  const Query& query_;
+  const LandmarkSet& landmarks_;
+  const MatchOptions& options_;
+  KeypointGrid grid_;
+  std::vector<ProjectedLandmark> projected_;
+};
+
+}  // namespace
 
 OptionTable DescribeOptions(MatchOptions* o) {
   OptionTable table = {
@@ -63,6 +214,89 @@ std::vector<Correspondence> MatchLandmarks(const Query& query, const LandmarkSet
     if (query.rays[match.idx1]) correspondences.push_back({match.idx1, landmarks.idx[match.idx2]});
   }
   return correspondences;
+}
+
+Result<std::vector<LandmarkIdx>> CovisibleLandmarks(const Map& map, const std::vector<LandmarkIdx>& seen,
+                                                    const MatchOptions& options) {
+  std::set<int32_t> image_blocks;  // those that a landmark's block names
+  int64_t ordinal = -1;
+  for (const LandmarkIdx landmark : seen) {
+    const int64_t next = map.directory().OrdinalOf(BlockKind::kLandmarks, landmark);
+    if (next == ordinal) continue;
+    ordinal = next;
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Landmarks(ordinal));
+    image_blocks.insert(block->image_blocks.begin(), block->image_blocks.end());
+  }
+  std::vector<std::pair<int, int32_t>> order;
+  for (const int32_t image_block : image_blocks) {
+    CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(image_block));
+    for (size_t i = 0; i < block->images.size(); ++i) {
+      const int num_shared = NumShared(block->images[i].landmarks, seen);
+      if (num_shared > 0) order.emplace_back(-num_shared, block->first + static_cast<int32_t>(i));
+    }
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<LandmarkIdx> landmarks = seen;
+  for (size_t i = 0; i < order.size() && static_cast<int>(i) < options.guided_num_images; ++i) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(order[i].second));
+    landmarks.insert(landmarks.end(), image->landmarks.begin(), image->landmarks.end());
+  }
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  return landmarks;
+}
+
+std::vector<Correspondence> MatchGuided(const Query& query, const LandmarkSet& landmarks,
+                                        const Pose& cam_from_world, const MatchOptions& options) {
+  return GuidedSearch(query, landmarks, cam_from_world, options).Match({0, 0});
+}
+
+GuidedMatches MatchGuidedInRounds(const Query& query, const LandmarkSet& landmarks, const PoseEstimate& first,
+                                  const MatchOptions& options, const EstimateOptions& estimate_options,
+                                  const RefineOptions& refine_options) {
+  GuidedMatches best{MatchGuided(query, landmarks, first.cam_from_world, options), first.cam_from_world};
+  const bool is_sure = static_cast<int>(first.inliers.size()) >= options.guided_sure_num_inliers;
+  Pose pose = first.cam_from_world;
+  for (double wider = is_sure ? 1 : options.guided_widest; wider > 1; wider /= 2) {
+    MatchOptions wide = options;
+    wide.guided_radius_px *= wider;
+    const auto estimate =
+        EstimatePose(MakeMeasurements(query, landmarks, MatchGuided(query, landmarks, pose, wide)),
+                     estimate_options, refine_options, kRansacSeed);
+    if (!estimate) break;
+    pose = estimate->cam_from_world;
+    std::vector<Correspondence> matches = MatchGuided(query, landmarks, pose, options);
+    if (matches.size() > best.matches.size()) best = {std::move(matches), pose};
+  }
+  for (int round = 1; round < options.guided_max_num_rounds; ++round) {
+    const auto refined =
+        RefinePose(MakeMeasurements(query, landmarks, best.matches), best.cam_from_world, refine_options);
+    if (!refined) break;
+    std::vector<Correspondence> matches = MatchGuided(query, landmarks, *refined, options);
+    if (matches.size() <= best.matches.size()) break;
+    best = {std::move(matches), *refined};
+  }
+  return best;
+}
+
+double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
+                      const MatchOptions& options) {
+  constexpr double kRadii = 4;
+  const GuidedSearch search(query, landmarks, cam_from_world, options);
+  double sum = 0;
+  for (const Eigen::Vector2d& aside : {Eigen::Vector2d(kRadii, 0), Eigen::Vector2d(-kRadii, 0),
+                                       Eigen::Vector2d(0, kRadii), Eigen::Vector2d(0, -kRadii)}) {
+    sum += static_cast<double>(search.Match(aside).size());
+  }
+  return sum / 4;
+}
+
+int NumInView(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world) {
+  return static_cast<int>(
+      std::count_if(landmarks.landmarks.begin(), landmarks.landmarks.end(), [&](const MapLandmark& landmark) {
+        const auto pixel = ImageFromCamera(query.camera, cam_from_world * landmark.position);
+        return pixel && IsInImage(*pixel, query.camera);
+      }));
 }
 
 }  // namespace cairn

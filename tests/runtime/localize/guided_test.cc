@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/localize/guided.h"
 #include "runtime/localize/localizer.h"
+#include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/landmark_set.h"
 #include "tests/runtime/localize/synthetic_room.h"

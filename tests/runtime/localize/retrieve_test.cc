@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/localize/guided.h"
+#include "runtime/localize/match.h"
 #include "runtime/localize/region_votes.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
