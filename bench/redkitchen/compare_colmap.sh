@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Compiles a capture (by default redkitchen) with cairn and with the installed COLMAP in one run and prints both as tables: seconds of every step,
-# keypoints an image, verified pairs and inliers under one test (count_inliers.cc), bytes, registered queries and their
+# Compiles a capture (by default redkitchen) with cairn and with the installed COLMAP in one run and prints both as tables:
+# seconds of every step, keypoints an image, verified pairs and inliers under one test (count_inliers.cc), bytes, registered queries and their
 # errors.  Everything is computed anew.  COLMAP gets what cairn gets: known poses and intrinsics of the survey; its
 # queries are matched against every survey image and registered one after the other: in the survey as stated, and as
 # COLMAP's bundle_adjuster leaves it with the camera refined (as stated, with one and with four coefficients of distortion),
@@ -99,12 +99,15 @@ print_errors() {
 }
 seconds colmap_register register triangulated
 print_errors triangulated "survey as stated" | tee "$work/colmap.txt"
-# adjust CAMERA_MODEL: the survey with this model of its camera, adjusted and aligned, in $work/adjusted_MODEL.
-awk '!/^#/ && NF >= 10 {
-  n = $5 * $5 + $2 * $2 + $3 * $3 + $4 * $4; w = $2; x = -$3; y = -$4; z = -$5; a = -$6; b = -$7; c = -$8
-  p = 2 * (y * c - z * b); q = 2 * (z * a - x * c); r = 2 * (x * b - y * a)
-  printf "%s %.9f %.9f %.9f\n", $10, a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
-}' "$capture/images.txt" >"$work/centres.txt"
+# The stated camera centres: where R c + t = 0.
+PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$here python3 - "$capture/images.txt" >"$work/centres.txt" <<'EOF'
+import sys
+from pose_errors import read_poses, rotate_back
+for name, (rotation, translation) in read_poses(sys.argv[1]).items():
+    print(name, *(f"{-x:.9f}" for x in rotate_back(rotation, translation)))
+EOF
+# adjust CAMERA_MODEL EXTRA_PARAMETERS FREE_CENTRE: the survey with this model of its camera, adjusted and aligned, in
+# $work/adjusted_MODEL, and the queries registered in it.
 adjust() {
   local to=$work/adjusted_$1
   rm -rf "$to"

@@ -216,4 +216,21 @@ std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& mea
   return std::move(poses.front());
 }
 
+std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
+                                              const PoseEstimate& first, const EstimateOptions& options,
+                                              const RefineOptions& refine_options, uint64_t seed) {
+  std::vector<int> indices;
+  for (size_t i = 0, next = 0; i < measurements.size(); ++i) {
+    if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
+      ++next;
+    } else {
+      indices.push_back(static_cast<int>(i));
+    }
+  }
+  auto other = EstimatePose(Select(measurements, indices), options, refine_options, seed);
+  if (!other) return std::nullopt;
+  for (int& i : other->inliers) i = indices[i];
+  return other;
+}
+
 }  // namespace cairn

@@ -31,5 +31,9 @@ std::vector<PoseEstimate> EstimatePoses(const std::vector<PoseMeasurement>& meas
 std::optional<PoseEstimate> EstimatePose(const std::vector<PoseMeasurement>& measurements,
                                          const EstimateOptions& options, const RefineOptions& refine_options,
                                          uint64_t seed);
+// The best of the measurements that are no inliers of a first.
+std::optional<PoseEstimate> EstimateOtherPose(const std::vector<PoseMeasurement>& measurements,
+                                              const PoseEstimate& first, const EstimateOptions& options,
+                                              const RefineOptions& refine_options, uint64_t seed);
 
 }  // namespace cairn

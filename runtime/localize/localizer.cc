@@ -329,15 +329,16 @@ Result<Localization> Localizer::Try(const Query& query, const Attempt& attempt) 
                             estimate->inliers.size(), matches.size(), log10_chance,
                             accept.min_num_unguided_inliers, accept.max_log10_chance));
   }
-  std::vector<PoseEstimate> firsts = {*estimate};
+  std::vector<PoseEstimate> firsts;
   if (localization.num_unguided_inliers < options_.sure_num_unguided_inliers) {
-    firsts = EstimatePoses(measurements, options_.estimate.max_num_first_poses, options_.estimate,
-                           options_.refine, kRansacSeed);
-    const auto has_few = [&](const PoseEstimate& first) {
-      return static_cast<int>(first.inliers.size()) < accept.min_num_unguided_inliers;
-    };
-    firsts.erase(std::remove_if(firsts.begin(), firsts.end(), has_few), firsts.end());
+    for (PoseEstimate& first : EstimatePoses(measurements, options_.estimate.max_num_first_poses,
+                                             options_.estimate, options_.refine, kRansacSeed)) {
+      if (static_cast<int>(first.inliers.size()) >= accept.min_num_unguided_inliers)
+        firsts.push_back(std::move(first));
+    }
   }
+  // Of smaller errors, they may have fewer inliers than the one that was accepted.
+  if (firsts.empty()) firsts.push_back(*estimate);
   if (auto second = SecondPose(measurements, *estimate)) firsts.push_back(*std::move(second));
   return Refine(query, *landmarks, matches, firsts, std::move(localization));
 }
@@ -431,27 +432,15 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
   const AcceptOptions& accept = options_.accept;
   if (accept.max_second_pose_ratio <= 0) return std::nullopt;
   const double needed = accept.max_second_pose_ratio * static_cast<double>(first.inliers.size());
-  std::vector<PoseMeasurement> others;
-  std::vector<int> indices;
-  size_t next = 0;
-  for (size_t i = 0; i < measurements.size(); ++i) {
-    if (next < first.inliers.size() && first.inliers[next] == static_cast<int>(i)) {
-      ++next;
-    } else {
-      others.push_back(measurements[i]);
-      indices.push_back(static_cast<int>(i));
-    }
-  }
-  if (static_cast<double>(others.size()) < needed) return std::nullopt;
+  if (static_cast<double>(measurements.size() - first.inliers.size()) < needed) return std::nullopt;
   EstimateOptions estimate_options = options_.estimate;
   estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;
   estimate_options.min_num_ransac_iterations =
       std::min(estimate_options.min_num_ransac_iterations, estimate_options.max_num_ransac_iterations);
-  auto second = EstimatePose(others, estimate_options, options_.refine, kRansacSeed);
+  auto second = EstimateOtherPose(measurements, first, estimate_options, options_.refine, kRansacSeed);
   if (!second || static_cast<double>(second->inliers.size()) < needed ||
       !AreFarApart(first.cam_from_world, second->cam_from_world, accept))
     return std::nullopt;
-  for (int& i : second->inliers) i = indices[i];
   return second;
 }
 

@@ -23,8 +23,8 @@ namespace cairn::group_classes {
 // (equivalence classes, ambiguity).  Differs from it: keypoints are joined by verified matches
 // (tracks/union_matches.h), not by distance in feature space alone; classes are triangulated from the
 // survey's poses and cameras, which are themselves adjusted as far as the images show that they are wrong
-// (adjust/adjust_survey.h); a class whose
-// look-alike lies at the same place is that place's duplicate, not ambiguous.
+// (adjust/adjust_survey.h); a class whose look-alike lies at the same place is that place's duplicate, not
+// ambiguous.
 struct GroupClassesOptions {
   TriangulateOptions triangulation;
   // "never": the stated poses and cameras are exact.  "always": adjust them (adjust/adjust_survey.h). "auto":
