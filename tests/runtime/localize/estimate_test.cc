@@ -93,6 +93,26 @@ TEST(EstimatePoses, BestFirstAndEachOfOtherMatches) {
   }
 }
 
+// Of the rest alone, and by their numbers among all.
+TEST(EstimateOtherPose, IsOfWhatTheFirstLeavesOver) {
+  auto measurements = MakeScene(30, 0, 1);
+  const Pose other = Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY())), {0.5, 0, 0}};
+  for (int i = 0; i < 30; i += 2)
+    measurements[i].ray.ray = (other * (kTruth * measurements[i].point)).hnormalized();
+  PoseEstimate first{kTruth, {}};
+  for (int i = 1; i < 30; i += 2) first.inliers.push_back(i);
+  const auto found = EstimateOtherPose(measurements, first, {}, {}, 0);
+  ASSERT_TRUE(found);
+  EXPECT_LT(CenterErrorM(found->cam_from_world, other * kTruth), 0.05);
+  std::vector<int> even;
+  for (int i = 0; i < 30; i += 2) even.push_back(i);
+  EXPECT_EQ(found->inliers, even);
+  // Nothing where three are left.
+  first.inliers.clear();
+  for (int i = 0; i < 27; ++i) first.inliers.push_back(i);
+  EXPECT_FALSE(EstimateOtherPose(measurements, first, {}, {}, 0));
+}
+
 // One that has far fewer is no rival.
 TEST(EstimatePoses, NotOfFarFewerMatches) {
   auto measurements = MakeScene(30, 0, 1);
