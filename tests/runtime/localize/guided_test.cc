@@ -221,7 +221,7 @@ TEST(Localizer, OfSeveralFirstPosesThatCountsWhichFindsMost) {
   places.options.sure_num_unguided_inliers = TwoPlaces::kNumOfOther;
   EXPECT_EQ(places.Localize().num_unguided_inliers, TwoPlaces::kNumOfOther);
   // A second pose elsewhere always is, if it has this part of the inliers, 10 of 12.
-  places.options.accept.max_second_pose_ratio = 0.8;
+  places.options.accept.max_second_pose_ratio = 10.0 / 12;
   EXPECT_EQ(places.Localize().num_unguided_inliers, TwoPlaces::kNumOfTruth);
   EXPECT_TRUE(places.Localize().has_fix());
   places.options.accept.max_second_pose_ratio = 0.9;

@@ -243,6 +243,10 @@ TEST(Localizer, BlankImageHasNoFix) {
 
 TEST(Localizer, ImageOfAnotherSizeOrTypeIsAnError) {
   Localizer localizer(RoomMap());
+  EXPECT_EQ(localizer.Localize(cv::Mat(100, 640, CV_8UC1), Room().camera).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(localizer.Localize(cv::Mat(480, 100, CV_8UC1), Room().camera).error().code,
+            ErrorCode::kInvalidArgument);
   EXPECT_EQ(localizer.Localize(cv::Mat(100, 100, CV_8UC1), Room().camera).error().code,
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(localizer.Localize(cv::Mat(480, 640, CV_8UC3), Room().camera).error().code,
