@@ -55,9 +55,9 @@ inline Status WriteInventedSurvey(const std::string& folder, const Camera& camer
 }
 
 // The main function of such a program: FOLDER NUM_IMAGES NUM_FEATURES.
-inline int WriteSurveyOfArguments(int argc, char** argv, const char* usage,
-                                  Status (*write)(const std::string& folder, int num_images,
-                                                  int num_features)) {
+inline int WriteSurveyOfArguments(
+    int argc, char** argv, const char* usage,
+    const std::function<Status(const std::string& folder, int num_images, int num_features)>& write) {
   if (argc != 4) {
     std::fprintf(stderr, "usage: %s\n", usage);
     return 2;

@@ -4,10 +4,13 @@
 // Rooms of 7 m x 7 m stand in a row.  A room's survey is a lattice of 12 x 12 stations, 0.5 m apart, with a
 // camera of 90 degrees in each of four headings, so that a room has 576 images.  Its walls bear points, each
 // with its size and its own random descriptor; an image has those that lie within its frustum, at an angle
-// and a distance at which SIFT would find them, with noise on place and descriptor.
+// and a distance at which SIFT would find them, with noise on place and descriptor.  Stated poses may drift,
+// so that stage 3 has something to adjust: from image to image by DRIFT_CM and 0.2 degrees for each of them,
+// in a square root of a metre of way, a radian being as long as a metre.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -34,6 +37,7 @@ constexpr double kMinScale_px = 1.6, kMaxScale_px = 8;  // of features that are 
 constexpr double kMinSize_m = 0.01, kMaxSize_m = 0.08;
 constexpr double kKeypointNoise_px = 0.4;
 constexpr double kDescriptorNoise = 4;
+constexpr double kDegreesPerCm = 0.2;  // of drift
 
 // A point on a wall, z up, metres.
 struct WallPoint {
@@ -110,17 +114,47 @@ Features SeeRoom(const std::vector<WallPoint>& points, const Pose& cam_from_worl
   return features;
 }
 
-Status WriteSyntheticBuilding(const std::string& folder, int num_images, int num_features) {
+// The poses that a drifting tracker states, one after the other.
+class Tracker {
+ public:
+  explicit Tracker(double drift_m) : drift_m_(drift_m) {}
+
+  Pose State(const Pose& cam_from_world) {
+    if (is_first_) stated_ = true_ = cam_from_world;
+    is_first_ = false;
+    const double turn_deg = RotationErrorDeg(true_, cam_from_world);
+    const double root = std::sqrt(CenterErrorM(true_, cam_from_world) + RadFromDeg(turn_deg));
+    Pose drift;
+    const double sigma_rad = RadFromDeg(kDegreesPerCm * 100 * drift_m_) * root;
+    Eigen::Vector3d turn;
+    for (double& value : turn) value = random_.Normal(0, sigma_rad);
+    for (double& value : drift.translation) value = random_.Normal(0, drift_m_ * root);
+    if (turn.norm() > 0) drift.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+    stated_ = drift * (cam_from_world * true_.Inverse()) * stated_;
+    true_ = cam_from_world;
+    return stated_;
+  }
+
+ private:
+  double drift_m_;
+  bool is_first_ = true;
+  Pose stated_, true_;
+  Random random_{MixSeed(2, 0)};
+};
+
+Status WriteSyntheticBuilding(const std::string& folder, int num_images, int num_features, double drift_cm) {
   const Camera camera = InventedCamera(320);
   int64_t num_keypoints = 0;
   std::vector<WallPoint> points;
+  Tracker tracker(drift_cm / 100);
   CAIRN_RETURN_IF_ERROR(WriteInventedSurvey(folder, camera, num_images, [&](int i) {
     const int room = i / kImagesPerRoom, in_room = i % kImagesPerRoom;
     if (in_room == 0) points = MakeRoom(room, num_features * kPointsPerFeature);
     const Pose pose = StationPose(room, in_room / kNumHeadings, in_room % kNumHeadings);
     Features features = SeeRoom(points, pose, camera, num_features, MixSeed(1, static_cast<uint64_t>(i)));
     num_keypoints += static_cast<int64_t>(features.keypoints.size());
-    return InventedImage{fmt::format("{:07}.png", i), pose, std::move(features)};
+    return InventedImage{fmt::format("{:07}.png", i), drift_cm > 0 ? tracker.State(pose) : pose,
+                         std::move(features)};
   }));
   std::printf("%d images, %.0f features an image\n", num_images,
               static_cast<double>(num_keypoints) / num_images);
@@ -131,6 +165,10 @@ Status WriteSyntheticBuilding(const std::string& folder, int num_images, int num
 }  // namespace cairn
 
 int main(int argc, char** argv) {
-  return cairn::WriteSurveyOfArguments(argc, argv, "synthetic_building FOLDER NUM_IMAGES MAX_NUM_FEATURES",
-                                       cairn::WriteSyntheticBuilding);
+  const double drift_cm = argc == 5 ? std::atof(argv[4]) : 0;
+  return cairn::WriteSurveyOfArguments(
+      argc == 5 ? 4 : argc, argv, "synthetic_building FOLDER NUM_IMAGES MAX_NUM_FEATURES [DRIFT_CM]",
+      [drift_cm](const std::string& folder, int num_images, int num_features) {
+        return cairn::WriteSyntheticBuilding(folder, num_images, num_features, drift_cm);
+      });
 }

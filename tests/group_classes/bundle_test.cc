@@ -4,20 +4,11 @@
 #include <Eigen/Dense>
 
 #include "core/base/random.h"
-#include "stages/group_classes/adjust/camera_models.h"
 #include "stages/group_classes/adjust/evidence.h"
+#include "tests/group_classes/circle.h"
 
 namespace cairn::group_classes {
 namespace {
-
-Camera Lens() {
-  Camera camera;
-  camera.model = CameraModel::kOpenCv;
-  camera.width = 640;
-  camera.height = 480;
-  camera.params = {500, 510, 322, 238, -0.1, 0.03, 0.002, -0.001};
-  return camera;
-}
 
 std::vector<int> AllParams(const Camera& camera) {
   std::vector<int> params;
@@ -44,57 +35,6 @@ TEST(CameraSensitivity, ResidualsFollowAChangedCamera) {
     // What the growth is there for: a longer focal length stretches residuals.
     EXPECT_NEAR(sensitivity.growth[0](0, 0), 1.0 / 500, 3e-4);
   }
-}
-
-// 12 cameras in a circle that look at points in its middle.
-struct Circle {
-  std::vector<Pose> poses;
-  std::vector<Eigen::Vector3d> points;
-  BundleProblem problem;
-};
-
-Circle MakeCircle(const Camera& seen_by, const Camera& stated, double noise_px, std::vector<int> free) {
-  Circle circle;
-  Random random(4);
-  for (int j = 0; j < 150; ++j)
-    circle.points.emplace_back(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
-  BundleProblem& problem = circle.problem;
-  problem.points = circle.points;
-  problem.is_offset_free = false;
-  problem.noise = {1e-5, 1e-4, 1e-5, 1e-4};
-  for (int i = 0; i < 12; ++i) {
-    Pose pose;
-    pose.rotation = Eigen::AngleAxisd(-0.5 * i, Eigen::Vector3d::UnitY());
-    pose.translation = {0, 0, 2.2 + 0.5 * (i % 3)};  // distances differ: they tell the focal length
-    circle.poses.push_back(pose);
-    BundleProblem::Image image;
-    image.stated = image.cam_from_world = image.drifted = pose;
-    image.way_m = 1.5;
-    problem.images.push_back(image);
-  }
-  CameraBlock block;
-  block.free = free;
-  block.prior.assign(free.size(), 0);
-  block.delta.assign(free.size(), 0);
-  for (const int p : free) block.sigma.push_back(p < 4 ? 50 : 0.5);
-  problem.cameras = {block};
-  for (int j = 0; j < 150; ++j) {
-    for (int i = 0; i < 12; ++i) {
-      const auto pixel = ImageFromCamera(seen_by, circle.poses[i] * circle.points[j]);
-      if (!pixel) continue;
-      BundleProblem::Observation o;
-      o.image_idx = i;
-      o.point_idx = j;
-      o.pixel = *pixel + Eigen::Vector2d(random.Normal(0, noise_px), random.Normal(0, noise_px));
-      const auto ray = MakePixelRay(stated, o.pixel);
-      if (!ray) continue;
-      o.ray = *ray;
-      o.camera = SensitivityOf(stated, o.pixel, free);
-      o.sigma_px = noise_px;
-      problem.observations.push_back(o);
-    }
-  }
-  return circle;
 }
 
 // The estimate is as far off as its standard deviation says, at any noise: without the growth of residuals
@@ -176,52 +116,6 @@ TEST(ReducedSystem, TracesAndCovariancesAreThoseOfTheWholeSystem) {
   const Eigen::MatrixXd rows = dense.topRows(4);
   EXPECT_NEAR(system.Trace({0, 1, 2, 3}), (rows * covariance * rows.transpose()).trace(), 0.25);
   EXPECT_NEAR(system.Trace({2}), (rows.row(2) * covariance * rows.row(2).transpose())(0, 0), 1e-6);
-}
-
-TEST(CameraVariants, GrowFromAsStatedAndKeepIt) {
-  for (const CameraModel model :
-       {CameraModel::kSimplePinhole, CameraModel::kPinhole, CameraModel::kSimpleRadial, CameraModel::kRadial,
-        CameraModel::kOpenCv, CameraModel::kOpenCvFisheye, CameraModel::kFullOpenCv, CameraModel::kFov,
-        CameraModel::kSimpleRadialFisheye, CameraModel::kRadialFisheye, CameraModel::kThinPrismFisheye}) {
-    Camera stated;
-    stated.model = model;
-    stated.width = 640;
-    stated.height = 480;
-    stated.params.assign(NumCameraParams(model), 0.01);
-    for (int i = 0; i < NumFocals(model); ++i) stated.params[i] = 500;
-    stated.params[NumFocals(model)] = 322;
-    stated.params[NumFocals(model) + 1] = 238;
-    const std::vector<CameraVariant> variants = CameraVariants(stated, {});
-    ASSERT_GE(variants.size(), 2u) << CameraModelName(model);
-    EXPECT_TRUE(variants[0].free.empty());
-    for (const CameraVariant& variant : variants) {
-      ASSERT_TRUE(CheckCamera(variant.camera).ok()) << CameraModelName(model) << " " << variant.name;
-      EXPECT_EQ(variant.free.size(), variant.sigma.size());
-      EXPECT_TRUE(std::is_sorted(variant.free.begin(), variant.free.end()));
-      // The same lens in the wider model.
-      const Eigen::Vector3d point(0.3, -0.4, 1);
-      EXPECT_LT((*ImageFromCamera(variant.camera, point) - *ImageFromCamera(stated, point)).norm(), 1e-9)
-          << CameraModelName(model) << " " << variant.name;
-    }
-  }
-  Camera panorama;
-  panorama.model = CameraModel::kEquirectangular;
-  EXPECT_EQ(CameraVariants(panorama, {}).size(), 1u);
-}
-
-TEST(CameraVariants, ACalibratedCameraIsTrustedMore) {
-  Camera pinhole = Lens(), guessed = GuessCamera(1, 640, 480);
-  pinhole.model = CameraModel::kPinhole;
-  pinhole.params.resize(4);
-  const auto focal_sigma = [](const Camera& camera) {
-    for (const CameraVariant& variant : CameraVariants(camera, {})) {
-      if (variant.name == "f") return variant.sigma[0] / camera.FocalX();
-    }
-    return 0.0;
-  };
-  EXPECT_NEAR(focal_sigma(pinhole), 0.03, 1e-9);
-  EXPECT_NEAR(focal_sigma(Lens()), 0.003, 1e-9);
-  EXPECT_NEAR(focal_sigma(guessed), 0.3, 1e-9);
 }
 
 }  // namespace
