@@ -7,7 +7,7 @@
 
 #include "core/files/database.h"
 #include "stages/group_classes/make_classes.h"
-#include "stages/group_classes/tracks/union_matches.h"
+#include "core/structure/union_matches.h"
 
 namespace cairn::group_classes {
 namespace {

@@ -14,7 +14,7 @@
 #include "stages/group_classes/adjust/adjust_survey.h"
 #include "stages/group_classes/find_ambiguous.h"
 #include "stages/group_classes/tracks/posed_images.h"
-#include "stages/group_classes/tracks/triangulate.h"
+#include "core/structure/triangulate.h"
 
 namespace cairn::group_classes {
 

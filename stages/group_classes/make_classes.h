@@ -5,8 +5,8 @@
 #include "core/world/dropped_items.h"
 #include "core/world/feature_class.h"
 #include "stages/group_classes/group_classes.h"
-#include "stages/group_classes/tracks/triangulate.h"
-#include "stages/group_classes/tracks/union_matches.h"
+#include "core/structure/triangulate.h"
+#include "core/structure/union_matches.h"
 
 namespace cairn::group_classes {
 

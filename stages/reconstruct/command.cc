@@ -102,12 +102,12 @@ std::string ResultText(const ReconstructResult& result) {
 // Reconstructs in `folder` and leaves only the result there.
 Result<ReconstructResult> ReconstructInto(const Arguments& arguments, const Capture& capture,
                                           const MapperInput& input, const std::string& folder,
-                                          Progress& progress) {
+                                          int num_threads, Progress& progress) {
   const std::string work = folder + "/work";
   std::error_code error;
   if (!fs::create_directory(work, error)) return WriteError(work, "cannot be created", error.value());
   CAIRN_ASSIGN_OR_RETURN(ReconstructResult result,
-                         Reconstruct(input, capture, arguments.options, work, progress));
+                         Reconstruct(input, capture, arguments.options, work, num_threads, progress));
   fs::remove_all(work, error);
   CAIRN_RETURN_IF_ERROR(WritePosesFolder(result, capture, folder));
   return result;
@@ -123,8 +123,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   ReconstructResult result;
   CAIRN_RETURN_IF_ERROR(ReplaceFolderAtomically(
       arguments.output, "a folder of poses", [&](const std::string& folder) -> Status {
-        CAIRN_ASSIGN_OR_RETURN(result,
-                               ReconstructInto(arguments, capture, input, folder, *environment.progress));
+        CAIRN_ASSIGN_OR_RETURN(result, ReconstructInto(arguments, capture, input, folder,
+                                                       environment.num_threads, *environment.progress));
         return Ok();
       }));
   for (const std::string& warning : result.warnings) spdlog::warn("{}", warning);

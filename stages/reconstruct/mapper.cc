@@ -139,48 +139,6 @@ Result<std::vector<ColmapModel>> ReadModels(const std::string& folder) {
 
 }  // namespace
 
-Result<MapperInput> ReadMapperInput(const std::string& matches_path) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
-  return WithDatabaseErrors(matches_path, [&]() -> Result<MapperInput> {
-    MapperInput input;
-    CAIRN_ASSIGN_OR_RETURN(input.cameras, ReadDatabaseCameras(database));
-    CAIRN_ASSIGN_OR_RETURN(input.images, ReadDatabaseImages(database));
-    std::map<ImageId, size_t> num_keypoints;
-    for (const DatabaseImage& image : input.images) {
-      if (input.cameras.count(image.camera_id) == 0) {
-        return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the database does not list",
-                         matches_path, image.name, image.camera_id);
-      }
-      CAIRN_ASSIGN_OR_RETURN(auto keypoints, ReadDatabaseKeypoints(database, image.image_id));
-      num_keypoints[image.image_id] = keypoints.size();
-      input.keypoints.push_back(std::move(keypoints));
-    }
-    CAIRN_ASSIGN_OR_RETURN(input.geometries, ReadDatabaseTwoViewGeometries(database, kMinNumMatches));
-    for (const TwoViewGeometry& geometry : input.geometries) {
-      const auto image1 = num_keypoints.find(geometry.image_id1),
-                 image2 = num_keypoints.find(geometry.image_id2);
-      const bool are_listed = image1 != num_keypoints.end() && image2 != num_keypoints.end();
-      const bool is_valid =
-          are_listed && std::all_of(geometry.inliers.begin(), geometry.inliers.end(), [&](const Match& m) {
-            return m.idx1 < image1->second && m.idx2 < image2->second;
-          });
-      if (!is_valid) {
-        return MakeError(ErrorCode::kCorrupt,
-                         "{}: the pair of images {} and {} names an image or a keypoint that the database "
-                         "lacks; match the features again",
-                         matches_path, geometry.image_id1, geometry.image_id2);
-      }
-    }
-    if (input.geometries.empty()) {
-      return MakeError(ErrorCode::kNoData,
-                       "{}: no pair of images has the {} verified matches that a reconstruction needs; do "
-                       "the images show the same place?",
-                       matches_path, kMinNumMatches);
-    }
-    return input;
-  });
-}
-
 Result<std::vector<ColmapModel>> RunMapper(const MapperInput& input, const std::string& images_folder,
                                            const MapperOptions& options, const std::string& work_folder,
                                            Progress& progress) {

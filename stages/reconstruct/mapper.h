@@ -5,14 +5,16 @@
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
-#include "core/colmap/colmap_database.h"
 #include "core/colmap/colmap_model.h"
+#include "stages/reconstruct/globally/mapper_input.h"
 
 namespace cairn::reconstruct {
 
 // How COLMAP's incremental mapper is run [Schönberger, Frahm: Structure-from-Motion Revisited, CVPR 2016].
 struct MapperOptions {
-  // Time limit after which it is ended, hours.  REQUIRES: > 0
+  // "global": all images at once (globally/map_globally.h); "colmap": COLMAP's, image by image.
+  std::string mapper = "colmap";
+  // Time limit after which COLMAP's is ended, hours.  REQUIRES: > 0
   double max_hours = 12;
   // Whether it refines the cameras' parameters, which come from EXIF or a guess.  Distortion: one radial
   // parameter for cameras that are given without any.
@@ -26,20 +28,6 @@ struct MapperOptions {
   // of images, but no two runs give the same result.
   bool deterministic = true;
 };
-
-// What the mapper reads of matches.db: no descriptors.
-struct MapperInput {
-  std::map<CameraId, Camera> cameras;
-  std::vector<DatabaseImage> images;             // ascending image_id
-  std::vector<std::vector<Keypoint>> keypoints;  // per image
-  std::vector<TwoViewGeometry> geometries;       // pairs with at least kMinNumMatches inliers
-};
-
-// Fewest verified matches of a pair that the mapper uses (its own default).
-inline constexpr int kMinNumMatches = 15;
-
-// Errors: those of the database's readers; NoData without a verified pair.
-Result<MapperInput> ReadMapperInput(const std::string& matches_path);
 
 // Runs `colmap mapper` on a database of its own in `work_folder` (an existing folder; the caller removes what
 // it leaves there): older versions cannot read every database that we can, and the mapper writes to the one

@@ -7,6 +7,7 @@
 
 #include "core/files/write_error.h"
 #include "stages/reconstruct/align.h"
+#include "stages/reconstruct/globally/map_globally.h"
 #include "stages/reconstruct/known_places.h"
 
 namespace cairn::reconstruct {
@@ -174,7 +175,13 @@ std::vector<MapperAttempt> Attempts(const MapperOptions& options) {
 // The models of the attempt that registers most images.
 Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
                                            const ReconstructOptions& options, const std::string& work_folder,
-                                           Progress& progress, ReconstructResult* result) {
+                                           int num_threads, Progress& progress, ReconstructResult* result) {
+  if (options.mapper.mapper == "global") {
+    return MapGlobally(input,
+                       {.refine_focal_length = options.mapper.refine_focal_length,
+                        .refine_distortion = options.mapper.refine_distortion},
+                       num_threads, progress);
+  }
   const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
   Result<std::vector<ColmapModel>> best = MakeError(ErrorCode::kNoData, "");
   std::string counts;
@@ -305,6 +312,10 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
 
 OptionTable DescribeOptions(ReconstructOptions* o) {
   OptionTable table = {
+      {.name = "mapper",
+       .value = &o->mapper.mapper,
+       .help = "global: poses of all images at once; colmap: image by image, by COLMAP's mapper",
+       .choices = {"global", "colmap"}},
       {.name = "max_hours",
        .value = &o->mapper.max_hours,
        .help = "time limit of COLMAP's mapper, hours",
@@ -376,11 +387,11 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
 
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
                                       const ReconstructOptions& options, const std::string& work_folder,
-                                      Progress& progress) {
+                                      int num_threads, Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
   ReconstructResult result;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ColmapModel> models,
-                         MapImages(input, capture, options, work_folder, progress, &result));
+                         MapImages(input, capture, options, work_folder, num_threads, progress, &result));
   const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;
   for (const ColmapModel& m : models) result.model_sizes.push_back(static_cast<int>(m.images.size()));

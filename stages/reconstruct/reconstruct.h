@@ -73,6 +73,6 @@ struct ReconstructResult {
 // those of RunMapper and of the files.
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
                                       const ReconstructOptions& options, const std::string& work_folder,
-                                      Progress& progress);
+                                      int num_threads, Progress& progress);
 
 }  // namespace cairn::reconstruct

@@ -33,7 +33,7 @@ class ReconstructTest : public testing::Test {
     fs::remove_all(work);
     fs::create_directories(work);
     NoProgress progress;
-    return Reconstruct(survey.input, survey.capture, options, work, progress);
+    return Reconstruct(survey.input, survey.capture, options, work, 2, progress);
   }
   void Write(const std::string& name, const std::string& text) {
     ASSERT_TRUE(WriteFileAtomically(root_ + "/" + name, text).ok());

@@ -15,14 +15,14 @@ import sys
 
 # What a room is for stands in its CMakeLists.txt.
 ORDER = """
-core/base core/files core/options core/geometry core/picture core/features core/camera core/vocabulary core/colmap
+core/base core/files core/options core/geometry core/picture core/features core/camera core/vocabulary core/colmap core/structure
 core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/line
 runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/c_api
 sim/render sim/survey sim/robot sim/worlds
 stages/simulate
 stages/extract_features
 stages/match_features/pairs stages/match_features
-stages/reconstruct
+stages/reconstruct/globally stages/reconstruct
 stages/group_classes/tracks stages/group_classes/adjust stages/group_classes
 stages/filter_visibility
 stages/decompose_regions/cover stages/decompose_regions/algorithms stages/decompose_regions

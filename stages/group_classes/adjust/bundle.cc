@@ -1,102 +1,19 @@
 #include "stages/group_classes/adjust/bundle.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include <ceres/ceres.h>
 #include <Eigen/LU>
 #include <Eigen/Sparse>
 
-#include "core/geometry/vector_geometry.h"
+#include "core/structure/bundle_blocks.h"
 #include "stages/group_classes/adjust/evidence.h"
-
-// Of OpenMP's runtime, which CHOLMOD brings along; <omp.h> comes with one compiler only.
-extern "C" void omp_set_max_active_levels(int max_levels);
 
 namespace cairn::group_classes {
 namespace {
-
-constexpr size_t kPoseSize = 7;  // quaternion x, y, z, w; translation
-using PoseManifold = ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
-
-void StorePose(const Pose& pose, double* block) {
-  Eigen::Map<Eigen::Vector4d> rotation(block);
-  Eigen::Map<Eigen::Vector3d> translation(block + 4);
-  rotation = pose.rotation.coeffs();
-  translation = pose.translation;
-}
-
-Pose LoadPose(const double* block) {
-  return {Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(block)).normalized(),
-          Eigen::Map<const Eigen::Vector3d>(block + 4)};
-}
-
-// Reprojection of a point, in units of the keypoint's standard deviation, with analytic derivatives.
-class ReprojectionCost : public ceres::CostFunction {
- public:
-  ReprojectionCost(const BundleProblem::Observation& observation, const CameraBlock& camera)
-      : ray_(observation.ray), camera_(observation.camera), weight_(1 / observation.sigma_px) {
-    set_num_residuals(2);
-    *mutable_parameter_block_sizes() = {7, 3};
-    if (!camera.free.empty())
-      mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.free.size()));
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const Eigen::Map<const Eigen::Quaterniond> q(parameters[0]);
-    const Eigen::Map<const Eigen::Vector3d> translation(parameters[0] + 4), point(parameters[1]);
-    const Eigen::Matrix3d rotation = q.toRotationMatrix();
-    const Eigen::Vector3d x = rotation * point + translation;
-    const double depth = ray_.normal.dot(x);
-    if (!(std::abs(depth) > 1e-12)) return false;
-    Eigen::Map<Eigen::Vector2d> residual(residuals);
-    residual = weight_ / depth * (ray_.pixel_from_plane * x);
-    Eigen::Matrix<double, 2, 3> from_x;
-    from_x = (weight_ * ray_.pixel_from_plane - residual * ray_.normal.transpose()) / depth;
-    const size_t num_free = camera_.by_param.size();
-    const Eigen::Vector2d before = residual;
-    Eigen::Matrix2d growth = Eigen::Matrix2d::Identity();
-    for (size_t p = 0; p < num_free; ++p) {
-      residual += parameters[2][p] * (weight_ * camera_.by_param[p] + camera_.growth[p] * before);
-      growth += parameters[2][p] * camera_.growth[p];
-    }
-    from_x = (growth * from_x).eval();
-    if (jacobians == nullptr) return true;
-    if (jacobians[0] != nullptr) {
-      // x = p + 2 w (v x p) + 2 v x (v x p) + t of a unit quaternion (v, w).
-      const Eigen::Vector3d v = q.vec();
-      Eigen::Matrix<double, 3, 7> x_from_pose;
-      x_from_pose.leftCols<3>() =
-          -2 * q.w() * CrossMatrix(point) + 2 * (v.dot(point) * Eigen::Matrix3d::Identity() +
-                                                 v * point.transpose() - 2 * point * v.transpose());
-      x_from_pose.col(3) = 2 * v.cross(point);
-      x_from_pose.rightCols<3>().setIdentity();
-      Eigen::Map<Eigen::Matrix<double, 2, 7, Eigen::RowMajor>> out(jacobians[0]);
-      out = from_x * x_from_pose;
-    }
-    if (jacobians[1] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> out(jacobians[1]);
-      out = from_x * rotation;
-    }
-    if (num_free > 0 && jacobians[2] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> out(
-          jacobians[2], 2, static_cast<Eigen::Index>(num_free));
-      for (size_t p = 0; p < num_free; ++p) {
-        out.col(static_cast<Eigen::Index>(p)) = weight_ * camera_.by_param[p] + camera_.growth[p] * before;
-      }
-    }
-    return true;
-  }
-
- private:
-  const PixelRay& ray_;
-  const CameraSensitivity& camera_;
-  double weight_;
-};
 
 template <typename T>
 struct PoseView {
@@ -211,18 +128,10 @@ class CeresBundle {
 
   bool Solve() {
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::SPARSE_SCHUR;
-    options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
     options.linear_solver_ordering = ordering_;
-    options.num_threads = 1;
     options.max_num_iterations = options_.max_num_iterations;
     options.function_tolerance = options_.function_tolerance;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    // CHOLMOD would start four threads for each thread that solves: slower here, and not what --memory
-    // counts.
-    omp_set_max_active_levels(0);
-    ceres::Solve(options, &problem_, &summary);
+    const ceres::Solver::Summary summary = SolveOnOneThread(options, &problem_);
     for (size_t i = 0; i < num_images_; ++i) {
       bundle_.images[i].cam_from_world = LoadPose(CamFromWorld(i));
       bundle_.images[i].drifted = LoadPose(Drifted(i));
@@ -306,13 +215,13 @@ class CeresBundle {
     return options;
   }
 
-  double* CamFromWorld(size_t image) { return &values_[kPoseSize * image]; }
-  double* Drifted(size_t image) { return &values_[kPoseSize * (num_images_ + image)]; }
-  double* Offset() { return &values_[kPoseSize * 2 * num_images_]; }
+  double* CamFromWorld(size_t image) { return &values_[size_t{kPoseBlockSize} * image]; }
+  double* Drifted(size_t image) { return &values_[size_t{kPoseBlockSize} * (num_images_ + image)]; }
+  double* Offset() { return &values_[size_t{kPoseBlockSize} * 2 * num_images_]; }
   double* Delta(size_t camera) { return &values_[first_delta_[camera]]; }
 
   void AddParameters() {
-    first_delta_.push_back(kPoseSize * (2 * num_images_ + 1));
+    first_delta_.push_back(size_t{kPoseBlockSize} * (2 * num_images_ + 1));
     for (const CameraBlock& camera : bundle_.cameras)
       first_delta_.push_back(first_delta_.back() + camera.free.size());
     values_.resize(first_delta_.back() + 1);
@@ -322,7 +231,7 @@ class CeresBundle {
     }
     const auto add_pose = [&](const Pose& pose, double* block) {
       StorePose(pose, block);
-      problem_.AddParameterBlock(block, kPoseSize, &manifold_);
+      problem_.AddParameterBlock(block, kPoseBlockSize, &manifold_);
       ordering_->AddElementToGroup(block, 1);
     };
     for (size_t i = 0; i < num_images_; ++i) {
@@ -350,8 +259,9 @@ class CeresBundle {
     std::vector<double*> blocks = {CamFromWorld(observation.image_idx),
                                    bundle_.points[observation.point_idx].data()};
     if (!camera.free.empty()) blocks.push_back(Delta(camera_idx));
-    other_blocks_.push_back(problem_.AddResidualBlock(new ReprojectionCost(observation, camera),
-                                                      losses_[observation.image_idx].get(), blocks));
+    other_blocks_.push_back(problem_.AddResidualBlock(
+        new ReprojectionCost(observation.ray, observation.camera, observation.sigma_px),
+        losses_[observation.image_idx].get(), blocks));
   }
 
   void AddStatedPose(size_t i) {
@@ -389,38 +299,6 @@ class CeresBundle {
 };
 
 }  // namespace
-
-CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,
-                                const std::vector<int>& params) {
-  constexpr double kStepPx = 1;
-  // The pixel and its neighbours: right, left, lower, upper.
-  const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(kStepPx, 0),
-                                                  Eigen::Vector2d(-kStepPx, 0), Eigen::Vector2d(0, kStepPx),
-                                                  Eigen::Vector2d(0, -kStepPx)};
-  CameraSensitivity sensitivity;
-  sensitivity.by_param.assign(params.size(), Eigen::Vector2d::Zero());
-  sensitivity.growth.assign(params.size(), Eigen::Matrix2d::Zero());
-  std::array<std::optional<Eigen::Vector3d>, 5> bearings;
-  for (size_t i = 0; i < offsets.size(); ++i) {
-    bearings[i] = BearingFromImage(camera, pixel + offsets[i]);
-    if (!bearings[i]) return sensitivity;
-  }
-  for (size_t p = 0; p < params.size(); ++p) {
-    const double step = 1e-6 * std::max(1.0, std::abs(camera.params[params[p]]));
-    Camera less = camera, more = camera;
-    less.params[params[p]] -= step;
-    more.params[params[p]] += step;
-    std::array<Eigen::Vector2d, 5> derivatives;
-    for (size_t i = 0; i < bearings.size(); ++i) {
-      const auto a = ImageFromCamera(less, *bearings[i]), b = ImageFromCamera(more, *bearings[i]);
-      derivatives[i] = a && b ? Eigen::Vector2d((*b - *a) / (2 * step)) : Eigen::Vector2d::Zero().eval();
-    }
-    sensitivity.by_param[p] = derivatives[0];
-    sensitivity.growth[p].col(0) = (derivatives[1] - derivatives[2]) / (2 * kStepPx);
-    sensitivity.growth[p].col(1) = (derivatives[3] - derivatives[4]) / (2 * kStepPx);
-  }
-  return sensitivity;
-}
 
 Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Observation& observation) {
   const BundleProblem::Image& image = problem.images[observation.image_idx];

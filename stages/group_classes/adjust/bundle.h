@@ -7,6 +7,7 @@
 #include "core/camera/camera.h"
 #include "core/camera/pixel_ray.h"
 #include "core/geometry/pose.h"
+#include "core/structure/camera_sensitivity.h"
 
 namespace cairn::group_classes {
 
@@ -26,15 +27,6 @@ struct CameraBlock {
   // Where the first two free ones are fx and fy: what delta[0] - delta[1] is expected to be, and its standard
   // deviation; 0: nothing is known of it.
   double difference_prior = 0, difference_sigma = 0;
-};
-
-// How a pixel moves with parameters of its camera.  A residual r of the camera before the change d becomes
-//   r + sum_p d_p (by_param_p + growth_p r)
-// The growth must not be left out: without it residuals seem to shrink as the focal length grows, and every
-// focal length is found too long.
-struct CameraSensitivity {
-  std::vector<Eigen::Vector2d> by_param;  // d pixel / d parameter, along the pixel's ray
-  std::vector<Eigen::Matrix2d> growth;    // d by_param / d pixel
 };
 
 // Bundle adjustment with contiguous indices; refined in place.
@@ -88,10 +80,6 @@ struct BundleOptions {
   // It has converged when a step lowers the cost by less than this part.  REQUIRES: > 0
   double function_tolerance = 1e-4;
 };
-
-// Of parameters by their indices, by differences; zero where the model does not see the pixel's neighbours.
-CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,
-                                const std::vector<int>& params);
 
 // Reprojection error of an observation, px.
 Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Observation& observation);

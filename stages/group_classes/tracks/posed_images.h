@@ -8,8 +8,8 @@
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_database.h"
 #include "core/features/features.h"
-#include "stages/group_classes/tracks/triangulate.h"
-#include "stages/group_classes/tracks/union_matches.h"
+#include "core/structure/triangulate.h"
+#include "core/structure/union_matches.h"
 
 namespace cairn::group_classes {
 

@@ -1,10 +1,10 @@
-#include "stages/group_classes/tracks/union_matches.h"
+#include "core/structure/union_matches.h"
 
 #include <algorithm>
 #include <numeric>
 #include <tuple>
 
-namespace cairn::group_classes {
+namespace cairn {
 namespace {
 
 // Union-find whose sets store the images of their keypoints.
@@ -86,4 +86,4 @@ std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vect
   return sets.Tracks();
 }
 
-}  // namespace cairn::group_classes
+}  // namespace cairn

@@ -1,9 +1,9 @@
-#include "stages/group_classes/tracks/union_matches.h"
+#include "core/structure/union_matches.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace cairn::group_classes {
+namespace cairn {
 namespace {
 
 using testing::ElementsAre;
@@ -51,4 +51,4 @@ TEST(UnionMatches, NoMatchesNoTracks) {
 }
 
 }  // namespace
-}  // namespace cairn::group_classes
+}  // namespace cairn

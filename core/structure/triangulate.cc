@@ -1,4 +1,4 @@
-#include "stages/group_classes/tracks/triangulate.h"
+#include "core/structure/triangulate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <Eigen/Dense>
 
-namespace cairn::group_classes {
+namespace cairn {
 namespace {
 
 constexpr int kMaxHypotheses = 15;
@@ -135,4 +135,4 @@ Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOp
   return result;
 }
 
-}  // namespace cairn::group_classes
+}  // namespace cairn

@@ -7,7 +7,7 @@
 #include "core/camera/pixel_ray.h"
 #include "core/geometry/pose.h"
 
-namespace cairn::group_classes {
+namespace cairn {
 
 // A ray to a scene point, from a posed camera of any model.
 struct PosedRay {
@@ -39,4 +39,4 @@ struct Triangulation {
 // reprojection error of its rays.  No randomness.  O(pairs * rays), at most 15 pairs.
 Triangulation Triangulate(const std::vector<PosedRay>& rays, const TriangulateOptions& options);
 
-}  // namespace cairn::group_classes
+}  // namespace cairn

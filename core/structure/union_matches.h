@@ -7,7 +7,7 @@
 #include "core/colmap/colmap_database.h"
 #include "core/features/features.h"
 
-namespace cairn::group_classes {
+namespace cairn {
 
 // A keypoint of an image, by contiguous image index.
 struct TrackElement {
@@ -32,4 +32,4 @@ struct ScoredMatch {
 std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
                                 int64_t* num_conflicts);
 
-}  // namespace cairn::group_classes
+}  // namespace cairn

@@ -1,11 +1,11 @@
-#include "stages/group_classes/tracks/triangulate.h"
+#include "core/structure/triangulate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
 
-namespace cairn::group_classes {
+namespace cairn {
 namespace {
 
 // Of a pinhole camera with f = 500 px.
@@ -118,4 +118,4 @@ TEST(Triangulate, CovarianceIsTheSpreadOfManyTrials) {
 }
 
 }  // namespace
-}  // namespace cairn::group_classes
+}  // namespace cairn

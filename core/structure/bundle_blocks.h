@@ -1,0 +1,38 @@
+#pragma once
+
+#include <ceres/ceres.h>
+#include <Eigen/Core>
+
+#include "core/camera/pixel_ray.h"
+#include "core/geometry/pose.h"
+#include "core/structure/camera_sensitivity.h"
+
+namespace cairn {
+
+// What bundle adjustments in Ceres consist of.
+
+// A pose as a parameter block: quaternion x, y, z, w; translation.
+inline constexpr int kPoseBlockSize = 7;
+using PoseManifold = ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
+void StorePose(const Pose& pose, double* block);
+Pose LoadPose(const double* block);
+
+// Reprojection of a point, in units of the keypoint's standard deviation, with analytic derivatives.  Blocks:
+// pose, point, and the changes of the camera's parameters where the sensitivity has any.
+class ReprojectionCost : public ceres::CostFunction {
+ public:
+  // Refers to its arguments.
+  ReprojectionCost(const PixelRay& ray, const CameraSensitivity& camera, double sigma_px);
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  const PixelRay& ray_;
+  const CameraSensitivity& camera_;
+  double weight_;
+};
+
+// Sparse Schur on one thread: bit-stable.  Sets what the options say of solver and threads.
+ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem);
+
+}  // namespace cairn

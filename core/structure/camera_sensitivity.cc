@@ -1,0 +1,42 @@
+#include "core/structure/camera_sensitivity.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace cairn {
+
+CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,
+                                const std::vector<int>& params) {
+  constexpr double kStepPx = 1;
+  // The pixel and its neighbours: right, left, lower, upper.
+  const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(kStepPx, 0),
+                                                  Eigen::Vector2d(-kStepPx, 0), Eigen::Vector2d(0, kStepPx),
+                                                  Eigen::Vector2d(0, -kStepPx)};
+  CameraSensitivity sensitivity;
+  sensitivity.by_param.assign(params.size(), Eigen::Vector2d::Zero());
+  sensitivity.growth.assign(params.size(), Eigen::Matrix2d::Zero());
+  std::array<std::optional<Eigen::Vector3d>, 5> bearings;
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    bearings[i] = BearingFromImage(camera, pixel + offsets[i]);
+    if (!bearings[i]) return sensitivity;
+  }
+  for (size_t p = 0; p < params.size(); ++p) {
+    const double step = 1e-6 * std::max(1.0, std::abs(camera.params[params[p]]));
+    Camera less = camera, more = camera;
+    less.params[params[p]] -= step;
+    more.params[params[p]] += step;
+    std::array<Eigen::Vector2d, 5> derivatives;
+    for (size_t i = 0; i < bearings.size(); ++i) {
+      const auto a = ImageFromCamera(less, *bearings[i]), b = ImageFromCamera(more, *bearings[i]);
+      derivatives[i] = a && b ? Eigen::Vector2d((*b - *a) / (2 * step)) : Eigen::Vector2d::Zero().eval();
+    }
+    sensitivity.by_param[p] = derivatives[0];
+    sensitivity.growth[p].col(0) = (derivatives[1] - derivatives[2]) / (2 * kStepPx);
+    sensitivity.growth[p].col(1) = (derivatives[3] - derivatives[4]) / (2 * kStepPx);
+  }
+  return sensitivity;
+}
+
+}  // namespace cairn

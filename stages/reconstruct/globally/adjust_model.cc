@@ -1,0 +1,134 @@
+#include "stages/reconstruct/globally/adjust_model.h"
+
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "core/camera/pixel_ray.h"
+#include "core/structure/bundle_blocks.h"
+#include "core/structure/camera_sensitivity.h"
+
+namespace cairn::reconstruct {
+namespace {
+
+// Sensitivities hold for so large a change, in standard deviations of what is likely.
+constexpr double kMaxChangeSigmas = 0.5;
+
+// Changes of a camera, about what is stated.
+class CameraPriorCost : public ceres::CostFunction {
+ public:
+  explicit CameraPriorCost(const FreeCamera& camera) : camera_(camera) {
+    set_num_residuals(static_cast<int>(camera.free.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.free.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const size_t n = camera_.free.size();
+    for (size_t i = 0; i < n; ++i) {
+      const int p = camera_.free[i];
+      residuals[i] =
+          (camera_.camera.params[p] + parameters[0][i] - camera_.stated.params[p]) / camera_.sigma[i];
+    }
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t k = 0; k < n; ++k) jacobians[0][i * n + k] = i == k ? 1 / camera_.sigma[i] : 0;
+    }
+    return true;
+  }
+
+ private:
+  const FreeCamera& camera_;
+};
+
+struct Seen {
+  PixelRay ray;
+  CameraSensitivity sensitivity;
+};
+
+}  // namespace
+
+void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
+  // Poses, then changes of cameras, in one piece: Ceres orders blocks by their addresses, and another order
+  // is another rounding.
+  size_t num_values = kPoseBlockSize * problem->cam_from_world.size();
+  std::vector<size_t> first_change;
+  for (const FreeCamera& camera : problem->cameras) {
+    first_change.push_back(num_values);
+    num_values += camera.free.size();
+  }
+  std::vector<double> values(num_values, 0);
+  const auto pose_of = [&](size_t image) { return &values[kPoseBlockSize * image]; };
+  for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
+    StorePose(problem->cam_from_world[i], pose_of(i));
+
+  std::vector<Seen> seen(problem->observations.size());
+  PoseManifold manifold;
+  ceres::CauchyLoss loss(options.loss_scale);
+  ceres::Problem::Options problem_options;
+  problem_options.disable_all_safety_checks = true;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem ceres_problem(problem_options);
+  std::vector<bool> is_camera_used(problem->cameras.size(), false);
+  const std::vector<int> none;
+  for (size_t k = 0; k < problem->observations.size(); ++k) {
+    const ModelObservation& observation = problem->observations[k];
+    const int c = problem->camera_idx[observation.image];
+    const FreeCamera& camera = problem->cameras[c];
+    const std::optional<PixelRay> ray = MakePixelRay(camera.camera, observation.pixel);
+    if (!ray) continue;
+    seen[k] = {*ray,
+               SensitivityOf(camera.camera, observation.pixel, options.adjust_cameras ? camera.free : none)};
+    std::vector<double*> blocks = {pose_of(observation.image), problem->points[observation.point].data()};
+    if (!seen[k].sensitivity.by_param.empty()) {
+      blocks.push_back(&values[first_change[c]]);
+      is_camera_used[c] = true;
+    }
+    ceres_problem.AddResidualBlock(
+        new ReprojectionCost(seen[k].ray, seen[k].sensitivity, observation.sigma_px), &loss, blocks);
+  }
+  const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (Eigen::Vector3d& point : problem->points) {
+    if (ceres_problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
+  }
+  bool is_frame_held = false;
+  for (size_t i = 0; i < problem->cam_from_world.size(); ++i) {
+    if (!ceres_problem.HasParameterBlock(pose_of(i))) continue;
+    ceres_problem.SetManifold(pose_of(i), &manifold);
+    ordering->AddElementToGroup(pose_of(i), 1);
+    if (!is_frame_held) ceres_problem.SetParameterBlockConstant(pose_of(i));
+    is_frame_held = true;
+  }
+  for (size_t c = 0; c < problem->cameras.size(); ++c) {
+    if (!is_camera_used[c]) continue;
+    ceres_problem.AddResidualBlock(new CameraPriorCost(problem->cameras[c]), nullptr,
+                                   &values[first_change[c]]);
+    ordering->AddElementToGroup(&values[first_change[c]], 1);
+    for (size_t k = 0; k < problem->cameras[c].free.size(); ++k) {
+      const double most = kMaxChangeSigmas * problem->cameras[c].sigma[k];
+      ceres_problem.SetParameterLowerBound(&values[first_change[c]], static_cast<int>(k), -most);
+      ceres_problem.SetParameterUpperBound(&values[first_change[c]], static_cast<int>(k), most);
+    }
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_ordering = ordering;
+  solver.max_num_iterations = options.max_num_iterations;
+  solver.function_tolerance = options.function_tolerance;
+  SolveOnOneThread(solver, &ceres_problem);
+  for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
+    problem->cam_from_world[i] = LoadPose(pose_of(i));
+  for (size_t c = 0; c < problem->cameras.size(); ++c) {
+    FreeCamera& camera = problem->cameras[c];
+    for (size_t k = 0; k < camera.free.size(); ++k)
+      camera.camera.params[camera.free[k]] += values[first_change[c] + k];
+  }
+}
+
+double ReprojectionErrorPx(const ModelProblem& problem, const ModelObservation& observation) {
+  const auto pixel =
+      ImageFromCamera(problem.cameras[problem.camera_idx[observation.image]].camera,
+                      problem.cam_from_world[observation.image] * problem.points[observation.point]);
+  return pixel ? (*pixel - observation.pixel).norm() : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace cairn::reconstruct

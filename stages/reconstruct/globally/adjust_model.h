@@ -1,0 +1,52 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/camera/camera.h"
+#include "core/geometry/pose.h"
+
+namespace cairn::reconstruct {
+
+// A camera's parameters that an adjustment may change, and by how much they are likely to.
+struct FreeCamera {
+  Camera camera;              // refined
+  Camera stated;              // what the deviations are about
+  std::vector<int> free;      // indices of parameters, ascending
+  std::vector<double> sigma;  // per free one
+};
+
+struct ModelObservation {
+  int image = 0, point = 0;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double sigma_px = 1;  // standard deviation of a coordinate
+};
+
+// A reconstruction in a frame of its own, and what was seen.
+struct ModelProblem {
+  std::vector<Pose> cam_from_world;  // refined
+  std::vector<int> camera_idx;       // per image
+  std::vector<FreeCamera> cameras;
+  std::vector<Eigen::Vector3d> points;  // refined
+  std::vector<ModelObservation> observations;
+};
+
+struct AdjustModelOptions {
+  // Cauchy's scale, in standard deviations of a keypoint.  REQUIRES: > 0
+  double loss_scale = 2;
+  int max_num_iterations = 25;
+  double function_tolerance = 1e-4;
+  // Whether the cameras' free parameters change, too.
+  bool adjust_cameras = true;
+};
+
+// Minimises the reprojection errors over poses, points and cameras, as group_classes does where poses are
+// stated (Ceres, points eliminated, one thread: bit-stable).  Cameras change by their sensitivities at the
+// start (core/structure/camera_sensitivity.h): call it again after larger changes.  The frame is free.
+void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem);
+
+// Reprojection error, pixels; infinite where the camera does not see the point.
+double ReprojectionErrorPx(const ModelProblem& problem, const ModelObservation& observation);
+
+}  // namespace cairn::reconstruct

@@ -1,0 +1,152 @@
+#include "stages/reconstruct/globally/average_rotations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <queue>
+
+#include <Eigen/SparseCholesky>
+
+namespace cairn::reconstruct {
+namespace {
+
+constexpr int kNumAbsoluteIterations = 8;
+constexpr double kLeastErrorRad = 1e-4;  // below, absolute values are not told apart
+constexpr double kConvergedRad = 1e-6;
+constexpr double kLeastWeight = 1e-3;
+
+Eigen::Vector3d LogOf(const Eigen::Quaterniond& q) {
+  const Eigen::AngleAxisd turn(q.w() < 0 ? Eigen::Quaterniond(-q.coeffs()) : q);
+  return turn.angle() * turn.axis();
+}
+
+// How a pair's rotation differs from that of the images, a rotation vector in the world's frame.
+Eigen::Vector3d ErrorOf(const ViewPair& pair, const std::vector<Eigen::Quaterniond>& rotations) {
+  return LogOf((rotations[pair.image2].conjugate() * pair.cam2_from_cam1.rotation * rotations[pair.image1])
+                   .normalized());
+}
+
+std::vector<std::vector<int>> PairsOfImages(int num_images, const std::vector<ViewPair>& pairs) {
+  std::vector<std::vector<int>> of_images(num_images);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    of_images[pairs[p].image1].push_back(static_cast<int>(p));
+    of_images[pairs[p].image2].push_back(static_cast<int>(p));
+  }
+  return of_images;
+}
+
+// Solves the weighted least squares for small turns of all images but the first: turn2 - turn1 = error.
+Eigen::MatrixX3d SolveTurns(int num_images, const std::vector<ViewPair>& pairs,
+                            const std::vector<Eigen::Vector3d>& errors, const std::vector<double>& weights) {
+  std::vector<Eigen::Triplet<double>> triplets;
+  Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(num_images - 1, 3);
+  const auto add = [&](int row, int column, double value) {
+    if (row > 0 && column > 0) triplets.emplace_back(row - 1, column - 1, value);
+  };
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const int a = pairs[p].image1, b = pairs[p].image2;
+    add(a, a, weights[p]);
+    add(b, b, weights[p]);
+    add(a, b, -weights[p]);
+    add(b, a, -weights[p]);
+    if (a > 0) right.row(a - 1) -= weights[p] * errors[p].transpose();
+    if (b > 0) right.row(b - 1) += weights[p] * errors[p].transpose();
+  }
+  Eigen::SparseMatrix<double> laplacian(num_images - 1, num_images - 1);
+  laplacian.setFromTriplets(triplets.begin(), triplets.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors(laplacian);
+  if (factors.info() != Eigen::Success) return Eigen::MatrixX3d::Zero(num_images - 1, 3);
+  return factors.solve(right);
+}
+
+}  // namespace
+
+std::vector<std::vector<int>> ConnectedParts(int num_images, const std::vector<ViewPair>& pairs) {
+  std::vector<int> root(num_images);
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int i) {
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return i;
+  };
+  std::vector<bool> has_pair(num_images, false);
+  for (const ViewPair& pair : pairs) {
+    has_pair[pair.image1] = has_pair[pair.image2] = true;
+    const int a = find(pair.image1), b = find(pair.image2);
+    root[std::max(a, b)] = std::min(a, b);
+  }
+  std::vector<std::vector<int>> by_root(num_images), parts;
+  for (int i = 0; i < num_images; ++i) {
+    if (has_pair[i]) by_root[find(i)].push_back(i);
+  }
+  for (std::vector<int>& part : by_root) {
+    if (!part.empty()) parts.push_back(std::move(part));
+  }
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  return parts;
+}
+
+std::vector<Eigen::Quaterniond> RotationsAlongTree(int num_images, const std::vector<ViewPair>& pairs) {
+  const std::vector<std::vector<int>> of_images = PairsOfImages(num_images, pairs);
+  std::vector<Eigen::Quaterniond> rotations(num_images, Eigen::Quaterniond::Identity());
+  std::vector<bool> is_placed(num_images, false);
+  const auto is_worse = [&](int a, int b) {
+    return std::pair(pairs[a].weight, -a) < std::pair(pairs[b].weight, -b);
+  };
+  std::priority_queue<int, std::vector<int>, decltype(is_worse)> open(is_worse);
+  const auto place = [&](int image) {
+    is_placed[image] = true;
+    for (const int p : of_images[image]) open.push(p);
+  };
+  const auto first = std::max_element(of_images.begin(), of_images.end(),
+                                      [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  if (first == of_images.end()) return rotations;
+  place(static_cast<int>(first - of_images.begin()));
+  while (!open.empty()) {
+    const ViewPair& pair = pairs[open.top()];
+    open.pop();
+    if (is_placed[pair.image1] == is_placed[pair.image2]) continue;
+    const bool forward = is_placed[pair.image1];
+    const int image = forward ? pair.image2 : pair.image1;
+    rotations[image] = forward ? pair.cam2_from_cam1.rotation * rotations[pair.image1]
+                               : pair.cam2_from_cam1.rotation.conjugate() * rotations[pair.image2];
+    rotations[image].normalize();
+    place(image);
+  }
+  return rotations;
+}
+
+std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vector<ViewPair>& pairs,
+                                                 const AverageRotationsOptions& options) {
+  std::vector<Eigen::Quaterniond> rotations = RotationsAlongTree(num_images, pairs);
+  if (num_images < 2) return rotations;
+  const double scale = options.robust_scale_deg * std::numbers::pi / 180;
+  std::vector<Eigen::Vector3d> errors(pairs.size());
+  std::vector<double> weights(pairs.size());
+  for (int iteration = 0; iteration < options.max_num_iterations; ++iteration) {
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      errors[p] = ErrorOf(pairs[p], rotations);
+      const double squared = errors[p].squaredNorm();
+      weights[p] = iteration < kNumAbsoluteIterations
+                       ? 1 / std::max(std::sqrt(squared), kLeastErrorRad)
+                       : std::pow(scale * scale / (scale * scale + squared), 2);
+      weights[p] *= std::max(pairs[p].weight, kLeastWeight);
+    }
+    const Eigen::MatrixX3d turns = SolveTurns(num_images, pairs, errors, weights);
+    double largest = 0;
+    for (int i = 1; i < num_images; ++i) {
+      const Eigen::Vector3d turn = turns.row(i - 1).transpose();
+      const double angle = turn.norm();
+      largest = std::max(largest, angle);
+      if (angle > 0) rotations[i] = (rotations[i] * Eigen::AngleAxisd(angle, turn / angle)).normalized();
+    }
+    if (iteration >= kNumAbsoluteIterations && largest < kConvergedRad) break;
+  }
+  return rotations;
+}
+
+double RotationErrorDeg(const ViewPair& pair, const std::vector<Eigen::Quaterniond>& rotations) {
+  return DegFromRad(ErrorOf(pair, rotations).norm());
+}
+
+}  // namespace cairn::reconstruct

@@ -1,0 +1,79 @@
+#include "stages/reconstruct/globally/backbone.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+
+namespace cairn::reconstruct {
+namespace {
+
+// Strength from which a pair belongs to the backbone, and the ladder down which parts of it are
+// joined.
+constexpr double kMinStrength = 0.5, kLadderFactor = 0.8, kLeastStrength = 0.01;
+// Of a drive: this many images on and back, from this strength on.
+constexpr int kMaxOrderDistance = 10;
+constexpr double kMinStrengthNear = 0.25;
+// A drive: of this part of its neighbours the pair is at least this strong.
+constexpr double kMinDriveRatio = 0.8, kMinStrengthOfNext = 0.4;
+
+class Components {
+ public:
+  explicit Components(int num_images) : root_(num_images) { std::iota(root_.begin(), root_.end(), 0); }
+  int Find(int i) {
+    while (root_[i] != i) i = root_[i] = root_[root_[i]];
+    return i;
+  }
+  void Join(int a, int b) { root_[std::max(Find(a), Find(b))] = std::min(Find(a), Find(b)); }
+
+ private:
+  std::vector<int> root_;
+};
+
+}  // namespace
+
+bool IsDrive(int num_images, const std::vector<ViewPair>& pairs) {
+  int num_strong = 0;
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    if (std::abs(pairs[p].image1 - pairs[p].image2) == 1 && pairs[p].strength >= kMinStrengthOfNext)
+      ++num_strong;
+  }
+  return num_strong >= kMinDriveRatio * (num_images - 1);
+}
+
+void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
+  for (ViewPair& pair : *pairs) {
+    const int distance = std::min(std::abs(pair.image1 - pair.image2), kMaxOrderDistance);
+    pair.weight = is_drive ? pair.strength / distance : pair.strength;
+  }
+}
+
+std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs, bool is_drive) {
+  std::vector<bool> is_taken(pairs.size(), false);
+  Components components(num_images);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const int distance = std::abs(pairs[p].image1 - pairs[p].image2);
+    is_taken[p] =
+        is_drive ? distance == 1 || (distance <= kMaxOrderDistance && pairs[p].strength >= kMinStrengthNear)
+                 : pairs[p].strength >= kMinStrength;
+    if (is_taken[p]) components.Join(pairs[p].image1, pairs[p].image2);
+  }
+  // What joins parts, the strongest first, all of one step of the ladder together.
+  for (double least = kMinStrength; least >= kLeastStrength; least *= kLadderFactor) {
+    std::vector<size_t> joining;
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      if (pairs[p].strength >= least && components.Find(pairs[p].image1) != components.Find(pairs[p].image2))
+        joining.push_back(p);
+    }
+    for (const size_t p : joining) {
+      is_taken[p] = true;
+      components.Join(pairs[p].image1, pairs[p].image2);
+    }
+  }
+  std::vector<int> taken;
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    if (is_taken[p]) taken.push_back(static_cast<int>(p));
+  }
+  return taken;
+}
+
+}  // namespace cairn::reconstruct

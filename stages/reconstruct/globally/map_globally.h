@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "core/colmap/colmap_model.h"
+#include "stages/reconstruct/globally/mapper_input.h"
+#include "stages/reconstruct/globally/part_mapper.h"
+
+namespace cairn::reconstruct {
+
+// Poses of all images at once instead of one after the other [Pan, Barath, Pollefeys & Schönberger, "Global
+// structure-from-motion revisited" (GLOMAP), ECCV 2024]: focal lengths that are guesses from the pairs,
+// relative poses, rotations averaged, wrong pairs cut, tracks, places of cameras and points from nowhere,
+// then bundle adjustments, each with tracks triangulated anew.  Every part that pairs join becomes a model.
+// Returns them, most images first (ties: more points), in frames and scales of their own.  The same for any
+// number of threads. Errors: NoData (no pair of images has a relative pose); Cancelled.
+Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const MapGloballyOptions& options,
+                                             int num_threads, Progress& progress);
+
+}  // namespace cairn::reconstruct

@@ -1,0 +1,300 @@
+#include "stages/reconstruct/globally/part_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "core/base/parallel.h"
+#include "core/base/quantiles.h"
+#include "stages/reconstruct/globally/position_images.h"
+
+namespace cairn::reconstruct {
+namespace {
+
+constexpr int kMinTrackLength = 3;
+constexpr int kNumKeypointsPositioned = 80;
+constexpr double kMinAngleDeg = 1;
+constexpr int kMinNumSeen = 15;  // points of an image that stays
+constexpr double kGuessedFocalSigma = 0.3, kStatedFocalSigma = 0.03, kDistortionSigma = 0.1;
+constexpr int kMinNumTested = 10;  // matches that tell whether a pair agrees with the map
+
+// One after the other, from coarse to fine.
+struct Round {
+  double accepted_rad;  // pairs that agree with the map so far are taken in; 0: none are
+  double max_error_px;  // of what is triangulated
+  int num_keypoints;    // of an image that decide; 0: as many as the budget allows
+  bool adjust_cameras;
+};
+constexpr Round kRounds[] = {{0, 24, 100, false},  {0, 12, 120, true},   {0.2, 12, 120, true},
+                             {0.2, 12, 120, true}, {0.2, 12, 120, true}, {0.1, 6, 150, true},
+                             {0.05, 4, 0, true}};
+// A round that takes in as far as the one before is left out if it would change fewer than this part of the
+// pairs.
+constexpr double kMinPartAccepted = 0.01;
+// Keypoints that decide in the last round: of an image, and of all.
+constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
+constexpr int kMaxNumObservations = 200000;
+
+// Focal lengths that a model has, one where it states one.
+int NumFocals(const Camera& camera) {
+  return camera.FocalX() == camera.params[0] && camera.FocalY() == camera.params[0] &&
+                 (camera.model == CameraModel::kSimplePinhole || camera.model == CameraModel::kSimpleRadial ||
+                  camera.model == CameraModel::kRadial || camera.model == CameraModel::kSimpleRadialFisheye ||
+                  camera.model == CameraModel::kRadialFisheye)
+             ? 1
+             : 2;
+}
+
+}  // namespace
+
+PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
+                       const MapGloballyOptions& options, int num_threads, std::vector<int> images,
+                       std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive)
+    : input_(input),
+      options_(options),
+      num_threads_(num_threads),
+      is_drive_(is_drive),
+      images_(std::move(images)),
+      pairs_(std::move(pairs)),
+      is_accepted_(pairs_.size(), false) {
+  for (const int p : backbone) is_accepted_[p] = true;
+  std::map<CameraId, int> index;
+  for (const auto& [camera_id, camera] : cameras) {
+    index.emplace(camera_id, static_cast<int>(problem_.cameras.size()));
+    problem_.cameras.push_back(FreeOf(camera));
+  }
+  for (const int image : images_) problem_.camera_idx.push_back(index.at(input.images[image].camera_id));
+}
+
+ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, const Progress& progress) {
+  MakeTracks();
+  Position(rotations);
+  for (const Round& round : kRounds) {
+    if (progress.Cancelled()) return {};
+    if (round.accepted_rad > 0) {
+      TriangulateAll(round.max_error_px);
+      const bool is_again = &round != kRounds && round.accepted_rad == (&round)[-1].accepted_rad;
+      if (AcceptPairs(round.accepted_rad) < kMinPartAccepted * static_cast<double>(pairs_.size()) && is_again)
+        continue;
+      MakeTracks();
+    }
+    TriangulateAll(round.max_error_px);
+    int num_keypoints = round.num_keypoints;
+    if (num_keypoints == 0)
+      num_keypoints = std::clamp(kMaxNumObservations / static_cast<int>(images_.size()), kMinNumKeypoints,
+                                 kMaxNumKeypoints);
+    Adjust(num_keypoints, round.adjust_cameras);
+  }
+  TriangulateAll(std::end(kRounds)[-1].max_error_px);
+  return MakeModel();
+}
+
+FreeCamera PartMapper::FreeOf(const Camera& stated) const {
+  FreeCamera camera{.camera = stated, .stated = stated, .free = {}, .sigma = {}};
+  if (options_.refine_distortion && stated.model == CameraModel::kSimplePinhole) {
+    camera.camera.model = CameraModel::kSimpleRadial;
+    camera.camera.params.push_back(0);
+    camera.stated = camera.camera;
+  }
+  if (stated.model == CameraModel::kEquirectangular) return camera;
+  const int num_focals = NumFocals(camera.stated);
+  const std::vector<double>& params = camera.stated.params;
+  for (int p = 0; p < num_focals && options_.refine_focal_length; ++p) {
+    camera.free.push_back(p);
+    camera.sigma.push_back(params[p] * (stated.has_focal_prior ? kStatedFocalSigma : kGuessedFocalSigma));
+  }
+  for (int p = num_focals + 2; p < static_cast<int>(params.size()) && options_.refine_distortion; ++p) {
+    camera.free.push_back(p);
+    camera.sigma.push_back(kDistortionSigma);
+  }
+  return camera;
+}
+
+Eigen::Vector2d PartMapper::PixelOf(const TrackElement& element) const {
+  const Keypoint& keypoint = input_.keypoints[images_[element.image_idx]][element.keypoint_idx];
+  return {keypoint.x, keypoint.y};
+}
+
+void PartMapper::MakeTracks() {
+  std::vector<int> num_keypoints;
+  for (const int image : images_) num_keypoints.push_back(static_cast<int>(input_.keypoints[image].size()));
+  std::vector<ScoredMatch> matches;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    if (!is_accepted_[p]) continue;
+    // Of strong pairs first.
+    const auto score = static_cast<int32_t>(1e6 * pairs_[p].strength);
+    for (const Match& match : pairs_[p].matches)
+      matches.push_back({{pairs_[p].image1, match.idx1}, {pairs_[p].image2, match.idx2}, score});
+  }
+  int64_t num_conflicts = 0;
+  tracks_ = UnionMatches(num_keypoints, std::move(matches), &num_conflicts);
+  std::erase_if(tracks_, [](const Track& track) { return static_cast<int>(track.size()) < kMinTrackLength; });
+  std::stable_sort(tracks_.begin(), tracks_.end(),
+                   [](const Track& a, const Track& b) { return a.size() > b.size(); });
+  spdlog::debug("reconstruct: {} of {} pairs, {} tracks",
+                std::count(is_accepted_.begin(), is_accepted_.end(), true), pairs_.size(), tracks_.size());
+}
+
+// Long tracks first, of each those elements whose images have too few keypoints so far, if they are enough
+// for a point; `elements`: those of each track that count.
+std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
+    int num_keypoints, const std::vector<std::vector<int>>& elements) const {
+  std::vector<int> count(images_.size(), 0);
+  std::vector<Chosen> chosen;
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    Chosen candidate{static_cast<int>(t), {}};
+    for (const int e : elements[t]) {
+      if (count[tracks_[t][e].image_idx] < num_keypoints) candidate.elements.push_back(e);
+    }
+    if (static_cast<int>(candidate.elements.size()) < kMinTrackLength) continue;
+    for (const int e : candidate.elements) ++count[tracks_[t][e].image_idx];
+    chosen.push_back(std::move(candidate));
+  }
+  return chosen;
+}
+
+void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
+  std::vector<std::vector<int>> all(tracks_.size());
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    all[t].resize(tracks_[t].size());
+    std::iota(all[t].begin(), all[t].end(), 0);
+  }
+  std::vector<Sight> sights;
+  const std::vector<Chosen> chosen = ChooseTracks(kNumKeypointsPositioned, all);
+  for (size_t k = 0; k < chosen.size(); ++k) {
+    for (const int e : chosen[k].elements) {
+      const TrackElement& element = tracks_[chosen[k].track][e];
+      const auto bearing = BearingFromImage(CameraOf(element.image_idx), PixelOf(element));
+      if (!bearing) continue;
+      sights.push_back(
+          {element.image_idx, static_cast<int>(k), rotations[element.image_idx].conjugate() * *bearing});
+    }
+  }
+  const Positions positions = PositionImages(static_cast<int>(images_.size()),
+                                             static_cast<int>(chosen.size()), sights, is_drive_, {});
+  for (size_t i = 0; i < images_.size(); ++i)
+    problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
+  spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());
+}
+
+void PartMapper::TriangulateAll(double max_error_px) {
+  TriangulateOptions options;
+  options.max_reprojection_error_px = max_error_px;
+  options.min_triangulation_angle_deg = kMinAngleDeg;
+  options.min_num_observations = 2;
+  triangulations_.assign(tracks_.size(), {});
+  ParallelFor(static_cast<int64_t>(tracks_.size()), num_threads_, [&](int64_t t) {
+    std::vector<PosedRay> rays;
+    std::vector<int> elements;
+    for (size_t e = 0; e < tracks_[t].size(); ++e) {
+      const TrackElement& element = tracks_[t][e];
+      const auto ray = MakePixelRay(CameraOf(element.image_idx), PixelOf(element));
+      if (!ray) continue;
+      rays.push_back({problem_.cam_from_world[element.image_idx], *ray});
+      elements.push_back(static_cast<int>(e));
+    }
+    triangulations_[t] = Triangulate(rays, options);
+    for (int& inlier : triangulations_[t].inliers) inlier = elements[inlier];
+    if (triangulations_[t].outcome != TriangulateOutcome::kOk) triangulations_[t].inliers.clear();
+  });
+}
+
+// A pair agrees with the map where the points of its keypoints in one image are, on the median, seen in the
+// other where they match.
+int PartMapper::AcceptPairs(double max_error_rad) {
+  std::vector<std::vector<int>> track_of(images_.size());
+  for (size_t i = 0; i < images_.size(); ++i) track_of[i].assign(input_.keypoints[images_[i]].size(), -1);
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    for (const int e : triangulations_[t].inliers)
+      track_of[tracks_[t][e].image_idx][tracks_[t][e].keypoint_idx] = static_cast<int>(t);
+  }
+  std::vector<char> verdict(pairs_.size(), 0);
+  ParallelFor(static_cast<int64_t>(pairs_.size()), num_threads_, [&](int64_t p) {
+    const ViewPair& pair = pairs_[p];
+    std::vector<double> errors;
+    const auto add = [&](int track, int image, KeypointIdx keypoint) {
+      if (track < 0) return;
+      const Eigen::Vector3d seen = problem_.cam_from_world[image] * triangulations_[track].position;
+      const auto bearing = BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
+      if (bearing) errors.push_back(std::atan2(bearing->cross(seen).norm(), bearing->dot(seen)));
+    };
+    for (const Match& match : pair.matches) {
+      add(track_of[pair.image1][match.idx1], pair.image2, match.idx2);
+      add(track_of[pair.image2][match.idx2], pair.image1, match.idx1);
+    }
+    if (static_cast<int>(errors.size()) < 2 * kMinNumTested) return;
+    verdict[p] = UpperMedian(errors) <= max_error_rad ? 1 : -1;
+  });
+  int num_changed = 0;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const bool is_accepted = verdict[p] == 0 ? is_accepted_[p] : verdict[p] > 0;
+    if (is_accepted != is_accepted_[p]) ++num_changed;
+    is_accepted_[p] = is_accepted;
+  }
+  return num_changed;
+}
+
+void PartMapper::Adjust(int num_keypoints, bool adjust_cameras) {
+  std::vector<std::vector<int>> elements;
+  for (const Triangulation& triangulation : triangulations_) elements.push_back(triangulation.inliers);
+  problem_.points.clear();
+  problem_.observations.clear();
+  for (const Chosen& chosen : ChooseTracks(num_keypoints, elements)) {
+    for (const int e : chosen.elements) {
+      const TrackElement& element = tracks_[chosen.track][e];
+      problem_.observations.push_back(
+          {element.image_idx, static_cast<int>(problem_.points.size()), PixelOf(element)});
+    }
+    problem_.points.push_back(triangulations_[chosen.track].position);
+  }
+  AdjustModel({.adjust_cameras = adjust_cameras}, &problem_);
+  spdlog::debug("reconstruct: {} points and {} observations adjusted", problem_.points.size(),
+                problem_.observations.size());
+}
+
+ColmapModel PartMapper::MakeModel() const {
+  ColmapModel model;
+  std::vector<int> num_seen(images_.size(), 0);
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    for (const int e : triangulations_[t].inliers) ++num_seen[tracks_[t][e].image_idx];
+  }
+  std::vector<int> place(images_.size(), -1);
+  for (size_t i = 0; i < images_.size(); ++i) {
+    if (num_seen[i] < kMinNumSeen) continue;
+    const DatabaseImage& listed = input_.images[images_[i]];
+    place[i] = static_cast<int>(model.images.size());
+    ModelImage image{.image_id = listed.image_id,
+                     .name = listed.name,
+                     .camera_id = listed.camera_id,
+                     .cam_from_world = problem_.cam_from_world[i],
+                     .keypoints = {}};
+    for (const Keypoint& keypoint : input_.keypoints[images_[i]])
+      image.keypoints.push_back({{keypoint.x, keypoint.y}, kNoPoint});
+    model.images.push_back(std::move(image));
+    model.cameras.emplace(listed.camera_id, CameraOf(static_cast<int>(i)));
+  }
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    std::vector<TrackElement> seen;
+    for (const int e : triangulations_[t].inliers) {
+      if (place[tracks_[t][e].image_idx] >= 0) seen.push_back(tracks_[t][e]);
+    }
+    if (seen.size() < 2) continue;
+    ModelPoint point{.point_id = model.points.size() + 1,
+                     .position = triangulations_[t].position,
+                     .error_px = triangulations_[t].rms_error_px,
+                     .track = {}};
+    for (const TrackElement& element : seen) {
+      ModelImage& image = model.images[place[element.image_idx]];
+      image.keypoints[element.keypoint_idx].point_id = point.point_id;
+      point.track.emplace_back(image.image_id, element.keypoint_idx);
+    }
+    model.points.push_back(std::move(point));
+  }
+  return model;
+}
+
+}  // namespace cairn::reconstruct

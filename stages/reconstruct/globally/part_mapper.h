@@ -1,0 +1,68 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "core/base/progress.h"
+#include "core/colmap/colmap_model.h"
+#include "core/structure/triangulate.h"
+#include "core/structure/union_matches.h"
+#include "stages/reconstruct/globally/adjust_model.h"
+#include "stages/reconstruct/globally/view_pairs.h"
+
+namespace cairn::reconstruct {
+
+struct MapGloballyOptions {
+  // Whether the cameras' focal lengths and distortion, which come from EXIF or a guess, are refined.  One
+  // radial parameter for cameras that are given without any.
+  bool refine_focal_length = true;
+  bool refine_distortion = true;
+};
+
+// Maps images that pairs join, from their rotations: places from nowhere by the pairs of the backbone, then
+// rounds, each of which takes in the pairs that agree with the map so far, makes tracks of their matches,
+// triangulates, and adjusts the longest.
+class PartMapper {
+ public:
+  // `images`: indices into the input's, ascending; `pairs`: of indices into `images`; `backbone`: indices of
+  // pairs.
+  PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
+             const MapGloballyOptions& options, int num_threads, std::vector<int> images,
+             std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive);
+
+  // Images that see too few points are not in the model.
+  ColmapModel Map(const std::vector<Eigen::Quaterniond>& rotations, const Progress& progress);
+
+ private:
+  // Elements of a track that decide on poses.
+  struct Chosen {
+    int track = 0;
+    std::vector<int> elements;
+  };
+
+  FreeCamera FreeOf(const Camera& stated) const;
+  Eigen::Vector2d PixelOf(const TrackElement& element) const;
+  const Camera& CameraOf(int image) const { return problem_.cameras[problem_.camera_idx[image]].camera; }
+  void MakeTracks();
+  std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
+  void Position(const std::vector<Eigen::Quaterniond>& rotations);
+  void TriangulateAll(double max_error_px);
+  int AcceptPairs(double max_error_rad);
+  void Adjust(int num_keypoints, bool adjust_cameras);
+  ColmapModel MakeModel() const;
+
+  const MapperInput& input_;
+  const MapGloballyOptions& options_;
+  int num_threads_;
+  bool is_drive_;
+  std::vector<int> images_;
+  std::vector<ViewPair> pairs_;
+  std::vector<bool> is_accepted_;              // per pair
+  std::vector<Track> tracks_;                  // longest first
+  std::vector<Triangulation> triangulations_;  // per track; inliers are its elements
+  ModelProblem problem_;
+};
+
+}  // namespace cairn::reconstruct

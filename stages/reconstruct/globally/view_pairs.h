@@ -1,0 +1,44 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "core/camera/camera.h"
+#include "core/geometry/pose.h"
+#include "stages/reconstruct/globally/mapper_input.h"
+
+namespace cairn::reconstruct {
+
+// Two images that show the same things: how the second camera stands to the first.
+struct ViewPair {
+  int image1 = 0, image2 = 0;  // indices into MapperInput::images
+  Pose cam2_from_cam1;         // its translation is a direction, of length 1
+  std::vector<Match> matches;  // those that it explains
+  // How much of what the images show both do: matches over the keypoints that have any, of the image with
+  // more.
+  double strength = 0;
+  double weight = 0;  // beside pairs that contradict it
+};
+
+// Focal lengths of cameras that have none but a guess, from fundamental matrices: with the right ones an
+// essential matrix's two singular values are equal [Fetzer, Reis & Stricker 2020, "Stable intrinsic
+// auto-calibration from fundamental matrices of devices with uncorrelated camera parameters"; as in Pan et
+// al. 2024, GLOMAP, §3.2].  Per camera, the one of a ladder from 0.3 to 4 times the image's longer side that
+// most pairs agree on, refined; a pair whose motion says nothing about it has no say.  Cameras with a stated
+// focal length stay.  O(pairs * steps).
+std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input);
+
+struct ViewPairOptions {
+  // Largest distance of a match to its epipolar line, pixels.  REQUIRES: > 0
+  double max_epipolar_error_px = 4;
+  // Fewest matches of a pair.  REQUIRES: >= 5
+  int min_num_matches = 15;
+};
+
+// The relative pose of each verified pair by these cameras: from its essential or fundamental matrix, or by
+// five points where it has none (a plane), refined.  Pairs that keep too few matches are left out; in the
+// order of the pairs.  Same result for any number of threads.
+std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
+                                        const ViewPairOptions& options, int num_threads);
+
+}  // namespace cairn::reconstruct

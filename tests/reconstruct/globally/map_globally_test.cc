@@ -1,0 +1,127 @@
+#include "stages/reconstruct/globally/map_globally.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "tests/reconstruct/synthetic_survey.h"
+
+namespace cairn::reconstruct {
+namespace {
+
+// Largest distance of a centre from the true one after the best similarity, metres.
+double LargestErrorM(const ColmapModel& model, const SyntheticSurvey& survey) {
+  Eigen::Matrix3Xd found(3, model.images.size()), truth(3, model.images.size());
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    found.col(i) = model.images[i].cam_from_world.Center();
+    for (size_t k = 0; k < survey.input.images.size(); ++k) {
+      if (survey.input.images[k].name == model.images[i].name)
+        truth.col(i) = survey.cams_from_world[k].Center();
+    }
+  }
+  const Eigen::Matrix4d fit = Eigen::umeyama(found, truth, true);
+  return (((fit.topLeftCorner<3, 3>() * found).colwise() + fit.topRightCorner<3, 1>()) - truth)
+      .colwise()
+      .norm()
+      .maxCoeff();
+}
+
+Result<std::vector<ColmapModel>> Map(const SyntheticSurvey& survey, int num_threads = 2,
+                                     const MapGloballyOptions& options = {}) {
+  NoProgress progress;
+  return MapGlobally(survey.input, options, num_threads, progress);
+}
+
+TEST(MapGlobally, FindsAllPosesAndTheFocalLength) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  ASSERT_EQ(models->size(), 1u);
+  const ColmapModel& model = models->front();
+  EXPECT_EQ(model.images.size(), 20u);
+  EXPECT_LT(LargestErrorM(model, survey), 0.03);
+  EXPECT_NEAR(model.cameras.at(1).FocalX(), 500, 15);
+  EXPECT_EQ(model.cameras.at(1).model, CameraModel::kSimpleRadial);
+  EXPECT_GT(model.points.size(), 300u);
+  for (const ModelPoint& point : model.points) {
+    EXPECT_GE(point.track.size(), 2u);
+    EXPECT_LT(point.error_px, 2);
+    for (const auto& [image_id, keypoint] : point.track)
+      EXPECT_EQ(model.images[image_id - 1].keypoints[keypoint].point_id, point.point_id);
+  }
+}
+
+TEST(MapGlobally, CamerasStayWhereTheyAreNotToBeRefined) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(15, 1);
+  Camera camera = survey.camera;
+  camera.camera_id = 1;
+  survey.input.cameras[1] = camera;
+  const auto models = Map(survey, 2, {.refine_focal_length = false, .refine_distortion = false});
+  ASSERT_TRUE(models.ok());
+  EXPECT_EQ(models->front().cameras.at(1).params, camera.params);
+  EXPECT_EQ(models->front().cameras.at(1).model, CameraModel::kSimplePinhole);
+  EXPECT_LT(LargestErrorM(models->front(), survey), 0.03);
+}
+
+TEST(MapGlobally, PartsThatNothingJoinsAreModelsOfTheirOwn) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(8, 1, "a");
+  AppendSurvey(MakeSyntheticSurvey(12, 2, "b", 100), &survey);
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  ASSERT_EQ(models->size(), 2u);
+  EXPECT_EQ(models->at(0).images.size(), 12u);
+  EXPECT_EQ(models->at(1).images.size(), 8u);
+  EXPECT_EQ(models->at(0).images[0].name, "b00.jpg");
+}
+
+TEST(MapGlobally, SameModelForAnyNumberOfThreads) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(12, 3);
+  const auto one = Map(survey, 1), seven = Map(survey, 7);
+  ASSERT_TRUE(one.ok() && seven.ok());
+  ASSERT_EQ(one->front().images.size(), seven->front().images.size());
+  for (size_t i = 0; i < one->front().images.size(); ++i) {
+    const Pose &a = one->front().images[i].cam_from_world, &b = seven->front().images[i].cam_from_world;
+    EXPECT_EQ(a.translation, b.translation);
+    EXPECT_EQ(a.rotation.coeffs(), b.rotation.coeffs());
+  }
+  EXPECT_EQ(one->front().cameras.at(1).params, seven->front().cameras.at(1).params);
+}
+
+// Four images of one place match four of another, as they would where both bear the same poster.
+TEST(MapGlobally, LookAlikesDoNotBendTheMap) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(30, 6);
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 25; j < 29; ++j) {
+      // A third of what neighbours share, exact for the pose that the two would have if the places were one.
+      const TwoViewGeometry& near =
+          survey.input.geometries[5 * i + j - 25 == i ? 5 * i : 5 * i + std::abs(j - 25 - i) - 1];
+      TwoViewGeometry geometry = near;
+      geometry.image_id1 = static_cast<ImageId>(i + 1);
+      geometry.image_id2 = static_cast<ImageId>(j + 1);
+      geometry.inliers.clear();
+      for (const Match& match : near.inliers) {
+        if (match.idx1 % 3 == 0 && match.idx2 < survey.input.keypoints[j].size())
+          geometry.inliers.push_back(match);
+      }
+      // The second image shows there what a neighbour of the first shows.
+      for (const Match& match : geometry.inliers)
+        survey.input.keypoints[j][match.idx2] = survey.input.keypoints[near.image_id2 - 1][match.idx2];
+      survey.input.geometries.push_back(geometry);
+    }
+  }
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  EXPECT_GE(models->front().images.size(), 26u);
+  EXPECT_LT(LargestErrorM(models->front(), survey), 0.1);
+}
+
+TEST(MapGlobally, NothingToJoinIsAnError) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(5, 1);
+  survey.input.geometries.clear();
+  const auto models = Map(survey);
+  ASSERT_FALSE(models.ok());
+  EXPECT_EQ(models.error().code, ErrorCode::kNoData);
+  EXPECT_NE(models.error().message.find("5 images"), std::string::npos) << models.error().message;
+}
+
+}  // namespace
+}  // namespace cairn::reconstruct

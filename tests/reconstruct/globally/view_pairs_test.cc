@@ -1,0 +1,127 @@
+#include "stages/reconstruct/globally/view_pairs.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include "core/geometry/relative_pose.h"
+#include "tests/reconstruct/synthetic_survey.h"
+
+namespace cairn::reconstruct {
+namespace {
+
+Eigen::Matrix3d CalibrationMatrix(double focal) {
+  Eigen::Matrix3d K;
+  K << focal, 0, 320, 0, focal, 240, 0, 0, 1;
+  return K;
+}
+
+// Pairs of cameras of 500 px, whose optical axes do not meet, with their fundamental matrices.
+MapperInput MakePairs(int num_pairs, bool has_focal_prior, double noise) {
+  Random random(2);
+  MapperInput input;
+  Camera camera = GuessCamera(1, 640, 480);
+  camera.has_focal_prior = has_focal_prior;
+  input.cameras.emplace(1, camera);
+  for (int p = 0; p < num_pairs; ++p) {
+    Pose pose;
+    pose.rotation = Eigen::AngleAxisd(
+        random.Uniform(0.1, 0.5),
+        Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1)).normalized());
+    pose.translation = {random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1)};
+    const Eigen::Matrix3d inverse = CalibrationMatrix(500).inverse();
+    TwoViewGeometry geometry{.image_id1 = static_cast<ImageId>(2 * p + 1),
+                             .image_id2 = static_cast<ImageId>(2 * p + 2),
+                             .config = TwoViewConfig::kUncalibrated};
+    geometry.F = inverse.transpose() * EssentialMatrix(pose) * inverse;
+    for (double& value : geometry.F.reshaped()) value *= 1 + random.Normal(0, noise);
+    geometry.inliers.resize(100);
+    input.images.push_back({geometry.image_id1, "a", 1});
+    input.images.push_back({geometry.image_id2, "b", 1});
+    input.geometries.push_back(geometry);
+  }
+  return input;
+}
+
+double FocalOf(const MapperInput& input) { return CalibrateFromPairs(input).at(1).params[0]; }
+
+TEST(CalibrateFromPairs, FindsTheFocalLengthThatNobodyStated) {
+  EXPECT_NEAR(FocalOf(MakePairs(40, false, 0)), 500, 2);
+  EXPECT_NEAR(FocalOf(MakePairs(40, false, 0.005)), 500, 25);
+}
+
+TEST(CalibrateFromPairs, AStatedFocalLengthStays) { EXPECT_EQ(FocalOf(MakePairs(40, true, 0)), 1.2 * 640); }
+
+TEST(CalibrateFromPairs, WithoutEvidenceItIsWhatIsLikely) {
+  EXPECT_NEAR(FocalOf(MakePairs(0, false, 0)), 0.8 * 640, 10);
+  MapperInput planar = MakePairs(40, false, 0);
+  for (TwoViewGeometry& geometry : planar.geometries) geometry.config = TwoViewConfig::kPlanarOrPanoramic;
+  EXPECT_NEAR(FocalOf(planar), 0.8 * 640, 10);
+}
+
+TEST(CalibrateFromPairs, TwoCamerasAreFoundTogether) {
+  MapperInput input = MakePairs(60, false, 0);
+  Camera other = GuessCamera(2, 640, 480);
+  input.cameras.emplace(2, other);
+  // The second image of each pair has a camera of 700 px.
+  for (size_t g = 0; g < input.geometries.size(); ++g) {
+    TwoViewGeometry& geometry = input.geometries[g];
+    if (g % 3 == 0) continue;  // within the first camera
+    geometry.F =
+        CalibrationMatrix(700).inverse().transpose() * CalibrationMatrix(500).transpose() * geometry.F;
+    input.images[2 * g + 1].camera_id = 2;
+  }
+  const auto cameras = CalibrateFromPairs(input);
+  EXPECT_NEAR(cameras.at(1).params[0], 500, 10);
+  EXPECT_NEAR(cameras.at(2).params[0], 700, 10);
+}
+
+std::map<CameraId, Camera> TrueCameras(const SyntheticSurvey& survey) {
+  Camera camera = survey.camera;
+  camera.camera_id = 1;
+  return {{1, camera}};
+}
+
+TEST(EstimateViewPairs, RelativePosesAreThoseOfTheCameras) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(12, 4);
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2);
+  ASSERT_EQ(pairs.size(), survey.input.geometries.size());
+  for (const ViewPair& pair : pairs) {
+    const Pose truth = survey.cams_from_world[pair.image2] * survey.cams_from_world[pair.image1].Inverse();
+    EXPECT_LT(DegFromRad(pair.cam2_from_cam1.rotation.angularDistance(truth.rotation)), 0.5);
+    EXPECT_GT(pair.cam2_from_cam1.translation.dot(truth.translation.normalized()), 0.99);
+    EXPECT_NEAR(pair.cam2_from_cam1.translation.norm(), 1, 1e-9);
+    EXPECT_GT(pair.strength, 0);
+    EXPECT_LE(pair.strength, 1);
+  }
+  const std::vector<ViewPair> alone = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1);
+  for (size_t p = 0; p < pairs.size(); ++p)
+    EXPECT_EQ(pairs[p].cam2_from_cam1.translation, alone[p].cam2_from_cam1.translation);
+}
+
+TEST(EstimateViewPairs, MatchesThatTheGeometryDoesNotExplainAreLeftOut) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(4, 4);
+  TwoViewGeometry& geometry = survey.input.geometries[0];
+  const size_t num_before = geometry.inliers.size();
+  for (size_t m = 0; m + 1 < geometry.inliers.size(); m += 10)
+    std::swap(geometry.inliers[m].idx2, geometry.inliers[m + 1].idx2);
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2);
+  EXPECT_LT(pairs[0].matches.size(), num_before * 9 / 10);
+  EXPECT_GT(pairs[0].matches.size(), num_before * 7 / 10);
+  // A pair with too few is none.
+  geometry.inliers.resize(14);
+  EXPECT_EQ(EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2).size(), pairs.size() - 1);
+}
+
+// A fundamental matrix from points on a plane may be any: five points decide.
+TEST(EstimateViewPairs, AWrongFundamentalMatrixDoesNoHarm) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(3, 4);
+  for (TwoViewGeometry& geometry : survey.input.geometries)
+    geometry.F << 0, -1e-6, 3e-4, 2e-6, 0, -1e-3, -4e-4, 8e-4, 0.1;
+  for (const ViewPair& pair : EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1)) {
+    const Pose truth = survey.cams_from_world[pair.image2] * survey.cams_from_world[pair.image1].Inverse();
+    EXPECT_LT(DegFromRad(pair.cam2_from_cam1.rotation.angularDistance(truth.rotation)), 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace cairn::reconstruct
