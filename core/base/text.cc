@@ -1,12 +1,40 @@
 #include "core/base/text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <numeric>
 
 namespace cairn {
 namespace {
 
 constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
+
+// Negative, zero, positive: a before, equal to, after b, runs of digits compared by value.
+int CompareNaturally(std::string_view a, std::string_view b) {
+  const auto take_digits = [](std::string_view* text) {
+    size_t length = 0;
+    while (length < text->size() && std::isdigit(static_cast<unsigned char>((*text)[length])) != 0) ++length;
+    std::string_view digits = text->substr(0, length);
+    text->remove_prefix(length);
+    digits.remove_prefix(std::min(digits.find_first_not_of('0'), digits.size()));
+    return digits;
+  };
+  while (!a.empty() && !b.empty()) {
+    const bool digit_a = std::isdigit(static_cast<unsigned char>(a[0])) != 0;
+    const bool digit_b = std::isdigit(static_cast<unsigned char>(b[0])) != 0;
+    if (digit_a && digit_b) {
+      const std::string_view digits_a = take_digits(&a), digits_b = take_digits(&b);
+      if (digits_a.size() != digits_b.size()) return digits_a.size() < digits_b.size() ? -1 : 1;
+      if (const int comparison = digits_a.compare(digits_b); comparison != 0) return comparison;
+    } else {
+      if (a[0] != b[0]) return static_cast<unsigned char>(a[0]) < static_cast<unsigned char>(b[0]) ? -1 : 1;
+      a.remove_prefix(1);
+      b.remove_prefix(1);
+    }
+  }
+  return static_cast<int>(b.empty()) - static_cast<int>(a.empty());
+}
 
 }  // namespace
 
@@ -56,6 +84,16 @@ std::optional<std::vector<double>> ParseNumbers(std::string_view text) {
     numbers.push_back(number);
   }
   return numbers;
+}
+
+std::vector<int> NaturalOrder(const std::vector<std::string>& names) {
+  std::vector<int> order(names.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    const int comparison = CompareNaturally(names[a], names[b]);
+    return comparison != 0 ? comparison < 0 : a < b;
+  });
+  return order;
 }
 
 }  // namespace cairn

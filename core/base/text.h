@@ -30,4 +30,7 @@ bool ParseNumber(std::string_view text, T* value) {
 // The numbers between commas: "1, 2.5" is {1, 2.5}.  Nothing where one is missing, or is not a finite number.
 std::optional<std::vector<double>> ParseNumbers(std::string_view text);
 
+// Indices in the natural order of their names: digits compare by value ("2.jpg" before "10.jpg").
+std::vector<int> NaturalOrder(const std::vector<std::string>& names);
+
 }  // namespace cairn

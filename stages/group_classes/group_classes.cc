@@ -6,8 +6,8 @@
 #include <set>
 
 #include "core/files/database.h"
-#include "stages/group_classes/make_classes.h"
 #include "core/structure/union_matches.h"
+#include "stages/group_classes/make_classes.h"
 
 namespace cairn::group_classes {
 namespace {

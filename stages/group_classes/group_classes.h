@@ -9,12 +9,12 @@
 #include "core/capture/capture.h"
 #include "core/colmap/colmap_database.h"
 #include "core/options/options.h"
+#include "core/structure/triangulate.h"
 #include "core/world/dropped_items.h"
 #include "core/world/feature_class.h"
 #include "stages/group_classes/adjust/adjust_survey.h"
 #include "stages/group_classes/find_ambiguous.h"
 #include "stages/group_classes/tracks/posed_images.h"
-#include "core/structure/triangulate.h"
 
 namespace cairn::group_classes {
 

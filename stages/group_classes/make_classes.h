@@ -2,11 +2,11 @@
 
 #include <vector>
 
+#include "core/structure/triangulate.h"
+#include "core/structure/union_matches.h"
 #include "core/world/dropped_items.h"
 #include "core/world/feature_class.h"
 #include "stages/group_classes/group_classes.h"
-#include "core/structure/triangulate.h"
-#include "core/structure/union_matches.h"
 
 namespace cairn::group_classes {
 

@@ -6,6 +6,7 @@
 
 #include <opencv2/core/utility.hpp>
 
+#include "core/base/text.h"
 #include "core/colmap/colmap_database.h"
 #include "core/files/file.h"
 #include "core/world/dropped_items.h"

@@ -143,7 +143,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 Command ReconstructCommand() {
   const auto arguments = std::make_shared<Arguments>();
   return {.name = "reconstruct",
-          .summary = "Find the poses of a capture without any, with COLMAP (stage 2b)",
+          .summary = "Find the poses of a capture without any (stage 2b)",
           .add_arguments =
               [arguments](ArgumentParser& parser) {
                 parser.Add("matches", arguments->matches, "COLMAP database with verified matches")

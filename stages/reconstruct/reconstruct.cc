@@ -145,43 +145,59 @@ size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
 }
 
-// One run of the mapper.
+// One run of a mapper.
 struct MapperAttempt {
   const char* folder;
   const char* name;    // of the images that it registers, in a warning
   const char* remedy;  // what makes it the first attempt; may be empty
   MapperOptions options;
+  bool is_global = false;
 };
 
-// How the mapper is run until enough images are registered.  Distortion and shape cannot be distinguished
-// from two images: the second attempt is without.  Along a street all pairs are of forward motion and small
-// angles, which COLMAP does not start from: the third starts from any pair.
+// How images are mapped until enough are registered: all at once; then by COLMAP.  Distortion and shape
+// cannot be distinguished from two images: its second attempt is without.  Along a street all pairs are of
+// forward motion and small angles, which it does not start from: the third starts from any pair.
 std::vector<MapperAttempt> Attempts(const MapperOptions& options) {
   std::vector<MapperAttempt> attempts;
+  const bool is_global = options.mapper == "global";
+  if (is_global) attempts.push_back({"global", "all at once", "", options, true});
   MapperOptions simpler = options;
   simpler.refine_distortion = false;
   if (options.refine_distortion) {
-    attempts.push_back({"first", "with the cameras' distortion refined", "", options});
+    attempts.push_back({"first", "by COLMAP with the cameras' distortion refined",
+                        is_global ? ": mapper = 'colmap' saves the first attempt" : "", options});
     attempts.push_back(
-        {"without_distortion", "without", ": refine_distortion = false saves the first attempt", simpler});
+        {"without_distortion", "without", ": refine_distortion = false saves an attempt", simpler});
   } else {
-    attempts.push_back({"first", "without distortion", "", options});
+    attempts.push_back({"first", "by COLMAP without distortion",
+                        is_global ? ": mapper = 'colmap' saves the first attempt" : "", options});
   }
   simpler.start_from_any_pair = true;
   attempts.push_back({"from_any_pair", "from a start of any motion", "", simpler});
   return attempts;
 }
 
+Result<std::vector<ColmapModel>> RunAttempt(const MapperAttempt& attempt, const MapperInput& input,
+                                            const Capture& capture, const std::string& work_folder,
+                                            int num_threads, Progress& progress) {
+  const MapperOptions& options = attempt.options;
+  if (attempt.is_global) {
+    return MapGlobally(
+        input,
+        {.refine_focal_length = options.refine_focal_length, .refine_distortion = options.refine_distortion},
+        num_threads, progress);
+  }
+  const std::string folder = work_folder + "/" + attempt.folder;
+  std::error_code error;
+  if (!std::filesystem::create_directory(folder, error))
+    return WriteError(folder, "cannot be created", error.value());
+  return RunMapper(input, capture.images_folder, options, folder, progress);
+}
+
 // The models of the attempt that registers most images.
 Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
                                            const ReconstructOptions& options, const std::string& work_folder,
                                            int num_threads, Progress& progress, ReconstructResult* result) {
-  if (options.mapper.mapper == "global") {
-    return MapGlobally(input,
-                       {.refine_focal_length = options.mapper.refine_focal_length,
-                        .refine_distortion = options.mapper.refine_distortion},
-                       num_threads, progress);
-  }
   const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
   Result<std::vector<ColmapModel>> best = MakeError(ErrorCode::kNoData, "");
   std::string counts;
@@ -189,12 +205,8 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   const MapperAttempt* taken = attempts.data();
   for (const MapperAttempt& attempt : attempts) {
     const bool is_first = &attempt == attempts.data();
-    const std::string folder = work_folder + "/" + attempt.folder;
-    std::error_code error;
-    if (!std::filesystem::create_directory(folder, error))
-      return WriteError(folder, "cannot be created", error.value());
     Result<std::vector<ColmapModel>> models =
-        RunMapper(input, capture.images_folder, attempt.options, folder, progress);
+        RunAttempt(attempt, input, capture, work_folder, num_threads, progress);
     if (!models.ok() && models.error().code != ErrorCode::kNoData &&
         (is_first || models.error().code == ErrorCode::kCancelled)) {
       return models;
@@ -314,7 +326,8 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
   OptionTable table = {
       {.name = "mapper",
        .value = &o->mapper.mapper,
-       .help = "global: poses of all images at once; colmap: image by image, by COLMAP's mapper",
+       .help = "global: poses of all images at once, and by COLMAP's mapper if that joins too few; colmap: "
+               "by COLMAP alone",
        .choices = {"global", "colmap"}},
       {.name = "max_hours",
        .value = &o->mapper.max_hours,
@@ -328,7 +341,8 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .help = "refine the cameras' distortion; cameras given without any get one radial parameter"},
       {.name = "deterministic",
        .value = &o->mapper.deterministic,
-       .help = "one thread and the same bytes on every run; false: all cores in bundle adjustment"},
+       .help = "COLMAP on one thread, and the same bytes on every run; false: all cores in its bundle "
+               "adjustment"},
       {.name = "min_registered_ratio",
        .value = &o->min_registered_ratio,
        .help = "smallest part of the images that must be registered together",

@@ -14,11 +14,11 @@
 
 namespace cairn::reconstruct {
 
-// Finds the poses of a capture that has none, from its matches: COLMAP's mapper gives them up to a similarity
-// (mapper.h), which GPS, known positions or known distances then determine (align.h).  Where too few images
-// are registered with the cameras' distortion refined, the mapper runs once more without, and then from a
-// start of any motion.  Before:
-// match_features.  After: group_classes and all stages that read poses.
+// Finds the poses of a capture that has none, from its matches: of all images at once
+// (globally/map_globally.h), up to a similarity, which GPS, known positions or known distances then determine
+// (align.h).  Where too few images are registered, COLMAP's mapper runs (mapper.h): with the cameras'
+// distortion refined, without, and then from a start of any motion.  Before: match_features.  After:
+// group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;
   // Smallest part of the capture's images that the largest model must have; with fewer there is no
@@ -67,10 +67,10 @@ struct ReconstructResult {
   double mean_error_px = 0;      // its mean reprojection error
 };
 
-// Runs COLMAP on the matches and puts the largest model into a frame.  `work_folder` is an empty folder.
-// Same result on every run where options.mapper.deterministic.  Errors: InvalidArgument (options); NoData
-// (too few images registered, the requested scale is not available, no image of the database in the capture);
-// those of RunMapper and of the files.
+// Maps the images and puts the largest model into a frame.  `work_folder` is an empty folder, for COLMAP.
+// Same result on every run and any number of threads where options.mapper.deterministic.  Errors:
+// InvalidArgument (options); NoData (too few images registered, the requested scale is not available, no
+// image of the database in the capture); those of RunMapper and of the files.
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       int num_threads, Progress& progress);

@@ -19,15 +19,16 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-// The real colmap on surveys with known truth.
-class ReconstructTest : public testing::Test {
+// Our mapper, and the real colmap, on surveys with known truth.
+class ReconstructTest : public testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     root_ = testing::TempDir() + "/reconstruct_test";
     fs::remove_all(root_);
     fs::create_directories(root_);
   }
-  Result<ReconstructResult> Run(SyntheticSurvey survey, const ReconstructOptions& options) {
+  Result<ReconstructResult> Run(SyntheticSurvey survey, ReconstructOptions options) {
+    options.mapper.mapper = GetParam();
     survey.capture.root = survey.capture.images_folder = root_;
     const std::string work = root_ + "/work";
     fs::remove_all(work);
@@ -61,7 +62,7 @@ double MaxCenterErrorM(const ReconstructResult& result, const SyntheticSurvey& s
   return most;
 }
 
-TEST_F(ReconstructTest, ControlPointsGiveTruePosesAndTheTrueCamera) {
+TEST_P(ReconstructTest, ControlPointsGiveTruePosesAndTheTrueCamera) {
   const SyntheticSurvey survey = MakeSyntheticSurvey(12, 11);
   WriteControlPoints(survey);
   const auto result = Run(survey, {.control_points = "control_points.txt"});
@@ -87,7 +88,7 @@ TEST_F(ReconstructTest, ControlPointsGiveTruePosesAndTheTrueCamera) {
   EXPECT_NEAR(result->cameras.at(1).params[3], 0, 0.01);
 }
 
-TEST_F(ReconstructTest, KnownDistancesGiveTheScale) {
+TEST_P(ReconstructTest, KnownDistancesGiveTheScale) {
   const SyntheticSurvey survey = MakeSyntheticSurvey(10, 12);
   const auto distance = [&](int i, int j) {
     return CenterErrorM(survey.cams_from_world[i], survey.cams_from_world[j]);
@@ -108,7 +109,7 @@ TEST_F(ReconstructTest, KnownDistancesGiveTheScale) {
   EXPECT_NEAR(result->residuals[2].residual_m, distance(2, 9), 0.1);
 }
 
-TEST_F(ReconstructTest, GpsGivesAnAnchoredFrame) {
+TEST_P(ReconstructTest, GpsGivesAnAnchoredFrame) {
   SyntheticSurvey survey = MakeSyntheticSurvey(10, 13);
   const GeodeticPosition place{-33.8567844, 151.2152967, -20};  // south, east, below sea level
   for (size_t i = 0; i < survey.input.images.size(); ++i) {
@@ -136,7 +137,7 @@ TEST_F(ReconstructTest, GpsGivesAnAnchoredFrame) {
   }
 }
 
-TEST_F(ReconstructTest, WithoutAnythingKnownTheUnitIsArbitraryAndSaidSo) {
+TEST_P(ReconstructTest, WithoutAnythingKnownTheUnitIsArbitraryAndSaidSo) {
   const auto result = Run(MakeSyntheticSurvey(8, 14), {.unscaled_step = 0.25, .hold_out_every = 3});
   ASSERT_TRUE(result.ok()) << result.error().message;
   EXPECT_EQ(result->frame.unit, "arbitrary");
@@ -151,7 +152,7 @@ TEST_F(ReconstructTest, WithoutAnythingKnownTheUnitIsArbitraryAndSaidSo) {
   EXPECT_NEAR(CenterErrorM(*result->images[0].cam_from_world, *result->images[1].cam_from_world), 0.25, 0.1);
 }
 
-TEST_F(ReconstructTest, AskedForGpsThatIsNotThereIsAnError) {
+TEST_P(ReconstructTest, AskedForGpsThatIsNotThereIsAnError) {
   const auto result = Run(MakeSyntheticSurvey(6, 15), {.scale_from = "gps"});
   ASSERT_FALSE(result.ok());
   EXPECT_EQ(result.error().code, ErrorCode::kNoData);
@@ -160,7 +161,7 @@ TEST_F(ReconstructTest, AskedForGpsThatIsNotThereIsAnError) {
 
 // Two places without a match between them, and one image of nothing: the larger place is kept, the others are
 // listed with their reasons.
-TEST_F(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
+TEST_P(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
   SyntheticSurvey survey = MakeSyntheticSurvey(9, 16);
   AppendSurvey(MakeSyntheticSurvey(5, 17, "other", 10), &survey);
   survey.input.images.push_back({15, "lonely.jpg", 1});
@@ -186,7 +187,24 @@ TEST_F(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
       AllOf(HasSubstr("only 9 of 15"), HasSubstr("min_registered_ratio = 0.61"), HasSubstr("other00.jpg: ")));
 }
 
-TEST_F(ReconstructTest, WithoutAStartTheMapperRunsOnceMoreWithoutDistortion) {
+TEST_P(ReconstructTest, BadOptionsAreRefused) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(3, 18);
+  for (const ReconstructOptions& options :
+       {ReconstructOptions{.min_registered_ratio = 2}, ReconstructOptions{.scale_from = "stars"},
+        ReconstructOptions{.scale_from = "distances"}, ReconstructOptions{.scale_from = "control_points"},
+        ReconstructOptions{.gps_sigma_m = 0}, ReconstructOptions{.hold_out_every = 1}}) {
+    const auto result = Run(survey, options);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument) << result.error().message;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Mappers, ReconstructTest, testing::Values("global", "colmap"));
+
+using ReconstructByColmapTest = ReconstructTest;
+INSTANTIATE_TEST_SUITE_P(Mappers, ReconstructByColmapTest, testing::Values("colmap"));
+
+TEST_P(ReconstructByColmapTest, WithoutAStartTheMapperRunsOnceMoreWithoutDistortion) {
   const FakeColmap colmap(R"(case "$*" in
 *"ba_refine_extra_params 1"*) echo "ERROR: failed to create sparse model"; exit 1;;
 esac
@@ -198,15 +216,15 @@ exec /usr/bin/colmap "$@")");
   EXPECT_THAT(result->images, SizeIs(12));
   EXPECT_EQ(result->cameras.at(1).model, CameraModel::kSimplePinhole);
   ASSERT_FALSE(result->warnings.empty());
-  EXPECT_THAT(result->warnings[0], HasSubstr("0 of 12 images were registered with the cameras' distortion "
-                                             "refined, 12 without"));
+  EXPECT_THAT(result->warnings[0], HasSubstr("0 of 12 images were registered by COLMAP with the cameras' "
+                                             "distortion refined, 12 without"));
   ReconstructOptions only_with{.control_points = "control_points.txt"};
   only_with.mapper.refine_distortion = false;
   EXPECT_THAT(Run(survey, only_with)->warnings, SizeIs(0));
 }
 
 // As along a street: COLMAP starts from no pair of forward motion unless it is told to.
-TEST_F(ReconstructTest, WithoutAStartTheMapperAtLastStartsFromAnyPair) {
+TEST_P(ReconstructByColmapTest, WithoutAStartTheMapperAtLastStartsFromAnyPair) {
   const FakeColmap colmap(R"(case "$*" in
 *"init_max_forward_motion 1 "*) exec /usr/bin/colmap "$@";;
 esac
@@ -219,24 +237,31 @@ echo "ERROR: failed to create sparse model"; exit 1)");
   EXPECT_THAT(result->images, SizeIs(12));
   ASSERT_FALSE(result->warnings.empty());
   EXPECT_EQ(result->warnings[0],
-            "0 of 12 images were registered with the cameras' distortion refined, 0 without, 12 from a start "
+            "0 of 12 images were registered by COLMAP with the cameras' distortion refined, 0 without, 12 "
+            "from a start "
             "of any motion; the reconstruction is the one from a start of any motion");
   options.mapper.refine_distortion = false;
   EXPECT_EQ(Run(survey, options)->warnings[0],
-            "0 of 12 images were registered without distortion, 12 from a start of any motion; the "
+            "0 of 12 images were registered by COLMAP without distortion, 12 from a start of any motion; the "
             "reconstruction is the one from a start of any motion");
 }
 
-TEST_F(ReconstructTest, BadOptionsAreRefused) {
-  const SyntheticSurvey survey = MakeSyntheticSurvey(3, 18);
-  for (const ReconstructOptions& options :
-       {ReconstructOptions{.min_registered_ratio = 2}, ReconstructOptions{.scale_from = "stars"},
-        ReconstructOptions{.scale_from = "distances"}, ReconstructOptions{.scale_from = "control_points"},
-        ReconstructOptions{.gps_sigma_m = 0}, ReconstructOptions{.hold_out_every = 1}}) {
-    const auto result = Run(survey, options);
-    ASSERT_FALSE(result.ok());
-    EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument) << result.error().message;
-  }
+// What joins too few images is left to COLMAP, which joins more of these: it says so.
+using ReconstructGloballyTest = ReconstructTest;
+INSTANTIATE_TEST_SUITE_P(Mappers, ReconstructGloballyTest, testing::Values("global"));
+
+TEST_P(ReconstructGloballyTest, ColmapIsAskedOnlyWhereTooFewImagesAreJoined) {
+  const FakeColmap colmap("echo called >> " + root_ +
+                          "/colmap.log\necho 'ERROR: failed to create sparse model'; exit 1");
+  const auto whole = Run(MakeSyntheticSurvey(12, 11), {.scale_from = "none"});
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  EXPECT_FALSE(fs::exists(root_ + "/colmap.log"));
+  SyntheticSurvey survey = MakeSyntheticSurvey(9, 16);
+  AppendSurvey(MakeSyntheticSurvey(5, 17, "other", 10), &survey);
+  const auto parts = Run(survey, {.min_registered_ratio = 0.7, .scale_from = "none"});
+  ASSERT_FALSE(parts.ok());
+  EXPECT_TRUE(fs::exists(root_ + "/colmap.log"));
+  EXPECT_THAT(parts.error().message, HasSubstr("only 9 of 14"));
 }
 
 }  // namespace

@@ -25,6 +25,8 @@ constexpr double kOffsetChiSquare = 33;
 // A larger model of a camera is taken if left-out keypoints gain this many standard errors, and this part.
 constexpr double kMinGainSigmas = 2, kMinGain = 1e-3, kMinGainOfShared = 0.5;
 constexpr double kFarOffGain = 0.3;
+// Noise and cameras' models need no adjustment to the last digit.
+constexpr double kLearningTolerance = 1e-3;
 constexpr int kMinNumCameraImages = 5;
 
 class SurveyAdjuster {
@@ -36,7 +38,8 @@ class SurveyAdjuster {
         tracks_(tracks),
         triangulate_(triangulate),
         options_(options),
-        bundle_options_{.max_num_iterations = options.max_num_iterations},
+        bundle_options_{.max_num_iterations = options.max_num_iterations,
+                        .function_tolerance = kLearningTolerance},
         num_threads_(num_threads),
         progress_(progress),
         posed_(*posed) {
@@ -69,8 +72,15 @@ class SurveyAdjuster {
     }
     findings_.noise = problem_.noise;
     findings_.camera_from_given = problem_.camera_from_given;
-    const LeftOutErrors as_stated = LeaveOut(bundle_options_, AsStated(problem_.camera_from_given));
-    const LeftOutGain gain = GainOf(problem_, as_stated, LeaveOut(bundle_options_, problem_), -1);
+    LeftOutErrors as_stated, adjusted;
+    ParallelFor(2, num_threads_, [&](int64_t i) {
+      if (i == 0) {
+        as_stated = LeaveOut(bundle_options_, AsStated(problem_.camera_from_given));
+      } else {
+        adjusted = LeaveOut(bundle_options_, problem_);
+      }
+    });
+    const LeftOutGain gain = GainOf(problem_, as_stated, adjusted, -1);
     if (IsGain(gain)) findings_.pose_gain = gain.part;
     if (findings_.pose_gain == 0 && findings_.has_offset) {
       // Poses that are exact make the least offset significant; but it must explain something.
@@ -91,6 +101,7 @@ class SurveyAdjuster {
   // Adjusts everything by what was learnt.
   void Apply(const SurveyFindings& findings, const TriangulateOptions& first) {
     is_learning_ = false;
+    bundle_options_.function_tolerance = BundleOptions().function_tolerance;
     findings_ = findings;
     problem_.noise = findings.noise;
     problem_.is_offset_free = findings.has_offset;

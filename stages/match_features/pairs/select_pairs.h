@@ -38,8 +38,6 @@ double FrustumOverlap(const PosedCamera& image1, const PosedCamera& image2,
 // Index pairs (i < j), ascending.
 using IndexPairs = std::vector<std::pair<int, int>>;
 IndexPairs ExhaustivePairs(int num_images);
-// Image indices in the natural order of their names: digits compare by value ("2.jpg" before "10.jpg").
-std::vector<int> NaturalOrder(const std::vector<std::string>& names);
 // Each image with its `window` successors in `order`, a permutation of the image indices.
 IndexPairs SequencePairs(const std::vector<int>& order, int window);
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/base/quantiles.h"
 #include "core/camera/pixel_ray.h"
 #include "core/structure/bundle_blocks.h"
 #include "core/structure/camera_sensitivity.h"
@@ -39,6 +40,43 @@ class CameraPriorCost : public ceres::CostFunction {
  private:
   const FreeCamera& camera_;
 };
+
+struct RelativeRotationCost {
+  Eigen::Quaterniond cam2_from_cam1;
+  double sigma_rad;
+  template <typename T>
+  bool operator()(const T* pose1, const T* pose2, T* residual) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> rotation1(pose1), rotation2(pose2);
+    const Eigen::Quaternion<T> q = rotation2 * rotation1.conjugate() * cam2_from_cam1.conjugate().cast<T>();
+    Eigen::Map<Eigen::Matrix<T, 3, 1>> out(residual);
+    out = (q.w() < T(0) ? T(-2) : T(2)) / T(sigma_rad) * q.vec();
+    return true;
+  }
+};
+
+struct StepLengthCost {
+  double step, sigma_ratio;
+  template <typename T>
+  bool operator()(const T* pose1, const T* pose2, T* residual) const {
+    const auto center = [](const T* pose) {
+      const Eigen::Map<const Eigen::Quaternion<T>> rotation(pose);
+      const Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation(pose + 4);
+      return Eigen::Matrix<T, 3, 1>(-(rotation.conjugate() * translation));
+    };
+    const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
+    // Smooth where nothing moves.
+    const T length = ceres::sqrt(way.squaredNorm() + T(1e-6 * step * step));
+    residual[0] = (length / T(step) - T(1)) / T(sigma_ratio);
+    return true;
+  }
+};
+
+double MedianStep(const ModelProblem& problem) {
+  std::vector<double> lengths;
+  for (const auto& [from, to] : problem.steps)
+    lengths.push_back(CenterErrorM(problem.cam_from_world[from], problem.cam_from_world[to]));
+  return lengths.empty() ? 0 : UpperMedian(lengths);
+}
 
 struct Seen {
   PixelRay ray;
@@ -86,6 +124,25 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
     }
     ceres_problem.AddResidualBlock(
         new ReprojectionCost(seen[k].ray, seen[k].sensitivity, observation.sigma_px), &loss, blocks);
+  }
+  ceres::CauchyLoss weak_loss(1);
+  const auto are_known = [&](size_t a, size_t b) {
+    return ceres_problem.HasParameterBlock(pose_of(a)) && ceres_problem.HasParameterBlock(pose_of(b));
+  };
+  for (const RelativeRotation& rotation : problem->rotations) {
+    if (!are_known(rotation.image1, rotation.image2)) continue;
+    ceres_problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<RelativeRotationCost, 3, kPoseBlockSize, kPoseBlockSize>(
+            new RelativeRotationCost{rotation.cam2_from_cam1, RadFromDeg(options.rotation_sigma_deg)}),
+        &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
+  }
+  const double step = MedianStep(*problem);
+  for (const auto& [from, to] : problem->steps) {
+    if (!(step > 0) || !are_known(from, to)) continue;
+    ceres_problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
+            new StepLengthCost{step, options.step_sigma_ratio}),
+        &weak_loss, pose_of(from), pose_of(to));
   }
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (Eigen::Vector3d& point : problem->points) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
@@ -23,6 +25,13 @@ struct ModelObservation {
   double sigma_px = 1;  // standard deviation of a coordinate
 };
 
+// What a pair says of its images' rotations: all that ties them where the camera turned on the spot, as
+// points without parallax are no points.
+struct RelativeRotation {
+  int image1 = 0, image2 = 0;
+  Eigen::Quaterniond cam2_from_cam1;
+};
+
 // A reconstruction in a frame of its own, and what was seen.
 struct ModelProblem {
   std::vector<Pose> cam_from_world;  // refined
@@ -30,11 +39,18 @@ struct ModelProblem {
   std::vector<FreeCamera> cameras;
   std::vector<Eigen::Vector3d> points;  // refined
   std::vector<ModelObservation> observations;
+  std::vector<RelativeRotation> rotations;
+  std::vector<std::pair<int, int>>
+      steps;  // images of a drive that follow each other: about as far apart as others
 };
 
 struct AdjustModelOptions {
   // Cauchy's scale, in standard deviations of a keypoint.  REQUIRES: > 0
   double loss_scale = 2;
+  // Standard deviations of a pair's rotation, degrees, and of a step, as a part of the median one.  REQUIRES:
+  // > 0
+  double rotation_sigma_deg = 0.5;
+  double step_sigma_ratio = 0.5;
   int max_num_iterations = 25;
   double function_tolerance = 1e-4;
   // Whether the cameras' free parameters change, too.

@@ -120,17 +120,13 @@ std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vect
                                                  const AverageRotationsOptions& options) {
   std::vector<Eigen::Quaterniond> rotations = RotationsAlongTree(num_images, pairs);
   if (num_images < 2) return rotations;
-  const double scale = options.robust_scale_deg * std::numbers::pi / 180;
   std::vector<Eigen::Vector3d> errors(pairs.size());
   std::vector<double> weights(pairs.size());
-  for (int iteration = 0; iteration < options.max_num_iterations; ++iteration) {
+  // Returns the largest turn.
+  const auto step = [&](const auto& weight_of) {
     for (size_t p = 0; p < pairs.size(); ++p) {
       errors[p] = ErrorOf(pairs[p], rotations);
-      const double squared = errors[p].squaredNorm();
-      weights[p] = iteration < kNumAbsoluteIterations
-                       ? 1 / std::max(std::sqrt(squared), kLeastErrorRad)
-                       : std::pow(scale * scale / (scale * scale + squared), 2);
-      weights[p] *= std::max(pairs[p].weight, kLeastWeight);
+      weights[p] = weight_of(errors[p].squaredNorm()) * std::max(pairs[p].weight, kLeastWeight);
     }
     const Eigen::MatrixX3d turns = SolveTurns(num_images, pairs, errors, weights);
     double largest = 0;
@@ -140,7 +136,18 @@ std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vect
       largest = std::max(largest, angle);
       if (angle > 0) rotations[i] = (rotations[i] * Eigen::AngleAxisd(angle, turn / angle)).normalized();
     }
-    if (iteration >= kNumAbsoluteIterations && largest < kConvergedRad) break;
+    return largest;
+  };
+  for (int iteration = 0; iteration < kNumAbsoluteIterations; ++iteration)
+    step([](double squared) { return 1 / std::max(std::sqrt(squared), kLeastErrorRad); });
+  for (const double scale_deg : options.robust_scales_deg) {
+    const double scale = RadFromDeg(scale_deg);
+    const auto weight_of = [&](double squared) {
+      return std::pow(scale * scale / (scale * scale + squared), 2);
+    };
+    for (int iteration = 0; iteration < options.max_num_iterations; ++iteration) {
+      if (step(weight_of) < kConvergedRad) break;
+    }
   }
   return rotations;
 }

@@ -18,10 +18,11 @@ std::vector<Eigen::Quaterniond> RotationsAlongTree(int num_images, const std::ve
 
 struct AverageRotationsOptions {
   // A pair whose rotation differs by more from that between its images' is wrong, degrees.  REQUIRES: > 0
-  double max_error_deg = 10;
-  // Scale beyond which a pair's error counts little, degrees [Chatterjee & Govindu 2013].  REQUIRES: > 0
-  double robust_scale_deg = 5;
-  int max_num_iterations = 60;
+  double max_error_deg = 5;
+  // Scales beyond which a pair's error counts little, degrees, one after the other: of two pairs that
+  // contradict each other by a few degrees one wins in the end.
+  std::vector<double> robust_scales_deg = {5, 2, 1};
+  int max_num_iterations = 30;  // with each scale
 };
 
 // Rotations cam_from_world of images that explain the pairs' best, robustly: along a tree of the pairs with

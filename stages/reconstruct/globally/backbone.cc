@@ -16,6 +16,9 @@ constexpr double kMinStrengthNear = 0.25;
 // A drive: of this part of its neighbours the pair is at least this strong.
 constexpr double kMinDriveRatio = 0.8, kMinStrengthOfNext = 0.4;
 
+// Relative poses of fewer matches are doubtful.
+constexpr int kNumCertainMatches = 50;
+
 class Components {
  public:
   explicit Components(int num_images) : root_(num_images) { std::iota(root_.begin(), root_.end(), 0); }
@@ -43,7 +46,8 @@ bool IsDrive(int num_images, const std::vector<ViewPair>& pairs) {
 void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
   for (ViewPair& pair : *pairs) {
     const int distance = std::min(std::abs(pair.image1 - pair.image2), kMaxOrderDistance);
-    pair.weight = is_drive ? pair.strength / distance : pair.strength;
+    const double certainty = std::min(1.0, static_cast<double>(pair.matches.size()) / kNumCertainMatches);
+    pair.weight = pair.strength * certainty / (is_drive ? distance : 1);
   }
 }
 

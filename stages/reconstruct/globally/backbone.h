@@ -10,7 +10,8 @@ namespace cairn::reconstruct {
 // the next one shows.
 bool IsDrive(int num_images, const std::vector<ViewPair>& pairs);
 
-// Sets the pairs' weights: their strengths; of a drive, over how many images they are apart, up to ten.
+// Sets the pairs' weights: their strengths, less where they have few matches; of a drive, over how many
+// images they are apart, up to ten.
 void SetWeights(bool is_drive, std::vector<ViewPair>* pairs);
 
 // The pairs to begin with: those that show most of the same, relative to the most that one of the two shares

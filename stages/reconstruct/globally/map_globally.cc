@@ -4,10 +4,12 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
+#include "core/base/text.h"
 #include "stages/reconstruct/globally/average_rotations.h"
 #include "stages/reconstruct/globally/backbone.h"
 #include "stages/reconstruct/globally/part_mapper.h"
@@ -22,9 +24,24 @@ constexpr double kMaxTreeErrorDeg = 20;
 
 // Images that pairs join, with indices of their own.
 struct Part {
-  std::vector<int> images;      // indices into the input's, ascending
+  std::vector<int> images;      // indices into the input's, in the order of their names
   std::vector<ViewPair> pairs;  // of indices into `images`
 };
+
+Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs) {
+  Part part;
+  std::vector<std::string> names;
+  for (const DatabaseImage& image : input.images) names.push_back(image.name);
+  part.images = NaturalOrder(names);
+  std::vector<int> place(part.images.size());
+  for (size_t i = 0; i < part.images.size(); ++i) place[part.images[i]] = static_cast<int>(i);
+  part.pairs = std::move(pairs);
+  for (ViewPair& pair : part.pairs) {
+    pair.image1 = place[pair.image1];
+    pair.image2 = place[pair.image2];
+  }
+  return part;
+}
 
 std::vector<Part> PartsOf(const Part& whole) {
   std::vector<Part> parts;
@@ -97,9 +114,7 @@ Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const Map
   const int num_images = static_cast<int>(input.images.size());
   progress.Begin("reconstruct", num_images, "images");
   const std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
-  Part whole;
-  for (int i = 0; i < num_images; ++i) whole.images.push_back(i);
-  whole.pairs = EstimateViewPairs(input, cameras, {}, num_threads);
+  Part whole = InOrderOfNames(input, EstimateViewPairs(input, cameras, {}, num_threads));
   std::vector<Part> found = PartsOf(whole);
   std::deque<Part> open(found.begin(), found.end());
   std::vector<ColmapModel> models;

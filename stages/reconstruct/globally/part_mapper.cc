@@ -10,6 +10,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
+#include "stages/reconstruct/globally/average_rotations.h"
 #include "stages/reconstruct/globally/position_images.h"
 
 namespace cairn::reconstruct {
@@ -61,7 +62,12 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
       images_(std::move(images)),
       pairs_(std::move(pairs)),
       is_accepted_(pairs_.size(), false) {
-  for (const int p : backbone) is_accepted_[p] = true;
+  for (const int p : backbone) {
+    is_accepted_[p] = true;
+    problem_.rotations.push_back({pairs_[p].image1, pairs_[p].image2, pairs_[p].cam2_from_cam1.rotation});
+  }
+  for (int i = 1; i < static_cast<int>(images_.size()) && is_drive; ++i)
+    problem_.steps.emplace_back(i - 1, i);
   std::map<CameraId, int> index;
   for (const auto& [camera_id, camera] : cameras) {
     index.emplace(camera_id, static_cast<int>(problem_.cameras.size()));
@@ -212,6 +218,8 @@ int PartMapper::AcceptPairs(double max_error_rad) {
     for (const int e : triangulations_[t].inliers)
       track_of[tracks_[t][e].image_idx][tracks_[t][e].keypoint_idx] = static_cast<int>(t);
   }
+  std::vector<Eigen::Quaterniond> rotations;
+  for (const Pose& pose : problem_.cam_from_world) rotations.push_back(pose.rotation);
   std::vector<char> verdict(pairs_.size(), 0);
   ParallelFor(static_cast<int64_t>(pairs_.size()), num_threads_, [&](int64_t p) {
     const ViewPair& pair = pairs_[p];
@@ -227,7 +235,10 @@ int PartMapper::AcceptPairs(double max_error_rad) {
       add(track_of[pair.image2][match.idx2], pair.image1, match.idx1);
     }
     if (static_cast<int>(errors.size()) < 2 * kMinNumTested) return;
-    verdict[p] = UpperMedian(errors) <= max_error_rad ? 1 : -1;
+    verdict[p] =
+        UpperMedian(errors) <= max_error_rad && RotationErrorDeg(pair, rotations) <= DegFromRad(max_error_rad)
+            ? 1
+            : -1;
   });
   int num_changed = 0;
   for (size_t p = 0; p < pairs_.size(); ++p) {
@@ -262,8 +273,10 @@ ColmapModel PartMapper::MakeModel() const {
   for (size_t t = 0; t < tracks_.size(); ++t) {
     for (const int e : triangulations_[t].inliers) ++num_seen[tracks_[t][e].image_idx];
   }
-  std::vector<int> place(images_.size(), -1);
-  for (size_t i = 0; i < images_.size(); ++i) {
+  std::vector<int> place(images_.size(), -1), order(images_.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return images_[a] < images_[b]; });
+  for (const int i : order) {
     if (num_seen[i] < kMinNumSeen) continue;
     const DatabaseImage& listed = input_.images[images_[i]];
     place[i] = static_cast<int>(model.images.size());
@@ -275,7 +288,7 @@ ColmapModel PartMapper::MakeModel() const {
     for (const Keypoint& keypoint : input_.keypoints[images_[i]])
       image.keypoints.push_back({{keypoint.x, keypoint.y}, kNoPoint});
     model.images.push_back(std::move(image));
-    model.cameras.emplace(listed.camera_id, CameraOf(static_cast<int>(i)));
+    model.cameras.emplace(listed.camera_id, CameraOf(i));
   }
   for (size_t t = 0; t < tracks_.size(); ++t) {
     std::vector<TrackElement> seen;

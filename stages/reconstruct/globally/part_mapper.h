@@ -26,8 +26,8 @@ struct MapGloballyOptions {
 // triangulates, and adjusts the longest.
 class PartMapper {
  public:
-  // `images`: indices into the input's, ascending; `pairs`: of indices into `images`; `backbone`: indices of
-  // pairs.
+  // `images`: indices into the input's, of a drive in its order; `pairs`: of indices into `images`;
+  // `backbone`: indices of pairs.
   PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
              const MapGloballyOptions& options, int num_threads, std::vector<int> images,
              std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive);
