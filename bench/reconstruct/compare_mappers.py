@@ -80,7 +80,7 @@ def main():
     print("| capture | mapper | joined | focal length, px | median error | 90th percentile | largest | s |")
     print("|---|---|---|---|---|---|---|---|")
     for capture in arguments.captures:
-        work = arguments.work / capture.resolve().name
+        work = arguments.work / capture.absolute().name
         bare, build = withhold_poses(capture, work / "capture"), work / "map.build"
         recipe = work / "map.toml"
         recipe.write_text(f'name = "map"\n[capture]\npath = "{bare.resolve()}"\n')
@@ -98,7 +98,7 @@ def main():
             seconds = time.time() - began
             found = read_poses(poses / "images.txt")
             focal = next(line.split()[4] for line in (poses / "cameras.txt").read_text().splitlines() if re.match(r"\d", line))
-            row = f"| {capture.resolve().name} | {mapper} | {len(found)} of {len(list((bare / 'images').rglob('*.*')))} | {float(focal):.1f} | "
+            row = f"| {capture.absolute().name} | {mapper} | {len(found)} of {len(list((bare / 'images').rglob('*.*')))} | {float(focal):.1f} | "
             if true:
                 distances, angles = errors(found, true)
                 row += " | ".join(f"{100 * value(distances):.2f} cm, {value(angles):.3f}°"

@@ -134,7 +134,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<RelativeRotationCost, 3, kPoseBlockSize, kPoseBlockSize>(
             new RelativeRotationCost{rotation.cam2_from_cam1, RadFromDeg(options.rotation_sigma_deg)}),
-        &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
+        rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
   }
   const double step = MedianStep(*problem);
   for (const auto& [from, to] : problem->steps) {

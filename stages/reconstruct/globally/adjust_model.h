@@ -30,6 +30,7 @@ struct ModelObservation {
 struct RelativeRotation {
   int image1 = 0, image2 = 0;
   Eigen::Quaterniond cam2_from_cam1;
+  bool is_sure = false;  // no points outvote it
 };
 
 // A reconstruction in a frame of its own, and what was seen.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -21,6 +22,10 @@ constexpr int kNumKeypointsPositioned = 80;
 constexpr double kMinAngleDeg = 1;
 constexpr int kMinNumSeen = 15;  // points of an image that stays
 constexpr double kGuessedFocalSigma = 0.3, kStatedFocalSigma = 0.03, kDistortionSigma = 0.1;
+// Images of a drive that follow each other: a rotation by so many matches, from which the average differs by
+// so little, is sure.
+constexpr int kMaxSureDistance = 2, kMinSureMatches = 50;
+constexpr double kMaxSureErrorDeg = 1;
 constexpr int kMinNumTested = 10;  // matches that tell whether a pair agrees with the map
 
 // One after the other, from coarse to fine.
@@ -62,10 +67,7 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
       images_(std::move(images)),
       pairs_(std::move(pairs)),
       is_accepted_(pairs_.size(), false) {
-  for (const int p : backbone) {
-    is_accepted_[p] = true;
-    problem_.rotations.push_back({pairs_[p].image1, pairs_[p].image2, pairs_[p].cam2_from_cam1.rotation});
-  }
+  for (const int p : backbone) is_accepted_[p] = true;
   for (int i = 1; i < static_cast<int>(images_.size()) && is_drive; ++i)
     problem_.steps.emplace_back(i - 1, i);
   std::map<CameraId, int> index;
@@ -77,6 +79,7 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
 }
 
 ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, const Progress& progress) {
+  KeepRotations(rotations);
   MakeTracks();
   Position(rotations);
   for (const Round& round : kRounds) {
@@ -97,6 +100,17 @@ ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, co
   }
   TriangulateAll(std::end(kRounds)[-1].max_error_px);
   return MakeModel();
+}
+
+void PartMapper::KeepRotations(const std::vector<Eigen::Quaterniond>& rotations) {
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const ViewPair& pair = pairs_[p];
+    if (!is_accepted_[p]) continue;
+    const bool is_next = is_drive_ && std::abs(pair.image2 - pair.image1) <= kMaxSureDistance;
+    problem_.rotations.push_back({pair.image1, pair.image2, pair.cam2_from_cam1.rotation,
+                                  is_next && static_cast<int>(pair.matches.size()) >= kMinSureMatches &&
+                                      RotationErrorDeg(pair, rotations) <= kMaxSureErrorDeg});
+  }
 }
 
 FreeCamera PartMapper::FreeOf(const Camera& stated) const {

@@ -45,6 +45,7 @@ class PartMapper {
   FreeCamera FreeOf(const Camera& stated) const;
   Eigen::Vector2d PixelOf(const TrackElement& element) const;
   const Camera& CameraOf(int image) const { return problem_.cameras[problem_.camera_idx[image]].camera; }
+  void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
   void Position(const std::vector<Eigen::Quaterniond>& rotations);

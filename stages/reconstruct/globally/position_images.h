@@ -30,7 +30,7 @@ struct PositionImagesOptions {
 // Places of images and points, up to shift and scale, from nowhere: all at random, then
 //   min sum_ik rho(|v_ik - d_ik (X_k - c_i)|^2),  d_ik >= 0,
 // over centres c, points X and factors d, where v are the sights [Pan, Barath, Pollefeys & Schönberger,
-// "Global structure-from-motion revisited", ECCV 2024, eq. 3; bilinear as in Zhuang, Cheong & Lee 2018,
+// "Global structure-from-motion revisited", ECCV 2024, §3.3; bilinear as in Zhuang, Cheong & Lee 2018,
 // BATA]. The form needs no start, and points tie cameras on a line together, whose pairwise directions are
 // parallel. Ceres, one thread; deterministic.  REQUIRES: the sights join all images and points.
 // `is_drive`: images follow each other at steps of about one length, which ties parts together between which

@@ -13,6 +13,7 @@ ViewPair Pair(int image1, int image2, double strength) {
   pair.image1 = image1;
   pair.image2 = image2;
   pair.strength = strength;
+  pair.matches.resize(50);
   return pair;
 }
 
@@ -39,7 +40,12 @@ TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
   EXPECT_DOUBLE_EQ(pairs[1].weight, 0.2);
   EXPECT_DOUBLE_EQ(pairs[2].weight, 0.08);
   EXPECT_DOUBLE_EQ(pairs[3].weight, 0.08);
+  // A relative pose of few matches is doubtful.
+  pairs[1].matches.resize(25);
+  SetWeights(true, &pairs);
+  EXPECT_DOUBLE_EQ(pairs[1].weight, 0.1);
   SetWeights(false, &pairs);
+  EXPECT_DOUBLE_EQ(pairs[1].weight, 0.4);
   EXPECT_DOUBLE_EQ(pairs[3].weight, 0.8);
 }
 
