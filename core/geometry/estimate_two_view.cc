@@ -185,4 +185,22 @@ std::optional<Eigen::Matrix3d> EstimateHomography(const Correspondences& corresp
   return on_bearings / (sign < 0 ? -on_bearings.norm() : on_bearings.norm());
 }
 
+std::vector<Pose> PosesFromHomography(const Eigen::Matrix3d& H) {
+  std::vector<Pose> poses;
+  if (!H.allFinite() || std::abs(H.determinant()) < 1e-12) return poses;
+  cv::Mat matrix;
+  cv::eigen2cv(Eigen::Matrix3d(H), matrix);
+  std::vector<cv::Mat> rotations, translations, normals;
+  cv::decomposeHomographyMat(matrix, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
+  for (size_t i = 0; i < rotations.size(); ++i) {
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d translation;
+    cv::cv2eigen(rotations[i], rotation);
+    cv::cv2eigen(translations[i], translation);
+    if (!rotation.allFinite() || !(translation.norm() > 1e-9)) continue;
+    poses.push_back({Eigen::Quaterniond(rotation).normalized(), translation.normalized()});
+  }
+  return poses;
+}
+
 }  // namespace cairn

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include <Eigen/Core>
 
+#include "core/geometry/pose.h"
 #include "core/geometry/two_view_error.h"
 
 namespace cairn {
@@ -33,5 +35,9 @@ std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& corr
 // the front.
 std::optional<Eigen::Matrix3d> EstimateHomography(const Correspondences& correspondences,
                                                   const EstimateModelOptions& options);
+
+// The relative poses, up to four, that a homography of bearings may come from; translations of length 1 and either
+// sign [Malis & Vargas 2007].  None of a rotation.
+std::vector<Pose> PosesFromHomography(const Eigen::Matrix3d& H);
 
 }  // namespace cairn

@@ -13,8 +13,9 @@ namespace cairn::reconstruct {
 // How COLMAP's incremental mapper is run [Schönberger, Frahm: Structure-from-Motion Revisited, CVPR 2016].
 struct MapperOptions {
   // "global": all images at once (globally/map_globally.h), and COLMAP's where that joins too few of them;
-  // "colmap": COLMAP's alone, image by image.
-  std::string mapper = "global";
+  // "colmap": COLMAP's alone, image by image; "auto": as "global" where the images are a drive; else
+  // COLMAP's, unless all at once many more are joined, or it is not installed.
+  std::string mapper = "auto";
   // Time limit after which COLMAP's is ended, hours.  REQUIRES: > 0
   double max_hours = 12;
   // Whether it refines the cameras' parameters, which come from EXIF or a guess.  Distortion: one radial

@@ -141,63 +141,45 @@ Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
   return WithoutScale(model, options, result);
 }
 
+// All at once, this many times as many images are many more.
+constexpr double kManyMore = 1.1;
+
 size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
 }
 
-// One run of a mapper.
+// One run of COLMAP's mapper.
 struct MapperAttempt {
   const char* folder;
   const char* name;    // of the images that it registers, in a warning
   const char* remedy;  // what makes it the first attempt; may be empty
   MapperOptions options;
-  bool is_global = false;
 };
 
-// How images are mapped until enough are registered: all at once; then by COLMAP.  Distortion and shape
-// cannot be distinguished from two images: its second attempt is without.  Along a street all pairs are of
-// forward motion and small angles, which it does not start from: the third starts from any pair.
+// How COLMAP is run until enough images are registered.  Distortion and shape cannot be distinguished from
+// two images: the second attempt is without.  Along a street all pairs are of forward motion and small
+// angles, which COLMAP does not start from: the third starts from any pair.
 std::vector<MapperAttempt> Attempts(const MapperOptions& options) {
   std::vector<MapperAttempt> attempts;
-  const bool is_global = options.mapper == "global";
-  if (is_global) attempts.push_back({"global", "all at once", "", options, true});
   MapperOptions simpler = options;
   simpler.refine_distortion = false;
   if (options.refine_distortion) {
-    attempts.push_back({"first", "by COLMAP with the cameras' distortion refined",
-                        is_global ? ": mapper = 'colmap' saves the first attempt" : "", options});
+    attempts.push_back({"first", "by COLMAP with the cameras' distortion refined", "", options});
     attempts.push_back(
-        {"without_distortion", "without", ": refine_distortion = false saves an attempt", simpler});
+        {"without_distortion", "without", ": refine_distortion = false saves the first attempt", simpler});
   } else {
-    attempts.push_back({"first", "by COLMAP without distortion",
-                        is_global ? ": mapper = 'colmap' saves the first attempt" : "", options});
+    attempts.push_back({"first", "by COLMAP without distortion", "", options});
   }
   simpler.start_from_any_pair = true;
   attempts.push_back({"from_any_pair", "from a start of any motion", "", simpler});
   return attempts;
 }
 
-Result<std::vector<ColmapModel>> RunAttempt(const MapperAttempt& attempt, const MapperInput& input,
-                                            const Capture& capture, const std::string& work_folder,
-                                            int num_threads, Progress& progress) {
-  const MapperOptions& options = attempt.options;
-  if (attempt.is_global) {
-    return MapGlobally(
-        input,
-        {.refine_focal_length = options.refine_focal_length, .refine_distortion = options.refine_distortion},
-        num_threads, progress);
-  }
-  const std::string folder = work_folder + "/" + attempt.folder;
-  std::error_code error;
-  if (!std::filesystem::create_directory(folder, error))
-    return WriteError(folder, "cannot be created", error.value());
-  return RunMapper(input, capture.images_folder, options, folder, progress);
-}
-
-// The models of the attempt that registers most images.
-Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
-                                           const ReconstructOptions& options, const std::string& work_folder,
-                                           int num_threads, Progress& progress, ReconstructResult* result) {
+// The models of COLMAP's attempt that registers most images.
+Result<std::vector<ColmapModel>> MapByColmap(const MapperInput& input, const Capture& capture,
+                                             const ReconstructOptions& options,
+                                             const std::string& work_folder, Progress& progress,
+                                             ReconstructResult* result) {
   const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
   Result<std::vector<ColmapModel>> best = MakeError(ErrorCode::kNoData, "");
   std::string counts;
@@ -205,8 +187,12 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   const MapperAttempt* taken = attempts.data();
   for (const MapperAttempt& attempt : attempts) {
     const bool is_first = &attempt == attempts.data();
+    const std::string folder = work_folder + "/" + attempt.folder;
+    std::error_code error;
+    if (!std::filesystem::create_directory(folder, error))
+      return WriteError(folder, "cannot be created", error.value());
     Result<std::vector<ColmapModel>> models =
-        RunAttempt(attempt, input, capture, work_folder, num_threads, progress);
+        RunMapper(input, capture.images_folder, attempt.options, folder, progress);
     if (!models.ok() && models.error().code != ErrorCode::kNoData &&
         (is_first || models.error().code == ErrorCode::kCancelled)) {
       return models;
@@ -229,6 +215,39 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   }
   result->warnings.push_back(fmt::format("{}; the reconstruction is the one {}", counts, taken->name));
   return best;
+}
+
+// By the mapper that the options name, or that suits the images.
+Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
+                                           const ReconstructOptions& options, const std::string& work_folder,
+                                           int num_threads, Progress& progress, ReconstructResult* result) {
+  const MapperOptions& mapper = options.mapper;
+  if (mapper.mapper == "colmap") return MapByColmap(input, capture, options, work_folder, progress, result);
+  Result<GlobalMap> global = MapGlobally(
+      input,
+      {.refine_focal_length = mapper.refine_focal_length, .refine_distortion = mapper.refine_distortion},
+      num_threads, progress);
+  if (!global.ok() && global.error().code != ErrorCode::kNoData) return global.error();
+  const auto num_global = global.ok() ? static_cast<double>(global->models.front().images.size()) : 0;
+  const bool is_enough =
+      num_global >= options.min_registered_ratio * static_cast<double>(input.images.size());
+  if (global.ok() && is_enough && (mapper.mapper == "global" || global->is_drive)) return global->models;
+  ReconstructResult warnings;
+  Result<std::vector<ColmapModel>> by_colmap =
+      MapByColmap(input, capture, options, work_folder, progress, &warnings);
+  if (!by_colmap.ok() && by_colmap.error().code == ErrorCode::kCancelled) return by_colmap;
+  const auto num_by_colmap = static_cast<double>(NumRegistered(by_colmap));
+  if (!global.ok() || num_by_colmap * kManyMore >= num_global) {
+    if (!by_colmap.ok() && !global.ok()) return global.error();
+    result->warnings.insert(result->warnings.end(), warnings.warnings.begin(), warnings.warnings.end());
+    return by_colmap;
+  }
+  result->warnings.push_back(fmt::format(
+      "{} of {} images were registered all at once, by COLMAP {}; the reconstruction is the first{}",
+      num_global, input.images.size(),
+      by_colmap.ok() ? fmt::format("{}", num_by_colmap) : "none: " + by_colmap.error().message,
+      is_enough ? ": mapper = \"global\" saves the second" : ""));
+  return global->models;
 }
 
 // Why an image is not in the model kept.
@@ -326,9 +345,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
   OptionTable table = {
       {.name = "mapper",
        .value = &o->mapper.mapper,
-       .help = "global: poses of all images at once, and by COLMAP's mapper if that joins too few; colmap: "
-               "by COLMAP alone",
-       .choices = {"global", "colmap"}},
+       .help = "global: poses of all images at once, by COLMAP if that joins too few; colmap: by COLMAP "
+               "alone; auto: global "
+               "for a drive, else COLMAP unless all at once many more are joined",
+       .choices = {"auto", "global", "colmap"}},
       {.name = "max_hours",
        .value = &o->mapper.max_hours,
        .help = "time limit of COLMAP's mapper, hours",

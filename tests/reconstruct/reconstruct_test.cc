@@ -248,7 +248,7 @@ echo "ERROR: failed to create sparse model"; exit 1)");
 
 // What joins too few images is left to COLMAP, which joins more of these: it says so.
 using ReconstructGloballyTest = ReconstructTest;
-INSTANTIATE_TEST_SUITE_P(Mappers, ReconstructGloballyTest, testing::Values("global"));
+INSTANTIATE_TEST_SUITE_P(Mappers, ReconstructGloballyTest, testing::Values("global", "auto"));
 
 TEST_P(ReconstructGloballyTest, ColmapIsAskedOnlyWhereTooFewImagesAreJoined) {
   const FakeColmap colmap("echo called >> " + root_ +

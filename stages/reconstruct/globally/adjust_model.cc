@@ -101,7 +101,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
 
   std::vector<Seen> seen(problem->observations.size());
   PoseManifold manifold;
-  ceres::CauchyLoss loss(options.loss_scale);
+  ceres::CauchyLoss loss(options.loss_scale_px);
   ceres::Problem::Options problem_options;
   problem_options.disable_all_safety_checks = true;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -122,8 +122,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
       blocks.push_back(&values[first_change[c]]);
       is_camera_used[c] = true;
     }
-    ceres_problem.AddResidualBlock(
-        new ReprojectionCost(seen[k].ray, seen[k].sensitivity, observation.sigma_px), &loss, blocks);
+    ceres_problem.AddResidualBlock(new ReprojectionCost(seen[k].ray, seen[k].sensitivity, 1), &loss, blocks);
   }
   ceres::CauchyLoss weak_loss(1);
   const auto are_known = [&](size_t a, size_t b) {

@@ -22,7 +22,6 @@ struct FreeCamera {
 struct ModelObservation {
   int image = 0, point = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double sigma_px = 1;  // standard deviation of a coordinate
 };
 
 // What a pair says of its images' rotations: all that ties them where the camera turned on the spot, as
@@ -41,13 +40,13 @@ struct ModelProblem {
   std::vector<Eigen::Vector3d> points;  // refined
   std::vector<ModelObservation> observations;
   std::vector<RelativeRotation> rotations;
-  std::vector<std::pair<int, int>>
-      steps;  // images of a drive that follow each other: about as far apart as others
+  // Images of a drive that follow each other: about as far apart as others.
+  std::vector<std::pair<int, int>> steps;
 };
 
 struct AdjustModelOptions {
-  // Cauchy's scale, in standard deviations of a keypoint.  REQUIRES: > 0
-  double loss_scale = 2;
+  // Cauchy's scale of reprojection errors, pixels.  REQUIRES: > 0
+  double loss_scale_px = 2;
   // Standard deviations of a pair's rotation, degrees, and of a step, as a part of the median one.  REQUIRES:
   // > 0
   double rotation_sigma_deg = 0.5;

@@ -153,7 +153,11 @@ std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vect
 }
 
 double RotationErrorDeg(const ViewPair& pair, const std::vector<Eigen::Quaterniond>& rotations) {
-  return DegFromRad(ErrorOf(pair, rotations).norm());
+  const Eigen::Quaterniond between = rotations[pair.image2] * rotations[pair.image1].conjugate();
+  double least = between.angularDistance(pair.cam2_from_cam1.rotation);
+  for (const Pose& other : pair.alternatives)
+    least = std::min(least, between.angularDistance(other.rotation));
+  return DegFromRad(least);
 }
 
 }  // namespace cairn::reconstruct

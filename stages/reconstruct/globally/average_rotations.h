@@ -33,7 +33,8 @@ struct AverageRotationsOptions {
 std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vector<ViewPair>& pairs,
                                                  const AverageRotationsOptions& options);
 
-// How far a pair's rotation is from that between its images, degrees.
+// How far a pair's rotation, or the nearest of those that explain it as well, is from that between its
+// images, degrees.
 double RotationErrorDeg(const ViewPair& pair, const std::vector<Eigen::Quaterniond>& rotations);
 
 }  // namespace cairn::reconstruct

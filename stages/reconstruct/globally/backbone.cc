@@ -9,7 +9,7 @@ namespace {
 
 // Strength from which a pair belongs to the backbone, and the ladder down which parts of it are
 // joined.
-constexpr double kMinStrength = 0.5, kLadderFactor = 0.8, kLeastStrength = 0.01;
+constexpr double kMinStrength = 0.25, kLadderFactor = 0.8, kLeastStrength = 0.01;
 // Of a drive: this many images on and back, from this strength on.
 constexpr int kMaxOrderDistance = 10;
 constexpr double kMinStrengthNear = 0.25;
@@ -18,6 +18,7 @@ constexpr double kMinDriveRatio = 0.8, kMinStrengthOfNext = 0.4;
 
 // Relative poses of fewer matches are doubtful.
 constexpr int kNumCertainMatches = 50;
+constexpr double kWeightOfAmbiguous = 0.3;  // of a pair that may have another rotation
 
 class Components {
  public:
@@ -47,7 +48,8 @@ void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
   for (ViewPair& pair : *pairs) {
     const int distance = std::min(std::abs(pair.image1 - pair.image2), kMaxOrderDistance);
     const double certainty = std::min(1.0, static_cast<double>(pair.matches.size()) / kNumCertainMatches);
-    pair.weight = pair.strength * certainty / (is_drive ? distance : 1);
+    const double unambiguity = pair.alternatives.empty() ? 1 : kWeightOfAmbiguous;
+    pair.weight = pair.strength * certainty * unambiguity / (is_drive ? distance : 1);
   }
 }
 

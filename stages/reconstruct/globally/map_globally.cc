@@ -88,10 +88,19 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
         is_wrong[p] = RotationErrorDeg(part->pairs[p], rotations) > max_error_deg;
       return is_wrong;
     };
+    const auto choose = [&](const std::vector<Eigen::Quaterniond>& rotations) {
+      for (size_t k = 0; k < pairs.size(); ++k) {
+        ChooseRotation(rotations[pairs[k].image2] * rotations[pairs[k].image1].conjugate(), &pairs[k]);
+        part->pairs[untangled.backbone[k]] = pairs[k];
+      }
+    };
     // First those that contradict stronger ones.
-    std::vector<bool> is_wrong = contradicting(RotationsAlongTree(num_images, pairs), kMaxTreeErrorDeg);
+    const std::vector<Eigen::Quaterniond> along_tree = RotationsAlongTree(num_images, pairs);
+    choose(along_tree);
+    std::vector<bool> is_wrong = contradicting(along_tree, kMaxTreeErrorDeg);
     if (std::find(is_wrong.begin(), is_wrong.end(), true) == is_wrong.end()) {
       untangled.rotations = AverageRotations(num_images, pairs, options);
+      choose(untangled.rotations);
       is_wrong = contradicting(untangled.rotations, options.max_error_deg);
     }
     const bool any = std::find(is_wrong.begin(), is_wrong.end(), true) != is_wrong.end();
@@ -109,17 +118,16 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
 
 }  // namespace
 
-Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const MapGloballyOptions& options,
-                                             int num_threads, Progress& progress) {
+Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions& options, int num_threads,
+                              Progress& progress) {
   const int num_images = static_cast<int>(input.images.size());
-  progress.Begin("reconstruct", num_images, "images");
+  progress.Begin("reconstruct", int64_t{num_images} * PartMapper::NumRounds(), "images in rounds");
   const std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
   Part whole = InOrderOfNames(input, EstimateViewPairs(input, cameras, {}, num_threads));
   std::vector<Part> found = PartsOf(whole);
   std::deque<Part> open(found.begin(), found.end());
-  std::vector<ColmapModel> models;
+  std::vector<std::pair<ColmapModel, bool>> models;  // and whether it is a drive
   while (!open.empty()) {
-    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
     Part part = std::move(open.front());
     open.pop_front();
     const bool is_drive = IsDrive(static_cast<int>(part.images.size()), part.pairs);
@@ -130,12 +138,11 @@ Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const Map
       open.insert(open.end(), smaller.begin(), smaller.end());
       continue;
     }
-    const auto part_size = static_cast<int64_t>(part.images.size());
     ColmapModel model = PartMapper(input, cameras, options, num_threads, std::move(part.images),
                                    std::move(part.pairs), untangled->backbone, is_drive)
                             .Map(untangled->rotations, progress);
-    progress.Advance(part_size);
-    if (!model.images.empty()) models.push_back(std::move(model));
+    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
+    if (!model.images.empty()) models.emplace_back(std::move(model), is_drive);
   }
   progress.End();
   if (models.empty()) {
@@ -145,10 +152,13 @@ Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const Map
         "images must show the same things from places some steps apart",
         kMinNumImages, num_images, input.geometries.size(), whole.pairs.size());
   }
-  std::stable_sort(models.begin(), models.end(), [](const ColmapModel& a, const ColmapModel& b) {
-    return std::pair(a.images.size(), a.points.size()) > std::pair(b.images.size(), b.points.size());
+  std::stable_sort(models.begin(), models.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first.images.size(), a.first.points.size()) >
+           std::pair(b.first.images.size(), b.first.points.size());
   });
-  return models;
+  GlobalMap map{.models = {}, .is_drive = models.front().second};
+  for (auto& [model, is_drive] : models) map.models.push_back(std::move(model));
+  return map;
 }
 
 }  // namespace cairn::reconstruct

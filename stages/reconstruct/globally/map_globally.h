@@ -10,13 +10,21 @@
 
 namespace cairn::reconstruct {
 
+struct GlobalMap {
+  // Of each part that pairs join, most images first (ties: more points), in frames and scales of their own.
+  std::vector<ColmapModel> models;
+  // Whether the largest part is a drive, whose images follow each other by name: then what looks alike bends
+  // nothing.  Without an order, pairs of places that look alike in most of an image may.
+  bool is_drive = false;
+};
+
 // Poses of all images at once instead of one after the other [Pan, Barath, Pollefeys & Schönberger, "Global
 // structure-from-motion revisited" (GLOMAP), ECCV 2024]: focal lengths that are guesses from the pairs,
 // relative poses, rotations averaged, wrong pairs cut, tracks, places of cameras and points from nowhere,
 // then bundle adjustments, each with tracks triangulated anew.  Every part that pairs join becomes a model.
 // Returns them, most images first (ties: more points), in frames and scales of their own.  The same for any
 // number of threads. Errors: NoData (no pair of images has a relative pose); Cancelled.
-Result<std::vector<ColmapModel>> MapGlobally(const MapperInput& input, const MapGloballyOptions& options,
-                                             int num_threads, Progress& progress);
+Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions& options, int num_threads,
+                              Progress& progress);
 
 }  // namespace cairn::reconstruct

@@ -78,12 +78,15 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
   for (const int image : images_) problem_.camera_idx.push_back(index.at(input.images[image].camera_id));
 }
 
-ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, const Progress& progress) {
+int PartMapper::NumRounds() { return static_cast<int>(std::size(kRounds)); }
+
+ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Progress& progress) {
   KeepRotations(rotations);
   MakeTracks();
   Position(rotations);
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return {};
+    progress.Advance(static_cast<int64_t>(images_.size()));
     if (round.accepted_rad > 0) {
       TriangulateAll(round.max_error_px);
       const bool is_again = &round != kRounds && round.accepted_rad == (&round)[-1].accepted_rad;

@@ -32,8 +32,12 @@ class PartMapper {
              const MapGloballyOptions& options, int num_threads, std::vector<int> images,
              std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive);
 
-  // Images that see too few points are not in the model.
-  ColmapModel Map(const std::vector<Eigen::Quaterniond>& rotations, const Progress& progress);
+  // Rounds of adjustment, for progress: each advances it by as many items as the part has images.
+  static int NumRounds();
+
+  // Images that see too few points are not in the model.  Ends early, without one, when progress is
+  // cancelled.
+  ColmapModel Map(const std::vector<Eigen::Quaterniond>& rotations, Progress& progress);
 
  private:
   // Elements of a track that decide on poses.

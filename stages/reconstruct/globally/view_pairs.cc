@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -25,6 +26,9 @@ constexpr double kGoodDifference = 0.02;
 // the same everywhere.
 constexpr double kLikelyFocalRatio = 0.8, kLogSigma = 0.35, kWeightOfLikely = 0.2;
 constexpr int kNumRefinements = 8;
+// Relative poses with costs within this ratio of the least explain the matches as well; they are different
+// from this angle on.
+constexpr double kAsGoodRatio = 1.2, kSameRotationDeg = 3;
 
 std::map<ImageId, int> IndexOf(const MapperInput& input) {
   std::map<ImageId, int> index;
@@ -134,32 +138,50 @@ double CauchyCost(const Eigen::Matrix3d& E, const Correspondences& c, double sca
   return cost;
 }
 
-// The best of the relative poses to which the pair's matrices and five points lead: a fundamental matrix of
-// points on a plane leads anywhere.
-std::optional<Pose> RelativePoseOf(const TwoViewGeometry& geometry, const Camera& camera1,
-                                   const Camera& camera2, const Correspondences& c, double max_error_rad) {
+Eigen::Matrix3d CalibrationOf(const Camera& camera) {
+  return CalibrationMatrix(camera.MeanFocal(), camera.PrincipalPoint());
+}
+
+double TurnOf(const Pose& pose) { return pose.rotation.angularDistance(Eigen::Quaterniond::Identity()); }
+
+// The relative poses that explain the matches about as well as any, that of the smallest turn first: those to
+// which the pair's matrices and five points lead.  A fundamental matrix of points on a plane leads anywhere,
+// and a homography to two poses that no match tells apart.
+std::vector<Pose> RelativePosesOf(const TwoViewGeometry& geometry, const Camera& camera1,
+                                  const Camera& camera2, const Correspondences& c, double max_error_rad) {
   std::vector<Eigen::Matrix3d> starts;
   if (!geometry.E.isZero()) {
     starts.push_back(geometry.E);
   } else {
-    if (!geometry.F.isZero() && geometry.config != TwoViewConfig::kPlanarOrPanoramic) {
-      // A fundamental matrix knows nothing of the guess that was made of the focal length.
-      starts.push_back(CalibrationMatrix(camera2.MeanFocal(), camera2.PrincipalPoint()).transpose() *
-                       geometry.F * CalibrationMatrix(camera1.MeanFocal(), camera1.PrincipalPoint()));
-    }
+    // Pixels know nothing of the guess that was made of the focal length.
+    if (!geometry.F.isZero() && geometry.config != TwoViewConfig::kPlanarOrPanoramic)
+      starts.push_back(CalibrationOf(camera2).transpose() * geometry.F * CalibrationOf(camera1));
     if (const auto E = EstimateEssentialMatrix(c, {.max_error_rad = max_error_rad})) starts.push_back(*E);
   }
-  std::optional<Pose> best;
-  double least = 0;
+  if (!geometry.H.isZero()) {
+    const Eigen::Matrix3d H = CalibrationOf(camera2).inverse() * geometry.H * CalibrationOf(camera1);
+    for (const Pose& pose : PosesFromHomography(H)) starts.push_back(EssentialMatrix(pose));
+  }
+  std::vector<std::pair<double, Pose>> found;
+  double least = std::numeric_limits<double>::infinity();
   for (const Eigen::Matrix3d& start : starts) {
     const Pose pose =
         RefineRelativePose(PoseFromEssentialMatrix(start, c), c, 0.5 * max_error_rad, kNumRefinements);
     const double cost = CauchyCost(EssentialMatrix(pose), c, 0.25 * max_error_rad);
-    if (best && !(cost < least)) continue;
-    best = pose;
-    least = cost;
+    found.emplace_back(cost, pose);
+    least = std::min(least, cost);
   }
-  return best;
+  std::vector<Pose> poses;
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [cost, pose] : found) {
+    const auto is_same = [&](const Pose& other) { return RotationErrorDeg(pose, other) < kSameRotationDeg; };
+    if (cost <= kAsGoodRatio * least && std::none_of(poses.begin(), poses.end(), is_same))
+      poses.push_back(pose);
+  }
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const Pose& a, const Pose& b) { return TurnOf(a) < TurnOf(b); });
+  return poses;
 }
 
 std::optional<ViewPair> EstimateViewPair(const TwoViewGeometry& geometry, const Camera& camera1,
@@ -174,10 +196,11 @@ std::optional<ViewPair> EstimateViewPair(const TwoViewGeometry& geometry, const 
   if (all.size() < options.min_num_matches) return std::nullopt;
   const double max_error_rad =
       options.max_epipolar_error_px / (0.5 * (camera1.MeanFocal() + camera2.MeanFocal()));
-  const auto pose = RelativePoseOf(geometry, camera1, camera2, all, max_error_rad);
-  if (!pose) return std::nullopt;
+  std::vector<Pose> poses = RelativePosesOf(geometry, camera1, camera2, all, max_error_rad);
+  if (poses.empty()) return std::nullopt;
   ViewPair pair;
-  pair.cam2_from_cam1 = *pose;
+  pair.cam2_from_cam1 = poses.front();
+  pair.alternatives.assign(poses.begin() + 1, poses.end());
   const Eigen::Matrix3d E = EssentialMatrix(pair.cam2_from_cam1);
   for (int i = 0; i < all.size(); ++i) {
     if (SquaredSampsonError(E, all.bearings1[i], all.bearings2[i]) <= max_error_rad * max_error_rad)
@@ -203,6 +226,14 @@ void SetStrengths(const MapperInput& input, std::vector<ViewPair>* pairs) {
 }
 
 }  // namespace
+
+void ChooseRotation(const Eigen::Quaterniond& cam2_from_cam1, ViewPair* pair) {
+  for (Pose& other : pair->alternatives) {
+    if (other.rotation.angularDistance(cam2_from_cam1) <
+        pair->cam2_from_cam1.rotation.angularDistance(cam2_from_cam1))
+      std::swap(other, pair->cam2_from_cam1);
+  }
+}
 
 std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input) {
   return FocalSearch(input).Search();

@@ -13,6 +13,8 @@ namespace cairn::reconstruct {
 struct ViewPair {
   int image1 = 0, image2 = 0;  // indices into MapperInput::images
   Pose cam2_from_cam1;         // its translation is a direction, of length 1
+  // Others that explain the matches as well: points on a plane leave two.
+  std::vector<Pose> alternatives;
   std::vector<Match> matches;  // those that it explains
   // How much of what the images show both do: matches over the keypoints that have any, of the image with
   // more.
@@ -28,6 +30,9 @@ struct ViewPair {
 // focal length stay.  O(pairs * steps).
 std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input);
 
+// Takes the one of the relative poses whose rotation is nearest to this.
+void ChooseRotation(const Eigen::Quaterniond& cam2_from_cam1, ViewPair* pair);
+
 struct ViewPairOptions {
   // Largest distance of a match to its epipolar line, pixels.  REQUIRES: > 0
   double max_epipolar_error_px = 4;
@@ -36,7 +41,8 @@ struct ViewPairOptions {
 };
 
 // The relative pose of each verified pair by these cameras: from its essential or fundamental matrix, or by
-// five points where it has none (a plane), refined.  Pairs that keep too few matches are left out; in the
+// five points where it has none, refined; of points on a plane also the others, the one of the smallest turn
+// first.  Pairs that keep too few matches are left out; in the
 // order of the pairs.  Same result for any number of threads.
 std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
                                         const ViewPairOptions& options, int num_threads);

@@ -50,15 +50,15 @@ TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
 }
 
 TEST(Backbone, WithoutAnOrderItIsTheStrongPairs) {
-  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.5), Pair(0, 2, 0.49), Pair(2, 3, 0.7)};
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.25), Pair(0, 2, 0.24), Pair(2, 3, 0.7)};
   EXPECT_THAT(Backbone(4, pairs, false), ElementsAre(0, 1, 3));
 }
 
 TEST(Backbone, PartsAreJoinedByTheStrongestOfTheWeakPairs) {
   // Two parts; the strongest pairs between them come, with those of nearly its strength, and the weak ones do
   // not.
-  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9),  Pair(2, 3, 0.9),  Pair(0, 2, 0.31),
-                                       Pair(1, 3, 0.29), Pair(1, 2, 0.05), Pair(0, 3, 0.24)};
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9),   Pair(2, 3, 0.9),  Pair(0, 2, 0.155),
+                                       Pair(1, 3, 0.145), Pair(1, 2, 0.05), Pair(0, 3, 0.12)};
   EXPECT_THAT(Backbone(4, pairs, false), ElementsAre(0, 1, 2, 3));
   // As weak as it need be.
   EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.012)}, false), ElementsAre(0, 1));

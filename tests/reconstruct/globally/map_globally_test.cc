@@ -28,7 +28,9 @@ double LargestErrorM(const ColmapModel& model, const SyntheticSurvey& survey) {
 Result<std::vector<ColmapModel>> Map(const SyntheticSurvey& survey, int num_threads = 2,
                                      const MapGloballyOptions& options = {}) {
   NoProgress progress;
-  return MapGlobally(survey.input, options, num_threads, progress);
+  const auto map = MapGlobally(survey.input, options, num_threads, progress);
+  if (!map.ok()) return map.error();
+  return map->models;
 }
 
 TEST(MapGlobally, FindsAllPosesAndTheFocalLength) {
@@ -48,6 +50,17 @@ TEST(MapGlobally, FindsAllPosesAndTheFocalLength) {
     for (const auto& [image_id, keypoint] : point.track)
       EXPECT_EQ(model.images[image_id - 1].keypoints[keypoint].point_id, point.point_id);
   }
+}
+
+TEST(MapGlobally, SaysWhetherItIsADrive) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  NoProgress progress;
+  EXPECT_TRUE(MapGlobally(survey.input, {}, 1, progress)->is_drive);
+  // The same images under names in another order.
+  for (size_t i = 0; i < 20; ++i) survey.input.images[i].name = fmt::format("image{:02}.jpg", 9 * i % 20);
+  const auto shuffled = MapGlobally(survey.input, {}, 1, progress);
+  EXPECT_FALSE(shuffled->is_drive);
+  EXPECT_EQ(shuffled->models.front().images.size(), 20u);
 }
 
 TEST(MapGlobally, CamerasStayWhereTheyAreNotToBeRefined) {

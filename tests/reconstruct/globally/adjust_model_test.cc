@@ -1,0 +1,166 @@
+#include "stages/reconstruct/globally/adjust_model.h"
+
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "core/base/random.h"
+
+namespace cairn::reconstruct {
+namespace {
+
+Camera TrueCamera() {
+  Camera camera;
+  camera.model = CameraModel::kSimpleRadial;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {500, 320, 240, -0.05};
+  return camera;
+}
+
+// Cameras on an arc that look at a cloud of points, and what they see of it.
+struct Scene {
+  ModelProblem problem;
+  std::vector<Pose> truth;
+};
+
+Scene MakeScene(double noise_px) {
+  Random random(9);
+  Scene scene;
+  ModelProblem& problem = scene.problem;
+  problem.cameras.push_back({TrueCamera(), TrueCamera(), {}, {}});
+  for (int k = 0; k < 120; ++k)
+    problem.points.emplace_back(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
+  for (int i = 0; i < 10; ++i) {
+    Pose pose;
+    pose.rotation = Eigen::AngleAxisd(-0.25 * i, Eigen::Vector3d::UnitY());
+    pose.translation = {0, 0, 3 + 0.3 * (i % 3)};
+    scene.truth.push_back(pose);
+    problem.camera_idx.push_back(0);
+    for (size_t k = 0; k < problem.points.size(); ++k) {
+      const auto pixel = ImageFromCamera(TrueCamera(), pose * problem.points[k]);
+      if (!pixel) continue;
+      problem.observations.push_back(
+          {i, static_cast<int>(k),
+           *pixel + Eigen::Vector2d(random.Normal(0, noise_px), random.Normal(0, noise_px))});
+    }
+  }
+  problem.cam_from_world = scene.truth;
+  return scene;
+}
+
+// Largest error of a rotation relative to the first image's, degrees.
+double LargestTurnDeg(const Scene& scene) {
+  double largest = 0;
+  for (size_t i = 1; i < scene.truth.size(); ++i) {
+    const std::vector<Pose>& found = scene.problem.cam_from_world;
+    largest = std::max(
+        largest, RotationErrorDeg(found[i] * found[0].Inverse(), scene.truth[i] * scene.truth[0].Inverse()));
+  }
+  return largest;
+}
+
+TEST(AdjustModel, MovedPosesAndPointsReturn) {
+  Scene scene = MakeScene(0.3);
+  Random random(1);
+  for (Pose& pose : scene.problem.cam_from_world) {
+    pose.rotation = Eigen::AngleAxisd(0.02, Eigen::Vector3d::Random().normalized()) * pose.rotation;
+    pose.translation.x() += random.Normal(0, 0.05);
+  }
+  for (Eigen::Vector3d& point : scene.problem.points) point.x() += random.Normal(0, 0.05);
+  EXPECT_GT(LargestTurnDeg(scene), 1);
+  AdjustModel({.max_num_iterations = 50, .function_tolerance = 1e-8}, &scene.problem);
+  EXPECT_LT(LargestTurnDeg(scene), 0.1);
+  double sum = 0;
+  for (const ModelObservation& observation : scene.problem.observations)
+    sum += std::pow(ReprojectionErrorPx(scene.problem, observation), 2);
+  EXPECT_LT(std::sqrt(sum / scene.problem.observations.size()), 0.5);
+}
+
+TEST(AdjustModel, WrongMatchesHaveLittleSay) {
+  Scene scene = MakeScene(0.3);
+  for (size_t k = 0; k < scene.problem.observations.size(); k += 10)
+    scene.problem.observations[k].pixel += Eigen::Vector2d(30, -20);
+  AdjustModel({}, &scene.problem);
+  EXPECT_LT(LargestTurnDeg(scene), 0.15);
+}
+
+TEST(AdjustModel, AGuessedCameraIsFoundStepByStep) {
+  Scene scene = MakeScene(0.2);
+  FreeCamera& camera = scene.problem.cameras[0];
+  camera.camera.params[0] = camera.stated.params[0] = 560;
+  camera.camera.params[3] = camera.stated.params[3] = 0;
+  camera.free = {0, 3};
+  camera.sigma = {0.3 * 560, 0.1};
+  AdjustModel({.adjust_cameras = false}, &scene.problem);
+  EXPECT_EQ(camera.camera.params[0], 560);
+  for (int round = 0; round < 3; ++round) AdjustModel({.max_num_iterations = 50}, &scene.problem);
+  EXPECT_NEAR(camera.camera.params[0], 500, 3);
+  EXPECT_NEAR(camera.camera.params[3], -0.05, 0.005);
+  EXPECT_EQ(camera.stated.params[0], 560);
+  // No step is longer than sensitivities hold.
+  camera.camera.params[0] = camera.stated.params[0] = 900;
+  camera.sigma[0] = 100;
+  AdjustModel({.max_num_iterations = 50}, &scene.problem);
+  EXPECT_NEAR(camera.camera.params[0], 850, 1);
+}
+
+// The last image sees nothing that others see: only what its pair says of its rotation holds it.
+TEST(AdjustModel, ARelativeRotationHoldsAnImageWithoutPoints) {
+  Scene scene = MakeScene(0.3);
+  const size_t last = scene.truth.size() - 1;
+  const auto with_points_of_its_own = [&] {
+    std::map<int, int> renamed;
+    for (ModelObservation& observation : scene.problem.observations) {
+      if (observation.image != static_cast<int>(last)) continue;
+      const auto [it, is_new] =
+          renamed.emplace(observation.point, static_cast<int>(scene.problem.points.size()));
+      if (is_new) scene.problem.points.push_back(scene.problem.points[observation.point]);
+      observation.point = it->second;
+    }
+  };
+  with_points_of_its_own();
+  Pose& pose = scene.problem.cam_from_world[last];
+  pose.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * pose.rotation;
+  ModelProblem without = scene.problem;
+  AdjustModel({}, &without);
+  scene.problem.rotations.push_back({static_cast<int>(last) - 1, static_cast<int>(last),
+                                     scene.truth[last].rotation * scene.truth[last - 1].rotation.conjugate(),
+                                     true});
+  AdjustModel({.max_num_iterations = 50}, &scene.problem);
+  EXPECT_LT(LargestTurnDeg(scene), 0.2);
+  scene.problem = without;
+  EXPECT_GT(LargestTurnDeg(scene), 2);
+}
+
+// The same for where it is, of a drive with steps of about one length.
+TEST(AdjustModel, AStepHoldsAnImageWithoutPoints) {
+  Scene scene = MakeScene(0.3);
+  const int last = static_cast<int>(scene.truth.size()) - 1;
+  std::erase_if(scene.problem.observations, [&](const ModelObservation& observation) {
+    return observation.image == last && observation.point >= 1;
+  });
+  for (int i = 1; i <= last; ++i) scene.problem.steps.emplace_back(i - 1, i);
+  double step = 0;
+  for (int i = 1; i < last; ++i) step = std::max(step, CenterErrorM(scene.truth[i], scene.truth[i - 1]));
+  scene.problem.cam_from_world[last].translation *= 6;
+  AdjustModel({.max_num_iterations = 200, .function_tolerance = 1e-10}, &scene.problem);
+  EXPECT_LT(CenterErrorM(scene.problem.cam_from_world[last], scene.problem.cam_from_world[last - 1]),
+            3 * step);
+}
+
+TEST(ReprojectionErrorPx, IsInPixelsAndInfiniteBehindTheCamera) {
+  Scene scene = MakeScene(0);
+  ModelObservation observation = scene.problem.observations[5];
+  EXPECT_LT(ReprojectionErrorPx(scene.problem, observation), 1e-6);
+  observation.pixel += Eigen::Vector2d(3, 4);
+  EXPECT_NEAR(ReprojectionErrorPx(scene.problem, observation), 5, 1e-6);
+  scene.problem.points[observation.point] =
+      scene.problem.cam_from_world[observation.image].Inverse() * Eigen::Vector3d(0, 0, -1);
+  EXPECT_TRUE(std::isinf(ReprojectionErrorPx(scene.problem, observation)));
+}
+
+}  // namespace
+}  // namespace cairn::reconstruct
