@@ -36,8 +36,8 @@ std::optional<Eigen::Matrix3d> EstimateByEightPoints(const Correspondences& corr
 std::optional<Eigen::Matrix3d> EstimateHomography(const Correspondences& correspondences,
                                                   const EstimateModelOptions& options);
 
-// The relative poses, up to four, that a homography of bearings may come from; translations of length 1 and either
-// sign [Malis & Vargas 2007].  None of a rotation.
+// The relative poses, up to four, that a homography of bearings may come from; translations of length 1 and
+// either sign [Malis & Vargas 2007].  None of a rotation.
 std::vector<Pose> PosesFromHomography(const Eigen::Matrix3d& H);
 
 }  // namespace cairn
