@@ -109,6 +109,14 @@ TEST(RotationsAlongTree, FollowsThePairsOfMostWeightInEitherDirection) {
   EXPECT_EQ(AverageRotations(1, {}, {}).size(), 1u);
 }
 
+TEST(RotationErrorDeg, IsThatOfTheNearestThatExplainsThePair) {
+  ViewPair pair = Pair(0, 1, Turn(40, {0, 1, 0}));
+  const std::vector<Eigen::Quaterniond> rotations = {Turn(0, {0, 1, 0}), Turn(10, {0, 1, 0})};
+  EXPECT_NEAR(RotationErrorDeg(pair, rotations), 30, 1e-6);
+  pair.alternatives.push_back({Turn(12, {0, 1, 0}), {}});
+  EXPECT_NEAR(RotationErrorDeg(pair, rotations), 2, 1e-6);
+}
+
 TEST(ConnectedParts, AreListedLargestFirstWithoutLonelyImages) {
   const Eigen::Quaterniond none = Eigen::Quaterniond::Identity();
   const std::vector<ViewPair> pairs = {Pair(0, 5, none), Pair(2, 6, none), Pair(6, 3, none),

@@ -123,5 +123,53 @@ TEST(EstimateViewPairs, AWrongFundamentalMatrixDoesNoHarm) {
   }
 }
 
+// A wall seen from two places: two relative poses explain it, and neighbours tell which is right.
+TEST(EstimateViewPairs, OfAPlaneBothRelativePosesAreKept) {
+  Random random(12);
+  Camera camera;
+  camera.camera_id = 1;
+  camera.model = CameraModel::kSimplePinhole;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {500, 320, 240};
+  MapperInput input;
+  input.cameras.emplace(1, camera);
+  input.images = {{1, "a", 1}, {2, "b", 1}};
+  input.keypoints.resize(2);
+  Pose truth;
+  truth.rotation = Eigen::AngleAxisd(RadFromDeg(12), Eigen::Vector3d(0.2, 1, 0).normalized());
+  truth.translation = {-0.9, 0.1, 0.2};
+  TwoViewGeometry geometry{.image_id1 = 1, .image_id2 = 2, .config = TwoViewConfig::kPlanarOrPanoramic};
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Vector3d point(random.Uniform(-1.2, 1.2), random.Uniform(-1, 1), 3);
+    const auto a = ImageFromCamera(camera, point), b = ImageFromCamera(camera, truth * point);
+    ASSERT_TRUE(a && b);
+    for (const auto& [image, pixel] : {std::pair(0, *a), std::pair(1, *b)}) {
+      input.keypoints[image].push_back({.x = static_cast<float>(pixel.x() + random.Normal(0, 0.2)),
+                                        .y = static_cast<float>(pixel.y() + random.Normal(0, 0.2)),
+                                        .scale = 2,
+                                        .orientation = 0});
+    }
+    geometry.inliers.push_back({static_cast<KeypointIdx>(k), static_cast<KeypointIdx>(k)});
+  }
+  // In the frame of the second camera x = (R + t n' / d) x1, with the wall's normal n and distance d.
+  const Eigen::Matrix3d K = CalibrationMatrix(500);
+  geometry.H = K * (truth.rotation.toRotationMatrix() + truth.translation * Eigen::RowVector3d(0, 0, 1) / 3) *
+               K.inverse();
+  input.geometries.push_back(geometry);
+  std::vector<ViewPair> pairs = EstimateViewPairs(input, input.cameras, {}, 1);
+  ASSERT_EQ(pairs.size(), 1u);
+  ViewPair& pair = pairs[0];
+  ASSERT_EQ(pair.alternatives.size(), 1u);
+  const auto turn = [](const Pose& pose) { return RotationErrorDeg(pose, Pose()); };
+  EXPECT_LE(turn(pair.cam2_from_cam1), turn(pair.alternatives[0]));
+  EXPECT_GT(RotationErrorDeg(pair.cam2_from_cam1, pair.alternatives[0]), 5);
+  ChooseRotation(truth.rotation, &pair);
+  EXPECT_LT(RotationErrorDeg(pair.cam2_from_cam1, truth), 1);
+  const Pose other = pair.alternatives[0];
+  ChooseRotation(other.rotation, &pair);
+  EXPECT_EQ(pair.cam2_from_cam1.translation, other.translation);
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct
