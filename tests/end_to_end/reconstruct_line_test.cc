@@ -165,9 +165,14 @@ TEST_F(ReconstructLine, FailingColmapFailsTheCompileWithItsLastLines) {
   fs::create_directories(Path("fake"));
   std::ofstream(Path("fake/colmap")) << "#!/bin/sh\necho out of luck\nexit 9\n";
   fs::permissions(Path("fake/colmap"), fs::perms::owner_all);
-  const ProgramRun run =
-      RunShell("PATH=" + Path("fake") + ":$PATH cairn stage reconstruct " + Path("flat.build/matches.db") +
-               " --capture " + Path("flat") + " -o " + Path("failed") + " --progress none");
+  const auto reconstruct = [](const std::string& mapper, const std::string& output) {
+    return RunShell("PATH=" + Path("fake") + ":$PATH cairn stage reconstruct " +
+                    Path("flat.build/matches.db") + " --capture " + Path("flat") + " --mapper " + mapper +
+                    " -o " + Path(output) + " --progress none");
+  };
+  // A drive needs none.
+  EXPECT_EQ(reconstruct("auto", "mapped").exit_code, 0);
+  const ProgramRun run = reconstruct("colmap", "failed");
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_THAT(run.err, HasSubstr("exit code 9"));
   EXPECT_THAT(run.err, HasSubstr("out of luck"));
