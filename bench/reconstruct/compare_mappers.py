@@ -46,7 +46,7 @@ def similarity(found, true):
 
 
 def errors(found, true):
-    """Distances in metres and angles in degrees of the images in both, after the similarity that fits the best half."""
+    """Distances in metres and angles in degrees of the images in both, after the similarity that fits those within three medians."""
     names = [name for name in found if name in true]
     centres = np.array([found[name][1] for name in names])
     targets = np.array([true[name][1] for name in names])

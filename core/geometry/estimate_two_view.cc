@@ -191,7 +191,12 @@ std::vector<Pose> PosesFromHomography(const Eigen::Matrix3d& H) {
   cv::Mat matrix;
   cv::eigen2cv(Eigen::Matrix3d(H), matrix);
   std::vector<cv::Mat> rotations, translations, normals;
-  cv::decomposeHomographyMat(matrix, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
+  try {
+    cv::decomposeHomographyMat(matrix, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    return poses;  // as of the other estimators
+  }
   for (size_t i = 0; i < rotations.size(); ++i) {
     Eigen::Matrix3d rotation;
     Eigen::Vector3d translation;

@@ -16,6 +16,18 @@ inline constexpr int kPoseBlockSize = 7;
 using PoseManifold = ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
 void StorePose(const Pose& pose, double* block);
 Pose LoadPose(const double* block);
+template <typename T>
+struct PoseView {
+  explicit PoseView(const T* array) : rotation(array), translation(array + 4) {}
+  Eigen::Map<const Eigen::Quaternion<T>> rotation;
+  Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation;
+};
+
+// Of a small turn.
+template <typename T>
+Eigen::Matrix<T, 3, 1> RotationVector(const Eigen::Quaternion<T>& q) {
+  return (q.w() < T(0) ? T(-2) : T(2)) * q.vec();
+}
 
 // Reprojection of a point, in units of the keypoint's standard deviation, with analytic derivatives.  Blocks:
 // pose, point, and the changes of the camera's parameters where the sensitivity has any.

@@ -7,6 +7,19 @@
 
 namespace cairn {
 
+int NumFocals(CameraModel model) {
+  switch (model) {
+    case CameraModel::kSimplePinhole:
+    case CameraModel::kSimpleRadial:
+    case CameraModel::kRadial:
+    case CameraModel::kSimpleRadialFisheye:
+    case CameraModel::kRadialFisheye:
+      return 1;
+    default:
+      return 2;
+  }
+}
+
 CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,
                                 const std::vector<int>& params) {
   constexpr double kStepPx = 1;

@@ -8,6 +8,9 @@
 
 namespace cairn {
 
+// How many of a model's parameters, the first ones, are focal lengths.
+int NumFocals(CameraModel model);
+
 // How a pixel moves with parameters of its camera.  A residual r of the camera before the change d becomes
 //   r + sum_p d_p (by_param_p + growth_p r)
 // The growth must not be left out: without it residuals seem to shrink as the focal length grows, and every

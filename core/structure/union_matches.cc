@@ -4,21 +4,22 @@
 #include <numeric>
 #include <tuple>
 
+#include "core/base/disjoint_sets.h"
+
 namespace cairn {
 namespace {
 
-// Union-find whose sets store the images of their keypoints.
+// Disjoint sets that know their keypoints.
 class TrackSets {
  public:
-  explicit TrackSets(const std::vector<int>& num_keypoints) {
+  explicit TrackSets(const std::vector<int>& num_keypoints)
+      : sets_(std::accumulate(num_keypoints.begin(), num_keypoints.end(), 0)) {
     for (size_t image = 0; image < num_keypoints.size(); ++image) {
       first_node_.push_back(static_cast<int>(elements_.size()));
       for (int k = 0; k < num_keypoints[image]; ++k) {
         elements_.push_back({static_cast<int32_t>(image), static_cast<KeypointIdx>(k)});
       }
     }
-    parents_.resize(elements_.size());
-    std::iota(parents_.begin(), parents_.end(), 0);
     members_.resize(elements_.size());
   }
 
@@ -26,14 +27,9 @@ class TrackSets {
     return first_node_[element.image_idx] + static_cast<int>(element.keypoint_idx);
   }
 
-  int Find(int node) {
-    while (parents_[node] != node) node = parents_[node] = parents_[parents_[node]];
-    return node;
-  }
-
   // False when the two sets hold different keypoints of one image.
   bool Union(int node1, int node2) {
-    int root1 = Find(node1), root2 = Find(node2);
+    const int root1 = sets_.Find(node1), root2 = sets_.Find(node2);
     if (root1 == root2) return true;
     Track merged;
     const Track track1 = TrackOf(root1), track2 = TrackOf(root2);
@@ -43,18 +39,16 @@ class TrackSets {
       return a.image_idx == b.image_idx;
     };
     if (std::adjacent_find(merged.begin(), merged.end(), same_image) != merged.end()) return false;
-    if (root2 < root1) std::swap(root1, root2);
-    parents_[root2] = root1;
-    members_[root1] = std::move(merged);
-    Track().swap(members_[root2]);
+    sets_.Join(root1, root2);
+    Track().swap(members_[std::max(root1, root2)]);
+    members_[std::min(root1, root2)] = std::move(merged);
     return true;
   }
 
   std::vector<Track> Tracks() {
     std::vector<Track> tracks;
-    for (size_t node = 0; node < parents_.size(); ++node) {
-      if (parents_[node] == static_cast<int>(node) && members_[node].size() >= 2)
-        tracks.push_back(std::move(members_[node]));
+    for (Track& track : members_) {
+      if (!track.empty()) tracks.push_back(std::move(track));
     }
     std::sort(tracks.begin(), tracks.end());
     return tracks;
@@ -66,8 +60,8 @@ class TrackSets {
 
   std::vector<int> first_node_;
   std::vector<TrackElement> elements_;
-  std::vector<int> parents_;
-  std::vector<Track> members_;
+  DisjointSets sets_;
+  std::vector<Track> members_;  // at the first node of each set of two or more
 };
 
 }  // namespace

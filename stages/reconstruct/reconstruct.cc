@@ -15,6 +15,8 @@ namespace {
 
 constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
 constexpr double kMaxResidualSigmas = 3;
+// All at once, this many times as many images as by COLMAP are many more.
+constexpr double kManyMore = 1.1;
 
 // The poses of the kept model, by image name, in its own frame.
 using ModelPoses = std::map<std::string, Pose>;
@@ -141,9 +143,6 @@ Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
   return WithoutScale(model, options, result);
 }
 
-// All at once, this many times as many images are many more.
-constexpr double kManyMore = 1.1;
-
 size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
 }
@@ -179,7 +178,7 @@ std::vector<MapperAttempt> Attempts(const MapperOptions& options) {
 Result<std::vector<ColmapModel>> MapByColmap(const MapperInput& input, const Capture& capture,
                                              const ReconstructOptions& options,
                                              const std::string& work_folder, Progress& progress,
-                                             ReconstructResult* result) {
+                                             std::vector<std::string>* warnings) {
   const double num_wanted = options.min_registered_ratio * static_cast<double>(input.images.size());
   Result<std::vector<ColmapModel>> best = MakeError(ErrorCode::kNoData, "");
   std::string counts;
@@ -207,13 +206,13 @@ Result<std::vector<ColmapModel>> MapByColmap(const MapperInput& input, const Cap
     }
     if (static_cast<double>(NumRegistered(best)) >= num_wanted && best.ok()) {
       if (!is_first) {
-        result->warnings.push_back(
+        warnings->push_back(
             fmt::format("{}; the reconstruction is the one {}{}", counts, taken->name, taken->remedy));
       }
       return best;
     }
   }
-  result->warnings.push_back(fmt::format("{}; the reconstruction is the one {}", counts, taken->name));
+  warnings->push_back(fmt::format("{}; the reconstruction is the one {}", counts, taken->name));
   return best;
 }
 
@@ -222,7 +221,8 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
                                            const ReconstructOptions& options, const std::string& work_folder,
                                            int num_threads, Progress& progress, ReconstructResult* result) {
   const MapperOptions& mapper = options.mapper;
-  if (mapper.mapper == "colmap") return MapByColmap(input, capture, options, work_folder, progress, result);
+  if (mapper.mapper == "colmap")
+    return MapByColmap(input, capture, options, work_folder, progress, &result->warnings);
   Result<GlobalMap> global = MapGlobally(
       input,
       {.refine_focal_length = mapper.refine_focal_length, .refine_distortion = mapper.refine_distortion},
@@ -232,14 +232,14 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   const bool is_enough =
       num_global >= options.min_registered_ratio * static_cast<double>(input.images.size());
   if (global.ok() && is_enough && (mapper.mapper == "global" || global->is_drive)) return global->models;
-  ReconstructResult warnings;
+  std::vector<std::string> warnings;
   Result<std::vector<ColmapModel>> by_colmap =
       MapByColmap(input, capture, options, work_folder, progress, &warnings);
   if (!by_colmap.ok() && by_colmap.error().code == ErrorCode::kCancelled) return by_colmap;
   const auto num_by_colmap = static_cast<double>(NumRegistered(by_colmap));
   if (!global.ok() || num_by_colmap * kManyMore >= num_global) {
     if (!by_colmap.ok() && !global.ok()) return global.error();
-    result->warnings.insert(result->warnings.end(), warnings.warnings.begin(), warnings.warnings.end());
+    result->warnings.insert(result->warnings.end(), warnings.begin(), warnings.end());
     return by_colmap;
   }
   result->warnings.push_back(fmt::format(
@@ -346,8 +346,7 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
       {.name = "mapper",
        .value = &o->mapper.mapper,
        .help = "global: poses of all images at once, by COLMAP if that joins too few; colmap: by COLMAP "
-               "alone; auto: global "
-               "for a drive, else COLMAP unless all at once many more are joined",
+               "alone; auto: global for a drive, else COLMAP unless all at once many more are joined",
        .choices = {"auto", "global", "colmap"}},
       {.name = "max_hours",
        .value = &o->mapper.max_hours,

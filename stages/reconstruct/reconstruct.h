@@ -16,9 +16,9 @@ namespace cairn::reconstruct {
 
 // Finds the poses of a capture that has none, from its matches: of all images at once
 // (globally/map_globally.h), up to a similarity, which GPS, known positions or known distances then determine
-// (align.h).  Where too few images are registered, COLMAP's mapper runs (mapper.h): with the cameras'
-// distortion refined, without, and then from a start of any motion.  Before: match_features.  After:
-// group_classes and all stages that read poses.
+// (align.h).  Where too few images are registered, and by default where they are no drive, COLMAP's mapper
+// runs (mapper.h): with the cameras' distortion refined, without, and then from a start of any motion.
+// Before: match_features.  After: group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;
   // Smallest part of the capture's images that the largest model must have; with fewer there is no

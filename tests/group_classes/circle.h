@@ -5,17 +5,9 @@
 
 #include "core/base/random.h"
 #include "stages/group_classes/adjust/bundle.h"
+#include "tests/core/structure/lens.h"
 
 namespace cairn::group_classes {
-
-inline Camera Lens() {
-  Camera camera;
-  camera.model = CameraModel::kOpenCv;
-  camera.width = 640;
-  camera.height = 480;
-  camera.params = {500, 510, 322, 238, -0.1, 0.03, 0.002, -0.001};
-  return camera;
-}
 
 // 12 cameras in a circle that look at points in its middle.
 struct Circle {

@@ -15,18 +15,6 @@
 namespace cairn::group_classes {
 namespace {
 
-template <typename T>
-struct PoseView {
-  explicit PoseView(const T* array) : rotation(array), translation(array + 4) {}
-  Eigen::Map<const Eigen::Quaternion<T>> rotation;
-  Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation;
-};
-
-template <typename T>
-Eigen::Matrix<T, 3, 1> RotationVector(const Eigen::Quaternion<T>& q) {
-  return (q.w() < T(0) ? T(-2) : T(2)) * q.vec();
-}
-
 // A camera's pose against the one that the drifted stated pose and the offset give: rotation, centre.
 struct OwnErrorCost {
   double sigma_rad, sigma_m;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/structure/camera_sensitivity.h"
+
 namespace cairn::group_classes {
 namespace {
 
@@ -48,19 +50,6 @@ CameraVariant Variant(const std::string& name, const Camera& stated, CameraModel
 }
 
 }  // namespace
-
-int NumFocals(CameraModel model) {
-  switch (model) {
-    case CameraModel::kSimplePinhole:
-    case CameraModel::kSimpleRadial:
-    case CameraModel::kRadial:
-    case CameraModel::kSimpleRadialFisheye:
-    case CameraModel::kRadialFisheye:
-      return 1;
-    default:
-      return 2;
-  }
-}
 
 OptionTable DescribeOptions(CameraPriorOptions* o) {
   return {

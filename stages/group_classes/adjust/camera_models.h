@@ -32,9 +32,6 @@ struct CameraVariant {
   double difference_sigma = 0;  // of the two focal lengths' difference, px; 0: they are not both free
 };
 
-// How many of a model's parameters, the first ones, are focal lengths.
-int NumFocals(CameraModel model);
-
 // From as stated (the first) to all that a lens of its kind may need, fewest parameters first.
 std::vector<CameraVariant> CameraVariants(const Camera& stated, const CameraPriorOptions& options);
 

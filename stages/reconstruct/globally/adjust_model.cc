@@ -1,6 +1,5 @@
 #include "stages/reconstruct/globally/adjust_model.h"
 
-#include <limits>
 #include <memory>
 #include <optional>
 
@@ -46,10 +45,10 @@ struct RelativeRotationCost {
   double sigma_rad;
   template <typename T>
   bool operator()(const T* pose1, const T* pose2, T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> rotation1(pose1), rotation2(pose2);
-    const Eigen::Quaternion<T> q = rotation2 * rotation1.conjugate() * cam2_from_cam1.conjugate().cast<T>();
+    const Eigen::Quaternion<T> q = PoseView<T>(pose2).rotation * PoseView<T>(pose1).rotation.conjugate() *
+                                   cam2_from_cam1.conjugate().cast<T>();
     Eigen::Map<Eigen::Matrix<T, 3, 1>> out(residual);
-    out = (q.w() < T(0) ? T(-2) : T(2)) / T(sigma_rad) * q.vec();
+    out = RotationVector(q) / T(sigma_rad);
     return true;
   }
 };
@@ -59,9 +58,8 @@ struct StepLengthCost {
   template <typename T>
   bool operator()(const T* pose1, const T* pose2, T* residual) const {
     const auto center = [](const T* pose) {
-      const Eigen::Map<const Eigen::Quaternion<T>> rotation(pose);
-      const Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation(pose + 4);
-      return Eigen::Matrix<T, 3, 1>(-(rotation.conjugate() * translation));
+      const PoseView<T> view(pose);
+      return Eigen::Matrix<T, 3, 1>(-(view.rotation.conjugate() * view.translation));
     };
     const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
     // Smooth where nothing moves.
@@ -178,13 +176,6 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
     for (size_t k = 0; k < camera.free.size(); ++k)
       camera.camera.params[camera.free[k]] += values[first_change[c] + k];
   }
-}
-
-double ReprojectionErrorPx(const ModelProblem& problem, const ModelObservation& observation) {
-  const auto pixel =
-      ImageFromCamera(problem.cameras[problem.camera_idx[observation.image]].camera,
-                      problem.cam_from_world[observation.image] * problem.points[observation.point]);
-  return pixel ? (*pixel - observation.pixel).norm() : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace cairn::reconstruct

@@ -62,7 +62,4 @@ struct AdjustModelOptions {
 // start (core/structure/camera_sensitivity.h): call it again after larger changes.  The frame is free.
 void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem);
 
-// Reprojection error, pixels; infinite where the camera does not see the point.
-double ReprojectionErrorPx(const ModelProblem& problem, const ModelObservation& observation);
-
 }  // namespace cairn::reconstruct

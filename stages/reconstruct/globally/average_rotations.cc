@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <queue>
 
 #include <Eigen/SparseCholesky>
+
+#include "core/base/disjoint_sets.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -62,21 +63,15 @@ Eigen::MatrixX3d SolveTurns(int num_images, const std::vector<ViewPair>& pairs,
 }  // namespace
 
 std::vector<std::vector<int>> ConnectedParts(int num_images, const std::vector<ViewPair>& pairs) {
-  std::vector<int> root(num_images);
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int i) {
-    while (root[i] != i) i = root[i] = root[root[i]];
-    return i;
-  };
+  DisjointSets sets(num_images);
   std::vector<bool> has_pair(num_images, false);
   for (const ViewPair& pair : pairs) {
     has_pair[pair.image1] = has_pair[pair.image2] = true;
-    const int a = find(pair.image1), b = find(pair.image2);
-    root[std::max(a, b)] = std::min(a, b);
+    sets.Join(pair.image1, pair.image2);
   }
   std::vector<std::vector<int>> by_root(num_images), parts;
   for (int i = 0; i < num_images; ++i) {
-    if (has_pair[i]) by_root[find(i)].push_back(i);
+    if (has_pair[i]) by_root[sets.Find(i)].push_back(i);
   }
   for (std::vector<int>& part : by_root) {
     if (!part.empty()) parts.push_back(std::move(part));

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <numeric>
+
+#include "core/base/disjoint_sets.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -10,9 +11,8 @@ namespace {
 // Strength from which a pair belongs to the backbone, and the ladder down which parts of it are
 // joined.
 constexpr double kMinStrength = 0.25, kLadderFactor = 0.8, kLeastStrength = 0.01;
-// Of a drive: this many images on and back, from this strength on.
+// Of a drive: those at most this many images on or back.
 constexpr int kMaxOrderDistance = 10;
-constexpr double kMinStrengthNear = 0.25;
 // A drive: of this part of its neighbours the pair is at least this strong.
 constexpr double kMinDriveRatio = 0.8, kMinStrengthOfNext = 0.4;
 
@@ -20,26 +20,12 @@ constexpr double kMinDriveRatio = 0.8, kMinStrengthOfNext = 0.4;
 constexpr int kNumCertainMatches = 50;
 constexpr double kWeightOfAmbiguous = 0.3;  // of a pair that may have another rotation
 
-class Components {
- public:
-  explicit Components(int num_images) : root_(num_images) { std::iota(root_.begin(), root_.end(), 0); }
-  int Find(int i) {
-    while (root_[i] != i) i = root_[i] = root_[root_[i]];
-    return i;
-  }
-  void Join(int a, int b) { root_[std::max(Find(a), Find(b))] = std::min(Find(a), Find(b)); }
-
- private:
-  std::vector<int> root_;
-};
-
 }  // namespace
 
 bool IsDrive(int num_images, const std::vector<ViewPair>& pairs) {
   int num_strong = 0;
-  for (size_t p = 0; p < pairs.size(); ++p) {
-    if (std::abs(pairs[p].image1 - pairs[p].image2) == 1 && pairs[p].strength >= kMinStrengthOfNext)
-      ++num_strong;
+  for (const ViewPair& pair : pairs) {
+    if (std::abs(pair.image1 - pair.image2) == 1 && pair.strength >= kMinStrengthOfNext) ++num_strong;
   }
   return num_strong >= kMinDriveRatio * (num_images - 1);
 }
@@ -55,12 +41,11 @@ void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
 
 std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs, bool is_drive) {
   std::vector<bool> is_taken(pairs.size(), false);
-  Components components(num_images);
+  DisjointSets components(num_images);
   for (size_t p = 0; p < pairs.size(); ++p) {
     const int distance = std::abs(pairs[p].image1 - pairs[p].image2);
-    is_taken[p] =
-        is_drive ? distance == 1 || (distance <= kMaxOrderDistance && pairs[p].strength >= kMinStrengthNear)
-                 : pairs[p].strength >= kMinStrength;
+    is_taken[p] = pairs[p].strength >= kMinStrength && (!is_drive || distance <= kMaxOrderDistance);
+    if (is_drive && distance == 1) is_taken[p] = true;
     if (is_taken[p]) components.Join(pairs[p].image1, pairs[p].image2);
   }
   // What joins parts, the strongest first, all of one step of the ladder together.

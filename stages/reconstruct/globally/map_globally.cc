@@ -19,7 +19,6 @@ namespace cairn::reconstruct {
 namespace {
 
 constexpr int kMinNumImages = 3;
-constexpr int kMaxNumCuts = 10;
 constexpr double kMaxTreeErrorDeg = 20;
 
 // Images that pairs join, with indices of their own.
@@ -43,7 +42,7 @@ Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs) {
   return part;
 }
 
-std::vector<Part> PartsOf(const Part& whole) {
+std::vector<Part> PartsOf(Part whole) {
   std::vector<Part> parts;
   const int num_images = static_cast<int>(whole.images.size());
   std::vector<int> part_of(num_images, -1), place(num_images, -1);
@@ -56,12 +55,12 @@ std::vector<Part> PartsOf(const Part& whole) {
       part.images.push_back(whole.images[i]);
     }
   }
-  for (const ViewPair& pair : whole.pairs) {
-    if (part_of[pair.image1] < 0) continue;
-    std::vector<ViewPair>& pairs = parts[part_of[pair.image1]].pairs;
-    pairs.push_back(pair);
-    pairs.back().image1 = place[pair.image1];
-    pairs.back().image2 = place[pair.image2];
+  for (ViewPair& pair : whole.pairs) {
+    const int p = part_of[pair.image1];
+    if (p < 0) continue;
+    pair.image1 = place[pair.image1];
+    pair.image2 = place[pair.image2];
+    parts[p].pairs.push_back(std::move(pair));
   }
   return parts;
 }
@@ -72,48 +71,56 @@ struct Untangled {
   std::vector<Eigen::Quaterniond> rotations;
 };
 
+// What rotations are averaged from.
+ViewPair WithoutMatches(const ViewPair& pair) {
+  return {.image1 = pair.image1,
+          .image2 = pair.image2,
+          .cam2_from_cam1 = pair.cam2_from_cam1,
+          .alternatives = pair.alternatives,
+          .matches = {},
+          .strength = pair.strength,
+          .weight = pair.weight};
+}
+
 // Nothing where the part falls apart without the pairs that contradict its rotations, which are taken out of
 // it.
 std::optional<Untangled> Untangle(bool is_drive, Part* part) {
   const int num_images = static_cast<int>(part->images.size());
   const AverageRotationsOptions options;
-  Untangled untangled;
-  for (int cut = 0; cut < kMaxNumCuts; ++cut) {
-    untangled.backbone = Backbone(num_images, part->pairs, is_drive);
+  while (true) {
+    Untangled untangled{.backbone = Backbone(num_images, part->pairs, is_drive), .rotations = {}};
     std::vector<ViewPair> pairs;
-    for (const int p : untangled.backbone) pairs.push_back(part->pairs[p]);
+    for (const int p : untangled.backbone) pairs.push_back(WithoutMatches(part->pairs[p]));
+    // Chooses the rotations nearest to these, and says which contradict them all the same.
     const auto contradicting = [&](const std::vector<Eigen::Quaterniond>& rotations, double max_error_deg) {
       std::vector<bool> is_wrong(part->pairs.size(), false);
-      for (const int p : untangled.backbone)
-        is_wrong[p] = RotationErrorDeg(part->pairs[p], rotations) > max_error_deg;
+      for (size_t k = 0; k < pairs.size(); ++k) {
+        const Eigen::Quaterniond between =
+            rotations[pairs[k].image2] * rotations[pairs[k].image1].conjugate();
+        ChooseRotation(between, &pairs[k]);
+        ChooseRotation(between, &part->pairs[untangled.backbone[k]]);
+        is_wrong[untangled.backbone[k]] = RotationErrorDeg(pairs[k], rotations) > max_error_deg;
+      }
       return is_wrong;
     };
-    const auto choose = [&](const std::vector<Eigen::Quaterniond>& rotations) {
-      for (size_t k = 0; k < pairs.size(); ++k) {
-        ChooseRotation(rotations[pairs[k].image2] * rotations[pairs[k].image1].conjugate(), &pairs[k]);
-        part->pairs[untangled.backbone[k]] = pairs[k];
-      }
+    const auto count = [](const std::vector<bool>& is_wrong) {
+      return std::count(is_wrong.begin(), is_wrong.end(), true);
     };
     // First those that contradict stronger ones.
-    const std::vector<Eigen::Quaterniond> along_tree = RotationsAlongTree(num_images, pairs);
-    choose(along_tree);
-    std::vector<bool> is_wrong = contradicting(along_tree, kMaxTreeErrorDeg);
-    if (std::find(is_wrong.begin(), is_wrong.end(), true) == is_wrong.end()) {
+    std::vector<bool> is_wrong = contradicting(RotationsAlongTree(num_images, pairs), kMaxTreeErrorDeg);
+    if (count(is_wrong) == 0) {
       untangled.rotations = AverageRotations(num_images, pairs, options);
-      choose(untangled.rotations);
       is_wrong = contradicting(untangled.rotations, options.max_error_deg);
     }
-    const bool any = std::find(is_wrong.begin(), is_wrong.end(), true) != is_wrong.end();
     spdlog::debug("reconstruct: {} images, a backbone of {} of {} pairs, {} of them contradict it{}",
-                  num_images, untangled.backbone.size(), part->pairs.size(),
-                  std::count(is_wrong.begin(), is_wrong.end(), true), is_drive ? "; in order" : "");
-    if (!any) return untangled;
+                  num_images, untangled.backbone.size(), part->pairs.size(), count(is_wrong),
+                  is_drive ? "; in order" : "");
+    if (count(is_wrong) == 0) return untangled;
     size_t p = 0;
     std::erase_if(part->pairs, [&](const ViewPair&) { return is_wrong[p++]; });
     const std::vector<std::vector<int>> parts = ConnectedParts(num_images, part->pairs);
     if (parts.empty() || parts[0].size() < part->images.size()) return std::nullopt;
   }
-  return untangled;
 }
 
 }  // namespace
@@ -124,8 +131,12 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
   progress.Begin("reconstruct", int64_t{num_images} * PartMapper::NumRounds(), "images in rounds");
   const std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
   Part whole = InOrderOfNames(input, EstimateViewPairs(input, cameras, {}, num_threads));
-  std::vector<Part> found = PartsOf(whole);
-  std::deque<Part> open(found.begin(), found.end());
+  const size_t num_pairs = whole.pairs.size();
+  std::deque<Part> open;
+  const auto add_parts = [&](Part part) {
+    for (Part& smaller : PartsOf(std::move(part))) open.push_back(std::move(smaller));
+  };
+  add_parts(std::move(whole));
   std::vector<std::pair<ColmapModel, bool>> models;  // and whether it is a drive
   while (!open.empty()) {
     Part part = std::move(open.front());
@@ -134,8 +145,7 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
     SetWeights(is_drive, &part.pairs);
     const auto untangled = Untangle(is_drive, &part);
     if (!untangled) {
-      std::vector<Part> smaller = PartsOf(part);
-      open.insert(open.end(), smaller.begin(), smaller.end());
+      add_parts(std::move(part));
       continue;
     }
     ColmapModel model = PartMapper(input, cameras, options, num_threads, std::move(part.images),
@@ -150,7 +160,7 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
         ErrorCode::kNoData,
         "no {} of {} images could be joined: of {} verified pairs {} have a relative pose; neighbouring "
         "images must show the same things from places some steps apart",
-        kMinNumImages, num_images, input.geometries.size(), whole.pairs.size());
+        kMinNumImages, num_images, input.geometries.size(), num_pairs);
   }
   std::stable_sort(models.begin(), models.end(), [](const auto& a, const auto& b) {
     return std::pair(a.first.images.size(), a.first.points.size()) >

@@ -11,6 +11,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
+#include "core/structure/camera_sensitivity.h"
 #include "stages/reconstruct/globally/average_rotations.h"
 #include "stages/reconstruct/globally/position_images.h"
 
@@ -45,16 +46,6 @@ constexpr double kMinPartAccepted = 0.01;
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
 constexpr int kMaxNumObservations = 200000;
 
-// Focal lengths that a model has, one where it states one.
-int NumFocals(const Camera& camera) {
-  return camera.FocalX() == camera.params[0] && camera.FocalY() == camera.params[0] &&
-                 (camera.model == CameraModel::kSimplePinhole || camera.model == CameraModel::kSimpleRadial ||
-                  camera.model == CameraModel::kRadial || camera.model == CameraModel::kSimpleRadialFisheye ||
-                  camera.model == CameraModel::kRadialFisheye)
-             ? 1
-             : 2;
-}
-
 }  // namespace
 
 PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
@@ -87,14 +78,16 @@ ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Pr
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return {};
     progress.Advance(static_cast<int64_t>(images_.size()));
-    if (round.accepted_rad > 0) {
-      TriangulateAll(round.max_error_px);
-      const bool is_again = &round != kRounds && round.accepted_rad == (&round)[-1].accepted_rad;
-      if (AcceptPairs(round.accepted_rad) < kMinPartAccepted * static_cast<double>(pairs_.size()) && is_again)
-        continue;
-      MakeTracks();
-    }
     TriangulateAll(round.max_error_px);
+    if (round.accepted_rad > 0) {
+      const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
+      const int num_changed = AcceptPairs(round.accepted_rad);
+      if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) continue;
+      if (num_changed > 0) {
+        MakeTracks();
+        TriangulateAll(round.max_error_px);
+      }
+    }
     int num_keypoints = round.num_keypoints;
     if (num_keypoints == 0)
       num_keypoints = std::clamp(kMaxNumObservations / static_cast<int>(images_.size()), kMinNumKeypoints,
@@ -124,7 +117,7 @@ FreeCamera PartMapper::FreeOf(const Camera& stated) const {
     camera.stated = camera.camera;
   }
   if (stated.model == CameraModel::kEquirectangular) return camera;
-  const int num_focals = NumFocals(camera.stated);
+  const int num_focals = NumFocals(camera.stated.model);
   const std::vector<double>& params = camera.stated.params;
   for (int p = 0; p < num_focals && options_.refine_focal_length; ++p) {
     camera.free.push_back(p);

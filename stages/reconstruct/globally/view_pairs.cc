@@ -11,6 +11,7 @@
 #include "core/base/parallel.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
+#include "core/structure/camera_sensitivity.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -78,8 +79,7 @@ class FocalSearch {
     for (auto& [camera_id, camera] : cameras_) {
       if (camera.has_focal_prior) continue;
       const double ratio = focals_[camera_id] / camera.MeanFocal();
-      camera.params[0] *= ratio;
-      if (camera.FocalX() != camera.FocalY()) camera.params[1] *= ratio;
+      for (int p = 0; p < NumFocals(camera.model); ++p) camera.params[p] *= ratio;
     }
     return cameras_;
   }

@@ -3,18 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "core/camera/pixel_ray.h"
+#include "tests/core/structure/lens.h"
 
 namespace cairn {
 namespace {
-
-Camera Lens() {
-  Camera camera;
-  camera.model = CameraModel::kOpenCv;
-  camera.width = 640;
-  camera.height = 480;
-  camera.params = {500, 510, 322, 238, -0.1, 0.03, 0.002, -0.001};
-  return camera;
-}
 
 std::vector<int> AllParams(const Camera& camera) {
   std::vector<int> params;
