@@ -4,7 +4,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "core/base/disjoint_sets.h"
+#include "core/structure/disjoint_sets.h"
 
 namespace cairn {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "core/base/disjoint_sets.h"
+#include "core/structure/disjoint_sets.h"
 
 namespace cairn::reconstruct {
 namespace {

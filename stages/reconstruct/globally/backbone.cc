@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "core/base/disjoint_sets.h"
+#include "core/structure/disjoint_sets.h"
 
 namespace cairn::reconstruct {
 namespace {
