@@ -58,11 +58,14 @@ struct MapHead {
   // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up
   // to noise.
   Pose camera_from_given;
-  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees); 0: poses as stated.
+  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees), which the poses here
+  // are free from; 0: poses as stated.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
-  // Which part of its variance a keypoint shares with the others of its image: n of them say as much as
-  // n / (1 + n / 2 * this) independent ones.  0: not measured.
+  // How much wider than its normal matrix says the covariance of a fix of n inliers is, as left-out survey
+  // images show: covariance_scale * (1 + n / 2 * keypoint_correlation).  0: not measured.
+  double covariance_scale = 0;
+  // Which part of its variance a keypoint shares with the others of its image.  0: not measured.
   double keypoint_correlation = 0;
 
   std::vector<Camera> cameras;  // ascending camera_id

@@ -205,6 +205,8 @@ Status CheckMapHead(const MapHead& head) {
       !(head.stated_pose_sigma_deg >= 0 && head.stated_pose_sigma_deg <= 180)) {
     return Invalid("the noise of the stated poses is not a valid number");
   }
+  if (!(head.covariance_scale == 0 || (head.covariance_scale >= 1 && head.covariance_scale < 1e6)))
+    return Invalid("the scale of covariances is neither 0 nor in 1 .. 10^6");
   if (!(head.keypoint_correlation >= 0 && head.keypoint_correlation <= 1))
     return Invalid("the correlation of keypoints is not in 0 .. 1");
   for (size_t i = 0; i < head.stated_cameras.size(); ++i) {

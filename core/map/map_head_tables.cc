@@ -141,6 +141,7 @@ Status DecodeMeta(Texts meta, const std::string& path, MapHead* head) {
                    meta["stated_pose_sigma_m"], meta["stated_pose_sigma_deg"]);
   }
   CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "epoch", path, &head->epoch));
+  CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "covariance_scale", path, &head->covariance_scale));
   CAIRN_RETURN_IF_ERROR(ReadNumber(meta, "keypoint_correlation", path, &head->keypoint_correlation));
   CAIRN_RETURN_IF_ERROR(ReadStatedCameras(meta, path, head));
   if (meta.count("findings")) head->findings_hash = meta["findings"];
@@ -189,6 +190,10 @@ void WriteTables(SQLite::Database& database, const MapHead& head) {
   }
   if (!head.findings_hash.empty()) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)", {{"findings", head.findings_hash}});
+  }
+  if (head.covariance_scale != 0) {
+    WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",
+               {{"covariance_scale", fmt::format("{}", head.covariance_scale)}});
   }
   if (head.keypoint_correlation != 0) {
     WriteTexts(database, "INSERT INTO meta VALUES (?, ?)",

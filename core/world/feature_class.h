@@ -57,8 +57,7 @@ struct Classes {
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
   Pose camera_from_given;
   // Where poses were refined: how far they moved from the stated ones, root mean square per axis of the
-  // camera's place and rotation.  The survey's poses share this error with every pose that is localized
-  // against them.
+  // camera's place and rotation: how wrong those were, and truth of the same source is.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
   // Which part of a keypoint's variance it shares with the others of its image (KeypointNoise of

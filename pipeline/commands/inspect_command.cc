@@ -178,6 +178,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"num_cameras", rows.cameras.size()},
                                  {"stated_poses_moved_m", rows.stated_pose_sigma_m},
                                  {"stated_poses_moved_deg", rows.stated_pose_sigma_deg},
+                                 {"covariance_scale", rows.covariance_scale},
                                  {"keypoint_correlation", rows.keypoint_correlation},
                                  {"num_appearance_nodes", rows.appearance.size()},
                                  {"num_kept_nodes", num_kept},

@@ -117,16 +117,15 @@ const char* ScopeName(Scope scope) {
 
 Localizer::Localizer(std::shared_ptr<const Map> map, const LocalizerOptions& options)
     : map_(std::move(map)), options_(options) {
-  // The errors of the survey's poses do not average out over landmarks.
-  options_.refine.systematic_sigma_m =
-      std::hypot(options.refine.systematic_sigma_m, map_->head().stated_pose_sigma_m);
   if (options.refine.keypoint_correlation == 0) {
-    options_.refine.keypoint_correlation = map_->head().keypoint_correlation;
-    // A map of an earlier program does not say.
-    if (map_->head().keypoint_correlation == 0) options_.refine.covariance_scale *= kUnmeasuredScale;
+    const MapHead& head = map_->head();
+    options_.refine.keypoint_correlation = head.keypoint_correlation;
+    if (head.covariance_scale > 0) {
+      options_.refine.covariance_scale *= head.covariance_scale;
+    } else if (head.keypoint_correlation == 0) {  // a map of an earlier program does not say
+      options_.refine.covariance_scale *= kUnmeasuredScale;
+    }
   }
-  options_.refine.systematic_sigma_deg =
-      std::hypot(options.refine.systematic_sigma_deg, map_->head().stated_pose_sigma_deg);
 }
 
 Result<Localization> Localizer::Localize(const cv::Mat& grey, const Camera& camera,

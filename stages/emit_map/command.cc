@@ -21,6 +21,7 @@
 #include "stages/emit_map/choose/fit_size.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/learn_fix_noise.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 
@@ -176,6 +177,12 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
   rows.stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
   rows.frame = inputs.provenance.frame;
   rows.sessions = inputs.provenance.sessions;
+  if (classes.images.size() == inputs.classes.images.size()) {  // the map itself, not one to be tried
+    if (const std::optional<FixNoise> noise = LearnFixNoise(classes, rows, num_threads)) {
+      rows.covariance_scale = noise->covariance_scale;
+      rows.keypoint_correlation = noise->keypoint_correlation;
+    }
+  }
   if (options.visual_map) {
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map, ModelLandmarks(classes, rows, options, num_threads));
     CAIRN_ASSIGN_OR_RETURN(rows.visual_map.errors,
@@ -216,6 +223,22 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const E
       options.max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks,
       guarantee.num_stations_below_k, rows.stations.size(), rows.k,
       fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted, options));
+}
+
+std::string FixNoiseText(const MapRows& rows) {
+  if (rows.covariance_scale == 0) {
+    return "emit_map: too few survey images to leave runs of them out: how far fixes are off is taken from "
+           "how "
+           "keypoints err\n";
+  }
+  const auto wider = [&](double num_inliers) {
+    return std::sqrt(rows.covariance_scale * (1 + 0.5 * num_inliers * rows.keypoint_correlation));
+  };
+  return fmt::format(
+      "emit_map: left-out runs of the survey: a fix of 30 landmarks is {:.1f} times as far off as "
+      "independent "
+      "keypoints would make it, one of 300 {:.1f} times; its covariance says so\n",
+      wider(30), wider(300));
 }
 
 std::string PromiseText(const MapPromise& promise) {
@@ -316,7 +339,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       rows.landmarks.size(), inputs.classes.classes.size(), rows.regions.size(), rows.images.size(),
       rows.vocabulary.num_words(),
       static_cast<double>(std::filesystem::file_size(arguments.output_path)) / 1e6);
-  *environment.out << guarantee;
+  *environment.out << guarantee << FixNoiseText(rows);
   return Ok();
 }
 

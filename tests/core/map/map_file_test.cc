@@ -35,6 +35,7 @@ MapRows ExampleRows() {
   rows.floor_from_world.rotation = Eigen::Quaterniond(0.9, 0.1, -0.3, 0.2).normalized();
   rows.stated_pose_sigma_m = 0.02;
   rows.stated_pose_sigma_deg = 1.5;
+  rows.covariance_scale = 1.23456789;
   rows.keypoint_correlation = 0.0123456789;
   rows.stated_cameras = {rows.cameras[0]};
   rows.stated_cameras[0].model = CameraModel::kSimplePinhole;
@@ -68,6 +69,7 @@ TEST(MapFile, RoundTripKeepsEverything) {
   }
   EXPECT_EQ(read->stated_pose_sigma_m, 0.02);
   EXPECT_EQ(read->stated_pose_sigma_deg, 1.5);
+  EXPECT_EQ(read->covariance_scale, 1.23456789);
   EXPECT_EQ(read->keypoint_correlation, 0.0123456789);
   ASSERT_EQ(read->stated_cameras.size(), 1u);
   EXPECT_EQ(read->stated_cameras[0].camera_id, written.cameras[0].camera_id);

@@ -49,6 +49,8 @@ TEST(MapRows, ValidRowsAreValidUpToTheirLimits) {
            [](MapRows&) {},
            [](MapRows& r) { r.stated_pose_sigma_deg = 180; },
            [](MapRows& r) { r.stated_pose_sigma_m = 999.9; },
+           [](MapRows& r) { r.covariance_scale = 1; },
+           [](MapRows& r) { r.covariance_scale = 999999; },
            [](MapRows& r) { r.appearance[2].entropy = 64; },
            [](MapRows& r) { r.documents = "kept"; },
            [](MapRows& r) {
@@ -110,6 +112,9 @@ TEST(MapRows, HeadsThatMakeNoSenseAreRefused) {
               HasSubstr("noise of the stated poses"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.stated_pose_sigma_deg = 180.5; }),
               HasSubstr("noise of the stated poses"));
+  for (const double scale : {-1.0, 0.99, 1e6, kNan}) {
+    EXPECT_THAT(Refusal([&](MapRows& r) { r.covariance_scale = scale; }), HasSubstr("scale of covariances"));
+  }
   EXPECT_THAT(Refusal([](MapRows& r) { r.documents = "some"; }), HasSubstr("documents = 'some'"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.floor_from_world.rotation.coeffs() *= 2; }),
               HasSubstr("the rotation of a frame"));
