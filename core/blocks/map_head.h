@@ -58,8 +58,8 @@ struct MapHead {
   // The poses that the capture states are cam_from_world = camera_from_given^-1 * (the poses here), up
   // to noise.
   Pose camera_from_given;
-  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees), which the poses here
-  // are free from; 0: poses as stated.
+  // That noise, root mean square per axis of a camera's place (m) and rotation (degrees), which the poses
+  // here are free from; 0: poses as stated.
   double stated_pose_sigma_m = 0;
   double stated_pose_sigma_deg = 0;
   // How much wider than its normal matrix says the covariance of a fix of n inliers is, as left-out survey

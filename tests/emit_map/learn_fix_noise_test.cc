@@ -99,7 +99,8 @@ double PartWithinBound(const Row& row, const Errors& errors, const RefineOptions
       features.keypoints.push_back(keypoint ? *keypoint : Keypoint{});
     const Query query = MakeQuery(features, row.rows.cameras[0], {});
     for (size_t k = 0; k < points.size(); ++k) {
-      if (features.keypoints[k].scale == 1) measurements.push_back({points[k], Eigen::Matrix3d::Zero(), *query.rays[k]});
+      if (features.keypoints[k].scale == 1)
+        measurements.push_back({points[k], Eigen::Matrix3d::Zero(), *query.rays[k]});
     }
     const auto refined = RefinePoseWithCovariance(measurements, truth, options);
     if (!refined) continue;
