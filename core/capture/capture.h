@@ -49,6 +49,10 @@ struct Capture {
 // queries.txt, or different cameras of one image size).
 Result<Capture> ReadCapture(const std::string& root);
 
+// In the folder of a capture without poses: what wheels or a tracker say of its images
+// (stages/reconstruct/known_places.h).
+inline constexpr const char* kOdometryFile = "odometry.txt";
+
 // Where a capture of several sessions without poses has the cameras of one of them.
 std::string SessionCamerasPath(const std::string& root, const std::string& session);
 

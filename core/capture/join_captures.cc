@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/base/text.h"
 #include "core/capture/sessions.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/image_list.h"
@@ -165,6 +166,23 @@ Status WriteSessionCameras(const std::vector<CaptureSession>& sessions, const st
   return Ok();
 }
 
+// Writes what odometry says of sessions without poses, each in a world of its own, where any has it: lines
+// with the session's name in front.
+Status WriteSessionOdometry(const std::vector<CaptureSession>& sessions, const std::string& folder) {
+  std::string joined;
+  for (const CaptureSession& session : sessions) {
+    const std::string path = session.root + "/" + kOdometryFile;
+    if (!fs::exists(path)) continue;
+    CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+    for (const std::string_view line : SplitLines(text)) {
+      const std::vector<std::string> words = SplitWords(line);
+      if (words.empty() || words[0][0] == '#') continue;
+      joined += fmt::format("{}/{}\n", session.name, fmt::join(words, " "));
+    }
+  }
+  return joined.empty() ? Ok() : WriteFileAtomically(folder + "/" + kOdometryFile, joined);
+}
+
 // images/SESSION -> the session's images.
 Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   std::error_code error;
@@ -220,7 +238,10 @@ Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, 
       ReplaceFolderAtomically(folder, "joined captures", [&](const std::string& written) -> Status {
         CAIRN_RETURN_IF_ERROR(LinkImages(sessions, written + "/images"));
         CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + kSessionsFile, names));
-        if (!HasPoses(sessions.front())) return WriteSessionCameras(sessions, written);
+        if (!HasPoses(sessions.front())) {
+          CAIRN_RETURN_IF_ERROR(WriteSessionCameras(sessions, written));
+          return WriteSessionOdometry(sessions, written);
+        }
         if (!cameras.empty()) CAIRN_RETURN_IF_ERROR(WriteCamerasText(written + "/cameras.txt", cameras));
         for (const auto& [name, text] : {std::pair<const char*, const std::string&>("images.txt", images),
                                          {"queries.txt", queries},

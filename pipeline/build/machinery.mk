@@ -45,11 +45,12 @@ $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
 # ---- The capture's files
 
 # Poses, cameras and frame, read by the stages that know the capture.
-CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt))
+CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt odometry.txt))
 ifneq ($(SESSIONS),)
 # The files of the joined capture, whether they exist yet or not.
-CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)),,cameras.txt images.txt \
-    frame.json $(if $(QUERIES),queries.txt)))
+ODOMETRY := $(wildcard $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session)))/odometry.txt))
+CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)), \
+    $(if $(ODOMETRY),odometry.txt),cameras.txt images.txt frame.json $(if $(QUERIES),queries.txt)))
 endif
 # The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
 # removed image changes its folder's date.
@@ -170,7 +171,7 @@ $(filter-out $(UNCHANGED),$(CAPTURE_LISTS)): $(BUILD)/capture.stamp ;
 $(UNCHANGED): $(BUILD)/capture.stamp
 	+@: # the same bytes as before
 SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
-SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json,$(SESSION_FOLDERS:%=%/$(list)))) \
+SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
 endif

@@ -32,6 +32,7 @@ std::string ReportJson(const ReconstructResult& result) {
                                    {"model_sizes", result.model_sizes},
                                    {"num_points", result.num_points},
                                    {"mean_error_px", result.mean_error_px}};
+  if (result.scale_sigma_ratio > 0) report["scale_sigma_ratio"] = result.scale_sigma_ratio;
   report["residuals"] = nlohmann::ordered_json::array();
   for (const AlignmentResidual& residual : result.residuals) {
     report["residuals"].push_back(
@@ -89,7 +90,10 @@ std::string ResultText(const ReconstructResult& result) {
   if (result.frame.unit == "arbitrary") {
     text += "reconstruct: no scale: the unit is arbitrary\n";
   } else {
-    text += fmt::format("reconstruct: scale from {}, {}\n", result.frame.source, ResidualText(result));
+    const std::string sigma =
+        result.scale_sigma_ratio > 0 ? fmt::format(" (+- {:.1f} %)", 100 * result.scale_sigma_ratio) : "";
+    text +=
+        fmt::format("reconstruct: scale from {}{}, {}\n", result.frame.source, sigma, ResidualText(result));
   }
   if (result.frame.anchor) {
     text += fmt::format("reconstruct: east, north, up at {:.7f}, {:.7f}, {:.2f} m\n",

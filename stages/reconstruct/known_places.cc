@@ -1,6 +1,7 @@
 #include "stages/reconstruct/known_places.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -52,6 +53,8 @@ Status SplitNames(const std::vector<std::string>& words, size_t last, const std:
                    Join(words, 0, last));
 }
 
+constexpr double kMaxNormError = 0.01;  // of a quaternion
+
 double WrapLongitude(double longitude_deg) { return std::remainder(longitude_deg, 360.0); }
 
 }  // namespace
@@ -94,6 +97,40 @@ Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::stri
   }));
   if (points.empty()) return MakeError(ErrorCode::kNoData, "{}: no line IMAGE X Y Z", path);
   return points;
+}
+
+Result<std::vector<OdometryPose>> ReadOdometry(const std::string& path, const Capture& capture) {
+  std::set<std::string> names, listed;
+  for (const CaptureImage& image : capture.images) names.insert(image.name);
+  std::vector<OdometryPose> poses;
+  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& words) -> Status {
+    std::array<double, 7> numbers{};
+    bool is_valid = words.size() > numbers.size();
+    for (size_t i = 0; is_valid && i < numbers.size(); ++i) {
+      is_valid =
+          ParseNumber(words[words.size() - numbers.size() + i], &numbers[i]) && std::isfinite(numbers[i]);
+    }
+    if (!is_valid) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "expected IMAGE TX TY TZ QX QY QZ QW: the camera's place, metres, and its rotation, "
+                       "world from camera, as a quaternion");
+    }
+    OdometryPose pose;
+    pose.name = Join(words, 0, words.size() - numbers.size());
+    if (!listed.insert(pose.name).second)
+      return MakeError(ErrorCode::kCorrupt, "image '{}' is listed twice", pose.name);
+    const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+    if (!(std::abs(rotation.norm() - 1) <= kMaxNormError))
+      return MakeError(ErrorCode::kCorrupt, "a quaternion of length {:.3g}, not 1", rotation.norm());
+    pose.world_from_cam = {rotation.normalized(), {numbers[0], numbers[1], numbers[2]}};
+    if (names.contains(pose.name)) poses.push_back(pose);
+    return Ok();
+  }));
+  if (poses.empty()) {
+    return MakeError(ErrorCode::kNoData, "{}: names none of the {} images of the capture", path,
+                     capture.images.size());
+  }
+  return poses;
 }
 
 std::map<std::string, ExifTags> ReadGpsTags(const Capture& capture) {

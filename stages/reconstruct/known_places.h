@@ -9,11 +9,12 @@
 #include "core/base/error.h"
 #include "core/capture/capture.h"
 #include "core/capture/exif.h"
+#include "core/geometry/pose.h"
 
 namespace cairn::reconstruct {
 
-// What is known of the images of a capture besides their pixels: positions of some, or distances
-// between them.
+// What is known of the images of a capture besides their pixels: positions of some, distances between them,
+// or odometry.
 
 // A distance between the cameras of two images.
 struct KnownDistance {
@@ -31,6 +32,19 @@ Result<std::vector<KnownDistance>> ReadKnownDistances(const std::string& path, c
 // (the form of COLMAP's model_aligner).  Errors as above; an image listed twice is Corrupt.
 Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::string& path,
                                                                  const Capture& capture);
+
+// What a robot's wheels, or a tracker, say of the images of a capture without poses: right over short ways,
+// in metres and level, and drifting over long ones.
+struct OdometryPose {
+  std::string name;     // of the image
+  Pose world_from_cam;  // the world is the odometry's own: metres, z up; camera axes as everywhere
+};
+
+// "IMAGE TX TY TZ QX QY QZ QW" a line, the pose of TUM's trajectories, in the order in which the images were
+// taken; empty lines and lines that begin with '#' are skipped.  Errors: NotFound, Io; Corrupt, with the line
+// (not seven finite numbers, a quaternion that is not of length 1 to 0.01, an image listed twice); NoData (no
+// line names an image of the capture).  Images that the capture lacks are left out.
+Result<std::vector<OdometryPose>> ReadOdometry(const std::string& path, const Capture& capture);
 
 // GPS tags of the images that have them, by name.
 std::map<std::string, ExifTags> ReadGpsTags(const Capture& capture);

@@ -15,18 +15,19 @@
 namespace cairn::reconstruct {
 
 // Finds the poses of a capture that has none, from its matches: of all images at once
-// (globally/map_globally.h), up to a similarity, which GPS, known positions or known distances then determine
-// (align.h).  Where too few images are registered, and by default where they are no drive, COLMAP's mapper
-// runs (mapper.h): with the cameras' distortion refined, without, and then from a start of any motion.
+// (globally/map_globally.h), up to a similarity, which odometry, GPS, known positions or known distances then
+// determine (align.h).  Where too few images are registered, and by default where they are no drive, COLMAP's
+// mapper runs (mapper.h): with the cameras' distortion refined, without, and then from a start of any motion.
 // Before: match_features.  After: group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;
   // Smallest part of the capture's images that the largest model must have; with fewer there is no
   // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
-  // Where scale and axes come from: "gps" (EXIF), "control_points", "distances", or "none"; "auto": the
-  // control points if their file is given, else the distances if theirs is, else GPS where at least three
-  // images have it and are far enough apart, else none.
+  // Where scale and axes come from: "odometry" (the capture's odometry.txt), "gps" (EXIF), "control_points",
+  // "distances", or "none"; "auto": the control points if their file is given, else the distances if theirs
+  // is, else odometry if it is there, else GPS where at least three images have it and are far enough apart,
+  // else none.
   std::string scale_from = "auto";
   // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
@@ -60,7 +61,8 @@ struct ReconstructResult {
   std::vector<CaptureImage> queries;   // held out, likewise
   CaptureFrame frame;
   std::vector<AlignmentResidual> residuals;
-  std::vector<Reject> rejects;  // images that are in neither list, and why
+  double scale_sigma_ratio = 0;  // standard deviation of the scale, as a part of it; 0: not known
+  std::vector<Reject> rejects;   // images that are in neither list, and why
   std::vector<std::string> warnings;
   std::vector<int> model_sizes;  // images of each model, the kept one first
   int num_points = 0;            // of the model kept

@@ -51,6 +51,35 @@ TEST_F(KnownPlacesTest, ReadsControlPoints) {
   EXPECT_EQ(points->at("b c.jpg"), Eigen::Vector3d(-1.5, 0, 0.2));
 }
 
+TEST_F(KnownPlacesTest, ReadsOdometryInItsOrderAndLeavesOutImagesThatTheCaptureLacks) {
+  const auto odometry = ReadOdometry(
+      Write("# t q\nd.jpg 1 2 3 0 0 0 1\nb c.jpg -1.5 0 2e-1 0.6 0 0 0.8\ne.jpg 0 0 0 0 0 0 1\n"), capture_);
+  ASSERT_TRUE(odometry.ok()) << odometry.error().message;
+  ASSERT_EQ(odometry->size(), 2u);
+  EXPECT_EQ((*odometry)[0].name, "d.jpg");
+  EXPECT_EQ((*odometry)[0].world_from_cam.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ((*odometry)[1].name, "b c.jpg");
+  EXPECT_NEAR((*odometry)[1].world_from_cam.rotation.x(), 0.6, 1e-12);
+  EXPECT_NEAR((*odometry)[1].world_from_cam.rotation.w(), 0.8, 1e-12);
+  const auto none = ReadOdometry(Write("e.jpg 0 0 0 0 0 0 1\n"), capture_);
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(none.error().message, HasSubstr("names none of the 3 images"));
+}
+
+TEST_F(KnownPlacesTest, WrongOdometryNamesTheLine) {
+  for (const char* line :
+       {"d.jpg 1 2 3 0 0 0", "d.jpg 1 2 3 0 0 0 x", "d.jpg 1 nan 3 0 0 0 1", "1 2 3 0 0 0 1",
+        "d.jpg 1 2 3 0 0 0 1.02", "d.jpg 1 2 3 0 0 0 0", "a.jpg 0 0 0 0 0 0 1"}) {
+    const auto odometry = ReadOdometry(Write(std::string("a.jpg 0 0 0 0 0 0 1\n") + line), capture_);
+    ASSERT_FALSE(odometry.ok()) << line;
+    EXPECT_EQ(odometry.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(odometry.error().message, HasSubstr("known_places.txt:2: "));
+  }
+  EXPECT_TRUE(ReadOdometry(Write("a.jpg 0 0 0 0 0 0 1.009"), capture_).ok());
+  EXPECT_EQ(ReadOdometry("/no/such/file", capture_).error().code, ErrorCode::kNotFound);
+}
+
 TEST_F(KnownPlacesTest, WrongControlPointsNameTheLine) {
   for (const char* line :
        {"a.jpg 1 2", "d.jpg 1 2 z", "d.jpg 1 nan 2", "e.jpg 1 2 3", "a.jpg 1 2 4", "1 2 3"}) {

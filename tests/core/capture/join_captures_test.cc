@@ -143,6 +143,17 @@ TEST_F(JoinCapturesTest, SessionsWithoutPosesKeepTheCamerasThatTheyGive) {
               HasSubstr("held-out images are given with their poses"));
 }
 
+TEST_F(JoinCapturesTest, OdometryOfSessionsWithoutPosesIsKeptUnderTheirNames) {
+  const std::string image = "P5\n1 1\n255\nx";
+  for (const std::string day : {"day1", "day2", "day3"}) Write(day + "/images/1.pgm", image);
+  ASSERT_TRUE(Join({Session("day1"), Session("day2")}).ok());
+  EXPECT_FALSE(ReadFile(Path("joined/odometry.txt")).ok());
+  Write("day1/odometry.txt", "# names\n1.pgm 1 2 3  0 0 0 1\r\n");
+  Write("day3/odometry.txt", "1.pgm 4 5 6 0 0 0 1\n");
+  ASSERT_TRUE(Join({Session("day1"), Session("day2"), Session("day3")}).ok());
+  EXPECT_EQ(*ReadFile(Path("joined/odometry.txt")), "day1/1.pgm 1 2 3 0 0 0 1\nday3/1.pgm 4 5 6 0 0 0 1\n");
+}
+
 TEST_F(JoinCapturesTest, SecondJoinTouchesOnlyWhatChanged) {
   WriteCapture("day1", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
   WriteCapture("day2", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
