@@ -29,6 +29,19 @@ constexpr double kFarOffGain = 0.3;
 constexpr double kLearningTolerance = 1e-3;
 constexpr int kMinNumCameraImages = 5;
 
+// Observations of a point that are adjusted, at most: k of them cost k^2, and say little more.
+constexpr size_t kMaxNumObservations = 16;
+
+// At most kMaxNumObservations of them, spread from the first to the last: both ends of a track, and all its
+// passes, are what it joins.
+std::vector<int> Spread(const std::vector<int>& inliers) {
+  if (inliers.size() <= kMaxNumObservations) return inliers;
+  std::vector<int> spread;
+  for (size_t k = 0; k < kMaxNumObservations; ++k)
+    spread.push_back(inliers[k * (inliers.size() - 1) / (kMaxNumObservations - 1)]);
+  return spread;
+}
+
 class SurveyAdjuster {
  public:
   SurveyAdjuster(const MatchedFeatures& matched, const std::vector<Track>& tracks,
@@ -101,7 +114,6 @@ class SurveyAdjuster {
   // Adjusts everything by what was learnt.
   void Apply(const SurveyFindings& findings, const TriangulateOptions& first) {
     is_learning_ = false;
-    bundle_options_.function_tolerance = BundleOptions().function_tolerance;
     findings_ = findings;
     problem_.noise = findings.noise;
     problem_.is_offset_free = findings.has_offset;
@@ -123,7 +135,12 @@ class SurveyAdjuster {
     posed_.camera_from_given = offset;
     if (findings.pose_gain == 0) return;
     Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
-    for (int round = 0; round < 2 && !progress_.Cancelled(); ++round) Adjust(nullptr);
+    Adjust(nullptr);
+    if (!progress_.Cancelled()) {  // again, with all that agrees now, and to the end
+      bundle_options_.function_tolerance = BundleOptions().function_tolerance;
+      Select(TriangulateTracks(tracks_, posed_, triangulate_, num_threads_));
+      Adjust(nullptr);
+    }
     KeepFrame();
   }
 
@@ -186,9 +203,9 @@ class SurveyAdjuster {
       const auto is_wanted = [&](int i) {
         return count[tracks_[t][i].image_idx] < options_.num_keypoints_adjusted;
       };
-      if (std::none_of(triangulations[t].inliers.begin(), triangulations[t].inliers.end(), is_wanted))
-        continue;
-      for (const int i : triangulations[t].inliers) ++count[tracks_[t][i].image_idx];
+      const std::vector<int> spread = Spread(triangulations[t].inliers);
+      if (std::none_of(spread.begin(), spread.end(), is_wanted)) continue;
+      for (const int i : spread) ++count[tracks_[t][i].image_idx];
       selected_.push_back(tracks_[t]);
       chosen.push_back(triangulations[t]);
     }
@@ -204,7 +221,7 @@ class SurveyAdjuster {
       if (triangulations[t].outcome != TriangulateOutcome::kOk) continue;
       const int point_idx = static_cast<int>(problem_.points.size());
       problem_.points.push_back(triangulations[t].position);
-      for (const int i : triangulations[t].inliers) {
+      for (const int i : Spread(triangulations[t].inliers)) {
         const TrackElement& element = selected_[t][i];
         const Keypoint& keypoint = KeypointOf(element);
         BundleProblem::Observation observation;

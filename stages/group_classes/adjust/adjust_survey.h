@@ -60,7 +60,7 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 // Finds out from the images how wrong the stated poses and cameras are, and makes them as right as the images
 // allow; exact ones stay what they are.  In turns:
 //   - poses, points, cameras and offset are adjusted together (bundle.h), over long tracks, 100 keypoints an
-//     image or more;
+//     image or more, at most 16 of a track;
 //   - what keypoints' errors are is measured by scale, and how much of them an image's keypoints share
 //     (keypoint_noise.h): real images say far less than as many independent keypoints would;
 //   - the four components of the poses' noise are learnt [MacKay 1992]: a standard deviation squared is the
