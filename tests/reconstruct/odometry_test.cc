@@ -1,5 +1,6 @@
 #include "stages/reconstruct/odometry.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -144,6 +145,33 @@ TEST(AlignToOdometry, ImagesThatAreNotInTheModelAreSteppedOver) {
   const auto alignment = AlignToOdometry(drive, model);
   ASSERT_TRUE(alignment.ok());
   EXPECT_NEAR(alignment->world_from_model.scale, 2, 1e-9);
+}
+
+// 0.4 m a step, back and forth, seven steps a leg: pieces of five steps (2 m) end 2, 1.2 or 0.4 m from where
+// they begin, and the last are too short to say something.
+TEST(AlignToOdometry, PiecesOnWhichTheCameraComesBackDoNotCount) {
+  auto drive = TrueDrive();
+  double x = 0;
+  for (size_t i = 0; i < drive.size(); ++i) {
+    drive[i].world_from_cam.translation = {x, 0, 0};
+    x += (i / 7) % 2 == 0 ? 0.4 : -0.4;
+  }
+  const auto alignment = AlignToOdometry(drive, ModelOf(drive, 1));
+  ASSERT_TRUE(alignment.ok());
+  EXPECT_LT(alignment->windows.size(), 30u);
+  EXPECT_GT(alignment->windows.size(), 10u);
+  for (const OdometryWindow& window : alignment->windows) EXPECT_GT(window.odometry_m, 0.5);
+}
+
+TEST(AlignToOdometry, TheScalesSigmaIsThatOfAPieceOverTheRootOfTheirNumber) {
+  const auto drive = TrueDrive(300);
+  const auto alignment = AlignToOdometry(WithDrift(drive, 0.1, 0), ModelOf(drive, 1));
+  ASSERT_TRUE(alignment.ok());
+  const auto num_on = std::count_if(alignment->windows.begin(), alignment->windows.end(),
+                                    [](const OdometryWindow& window) { return !window.is_off; });
+  // Seven or eight steps a piece, each 10 % off.
+  EXPECT_NEAR(alignment->spread_ratio, 0.1 / std::sqrt(7.5), 0.015);
+  EXPECT_NEAR(alignment->scale_sigma_ratio * std::sqrt(num_on), alignment->spread_ratio, 1e-12);
 }
 
 TEST(AlignToOdometry, NoWayGivesNoScale) {
