@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <string_view>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/capture/film_file.h"
 #include "core/files/input_file.h"
 
 extern "C" {
@@ -36,24 +36,8 @@ std::string AvErrorText(int code) {
   return text.data();
 }
 
-// The first bytes of a file; fewer where it has fewer.
-std::string FirstBytes(const std::string& path, size_t num_bytes) {
-  std::string bytes(num_bytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(bytes.data(), static_cast<std::streamsize>(num_bytes));
-  bytes.resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return bytes;
-}
-
-bool BeginsLikeMp4(std::string_view bytes) {
-  if (bytes.size() < 8) return false;
-  const std::string_view type = bytes.substr(4, 4);
-  return type == "ftyp" || type == "moov" || type == "mdat" || type == "wide" || type == "skip" ||
-         type == "free";
-}
-
 Error CannotOpen(const std::string& path, int code) {
-  if (BeginsLikeMp4(FirstBytes(path, 8))) {
+  if (BeginsLikeMp4(path)) {
     return MakeError(ErrorCode::kCorrupt,
                      "{}: a film without its index ({}): the recording or a copy of it was cut off; copy it "
                      "again, or repair it with a tool such as untrunc",
@@ -344,18 +328,5 @@ double FilmReader::StatedDurationS() const {
 int64_t FilmReader::num_damaged() const { return impl_->num_damaged; }
 int FilmReader::turn_deg() const { return impl_->turn_deg; }
 bool FilmReader::is_interlaced() const { return impl_->is_interlaced; }
-
-bool IsFilm(const std::string& path) {
-  if (!CheckInputFile(path).ok()) return false;
-  constexpr const char* kSuffixes[] = {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi",
-                                       ".3gp", ".ts",  ".mts", ".mpg", ".mpeg"};
-  std::string suffix = fs::path(path).extension().string();
-  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (std::find(std::begin(kSuffixes), std::end(kSuffixes), suffix) != std::end(kSuffixes)) return true;
-  const std::string bytes = FirstBytes(path, 12);
-  return BeginsLikeMp4(bytes) || bytes.starts_with("\x1a\x45\xdf\xa3") ||
-         (bytes.starts_with("RIFF") && bytes.substr(8) == "AVI ");
-}
 
 }  // namespace cairn::pipeline
