@@ -26,6 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kMaxNumPixels = int64_t{1} << 26;
+// Eleven days: a frame that states a later time is from no film.
+constexpr double kMaxTimeS = 999999;
 // Demuxers of files that are films by themselves: playlists, which name other files, are none.
 constexpr const char* kFormats = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,ogg,asf,flv";
 constexpr const char* kKnown = "a film is an MP4, MOV, MKV, WebM or AVI file";
@@ -200,14 +202,16 @@ double FilmReader::Impl::FrameIntervalS() const {
   return interval_s > 0 && interval_s < 3600 ? interval_s : 1.0 / 30;
 }
 
-// As the film states; where it states nothing, or a time that is not after the last, one interval later.
+// As the film states; where it states nothing, or a time that is not after the last or beyond all films, one
+// interval later.
 double FilmReader::Impl::FrameTimeS() {
   const int64_t stamp = frame->best_effort_timestamp;
   const bool is_stated = stamp != AV_NOPTS_VALUE;
   double time_s = is_stated ? static_cast<double>(stamp) * av_q2d(stream().time_base) : 0;
   if (num_frames == 0) first_s = time_s;
   time_s -= first_s;
-  if (num_frames > 0 && (!is_stated || !(time_s > last_s))) time_s = last_s + FrameIntervalS();
+  if (num_frames > 0 && (!is_stated || !(time_s > last_s && time_s < kMaxTimeS)))
+    time_s = last_s + FrameIntervalS();
   ++num_frames;
   return last_s = time_s;
 }

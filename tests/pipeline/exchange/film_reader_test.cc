@@ -82,6 +82,17 @@ TEST_F(FilmReaderTest, FramesHaveTheTimesThatTheFilmStates) {
   }
 }
 
+TEST_F(FilmReaderTest, TimesThatCannotBeAreOneIntervalAfterTheLast) {
+  EncodeFilm(Path("years.mkv"), DrawnWalk(6, 4),
+             "-vf \"setpts='if(lt(N,3),N,N+1e12)'\" -vsync vfr -c:v libx264 -pix_fmt yuv420p -bf 0");
+  const std::vector<double> times = Times(Frames("years.mkv"));
+  ASSERT_GE(times.size(), 4u);
+  for (size_t i = 1; i < times.size(); ++i) {
+    EXPECT_GT(times[i], times[i - 1]);
+    EXPECT_LT(times[i], 10);
+  }
+}
+
 TEST_F(FilmReaderTest, AnAviHasAFrameAtEveryInterval) {
   EncodeFilm(Path("a.avi"), DrawnWalk(5, 4), "-c:v mpeg4 -q:v 2");
   EXPECT_THAT(Times(Frames("a.avi")),
@@ -154,6 +165,38 @@ TEST_F(FilmReaderTest, AFilmThatWasCutOffGivesItsWholeFrames) {
     for (size_t i = 0; i < cut.size(); ++i)
       ASSERT_EQ(cv::norm(cut[i].grey, whole[i].grey, cv::NORM_INF), 0)
           << name << ": frame " << i << " is not whole";
+  }
+}
+
+// Whatever the bytes: frames, or an error.
+TEST_F(FilmReaderTest, DamagedFilmsHaveAnEnd) {
+  const std::pair<const char*, const char*> kinds[] = {{"a.mp4", "-c:v libx264 -pix_fmt yuv420p"},
+                                                       {"a.mkv", "-c:v libx264 -pix_fmt yuv420p"},
+                                                       {"a.webm", "-c:v libvpx"},
+                                                       {"a.avi", "-c:v mpeg4"}};
+  cv::RNG random(5);
+  for (const auto& [name, options] : kinds) {
+    EncodeFilm(Path(name), DrawnWalk(12, 4), options);
+    const std::string whole = ReadFile(Path(name)).value();
+    for (int trial = 0; trial < 25; ++trial) {
+      std::string bytes = whole;
+      // Half of them in the head, where the structure is.
+      const size_t range = trial % 2 == 0 ? std::min<size_t>(1000, bytes.size()) : bytes.size();
+      for (int i = 0; i < 8; ++i)
+        bytes[static_cast<size_t>(random.uniform(0, static_cast<int>(range)))] =
+            static_cast<char>(random.uniform(0, 256));
+      Write(std::string("damaged_") + name, bytes);
+      const auto reader = FilmReader::Open(Path(std::string("damaged_") + name));
+      int num_frames = 0;
+      double last_s = -1;
+      while (reader.ok()) {
+        const auto frame = (*reader)->Next();
+        if (!frame.ok() || !frame->has_value()) break;
+        EXPECT_GT((*frame)->time_s, last_s) << name << " " << trial;
+        last_s = (*frame)->time_s;
+        ASSERT_LE(++num_frames, 100) << name << " " << trial;
+      }
+    }
   }
 }
 
