@@ -107,6 +107,9 @@ TEST_F(ImportFilmTest, FramesMayBeChosenByTime) {
   EncodeFilm(Path("walk.mp4"), DrawnWalk(60, 4));
   ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("0.5").value()).ok());
   EXPECT_THAT(Images(), ElementsAre("000000.000.jpg", "000000.500.jpg", "000001.000.jpg", "000001.500.jpg"));
+  // Each third frame, although sums of 0.1 and times in units of a film do not meet exactly.
+  ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("0.1").value(), "thirds").ok());
+  EXPECT_THAT(Images("thirds"), testing::AllOf(SizeIs(20), Contains("000001.900.jpg")));
   ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("all").value(), "all").ok());
   EXPECT_THAT(Images("all"), SizeIs(60));
   for (const char* text : {"0", "-1", "nan", "inf", "often", ""})
