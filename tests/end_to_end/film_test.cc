@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -7,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/base/quantiles.h"
 #include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
@@ -79,7 +81,11 @@ TEST(Film, OfADriveCompilesToOneMapWithTheDrivesPoses) {
   EXPECT_GT(drive.images.size(), 5 * imported.images.size());  // few keyframes
   EXPECT_GE(static_cast<double>(mapped.images.size()), 0.95 * static_cast<double>(imported.images.size()));
   const FilmErrors errors = CompareToDrive(mapped, drive);
-  for (const double error_m : errors.errors_m) EXPECT_LT(error_m, 0.01 * errors.way_m);
+  // The first images of a film may hang on few others.
+  const auto num_right = std::count_if(errors.errors_m.begin(), errors.errors_m.end(),
+                                       [&](double error_m) { return error_m < 0.01 * errors.way_m; });
+  EXPECT_GE(static_cast<double>(num_right), 0.95 * static_cast<double>(errors.errors_m.size()));
+  EXPECT_LT(Median(errors.errors_m), 0.001 * errors.way_m);
 
   // Nothing is redone as long as the film is the same ...
   EXPECT_THAT(compile("walk.mp4").out, HasSubstr("up to date"));
