@@ -48,10 +48,11 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     if (!name.ends_with(kReportSuffix)) continue;
     CAIRN_ASSIGN_OR_RETURN(Json report, ReadJson(entry.path().string()));
     const std::string stage = report["stage"];
-    if ((stage == "simulate" && !run.simulated) || (stage == "join_captures" && !run.joined) ||
-        (stage == "reconstruct" && !run.reconstructed) || (stage == "decompose_views" && !run.has_floor_plan))
-      continue;
     name.resize(name.size() - std::string_view(kReportSuffix).size());
+    if ((stage == "simulate" && !run.simulated) || (stage == "import" && !run.films.contains(name)) ||
+        (stage == "join_captures" && !run.joined) || (stage == "reconstruct" && !run.reconstructed) ||
+        (stage == "decompose_views" && !run.has_floor_plan))
+      continue;
     const size_t place = std::find_if(std::begin(kLine), std::end(kLine),
                                       [&](const LineStage& of_line) { return stage == of_line.name; }) -
                          std::begin(kLine);
@@ -93,7 +94,7 @@ std::string FlowText(const Json& report) {
                      taken_over.empty() ? "" : " (" + taken_over + " taken over)");
 }
 
-// All files of one stage: several where it is sharded.
+// All files of one stage: several where it is sharded.  Each film has a row of its own.
 struct StageRow {
   std::string stage, state;
   double seconds = 0;
@@ -104,7 +105,8 @@ struct StageRow {
 std::vector<StageRow> StageRows(const Json& report) {
   std::vector<StageRow> rows;
   for (const Json& file : report["stages"]) {
-    if (rows.empty() || rows.back().stage != file["stage"]) rows.push_back({file["stage"], file["state"]});
+    if (rows.empty() || rows.back().stage != file["stage"] || file["stage"] == "import")
+      rows.push_back({file["stage"], file["state"]});
     StageRow& row = rows.back();
     if (file["state"] == "ran") row.state = "ran";
     row.seconds += file["seconds"].get<double>();

@@ -6,6 +6,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "pipeline/exchange/film/import_film.h"
 #include "pipeline/exchange/import/layouts.h"
 #include "pipeline/exchange/import/write_capture.h"
 
@@ -18,9 +19,61 @@ struct ImportArguments {
   ImportOptions options;
   HoldOut hold_out;
   std::string link = "symbolic";
+  std::string keyframes = "auto";
 };
 
+// Films have frames of their own: what is said of files, poses and lists is not for them.
+Status CheckIsForFilms(const ImportArguments& arguments) {
+  const ImportArguments unsaid;
+  const std::pair<bool, const char*> given[] = {
+      {!arguments.options.images_folder.empty(), "--images"},
+      {!arguments.options.sequence.empty(), "--sequence"},
+      {!arguments.options.sensors.empty(), "--sensors"},
+      {arguments.options.max_time_gap_s != unsaid.options.max_time_gap_s, "--max-time-gap-s"},
+      {arguments.hold_out.every != unsaid.hold_out.every, "--every"},
+      {!arguments.hold_out.queries_path.empty(), "--queries"},
+      {arguments.link != unsaid.link, "--link"},
+  };
+  for (const auto& [is_given, option] : given) {
+    if (is_given) {
+      return MakeError(ErrorCode::kInvalidArgument, "{} is for data sets, and {} is a film; leave it out",
+                       option, arguments.source);
+    }
+  }
+  return Ok();
+}
+
+Status RunFilmImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(CheckIsForFilms(arguments));
+  CAIRN_ASSIGN_OR_RETURN(FilmOptions options, ParseFrameChoice(arguments.keyframes));
+  options.camera = arguments.options.camera;
+  CAIRN_ASSIGN_OR_RETURN(const FilmReport report, ImportFilm(arguments.source, options, arguments.output,
+                                                             environment.num_threads, *environment.progress));
+  for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
+  const KeyframeStats& frames = report.frames;
+  environment.report->in = {{"frames", frames.num_frames}};
+  environment.report->out = {{"images", frames.num_keyframes}};
+  *environment.out << fmt::format("import: {} frames in {:.1f} s, {} images of {} x {} pixels",
+                                  frames.num_frames, report.duration_s, frames.num_keyframes, report.width,
+                                  report.height);
+  if (options.choice == FrameChoice::kKeyframes) {
+    *environment.out << fmt::format("; {} frames are blurred, {} blank, {} repeated; {} cuts",
+                                    frames.num_blurred, frames.num_blank, frames.num_repeated,
+                                    frames.cuts.size());
+  }
+  *environment.out << "\n";
+  return Ok();
+}
+
 Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
+  std::error_code error;
+  const bool is_file = std::filesystem::is_regular_file(arguments.source, error);
+  if (arguments.options.layout == "film" || (arguments.options.layout == "auto" && is_file))
+    return RunFilmImport(arguments, environment);
+  if (arguments.keyframes != ImportArguments().keyframes) {
+    return MakeError(ErrorCode::kInvalidArgument, "--keyframes is for films, and {} is none; leave it out",
+                     arguments.source);
+  }
   CAIRN_ASSIGN_OR_RETURN(ImportedSurvey survey, ReadSurvey(arguments.source, arguments.options));
   CAIRN_RETURN_IF_ERROR(ChooseQueries(arguments.hold_out, &survey));
   const ImageTransfer transfer = arguments.link == "copy"   ? ImageTransfer::kCopy
@@ -41,19 +94,24 @@ Status RunImport(const ImportArguments& arguments, const CommandEnvironment& env
 }
 
 void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
-  parser.Add("source", arguments->source, "Folder of the data set, or of a COLMAP model")
+  parser.Add("source", arguments->source, "Film, or folder of a data set or of a COLMAP model")
       .Required()
       .Type("SOURCE");
   parser.Add("-o,--output", arguments->output, "Capture folder to write").Required().Type("CAPTURE");
   parser
       .Add("--format", arguments->options.layout,
-           "auto|colmap|tum|7scenes|kitti|euroc|kapture; auto: by the files that are there [auto]")
-      .OneOf({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture"})
+           "auto|colmap|tum|7scenes|kitti|euroc|kapture|film; auto: by the files that are there [auto]")
+      .OneOf({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture", "film"})
       .Type("FORMAT");
   parser
       .Add("--camera", arguments->options.camera,
-           "Camera of all images, in COLMAP's pixels [as the data set states]")
+           "Camera of all images, in COLMAP's pixels [as the data set states; of a film: not known]")
       .Type("MODEL,W,H,P...");
+  parser
+      .Add("--keyframes", arguments->keyframes,
+           "Frames of a film that become images: auto|all|SECONDS between two; auto: sharp ones from which "
+           "enough of the last is seen [auto]")
+      .Type("WHICH");
   parser
       .Add("--images", arguments->options.images_folder,
            "colmap: folder of the images [images/ in or beside the model]")
@@ -89,7 +147,7 @@ Command ImportCommand() {
   auto arguments = std::make_shared<ImportArguments>();
   return {
       .name = "import",
-      .summary = "Make a capture of a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture",
+      .summary = "Make a capture of a film, a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture",
       .add_arguments = [arguments](ArgumentParser& parser) { AddArguments(parser, arguments.get()); },
       .run =
           [arguments](const CommandEnvironment& environment) { return RunImport(*arguments, environment); },

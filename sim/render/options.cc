@@ -49,6 +49,11 @@ OptionTable DescribeOptions(SimulateOptions* o) {
        "Part of the floor that a lattice survey and its queries are limited to: x from, y from, x to, y to, "
        "metres; empty: all"},
       {"step_m", &o->step_m, "Path length between images of a driven survey, metres", 0.01, 5},
+      {"max_turn_deg", &o->max_turn_deg,
+       "Greatest turn between images of a driven survey, degrees: where the way turns faster, the camera "
+       "turns "
+       "on the spot",
+       0.1, 90},
       {"clearance_m", &o->clearance_m, "Least distance of the camera from walls and furniture, metres", 0.05,
        2},
       {"pose_noise_m", &o->pose_noise_m, "Standard deviation of stated survey positions, per axis, metres", 0,
@@ -76,7 +81,7 @@ OptionTable DescribeOptions(SimulateOptions* o) {
   };
   AddCondition({"survey", {"lattice"}}, {"spacing_m", "num_headings", "survey_area_m", "query_headings"},
                &table);
-  AddCondition({"survey", {"driven"}}, {"step_m"}, &table);
+  AddCondition({"survey", {"driven"}}, {"step_m", "max_turn_deg"}, &table);
   AddCondition({"camera_model", {"EQUIRECTANGULAR"}}, {"panorama_width_px"}, &table);
   AddCondition({"camera_model", {"PINHOLE", "OPENCV_FISHEYE"}}, {"num_headings"}, &table);
   AddCondition({"twin_wings", {"true"}}, {"back_corridor", "num_different_panels"}, &table);

@@ -80,6 +80,9 @@ struct SimulateOptions {
   std::vector<double> survey_area_m;
   // Path length between two images of a driven survey.  REQUIRES: in [0.01, 5]
   double step_m = 0.15;
+  // Greatest turn between two images of a driven survey: where the way turns faster, the camera turns on the
+  // spot.  With steps of 3 cm and turns of 2 degrees the images are those of a film.  REQUIRES: in [0.1, 90]
+  double max_turn_deg = 25;
   // Number of the run through the same building; each has other places in another order, and other noise.
   // For a second survey of it, or a drive to localize along.  REQUIRES: >= 0
   int run = 0;

@@ -24,8 +24,6 @@ constexpr int kSmoothingSteps = 40;
 // this factor more.
 constexpr double kPreferenceM = 0.8;
 constexpr double kPreferenceCost = 2;
-// Greatest turn between two images, rad: where the way turns faster, the camera turns on the spot.
-constexpr double kMaxTurnRad = 25 * std::numbers::pi / 180;
 
 class DrivePlanner {
  public:
@@ -179,6 +177,7 @@ class DrivePlanner {
       for (; left < length; left += options_.step_m) points.push_back(way[i] + left / length * step);
       left -= length;
     }
+    const double max_turn_rad = options_.max_turn_deg * std::numbers::pi / 180;
     std::vector<DrivePose> poses;
     for (size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector2d ahead = points[std::min(i + 1, points.size() - 1)] - points[i > 0 ? i - 1 : 0];
@@ -189,7 +188,7 @@ class DrivePlanner {
       if (!poses.empty()) {
         const DrivePose before = poses.back();
         const double turn = std::remainder(heading - before.heading_rad, 2 * std::numbers::pi);
-        const int num_turns = static_cast<int>(std::abs(turn) / kMaxTurnRad);
+        const int num_turns = static_cast<int>(std::abs(turn) / max_turn_rad);
         for (int t = 1; t <= num_turns; ++t) {
           poses.push_back({before.position, before.heading_rad + turn * t / (num_turns + 1)});
         }

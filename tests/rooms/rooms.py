@@ -31,7 +31,7 @@ stages/link_appearance/dominating_set stages/link_appearance
 stages/decompose_views/plan stages/decompose_views
 stages/emit_map/choose stages/emit_map
 stages/check_map
-pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import
+pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film
 pipeline/commands pipeline
 """.split()
 # What robots' authors write, and Python's module: nobody includes them.

@@ -184,6 +184,20 @@ TEST(PlanSurvey, DrivesThroughAllRooms) {
   }
 }
 
+TEST(PlanSurvey, ADriveLikeAFilmTurnsLittleBetweenTwoImages) {
+  SimulateOptions options = QuickOptions();
+  options.survey = "driven";
+  options.num_queries = 0;
+  const Building building = *MakeBuilding(options, 1);
+  const size_t num_images = PlanSurvey(building, options, 1)->images.size();
+  options.max_turn_deg = 2;
+  const Survey survey = *PlanSurvey(building, options, 1);
+  EXPECT_GT(survey.images.size(), num_images);
+  for (size_t i = 1; i < survey.images.size(); ++i) {
+    EXPECT_LT(RotationErrorDeg(survey.images[i - 1].cam_from_world, survey.images[i].cam_from_world), 2.01);
+  }
+}
+
 TEST(PlanSurvey, AnotherRunDrivesElsewhereThroughAllRooms) {
   SimulateOptions options = QuickOptions();
   options.survey = "driven";
