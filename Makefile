@@ -9,7 +9,7 @@ PREFIX ?= /usr/local
 # Debian 12 packages, by what needs them.  The program:
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
-    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev liblz4-dev zlib1g-dev \
+    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev liblz4-dev libbz2-dev zlib1g-dev \
     coinor-libcbc-dev libgeos++-dev libjs-leaflet libjs-chart.js jq
 # Captures without poses, Python's module, ROS's node:
 PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \

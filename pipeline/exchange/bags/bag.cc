@@ -24,10 +24,11 @@ struct BagKind {
 constexpr BagKind kBagKinds[] = {
     {".db3", "SQLite format 3", OpenSqliteBag},
     {".mcap", "\x89MCAP", OpenMcapBag},
+    {".bag", "#ROSBAG V", OpenRos1Bag},
 };
 constexpr size_t kMaxMagicBytes = 16;
 
-std::string FirstBytes(const std::string& path) {
+std::string BagHead(const std::string& path) {
   if (!CheckInputFile(path).ok()) return {};
   std::string head(kMaxMagicBytes, '\0');
   std::ifstream file(path, std::ios::binary);
@@ -49,15 +50,16 @@ Result<std::unique_ptr<Bag>> OpenBagFile(const std::string& path) {
                      path);
   }
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
-  const std::string head = FirstBytes(path);
+  const std::string head = BagHead(path);
   if (head.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: no bytes, expected a bag", path);
   for (const BagKind& kind : kBagKinds) {
     if (head.starts_with(kind.magic)) return kind.open(path);
   }
-  return MakeError(ErrorCode::kCorrupt,
-                   "{}: not a bag: it begins neither as SQLite's files (.db3) nor as those of MCAP; is it "
-                   "truncated, or another kind of file?",
-                   path);
+  return MakeError(
+      ErrorCode::kCorrupt,
+      "{}: not a bag: it does not begin as SQLite's files (.db3), MCAP or ROS 1's bags do; is it "
+      "truncated, or another kind of file?",
+      path);
 }
 
 // Files that were recorded one after the other.
@@ -140,7 +142,7 @@ bool IsBag(const std::string& path) {
     return text.ok() && text->find("rosbag2_bagfile_information") != std::string::npos;
   }
   if (HasBagSuffix(path)) return true;
-  const std::string head = FirstBytes(path);
+  const std::string head = BagHead(path);
   return std::any_of(std::begin(kBagKinds), std::end(kBagKinds),
                      [&](const BagKind& kind) { return head.starts_with(kind.magic); });
 }
@@ -153,7 +155,7 @@ Result<std::unique_ptr<Bag>> OpenBag(const std::string& path) {
     CAIRN_ASSIGN_OR_RETURN(files, ListedFiles(path));
   }
   if (files.empty())
-    return MakeError(ErrorCode::kNoData, "{}: no bag in it: no metadata.yaml, .db3 or .mcap", path);
+    return MakeError(ErrorCode::kNoData, "{}: no bag in it: no metadata.yaml, .db3, .mcap or .bag", path);
   // What is wrong with a file is said before anything is read.
   for (const std::string& file : files) {
     if (const auto bag = OpenBagFile(file); !bag.ok()) return bag.error();

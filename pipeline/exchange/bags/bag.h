@@ -63,6 +63,7 @@ Result<std::unique_ptr<Bag>> OpenBag(const std::string& path);
 // One kind of file each.  Errors: Corrupt, Unsupported (another version of the schema).
 Result<std::unique_ptr<Bag>> OpenSqliteBag(const std::string& path);
 Result<std::unique_ptr<Bag>> OpenMcapBag(const std::string& path);
+Result<std::unique_ptr<Bag>> OpenRos1Bag(const std::string& path);
 
 // "sensor_msgs/Image" from ROS 2's "sensor_msgs/msg/Image".
 std::string TypeWithoutMsg(const std::string& type);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 
+#include <bzlib.h>
 #include <lz4frame.h>
 #include <zstd.h>
 
@@ -69,6 +70,26 @@ Result<std::string> UnpackLz4UpTo(std::string_view packed, uint64_t max_bytes) {
   });
 }
 
+Result<std::string> UnpackBzip2UpTo(std::string_view packed, uint64_t max_bytes) {
+  bz_stream stream = {};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK)
+    return MakeError(ErrorCode::kCorrupt, "bzip2 cannot be started");
+  const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end(&stream, &BZ2_bzDecompressEnd);
+  return UnpackInto(packed, max_bytes, [&](std::string_view rest, char* to, size_t size) {
+    // Both are at most 1 GiB, which an unsigned int holds.
+    stream.next_in = const_cast<char*>(rest.data());
+    stream.avail_in = static_cast<unsigned>(rest.size());
+    stream.next_out = to;
+    stream.avail_out = static_cast<unsigned>(size);
+    const int code = BZ2_bzDecompress(&stream);
+    UnpackStep step = {.num_read = rest.size() - stream.avail_in,
+                       .num_written = size - stream.avail_out,
+                       .is_done = code == BZ_STREAM_END};
+    if (code != BZ_OK && code != BZ_STREAM_END) step.error = fmt::format("bzip2 says: error {}", code);
+    return step;
+  });
+}
+
 }  // namespace
 
 Result<std::string> UnpackChunk(const std::string& compression, std::string_view packed, uint64_t num_bytes) {
@@ -80,7 +101,9 @@ Result<std::string> UnpackChunk(const std::string& compression, std::string_view
     if (compression.empty() || compression == "none") return std::string(packed);
     if (compression == "zstd") return UnpackZstdUpTo(packed, num_bytes);
     if (compression == "lz4") return UnpackLz4UpTo(packed, num_bytes);
-    return MakeError(ErrorCode::kUnsupported, "its compression is '{}', known are lz4 and zstd", compression);
+    if (compression == "bz2") return UnpackBzip2UpTo(packed, num_bytes);
+    return MakeError(ErrorCode::kUnsupported, "its compression is '{}', known are lz4, zstd and bz2",
+                     compression);
   };
   CAIRN_ASSIGN_OR_RETURN(std::string bytes, unpack());
   if (bytes.size() == num_bytes) return bytes;

@@ -8,7 +8,7 @@
 
 namespace cairn::pipeline {
 
-// Unpacks a chunk of a bag.  `compression`: "lz4" (LZ4's frames) or "zstd"; "" or "none" copies it.
+// Unpacks a chunk of a bag.  `compression`: "lz4" (LZ4's frames), "zstd" or "bz2"; "" or "none" copies it.
 // `num_bytes`: how long the chunk says to be, unpacked.  Memory grows with what really comes out, up to that.
 // Errors: Unsupported (another compression, more than 1 GiB), Corrupt (not such data; more or fewer bytes
 // come out than stated); without the file's name.

@@ -10,6 +10,7 @@
 #include "core/files/file.h"
 #include "core/files/folder.h"
 #include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/bag_bytes.h"
 #include "pipeline/exchange/bags/camera_of_info.h"
 #include "pipeline/exchange/bags/choose_topics.h"
 #include "pipeline/exchange/bags/image_pixels.h"
@@ -21,15 +22,6 @@ namespace fs = std::filesystem;
 
 // Cameras that look steeper than this, on the mean, are as likely not stated in their optical frame.
 constexpr double kSteepSine = 0.9;
-
-// What was passed over for one reason, and the first of it.
-struct Skipped {
-  int64_t count = 0;
-  std::string first;
-  void Add(const std::string& reason) {
-    if (count++ == 0) first = reason;
-  }
-};
 
 struct TimeSpan {
   int64_t first_ns = 0, last_ns = 0;
@@ -134,7 +126,7 @@ class ImportVisitor : public BagVisitor {
   FrameMotion motion_;
   Trajectory odometry_;
   TimeSpan odometry_times_;
-  Skipped damaged_images_, resized_images_, late_images_, unstamped_images_, damaged_odometry_,
+  PassedOver damaged_images_, resized_images_, late_images_, unstamped_images_, damaged_odometry_,
       damaged_transforms_;
 };
 
@@ -229,7 +221,7 @@ void ImportVisitor::TakeTransforms(const BagMessage& message) {
 std::vector<std::string> ImportVisitor::Warnings() const {
   std::vector<std::string> warnings;
   const std::string& topic = plan_.images.topic.name;
-  const auto say = [&](const Skipped& skipped, const std::string& text) {
+  const auto say = [&](const PassedOver& skipped, const std::string& text) {
     if (skipped.count > 0) warnings.push_back(fmt::format("{}: {}", plan_.path, text));
   };
   say(damaged_images_, fmt::format("{} images of {} are left out, as they cannot be read; the first: {}",
@@ -262,7 +254,7 @@ std::string ImportVisitor::OdometryLines(int64_t* num_lines, std::vector<std::st
     return {};
   }
   std::string lines;
-  Skipped missing;
+  PassedOver missing;
   double sum_sines = 0;
   for (const WrittenImage& image : written_) {
     const Result<Pose> world_from_base = odometry_.At(image.time_ns, options_.max_time_gap_s);

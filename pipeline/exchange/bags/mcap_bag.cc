@@ -2,16 +2,12 @@
 // contents, little-endian; messages stand in chunks, which may be compressed.  Read from front to back, so
 // that a file that was cut off gives what is whole; of the index at the end only channels are used.
 #include <algorithm>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <map>
 
 #include <zlib.h>
 
-#include "core/files/input_file.h"
 #include "pipeline/exchange/bags/bag.h"
-#include "pipeline/exchange/bags/byte_cursor.h"
+#include "pipeline/exchange/bags/bag_bytes.h"
 #include "pipeline/exchange/bags/chunk_compression.h"
 
 namespace cairn::pipeline {
@@ -32,32 +28,22 @@ enum Opcode : uint8_t {
   kDataEnd = 15,
 };
 
-// How often something was passed over, and where first.
-struct Passed {
-  int64_t count = 0;
-  std::string first;
-  void Add(const std::string& where) {
-    if (count++ == 0) first = where;
-  }
-};
-
 class McapBag : public Bag {
  public:
-  McapBag(std::string path, uint64_t num_bytes)
-      : path_(std::move(path)), file_(path_, std::ios::binary), num_bytes_(num_bytes) {}
+  explicit McapBag(BagBytes file) : file_(std::move(file)), num_bytes_(file_.num_bytes()) {}
 
   // Channels stand before their messages; where that chunk is damaged, they are found in the summary.
   Status ReadSummary() {
     const uint64_t tail = kRecordHeadBytes + kFooterBytes + kMagic.size();
     if (num_bytes_ < kMagic.size() + tail) return Ok();
-    CAIRN_ASSIGN_OR_RETURN(const std::string end, BytesAt(num_bytes_ - tail, tail));
+    CAIRN_ASSIGN_OR_RETURN(const std::string end, file_.At(num_bytes_ - tail, tail));
     is_closed_ = end.ends_with(kMagic) && end[0] == kFooter;
     if (!is_closed_) return Ok();
     ByteCursor footer(std::string_view(end).substr(kRecordHeadBytes));
     const uint64_t start = footer.Get<uint64_t>();
     if (start < kMagic.size() || start > num_bytes_ - tail || num_bytes_ - tail - start > kMaxRecordBytes)
       return Ok();
-    CAIRN_ASSIGN_OR_RETURN(const std::string summary, BytesAt(start, num_bytes_ - tail - start));
+    CAIRN_ASSIGN_OR_RETURN(const std::string summary, file_.At(start, num_bytes_ - tail - start));
     ByteCursor records(summary);
     while (records.num_left() >= kRecordHeadBytes) {
       const auto opcode = records.Get<uint8_t>();
@@ -69,56 +55,41 @@ class McapBag : public Bag {
   }
 
   Result<std::vector<std::string>> Read(BagVisitor& visitor) override {
-    damaged_chunks_ = damaged_records_ = {};
-    file_.clear();
-    uint64_t place = kMagic.size();
-    bool is_cut = false;
+    damage_ = {.is_closed = is_closed_};
+    uint64_t& place = damage_.place = kMagic.size();
     for (bool is_end = false; !is_end && place < num_bytes_;) {
       if (num_bytes_ - place < kRecordHeadBytes) {
-        is_cut = true;
+        damage_.is_cut = true;
         break;
       }
-      char head[kRecordHeadBytes] = {};
-      CAIRN_RETURN_IF_ERROR(ReadInto(place, head, sizeof(head)));
-      ByteCursor cursor({head, sizeof(head)});
+      const Result<std::string> head = file_.At(place, kRecordHeadBytes);
+      if (!head.ok()) return head.error();
+      ByteCursor cursor(*head);
       const auto opcode = cursor.Get<uint8_t>();
       const auto length = cursor.Get<uint64_t>();
       if (length > num_bytes_ - place - kRecordHeadBytes) {
-        is_cut = true;
+        damage_.is_cut = true;
         break;
       }
       is_end = opcode == kDataEnd || opcode == kFooter;
       CAIRN_RETURN_IF_ERROR(ReadRecord(opcode, place, length, visitor));
       place += kRecordHeadBytes + length;
     }
-    return Damage(is_cut, place);
+    return damage_.Sentences(file_);
   }
 
  private:
-  Status ReadInto(uint64_t place, char* bytes, uint64_t length) {
-    file_.clear();
-    file_.seekg(static_cast<std::streamoff>(place));
-    if (file_.read(bytes, static_cast<std::streamsize>(length))) return Ok();
-    return MakeError(ErrorCode::kIo, "{}: cannot be read at byte {}", path_, place);
-  }
-
-  Result<std::string> BytesAt(uint64_t place, uint64_t length) {
-    std::string bytes(length, '\0');
-    CAIRN_RETURN_IF_ERROR(ReadInto(place, bytes.data(), length));
-    return bytes;
-  }
-
   Status ReadRecord(uint8_t opcode, uint64_t place, uint64_t length, BagVisitor& visitor) {
     if (opcode != kSchema && opcode != kChannel && opcode != kMessage && opcode != kChunk) return Ok();
     const std::string where = fmt::format("at byte {}", place);
     if (length > kMaxRecordBytes) {
-      damaged_records_.Add(where + ", which says to be longer than 1 GiB");
+      damage_.records.Add(where + ", which says to be longer than 1 GiB");
       return Ok();
     }
-    CAIRN_ASSIGN_OR_RETURN(const std::string record, BytesAt(place + kRecordHeadBytes, length));
+    CAIRN_ASSIGN_OR_RETURN(const std::string record, file_.At(place + kRecordHeadBytes, length));
     if (opcode == kChunk) return ReadChunk(record, where, visitor);
     if (opcode == kMessage) return Show(record, where, visitor);
-    if (!Learn(opcode, record)) damaged_records_.Add(where);
+    if (!Learn(opcode, record)) damage_.records.Add(where);
     return Ok();
   }
 
@@ -130,18 +101,18 @@ class McapBag : public Bag {
     const std::string compression(cursor.Take(cursor.Get<uint32_t>()));
     const std::string_view packed = cursor.Take(cursor.Get<uint64_t>());
     if (!cursor.is_ok()) {
-      damaged_chunks_.Add(where + ": lengths in it that are not those of the chunk");
+      damage_.chunks.Add(where + ": lengths in it that are not those of the chunk");
       return Ok();
     }
     const Result<std::string> records = UnpackChunk(compression, packed, num_bytes);
     if (!records.ok()) {
-      damaged_chunks_.Add(where + ": " + records.error().message);
+      damage_.chunks.Add(where + ": " + records.error().message);
       return Ok();
     }
     const auto found = static_cast<uint32_t>(
         crc32_z(0, reinterpret_cast<const unsigned char*>(records->data()), records->size()));
     if (crc != 0 && crc != found) {  // 0: not computed
-      damaged_chunks_.Add(fmt::format("{}: its checksum is {:08x}, stated is {:08x}", where, found, crc));
+      damage_.chunks.Add(fmt::format("{}: its checksum is {:08x}, stated is {:08x}", where, found, crc));
       return Ok();
     }
     return ReadRecordsOfChunk(*records, where, visitor);
@@ -153,12 +124,12 @@ class McapBag : public Bag {
       const auto opcode = cursor.Get<uint8_t>();
       const std::string_view record = cursor.Take(cursor.Get<uint64_t>());
       if (!cursor.is_ok()) {
-        damaged_records_.Add(where + ", in the chunk");
+        damage_.records.Add(where + ", in the chunk");
         break;
       }
       if (opcode == kMessage) CAIRN_RETURN_IF_ERROR(Show(record, where, visitor));
       if ((opcode == kSchema || opcode == kChannel) && !Learn(opcode, record))
-        damaged_records_.Add(where + ", in the chunk");
+        damage_.records.Add(where + ", in the chunk");
     }
     return Ok();
   }
@@ -171,7 +142,7 @@ class McapBag : public Bag {
     cursor.Get<uint64_t>();  // publish time
     const auto channel = channels_.find(channel_id);
     if (!cursor.is_ok() || channel == channels_.end()) {
-      damaged_records_.Add(where);
+      damage_.records.Add(where);
       return Ok();
     }
     if (!visitor.Wants(channel->second)) return Ok();
@@ -200,53 +171,25 @@ class McapBag : public Bag {
     return true;
   }
 
-  std::vector<std::string> Damage(bool is_cut, uint64_t place) const {
-    std::vector<std::string> sentences;
-    if (is_cut) {
-      sentences.push_back(fmt::format(
-          "{}: ends in the middle of a record, at byte {} of {}: the file was cut off, or a length in it is "
-          "wrong; what is before is read",
-          path_, place, num_bytes_));
-    } else if (!is_closed_) {
-      sentences.push_back(
-          fmt::format("{}: the recording was not closed; what came to be written is read", path_));
-    }
-    if (damaged_chunks_.count > 0) {
-      sentences.push_back(fmt::format("{}: {} damaged chunks are left out, the first {}", path_,
-                                      damaged_chunks_.count, damaged_chunks_.first));
-    }
-    if (damaged_records_.count > 0) {
-      sentences.push_back(fmt::format("{}: {} damaged records are left out, the first {}", path_,
-                                      damaged_records_.count, damaged_records_.first));
-    }
-    return sentences;
-  }
-
-  std::string path_;
-  std::ifstream file_;
+  BagBytes file_;
   uint64_t num_bytes_;
   bool is_closed_ = false;
   std::map<uint16_t, std::string> schemas_;
   std::map<uint16_t, BagTopic> channels_;
-  Passed damaged_chunks_, damaged_records_;
+  BagDamage damage_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<Bag>> OpenMcapBag(const std::string& path) {
-  CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return MakeError(ErrorCode::kIo, "{}: cannot be opened", path);
-  std::string head(kMagic.size(), '\0');
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  CAIRN_ASSIGN_OR_RETURN(BagBytes file, BagBytes::Open(path));
+  CAIRN_ASSIGN_OR_RETURN(const std::string head,
+                         file.At(0, std::min<uint64_t>(kMagic.size(), file.num_bytes())));
   if (head != kMagic) {
     return MakeError(ErrorCode::kCorrupt, "{}: does not begin as MCAP, version 0, does; is it truncated?",
                      path);
   }
-  std::error_code error;
-  const uint64_t num_bytes = std::filesystem::file_size(path, error);
-  if (error) return MakeError(ErrorCode::kIo, "{}: {}", path, error.message());
-  auto bag = std::make_unique<McapBag>(path, num_bytes);
+  auto bag = std::make_unique<McapBag>(std::move(file));
   CAIRN_RETURN_IF_ERROR(bag->ReadSummary());
   return std::unique_ptr<Bag>(std::move(bag));
 }

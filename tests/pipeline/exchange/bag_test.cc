@@ -63,6 +63,11 @@ class BagFiles : public testing::Test {
     EXPECT_EQ(damage_, again);
     return first;
   }
+  std::vector<std::string> DamageOf(const std::string& path) {
+    const auto listing = Read(path);
+    EXPECT_TRUE(listing.ok());
+    return damage_;
+  }
   std::string ErrorOf(const std::string& path) {
     const auto listing = Read(path);
     return listing.ok() ? "read" : listing.error().message;
@@ -259,10 +264,87 @@ TEST_F(BagFiles, LengthsThatLieAllocateNothingAndAreSaid) {
   EXPECT_THAT(damage_.back(), HasSubstr("1 damaged records"));
 }
 
+const std::vector<Recorded> kThreeOfRos1 = {{"/a", "sensor_msgs/Image", 10, "one"},
+                                            {"/unwanted", "std_msgs/String", 11, "two"},
+                                            {"/b", "nav_msgs/Odometry", 2'000'000'012, "three"}};
+
+TEST_F(BagFiles, OfRos1ShowTheirMessages) {
+  for (const char* compression : {"none", "lz4", "bz2"}) {
+    SCOPED_TRACE(compression);
+    const std::string path =
+        Write(fmt::format("{}.bag", compression), Ros1BagBytes(kThreeOfRos1, {.compression = compression}));
+    EXPECT_TRUE(IsBag(path));
+    const auto listing = Read(path);
+    ASSERT_TRUE(listing.ok()) << listing.error().message;
+    EXPECT_THAT(listing->lines,
+                ElementsAre("/a sensor_msgs/Image 10 one", "/b nav_msgs/Odometry 2000000012 three"));
+    EXPECT_EQ(listing->num_asked, 3);
+    EXPECT_FALSE(listing->is_cdr);
+    EXPECT_THAT(damage_, IsEmpty());
+  }
+  EXPECT_THAT(DamageOf(Write("open.bag", Ros1BagBytes(kThreeOfRos1, {.is_closed = false}))),
+              ElementsAre(HasSubstr("the recording was not closed")));
+  EXPECT_THAT(ErrorOf(Write("old.bag", "#ROSBAG V1.2\n")), HasSubstr("another version of ROS 1 than 2.0"));
+}
+
+TEST_F(BagFiles, OfRos1ThatAreTruncatedGiveWhatIsWhole) {
+  const std::vector<std::string> lines = {"/a t 1 one", "/a t 2 two", "/b u 3 three", "/a t 4 four"};
+  const std::string bytes = Ros1BagBytes(
+      {{"/a", "t", 1, "one"}, {"/a", "t", 2, "two"}, {"/b", "u", 3, "three"}, {"/a", "t", 4, "four"}});
+  size_t most = 0;
+  for (size_t size = 13; size < bytes.size(); ++size) {
+    const auto listing = Read(Write("cut.bag", bytes.substr(0, size)));
+    ASSERT_TRUE(listing.ok()) << listing.error().message;
+    ASSERT_LE(listing->lines.size(), lines.size());
+    ASSERT_TRUE(std::equal(listing->lines.begin(), listing->lines.end(), lines.begin())) << size;
+    EXPECT_GE(listing->lines.size(), most) << size;
+    most = listing->lines.size();
+  }
+  EXPECT_EQ(most, 4u);
+  EXPECT_THAT(DamageOf(Write("cut.bag", bytes.substr(0, bytes.size() / 2))),
+              ElementsAre(HasSubstr("ends in the middle of a record")));
+}
+
+TEST_F(BagFiles, OfRos1WithDamagedChunksOrLengthsGiveTheRest) {
+  // The first chunk has the connections: they are found at the end.
+  const std::vector<Recorded> messages = {
+      {"/a", "t", 1, "one"}, {"/a", "t", 2, "two"}, {"/a", "t", 3, "three"}};
+  for (const char* compression : {"lz4", "bz2"}) {
+    std::string bytes = Ros1BagBytes(messages, {.compression = compression});
+    const size_t chunk = bytes.find("compression=") + 40;
+    std::fill_n(bytes.begin() + static_cast<long>(chunk), 20, '\xee');
+    EXPECT_THAT(Read(Write("a.bag", bytes))->lines, ElementsAre("/a t 3 three"));
+    EXPECT_THAT(damage_, ElementsAre(HasSubstr("1 damaged chunks are left out")));
+  }
+  const std::string head = Ros1BagBytes({});
+  const std::string huge = BytesOf(uint32_t{0xfffffff0});
+  const std::vector<std::pair<std::string, std::string>> chunk = {
+      {"op", "\5"}, {"compression", "none"}, {"size", huge}};
+  EXPECT_THAT(DamageOf(Write("b.bag", head + huge + "op")),
+              ElementsAre(HasSubstr("or a length in it is wrong")));
+  EXPECT_THAT(DamageOf(Write("c.bag", head + Ros1Record(chunk, "abc"))),
+              ElementsAre(HasSubstr("more than 1073741824")));
+  EXPECT_THAT(
+      DamageOf(Write(
+          "d.bag", head + Ros1Record({{"op", "\5"}, {"compression", "none"}, {"size", BytesOf(uint32_t{6})}},
+                                     huge + "ab"))),
+      ElementsAre(HasSubstr("1 damaged records")));
+  // A message of a connection that nothing describes; a record without an operation.
+  EXPECT_THAT(
+      DamageOf(
+          Write("e.bag",
+                head +
+                    Ros1Record({{"op", "\2"}, {"conn", BytesOf(uint32_t{9})}, {"time", BytesOf(uint64_t{1})}},
+                               "x") +
+                    Ros1Record({}, "x"))),
+      ElementsAre(HasSubstr("2 damaged records")));
+}
+
 TEST_F(BagFiles, ChunksAreUnpackedIntoNoMoreThanComesOut) {
   const std::string text(100'000, 'x');
   EXPECT_EQ(*UnpackChunk("zstd", PackZstd(text), text.size()), text);
   EXPECT_EQ(*UnpackChunk("lz4", PackLz4(text), text.size()), text);
+  EXPECT_EQ(*UnpackChunk("bz2", PackBzip2(text), text.size()), text);
   EXPECT_EQ(*UnpackChunk("", "", 0), "");
   const auto short_one = UnpackChunk("zstd", PackZstd(text), 1 << 30);
   ASSERT_FALSE(short_one.ok());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <bzlib.h>
 #include <gtest/gtest.h>
 #include <lz4frame.h>
 #include <zlib.h>
@@ -166,6 +167,7 @@ inline std::map<std::string, int> TopicNumbers(const std::vector<Recorded>& mess
 // rosbag2's SQLite storage.
 inline void WriteDb3(const std::string& path, const std::vector<Recorded>& messages) {
   SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  database.exec("PRAGMA synchronous = OFF");
   database.exec(
       "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
       "INSERT INTO schema VALUES (4, 'jazzy');"
@@ -270,6 +272,75 @@ inline std::string McapBytes(const std::vector<Recorded>& messages, const McapFo
   if (form.has_summary) bytes += channels;
   bytes += McapRecord(2, BytesOf(summary) + BytesOf(uint64_t{0}) + BytesOf(uint32_t{0}));
   return bytes + std::string(kMagic);
+}
+
+inline std::string PackBzip2(const std::string& bytes) {
+  auto size = static_cast<unsigned>(bytes.size() + bytes.size() / 100 + 600);
+  std::string packed(size, '\0');
+  BZ2_bzBuffToBuffCompress(packed.data(), &size, const_cast<char*>(bytes.data()),
+                           static_cast<unsigned>(bytes.size()), 9, 0, 0);
+  packed.resize(size);
+  return packed;
+}
+
+inline std::string Ros1Fields(const std::vector<std::pair<std::string, std::string>>& fields) {
+  std::string bytes;
+  for (const auto& [name, value] : fields) bytes += McapText(name + "=" + value);
+  return bytes;
+}
+inline std::string Ros1Record(const std::vector<std::pair<std::string, std::string>>& head,
+                              const std::string& contents) {
+  return McapText(Ros1Fields(head)) + McapText(contents);
+}
+
+struct Ros1Form {
+  std::string compression = "none";  // "lz4", "bz2"
+  bool is_closed = true;             // else without connections at the end
+  int messages_per_chunk = 2;
+};
+
+// The bytes of a ROS 1 bag.
+inline std::string Ros1BagBytes(const std::vector<Recorded>& messages, const Ros1Form& form = {}) {
+  constexpr char kFirstLine[] = "#ROSBAG V2.0\n";
+  std::string body, chunk, connections;
+  const std::map<std::string, int> numbers = TopicNumbers(messages);
+  std::map<int, bool> is_listed;
+  int num_in_chunk = 0;
+  const auto end_chunk = [&] {
+    const std::string packed = form.compression == "lz4"   ? PackLz4(chunk)
+                               : form.compression == "bz2" ? PackBzip2(chunk)
+                                                           : chunk;
+    if (num_in_chunk > 0) {
+      body += Ros1Record({{"op", "\5"},
+                          {"compression", form.compression},
+                          {"size", BytesOf(static_cast<uint32_t>(chunk.size()))}},
+                         packed);
+      body += Ros1Record({{"op", "\4"}}, "index");
+    }
+    chunk.clear();
+    num_in_chunk = 0;
+  };
+  for (const Recorded& message : messages) {
+    const auto number = static_cast<uint32_t>(numbers.at(message.topic));
+    if (!is_listed[static_cast<int>(number)]) {
+      const std::string connection = Ros1Record(
+          {{"op", "\7"}, {"conn", BytesOf(number)}, {"topic", message.topic}},
+          Ros1Fields({{"topic", message.topic}, {"type", message.type}, {"message_definition", "a=b"}}));
+      chunk += connection;
+      connections += connection;
+      is_listed[static_cast<int>(number)] = true;
+    }
+    const std::string time = BytesOf(static_cast<uint32_t>(message.time_ns / 1'000'000'000)) +
+                             BytesOf(static_cast<uint32_t>(message.time_ns % 1'000'000'000));
+    chunk += Ros1Record({{"op", "\2"}, {"conn", BytesOf(number)}, {"time", time}}, message.bytes);
+    if (++num_in_chunk == form.messages_per_chunk) end_chunk();
+  }
+  end_chunk();
+  const auto head = [&](uint64_t index_place) {
+    return kFirstLine + Ros1Record({{"op", "\3"}, {"index_pos", BytesOf(index_place)}}, std::string(50, ' '));
+  };
+  if (!form.is_closed) return head(0) + body;
+  return head(head(0).size() + body.size()) + body + connections + Ros1Record({{"op", "\6"}}, "chunk info");
 }
 
 }  // namespace cairn::pipeline

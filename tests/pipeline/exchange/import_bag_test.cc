@@ -172,6 +172,14 @@ TEST_F(ImportedBag, IsTheSameFromEveryStorageAndByteOrder) {
                 ElementsAre(10, 11, 4.5, 3.5, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0));
     odometry.push_back(*ReadFile(root_ + "/capture/odometry.txt"));
     EXPECT_EQ(odometry.back(), odometry.front());
+    if (form != MessageForm::kRos1) continue;
+    std::vector<Recorded> of_ros1 = messages;
+    for (Recorded& message : of_ros1) message.type.erase(message.type.find("msg/"), 4);
+    ASSERT_TRUE(WriteFileAtomically(root_ + "/bag.bag", Ros1BagBytes(of_ros1, {.compression = "lz4"})).ok());
+    fs::remove_all(root_ + "/capture");
+    ASSERT_TRUE(ImportFile(root_ + "/bag.bag").ok());
+    EXPECT_EQ(*ReadFile(root_ + "/capture/odometry.txt"), odometry.front());
+    EXPECT_EQ(ReadImage(Names()[0]).at<uint8_t>(5, 7), 77);
   }
 }
 

@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
+
+#include "core/base/error.h"
 
 namespace cairn::pipeline {
 
@@ -46,6 +51,40 @@ class ByteCursor {
   std::string_view bytes_;
   size_t place_ = 0;
   bool is_ok_ = true;
+};
+
+// A file of which parts are read.
+class BagBytes {
+ public:
+  // Errors: as CheckInputFile, Io.
+  static Result<BagBytes> Open(const std::string& path);
+  const std::string& path() const { return path_; }
+  uint64_t num_bytes() const { return num_bytes_; }
+  // REQUIRES: the part lies in the file: nothing is allocated for what cannot be there.  Errors: Io.
+  Result<std::string> At(uint64_t place, uint64_t length);
+
+ private:
+  std::string path_;
+  std::ifstream file_;
+  uint64_t num_bytes_ = 0;
+};
+
+// What was passed over for one reason: how often, and the first of it.
+struct PassedOver {
+  int64_t count = 0;
+  std::string first;
+  void Add(const std::string& reason) {
+    if (count++ == 0) first = reason;
+  }
+};
+
+// What a reading of a file found damaged.
+struct BagDamage {
+  PassedOver chunks, records;
+  bool is_cut = false;  // at `place` is less than its length says
+  uint64_t place = 0;
+  bool is_closed = true;  // the recorder came to write the end
+  std::vector<std::string> Sentences(const BagBytes& file) const;
 };
 
 }  // namespace cairn::pipeline
