@@ -22,6 +22,10 @@ std::vector<std::string> FrameTree::WayUp(const std::string& frame) const {
 }
 
 Result<FrameChain> FrameTree::Chain(const std::string& base, const std::string& camera) const {
+  if (base.empty() || camera.empty()) {
+    return MakeError(ErrorCode::kNoData, "{} name no frame in their headers",
+                     base.empty() ? "messages of odometry" : "images");
+  }
   const std::vector<std::string> base_way = WayUp(base);
   const std::vector<std::string> camera_way = WayUp(camera);
   for (auto common = camera_way.begin(); common != camera_way.end(); ++common) {

@@ -24,7 +24,7 @@ class FrameTree {
  public:
   // The first parent of a frame counts.
   void AddLink(const std::string& parent, const std::string& child) { parents_.emplace(child, parent); }
-  // Errors: NoData, naming both frames and where the way up from each ends.
+  // Errors: NoData, naming both frames and where the way up from each ends; a frame without a name.
   Result<FrameChain> Chain(const std::string& base, const std::string& camera) const;
 
  private:

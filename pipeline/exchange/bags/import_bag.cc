@@ -101,7 +101,7 @@ class ImportVisitor : public BagVisitor {
   };
 
   static int64_t TimeOf(const MessageHeader& header, const BagMessage& message) {
-    return header.stamp_ns != 0 ? header.stamp_ns : message.record_time_ns;
+    return header.stamp_ns != 0 ? header.stamp_ns : std::max<int64_t>(message.record_time_ns, 0);
   }
 
   Status TakeImage(const BagMessage& message);

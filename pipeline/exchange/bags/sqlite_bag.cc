@@ -22,7 +22,7 @@ class SqliteBag : public Bag {
     return WithDatabaseErrors(path_, [&]() -> Status {
       for (const auto& [table, columns] : std::map<std::string, std::vector<std::string>>{
                {"topics", {"id", "name", "type", "serialization_format"}},
-               {"messages", {"id", "topic_id", "timestamp", "data"}}}) {
+               {"messages", {"topic_id", "timestamp", "data"}}}) {
         for (const std::string& column : columns) {
           if (HasTable(database_, table) && HasColumn(database_, table, column)) continue;
           return MakeError(ErrorCode::kUnsupported,
@@ -54,7 +54,7 @@ class SqliteBag : public Bag {
     int64_t num_shown = 0;
     const Status status = WithDatabaseErrors(path_, [&]() -> Status {
       // In the order of rows, which is that of the file: sorting would hold all images.
-      SQLite::Statement query(database_, "SELECT topic_id, timestamp, data FROM messages ORDER BY id");
+      SQLite::Statement query(database_, "SELECT topic_id, timestamp, data FROM messages ORDER BY rowid");
       while (query.executeStep()) {
         const auto topic = topics_.find(query.getColumn(0).getInt64());
         if (topic == topics_.end()) {

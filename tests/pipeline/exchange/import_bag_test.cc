@@ -366,6 +366,13 @@ TEST_F(ImportedBag, WithoutAWayFromBaseToCameraHasNoOdometry) {
   EXPECT_FALSE(Has("odometry.txt"));
   EXPECT_THAT(warnings_, Contains(AllOf(HasSubstr("odometry is left out"), HasSubstr("'camera_optical'"),
                                         HasSubstr("'base_link'"), HasSubstr("'mast'"))));
+  // Images that name no frame.
+  RawImage nowhere = Grey(1);
+  nowhere.frame = "";
+  ASSERT_TRUE(
+      Import({{"/i", kImage, 0, ImageBytes(nowhere)}, OdometryMessageAt(1, {}), StaticFrames()}).ok());
+  EXPECT_FALSE(Has("odometry.txt"));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("odometry is left out: images name no frame")));
   // Frames in a ring.
   ASSERT_TRUE(
       Import({GreyMessage(1),
