@@ -9,13 +9,15 @@ PREFIX ?= /usr/local
 # Debian 12 packages, by what needs them.  The program:
 PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
-    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev liblz4-dev libbz2-dev zlib1g-dev \
+    libavformat-dev libavcodec-dev libavutil-dev libswscale-dev \
+    nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev \
+    liblz4-dev libbz2-dev zlib1g-dev \
     coinor-libcbc-dev libgeos++-dev libjs-leaflet libjs-chart.js jq
 # Captures without poses, Python's module, ROS's node:
 PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
     libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libdiagnostic-msgs-dev
-# Tests and benchmarks: a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
-PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 \
+# Tests and benchmarks: films, a browser for reports, a cluster, a running ROS, tools for Debian packages, tools for the style.
+PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 ffmpeg \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
     python3-rosbag python3-nav-msgs python3-tf2-msgs \

@@ -35,8 +35,9 @@ constexpr double kBeginningWay = 0.3;
 constexpr double kEndingWay = 0.5;
 // Of candidates about as sharp as the sharpest the last one counts.
 constexpr double kAboutAsSharp = 0.9;
-// The sharpness that is usual is the median of this many frames.
-constexpr size_t kNumRecent = 31;
+// The sharpness that is usual is the median of this many frames: of more, a turn to what has less texture
+// would count as blurred.
+constexpr size_t kNumRecent = 11;
 
 cv::Mat MakeSmall(const cv::Mat& grey, int max_side_px) {
   const double scale = static_cast<double>(max_side_px) / std::max(grey.cols, grey.rows);

@@ -17,12 +17,12 @@ struct KeyframeOptions {
   int num_corners = 200;
   // A keyframe is due when corners moved by this because the camera changed its place, ...
   // REQUIRES: > 0
-  double parallax_ratio = 0.04;
+  double parallax_ratio = 0.05;
   // ... by this for any reason (0.12: turns of 13 degrees at 90 degrees of view, of 8 at 60), ...
   // REQUIRES: > 0
   double shift_ratio = 0.12;
   // ... or fewer of them than this are still found.  REQUIRES: in (0, 1)
-  double min_overlap_ratio = 0.6;
+  double min_overlap_ratio = 0.5;
   // Frames as far as this from the last keyframe to the next are candidates for the next.  REQUIRES: in (0,
   // 1)
   double first_candidate = 0.7;

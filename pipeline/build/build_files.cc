@@ -24,7 +24,7 @@ std::string WithoutTemporaryMark(const std::string& name) {
 
 bool IsBuildFileName(const std::string& name) {
   static const std::regex kStageFile = [] {
-    std::string stems = "images";
+    std::string stems = "images|film-[-A-Za-z0-9_.]+";
     for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
     return std::regex(
         "(" + stems +
@@ -36,7 +36,7 @@ bool IsBuildFileName(const std::string& name) {
 }
 
 bool IsOptionsFileName(const std::string& name) {
-  static const std::set<std::string> kOthers = {"seed",    "name",    "capture",
+  static const std::set<std::string> kOthers = {"seed",    "name",    "capture",   "films",
                                                 "queries", "program", "floor_plan"};
   const std::string stem = WithoutTemporaryMark(name);
   return kOthers.contains(stem) ||

@@ -89,10 +89,31 @@ Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
   return path;
 }
 
+// The folder that a capture is in, or will be.
+std::string FolderOf(const RecipeCapture& capture, const std::string& build_dir) {
+  return capture.IsFile() ? build_dir + "/" + FilmFolderName(capture) : Absolute(capture.path);
+}
+
 // The folder that the stages read.
 std::string CaptureFolder(const Recipe& recipe, const std::string& build_dir) {
   if (recipe.simulated || IsJoined(recipe)) return build_dir + "/capture";
-  return Absolute(recipe.captures.front().path);
+  return FolderOf(recipe.captures.front(), build_dir);
+}
+
+// The captures that are files: NAME=FILE, NAME=KEYFRAMES, and NAME=CAMERA where the recipe gives one.
+struct FilmWords {
+  std::vector<std::pair<std::string, std::string>> files, keyframes, cameras;
+};
+
+FilmWords Films(const Recipe& recipe) {
+  FilmWords words;
+  for (const RecipeCapture& capture : recipe.captures) {
+    if (!capture.IsFile()) continue;
+    words.files.emplace_back(capture.name, Absolute(capture.path));
+    words.keyframes.emplace_back(capture.name, capture.keyframes);
+    if (!capture.camera.empty()) words.cameras.emplace_back(capture.name, capture.camera);
+  }
+  return words;
 }
 
 // What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
@@ -100,11 +121,11 @@ struct SessionWords {
   std::vector<std::pair<std::string, std::string>> folders, queries;
 };
 
-SessionWords JoinedSessions(const Recipe& recipe) {
+SessionWords JoinedSessions(const Recipe& recipe, const std::string& build_dir) {
   SessionWords words;
   if (!IsJoined(recipe)) return words;
   for (const RecipeCapture& capture : recipe.captures) {
-    words.folders.emplace_back(capture.name, Absolute(capture.path));
+    words.folders.emplace_back(capture.name, FolderOf(capture, build_dir));
     if (!capture.queries_path.empty())
       words.queries.emplace_back(capture.name, Absolute(capture.queries_path));
   }
@@ -142,6 +163,8 @@ std::string FloorPlanPath(const Recipe& recipe, const std::string& capture) {
 
 }  // namespace
 
+std::string FilmFolderName(const RecipeCapture& capture) { return "film-" + capture.name; }
+
 bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empty(); }
 
 bool IsReconstructed(const Recipe& recipe) {
@@ -152,7 +175,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string capture = CaptureFolder(recipe, paths.build_dir);
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   const std::string floor_plan = FloorPlanPath(recipe, capture);
-  const SessionWords sessions = JoinedSessions(recipe);
+  const SessionWords sessions = JoinedSessions(recipe, paths.build_dir);
+  const FilmWords films = Films(recipe);
   const std::string seed = std::to_string(recipe.seed);
   std::vector<std::string> known_places;
   if (IsReconstructed(recipe)) {
@@ -173,6 +197,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));
   CAIRN_RETURN_IF_ERROR(config.Set("SEED", "the seed", {seed}));
   CAIRN_RETURN_IF_ERROR(config.Set("PROGRAM", "the program", {SizeAndDate(paths.program)}));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILMS", "the film", films.files));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILM_KEYFRAMES", "keyframes", films.keyframes));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILM_CAMERAS", "the camera", films.cameras));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSIONS", "the capture", sessions.folders));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
@@ -195,6 +222,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
       options + "/capture",
       IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) : capture + "\n"));
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+      options + "/films", PairsLine(films.files) + PairsLine(films.keyframes) + PairsLine(films.cameras)));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));

@@ -48,10 +48,11 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     if (!name.ends_with(kReportSuffix)) continue;
     CAIRN_ASSIGN_OR_RETURN(Json report, ReadJson(entry.path().string()));
     const std::string stage = report["stage"];
-    if ((stage == "simulate" && !run.simulated) || (stage == "join_captures" && !run.joined) ||
-        (stage == "reconstruct" && !run.reconstructed) || (stage == "decompose_views" && !run.has_floor_plan))
-      continue;
     name.resize(name.size() - std::string_view(kReportSuffix).size());
+    if ((stage == "simulate" && !run.simulated) || (stage == "import" && !run.films.contains(name)) ||
+        (stage == "join_captures" && !run.joined) || (stage == "reconstruct" && !run.reconstructed) ||
+        (stage == "decompose_views" && !run.has_floor_plan))
+      continue;
     const size_t place = std::find_if(std::begin(kLine), std::end(kLine),
                                       [&](const LineStage& of_line) { return stage == of_line.name; }) -
                          std::begin(kLine);

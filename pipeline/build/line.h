@@ -10,6 +10,7 @@ struct LineStage {
 
 // In the order in which they run (map.mk has their rules).
 inline constexpr LineStage kLine[] = {{"simulate", "capture"},
+                                      {"import", "film"},
                                       {"join_captures", "capture"},
                                       {"extract_features", "features.db"},
                                       {"match_features", "matches.db"},

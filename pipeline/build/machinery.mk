@@ -21,7 +21,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN,
+# Sets MAP, CAPTURE, FILMS, FILM_KEYFRAMES, FILM_CAMERAS, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN,
 # VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
@@ -155,9 +155,24 @@ $(BUILD)/features.begun $(BUILD)/matches.begun:
 CAIRN_REUSE_SHARDS = $(patsubst %.stamp,--reuse %.db,$(SHARD_STAMPS))
 CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
 
-# ---- The capture that map.mk makes: simulated, or joined
+# ---- The capture that map.mk makes: simulated, imported, or joined
 
 CAPTURE_STAMP :=
+# $(call CAIRN_OF_FILM,VARIABLE,NAME): the words that VARIABLE, NAME=WORD ..., has for the film.
+CAIRN_OF_FILM = $(patsubst $(2)=%,%,$(filter $(2)=%,$($(1))))
+# $(call CAIRN_FILM,NAME): what the stamp of a film depends on, and what its rule uses.
+define CAIRN_FILM
+$(BUILD)/film-$(1).stamp: $(call CAIRN_OF_FILM,FILMS,$(1)) $(if $(wildcard $(BUILD)/film-$(1)/images),,cairn-missing)
+$(BUILD)/film-$(1).stamp: FILM := $(call CAIRN_OF_FILM,FILMS,$(1))
+$(BUILD)/film-$(1).stamp: FILM_OPTIONS := --keyframes $(call CAIRN_OF_FILM,FILM_KEYFRAMES,$(1)) \
+    $(addprefix --camera ,$(call CAIRN_OF_FILM,FILM_CAMERAS,$(1)))
+endef
+FILM_NAMES := $(foreach film,$(FILMS),$(firstword $(subst =, ,$(film))))
+FILM_STAMPS := $(FILM_NAMES:%=$(BUILD)/film-%.stamp)
+$(foreach film,$(FILM_NAMES),$(eval $(call CAIRN_FILM,$(film))))
+ifeq ($(SESSIONS),)
+CAPTURE_STAMP := $(FILM_STAMPS)
+endif
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
@@ -172,6 +187,7 @@ $(UNCHANGED): $(BUILD)/capture.stamp
 SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
 SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
+$(BUILD)/capture.stamp: $(FILM_STAMPS)
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
 endif
 # Where the stages after matching read poses.

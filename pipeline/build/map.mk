@@ -48,6 +48,13 @@ $(BUILD)/capture.stamp: $(call CAIRN_OPTIONS,simulate) $(SEED_FILE)
 	$(CAIRN_LAUNCH) $(CAIRN) stage simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
 endif
 
+# ... or a film, whose keyframes become a capture; each of several has a name ...
+ifneq ($(FILMS),)
+$(FILM_STAMPS): $(BUILD)/options/films $(PROGRAM_HASH)
+	$(CAIRN_WHY)
+	$(CAIRN_LAUNCH) $(CAIRN) import $(FILM) $(FILM_OPTIONS) -o $(@:.stamp=) $(CAIRN_FLAGS)
+endif
+
 # ... or several captures as one.
 ifneq ($(SESSIONS),)
 $(BUILD)/capture.stamp: $(BUILD)/options/capture $(PROGRAM_HASH) $(SESSION_LISTS)

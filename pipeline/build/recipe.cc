@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "core/colmap/cameras_text.h"
 #include "core/options/toml_options.h"
 #include "stages/simulate/read_recipe.h"
 
@@ -28,7 +29,15 @@ constexpr Key kCaptureKeys[] = {
      "Name of the session in the map, where there are several captures: letters, digits, '-', '_' and '.'. "
      "Default: the name of the folder."},
     {"path", "text",
-     "Folder of the capture (images/, cameras.txt, images.txt), relative to the recipe. Required."},
+     "Folder of the capture (images/, cameras.txt, images.txt), or a film, relative to the recipe. "
+     "Required."},
+    {"keyframes", "text or number",
+     "Of a film: \"auto\" (sharp frames, from each of which enough of the one before is seen), \"all\", or "
+     "the "
+     "seconds between images. Default \"auto\"."},
+    {"camera", "text",
+     "Of a film: its camera as \"MODEL,WIDTH,HEIGHT,PARAM,...\", of the upright picture. Default: not "
+     "known."},
     {"queries", "text",
      "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
      "capture's queries.txt, if there is one."},
@@ -192,6 +201,7 @@ class RecipeReader {
   Status ReadCaptureTable(const toml::table& table) {
     RecipeCapture capture;
     std::string up;
+    bool is_for_film = false;
     for (const auto& [key, node] : table) {
       const std::string name(key.str());
       if (name == "path") {
@@ -199,6 +209,13 @@ class RecipeReader {
       } else if (name == "name") {
         CAIRN_ASSIGN_OR_RETURN(capture.name, Text(name, node));
         CAIRN_RETURN_IF_ERROR(CheckName(path_, node, capture.name));
+      } else if (name == "keyframes") {
+        CAIRN_ASSIGN_OR_RETURN(capture.keyframes, TextOrNumber(name, node));
+        is_for_film = true;
+      } else if (name == "camera") {
+        CAIRN_ASSIGN_OR_RETURN(capture.camera, Text(name, node));
+        CAIRN_RETURN_IF_ERROR(CheckCameraText(node, capture.camera));
+        is_for_film = true;
       } else if (name == "queries") {
         CAIRN_ASSIGN_OR_RETURN(capture.queries_path, ExistingPath(name, node));
       } else if (name == "floor_plan") {
@@ -214,6 +231,12 @@ class RecipeReader {
     if (capture.path.empty()) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: [[capture]] has no path; add path = \"FOLDER\"",
                        TomlPlace(path_, table));
+    }
+    if (is_for_film && !capture.IsFile()) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: keyframes and camera are for films, and {} is a folder; leave them out (a folder "
+                       "has its cameras in cameras.txt)",
+                       TomlPlace(path_, table), capture.path);
     }
     if (!up.empty() && up != "auto") {
       if (recipe_.up != "auto" && recipe_.up != up) {
@@ -260,6 +283,18 @@ class RecipeReader {
   Result<std::string> Text(const std::string& key, const toml::node& node) const {
     if (const auto* text = node.as_string()) return text->get();
     return WrongType(path_, node, key, "a text in quotes");
+  }
+
+  Result<std::string> TextOrNumber(const std::string& key, const toml::node& node) const {
+    if (const auto number = node.value<double>(); node.is_number() && number)
+      return fmt::format("{}", *number);
+    return Text(key, node);
+  }
+
+  Status CheckCameraText(const toml::node& node, const std::string& text) const {
+    const auto camera = ParseCamera(text);
+    if (camera.ok()) return Ok();
+    return MakeError(camera.error().code, "{}: camera: {}", TomlPlace(path_, node), camera.error().message);
   }
 
   Result<std::string> ExistingPath(const std::string& key, const toml::node& node) const {
@@ -346,9 +381,16 @@ std::vector<std::string> UnreadKeys(const Recipe& recipe,
   return lines;
 }
 
+bool RecipeCapture::IsFile() const {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
 std::string NameOfFolder(const std::string& path) {
   fs::path folder(path);
   if (!folder.has_filename()) folder = folder.parent_path();
+  std::error_code error;
+  if (fs::is_regular_file(folder, error)) folder.replace_extension();
   std::string name = folder.filename().string().substr(0, 100);
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';

@@ -14,9 +14,16 @@ struct RecipeCapture {
   // The session's name in the map: that of the capture's folder where the recipe gives none.
   std::string name;
   std::string path;
+  // Of a capture that is a file, a film: which frames become images (`cairn import --keyframes`), and the
+  // camera as MODEL,WIDTH,HEIGHT,PARAM,... (empty: not known).
+  std::string keyframes = "auto";
+  std::string camera;
   // Held-out images for the self-test; empty = the capture's queries.txt, if it has one.
   std::string queries_path;
   std::string floor_plan_path;  // empty = none
+
+  // A file is imported into the build folder first.
+  bool IsFile() const;
 };
 
 // What a map is made from: a TOML file with `name`, `seed`, captures (or [simulate]), and a table of options
@@ -53,7 +60,8 @@ Result<Recipe> ReadRecipe(const std::string& path, std::vector<StageOptions> sta
 std::vector<std::string> UnreadKeys(const Recipe& recipe,
                                     const std::vector<std::pair<std::string, std::string>>& skipped);
 
-// The name that a map or a session gets from its folder: characters that a name must not have become '_'.
+// The name that a map or a session gets from its folder, or its file without the suffix: characters that a
+// name must not have become '_'.
 std::string NameOfFolder(const std::string& path);
 
 // The reference page of recipes (docs/recipe.md): every key with its default, range and meaning, in Markdown.

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/capture/film_file.h"
 #include "core/capture/image_file.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
@@ -15,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kWhatIsCompiled = "compile takes a recipe (docs/recipe.md) or the folder of a capture";
+constexpr const char* kWhatIsCompiled =
+    "compile takes a recipe (docs/recipe.md), a film or the folder of a capture";
 
 bool HoldsImages(const std::string& folder) {
   std::error_code error;
@@ -76,7 +78,8 @@ Status CheckIsText(const std::string& path) {
   return Ok();
 }
 
-// The recipe that compiles a folder with defaults.  The path has no character that TOML needs escaped.
+// The recipe that compiles a folder or a film with defaults.  The path has no character that TOML needs
+// escaped.
 std::string DefaultRecipe(const std::string& name, const std::string& folder) {
   return fmt::format(
       "# Every key that is not here has its default; docs/recipe.md lists them.\n"
@@ -88,13 +91,14 @@ std::string DefaultRecipe(const std::string& name, const std::string& folder) {
 
 Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map) {
   std::error_code error;
-  if (!fs::is_directory(given, error)) {
+  const bool is_folder = fs::is_directory(given, error);
+  if (!is_folder && !IsFilm(given)) {
     CAIRN_RETURN_IF_ERROR(CheckIsText(given));
     return RecipeSource{.recipe = given, .map = map};
   }
   fs::path folder = fs::absolute(given).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // a trailing '/'
-  CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
+  if (is_folder) CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
   const std::string name = NameOfFolder(folder.string());
   RecipeSource source{.map = map.empty() ? name + ".cairn" : map};
   if (fs::path(source.map).extension() != ".cairn")

@@ -76,6 +76,15 @@ Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, Compile
   return recipe;
 }
 
+// What the films of the recipe are called in the build folder.
+std::set<std::string> FilmFolders(const Recipe& recipe) {
+  std::set<std::string> names;
+  for (const RecipeCapture& capture : recipe.captures) {
+    if (capture.IsFile()) names.insert(FilmFolderName(capture));
+  }
+  return names;
+}
+
 Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, const BuildPaths& paths) {
   if (until.empty() || until == "check_map" || until == "check-map") return paths.map;
   std::string stage = until;
@@ -94,6 +103,12 @@ Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, con
   for (const LineStage& of_line : kLine) {
     const std::string file = of_line.file;
     if (std::string(of_line.name) == "join_captures") continue;
+    if (std::string(of_line.name) == "import") {
+      const std::set<std::string> films = FilmFolders(recipe);
+      if (films.empty()) continue;
+      const std::string last = recipe.captures.size() > 1 ? "capture" : *films.begin();  // several are joined
+      if (stage == of_line.name) return paths.build_dir + "/" + last + ".stamp";
+    }
     if (stage == of_line.name) return paths.build_dir + "/" + (file == "capture" ? "capture.stamp" : file);
     stages.emplace_back(of_line.name);
   }
@@ -193,6 +208,7 @@ Status Compile(CompileArguments arguments, const CommandEnvironment& environment
                   .joined = recipe.captures.size() > 1,
                   .reconstructed = IsReconstructed(recipe),
                   .has_floor_plan = HasFloorPlan(recipe),
+                  .films = FilmFolders(recipe),
                   .whole_line = goal == paths.map,
                   .ran = RanSince(dates_before, paths.build_dir)};
   if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths);
@@ -218,13 +234,14 @@ Status Configure(CompileArguments arguments, const CommandEnvironment& environme
 void AddRecipeArguments(ArgumentParser& parser, CompileArguments* arguments) {
   parser
       .Add("recipe", arguments->recipe,
-           "Recipe of the map (docs/recipe.md), or the folder of a capture: then it is compiled with "
+           "Recipe of the map (docs/recipe.md), or a film, or the folder of a capture: then it is compiled "
+           "with "
            "defaults, by the recipe NAME.toml that is written beside the map")
       .Required()
-      .Type("RECIPE.toml|FOLDER");
+      .Type("RECIPE.toml|FILM|FOLDER");
   parser
       .Add("-o,--output", arguments->output,
-           "Map to write [by the name of the recipe or the folder, in the current folder]")
+           "Map to write [by the name of the recipe, the film or the folder, in the current folder]")
       .Type("NAME.cairn");
   parser.Add("--build-dir", arguments->build_dir, "Folder for the stages' files [NAME.build beside the map]")
       .Type("FOLDER");
@@ -236,7 +253,7 @@ Command CompileCommand() {
   const auto arguments = std::make_shared<CompileArguments>();
   return {
       .name = "compile",
-      .summary = "Compile a recipe, or the folder of a capture, into a map, or redo what changed",
+      .summary = "Compile a recipe, a film or the folder of a capture into a map, or redo what changed",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             AddRecipeArguments(parser, arguments.get());

@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <string_view>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/capture/film_file.h"
 #include "core/files/input_file.h"
 
 extern "C" {
@@ -26,6 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kMaxNumPixels = int64_t{1} << 26;
+// Eleven days: a frame that states a later time is from no film.
+constexpr double kMaxTimeS = 999999;
 // Demuxers of files that are films by themselves: playlists, which name other files, are none.
 constexpr const char* kFormats = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,ogg,asf,flv";
 constexpr const char* kKnown = "a film is an MP4, MOV, MKV, WebM or AVI file";
@@ -36,24 +38,8 @@ std::string AvErrorText(int code) {
   return text.data();
 }
 
-// The first bytes of a file; fewer where it has fewer.
-std::string FirstBytes(const std::string& path, size_t num_bytes) {
-  std::string bytes(num_bytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(bytes.data(), static_cast<std::streamsize>(num_bytes));
-  bytes.resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return bytes;
-}
-
-bool BeginsLikeMp4(std::string_view bytes) {
-  if (bytes.size() < 8) return false;
-  const std::string_view type = bytes.substr(4, 4);
-  return type == "ftyp" || type == "moov" || type == "mdat" || type == "wide" || type == "skip" ||
-         type == "free";
-}
-
 Error CannotOpen(const std::string& path, int code) {
-  if (BeginsLikeMp4(FirstBytes(path, 8))) {
+  if (BeginsLikeMp4(path)) {
     return MakeError(ErrorCode::kCorrupt,
                      "{}: a film without its index ({}): the recording or a copy of it was cut off; copy it "
                      "again, or repair it with a tool such as untrunc",
@@ -216,14 +202,16 @@ double FilmReader::Impl::FrameIntervalS() const {
   return interval_s > 0 && interval_s < 3600 ? interval_s : 1.0 / 30;
 }
 
-// As the film states; where it states nothing, or a time that is not after the last, one interval later.
+// As the film states; where it states nothing, or a time that is not after the last or beyond all films, one
+// interval later.
 double FilmReader::Impl::FrameTimeS() {
   const int64_t stamp = frame->best_effort_timestamp;
   const bool is_stated = stamp != AV_NOPTS_VALUE;
   double time_s = is_stated ? static_cast<double>(stamp) * av_q2d(stream().time_base) : 0;
   if (num_frames == 0) first_s = time_s;
   time_s -= first_s;
-  if (num_frames > 0 && (!is_stated || !(time_s > last_s))) time_s = last_s + FrameIntervalS();
+  if (num_frames > 0 && (!is_stated || !(time_s > last_s && time_s < kMaxTimeS)))
+    time_s = last_s + FrameIntervalS();
   ++num_frames;
   return last_s = time_s;
 }
@@ -344,18 +332,5 @@ double FilmReader::StatedDurationS() const {
 int64_t FilmReader::num_damaged() const { return impl_->num_damaged; }
 int FilmReader::turn_deg() const { return impl_->turn_deg; }
 bool FilmReader::is_interlaced() const { return impl_->is_interlaced; }
-
-bool IsFilm(const std::string& path) {
-  if (!CheckInputFile(path).ok()) return false;
-  constexpr const char* kSuffixes[] = {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi",
-                                       ".3gp", ".ts",  ".mts", ".mpg", ".mpeg"};
-  std::string suffix = fs::path(path).extension().string();
-  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (std::find(std::begin(kSuffixes), std::end(kSuffixes), suffix) != std::end(kSuffixes)) return true;
-  const std::string bytes = FirstBytes(path, 12);
-  return BeginsLikeMp4(bytes) || bytes.starts_with("\x1a\x45\xdf\xa3") ||
-         (bytes.starts_with("RIFF") && bytes.substr(8) == "AVI ");
-}
 
 }  // namespace cairn::pipeline

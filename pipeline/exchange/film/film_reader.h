@@ -17,10 +17,6 @@ struct FilmFrame {
   cv::Mat grey;       // CV_8UC1, luma of full range, upright, square pixels
 };
 
-// Whether a file is for FilmReader: it begins as films do (MP4, MOV, Matroska, WebM, AVI, MPEG transport or
-// program streams), or its name ends as theirs do.  False for what cannot be read.
-bool IsFilm(const std::string& path);
-
 // Reads the frames of a film, in the order in which they are shown, through FFmpeg's libraries:
 //
 //   CAIRN_ASSIGN_OR_RETURN(const std::unique_ptr<FilmReader> reader, FilmReader::Open(path));

@@ -29,6 +29,8 @@ constexpr double kGapS = 0.5;
 constexpr double kGapFactor = 5;
 // A film that ends before this part of the length that it states, and by more than a second, was cut off.
 constexpr double kWholeRatio = 0.98;
+// A frame that is due counts although it comes early by this part of the interval: films round their times.
+constexpr double kEarlyRatio = 0.01;
 // In a warning.
 constexpr size_t kMaxNumTimes = 8;
 
@@ -139,7 +141,8 @@ class FilmImporter {
       return OtherSize(index, frame);
     if (options_.choice != FrameChoice::kKeyframes) {
       ++report_.frames.num_frames;
-      if (options_.choice == FrameChoice::kEvery && frame.time_s < next_s_) return Ok();
+      if (options_.choice == FrameChoice::kEvery && frame.time_s < next_s_ - kEarlyRatio * options_.every_s)
+        return Ok();
       // From the frame on that was taken, so that slow films give no bunches.
       next_s_ = std::max(next_s_ + options_.every_s, frame.time_s + 0.5 * options_.every_s);
       ++report_.frames.num_keyframes;

@@ -125,7 +125,8 @@ Status CheckIsRead(const std::string& layout, const ImportOptions& options) {
 Result<std::string> DetectLayout(const std::string& source) {
   std::error_code error;
   if (!fs::is_directory(source, error)) {
-    return MakeError(ErrorCode::kNotFound, "{}: no such folder; name the folder of a data set", source);
+    return MakeError(ErrorCode::kNotFound,
+                     "{}: no such file or folder; name a film, or the folder of a data set", source);
   }
   std::string expected;
   for (const Layout& layout : Layouts()) {

@@ -66,6 +66,26 @@ TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
   for (size_t i = 1; i < files.size(); ++i) EXPECT_EQ(Date(files[i]), dates[i]) << files[i];
 }
 
+TEST_F(BuildFolderTest, AFilmIsImportedIntoAFolderOfItsNameAndReconstructed) {
+  const std::string film = (folder_ / "walk.mp4").string();
+  ASSERT_TRUE(WriteFileAtomically(film, "").ok());
+  recipe_.captures = {{.name = "walk", .path = film, .keyframes = "0.5", .camera = "PINHOLE,4,4,2,2,2,2"}};
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_TRUE(IsReconstructed(recipe_));
+  const std::string config = Text("config.mk");
+  EXPECT_THAT(config, HasSubstr("\nCAPTURE := " + paths_.build_dir + "/film-walk\n"));
+  EXPECT_THAT(config, HasSubstr("\nFILMS := walk=" + film + "\n"));
+  EXPECT_THAT(config, HasSubstr("\nFILM_KEYFRAMES := walk=0.5\n"));
+  EXPECT_THAT(config, HasSubstr("\nFILM_CAMERAS := walk=PINHOLE,4,4,2,2,2,2\n"));
+  for (const char* name : {"film-walk", "film-walk.stamp", "film-walk.report.json"})
+    EXPECT_TRUE(IsBuildFileName(name)) << name;
+  EXPECT_FALSE(IsBuildFileName("film.mp4"));
+  // Beside a folder it is joined with that one.
+  recipe_.captures.push_back({.name = "survey", .path = (folder_ / "survey").string()});
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nSESSIONS := walk=" + paths_.build_dir + "/film-walk survey="));
+}
+
 TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
   ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/images.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());

@@ -123,5 +123,19 @@ TEST_F(RecipeSourceTest, NothingIsWrittenWhereTheMapCouldNotBe) {
   for (const auto& entry : fs::directory_iterator(".")) EXPECT_NE(entry.path().extension(), ".toml");
 }
 
+TEST_F(RecipeSourceTest, AFilmIsCompiledByARecipeOfItsNameWithoutTheSuffix) {
+  Write("survey/Walk 1.MOV", "");
+  Write("survey/walk.v2.mp4", "");
+  const RecipeSource source = FindRecipe("survey/walk.v2.mp4", "").value();
+  EXPECT_EQ(source.map, "walk.v2.cairn");
+  EXPECT_TRUE(source.was_written);
+  const Recipe recipe = ReadRecipe(source.recipe, TestStages()).value();
+  ASSERT_EQ(recipe.captures.size(), 1u);
+  EXPECT_EQ(recipe.captures[0].name, "walk.v2");
+  EXPECT_TRUE(recipe.captures[0].IsFile());
+  EXPECT_TRUE(fs::equivalent(recipe.captures[0].path, "survey/walk.v2.mp4"));
+  EXPECT_THAT(Message("survey/Walk 1.MOV"), HasSubstr("has a space"));
+}
+
 }  // namespace
 }  // namespace cairn::pipeline

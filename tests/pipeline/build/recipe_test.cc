@@ -56,6 +56,22 @@ TEST_F(RecipeTest, NameAndCaptureAreEnough) {
   }
 }
 
+TEST_F(RecipeTest, KeyframesAndCameraAreForFilms) {
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "walk.mp4").string(), "").ok());
+  const std::string film = "name = \"a\"\n[[capture]]\npath = \"walk.mp4\"\n";
+  const auto recipe = Read(film + "keyframes = 0.5\ncamera = \"SIMPLE_PINHOLE,640,480,500,320,240\"\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_TRUE(recipe->captures[0].IsFile());
+  EXPECT_EQ(recipe->captures[0].name, "walk");
+  EXPECT_EQ(recipe->captures[0].keyframes, "0.5");
+  EXPECT_EQ(recipe->captures[0].camera, "SIMPLE_PINHOLE,640,480,500,320,240");
+  EXPECT_EQ(Read(film)->captures[0].keyframes, "auto");
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\nkeyframes = \"all\"\n"),
+              HasSubstr("keyframes and camera are for films"));
+  EXPECT_THAT(Message(film + "camera = \"PINHOLE,640\"\n", ErrorCode::kCorrupt),
+              HasSubstr("recipe.toml:4: camera"));
+}
+
 TEST_F(RecipeTest, StageTablesOverrideDefaults) {
   const auto recipe = Read(
       "name = \"a\"\nseed = 7\n[simulate]\nwidth_m = 12\n"
