@@ -346,6 +346,12 @@ TEST_F(ImportedBag, TheCameraInfoOfAnotherCameraIsNotTaken) {
   ASSERT_TRUE(
       Import({GreyMessage(1, "/picture"), {"/elsewhere/camera_info", kInfo, 0, CameraInfoBytes({})}}).ok());
   EXPECT_TRUE(Has("cameras.txt"));
+  // Of two in the same frame nothing says which it is.
+  ASSERT_TRUE(Import({GreyMessage(1, "/picture"),
+                      {"/one/camera_info", kInfo, 0, CameraInfoBytes({})},
+                      {"/two/camera_info", kInfo, 0, CameraInfoBytes({})}})
+                  .ok());
+  EXPECT_FALSE(Has("cameras.txt"));
 }
 
 TEST_F(ImportedBag, RectifiedImagesHaveTheCameraOfP) {
