@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/base/text.h"
+#include "core/capture/keyframes.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
 #include "tests/pipeline/exchange/bag_writers.h"
@@ -517,7 +518,7 @@ TEST_F(ImportedBag, ImagesThatCannotBeReadAreLeftOut) {
                              HasSubstr("found 47 bytes in rows of 8"))));
 }
 
-TEST_F(ImportedBag, ImagesAreChosenByTimeOrAsKeyframes) {
+TEST_F(ImportedBag, ImagesAreChosenByTime) {
   std::vector<Recorded> messages;
   for (int i = 0; i < 10; ++i) messages.push_back(GreyMessage(1 + 0.1 * i));
   ASSERT_TRUE(Import(messages, {.choice = FrameChoice::kEvery, .every_s = 0.35}).ok());
@@ -525,30 +526,48 @@ TEST_F(ImportedBag, ImagesAreChosenByTimeOrAsKeyframes) {
                                    "0000000001.800000000.png"));
   EXPECT_THAT(ErrorOf(messages, {}),
               HasSubstr("no keyframe among 10 images of /camera/image_raw: they are blank"));
+}
 
-  // A camera slides along a wall by a twentieth of its view an image.
+// Images are written when the chooser has decided, often some images later.
+TEST_F(ImportedBag, KeyframesAreThoseOfTheChooser) {
+  // A camera slides along a wall, three pixels an image; three of four images are less sharp.
   cv::Mat wall(120, 1200, CV_8UC1);
   cv::theRNG().state = 1;
   cv::randu(wall, 0, 255);
   cv::GaussianBlur(wall, wall, {}, 2);
   cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
-  messages.clear();
-  for (int i = 0; i < 120; ++i) {
-    const cv::Mat view = wall(cv::Rect(8 * i, 0, 160, 120)).clone();
+  const auto view = [&](int i) {
+    cv::Mat picture = wall(cv::Rect(3 * i, 0, 160, 120)).clone();
+    if (i % 4 != 0) cv::GaussianBlur(picture, picture, {}, 1);
+    return picture;
+  };
+  std::vector<Recorded> messages;
+  KeyframeChooser chooser;
+  std::vector<int64_t> expected;
+  int num_late = 0;
+  for (int i = 0; i < 300; ++i) {
+    const cv::Mat picture = view(i);
     messages.push_back({"/i", kImage, 0,
                         ImageBytes({.stamp_ns = (1 + i) * kSecond,
                                     .width = 160,
                                     .height = 120,
-                                    .pixels = std::string(view.ptr<char>(), view.total())})});
+                                    .pixels = std::string(picture.ptr<char>(), picture.total())})});
+    for (const int64_t keyframe : chooser.Add(i, picture)) {
+      expected.push_back(keyframe);
+      num_late += keyframe < i;
+    }
   }
+  for (const int64_t keyframe : chooser.Finish()) expected.push_back(keyframe);
+  ASSERT_GT(num_late, 5);
   const auto report = Import(messages, {});
   ASSERT_TRUE(report.ok()) << report.error().message;
-  EXPECT_GT(report->num_images, 20);
-  EXPECT_LT(report->num_images, 80);
-  // Each is the image of its time.
-  for (const std::string& name : Names()) {
-    const int i = std::stoi(name.substr(0, 10)) - 1;
-    EXPECT_EQ(cv::norm(ReadImage(name), wall(cv::Rect(8 * i, 0, 160, 120)), cv::NORM_INF), 0) << name;
+  const std::vector<std::string> names = Names();
+  ASSERT_EQ(names.size(), expected.size());
+  EXPECT_EQ(report->num_images, static_cast<int64_t>(expected.size()));
+  for (size_t k = 0; k < names.size(); ++k) {
+    EXPECT_EQ(names[k], fmt::format("{:010}.000000000.png", expected[k] + 1));
+    EXPECT_EQ(cv::norm(ReadImage(names[k]), view(static_cast<int>(expected[k])), cv::NORM_INF), 0)
+        << names[k];
   }
 }
 
