@@ -124,6 +124,10 @@ TEST_F(BagFiles, FoldersHaveTheFilesOfTheirMetadataElseAllInTheOrderOfNames) {
   EXPECT_THAT(ErrorOf(root_), HasSubstr("lists gone.db3, which is not there"));
   Write("metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths: [../../etc/passwd]\n");
   EXPECT_THAT(ErrorOf(root_), HasSubstr("lists passwd, which is not there"));
+  // A file that is there, but outside.
+  fs::create_directories(root_ + "/inner");
+  Write("inner/metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths: [../run_9.db3]\n");
+  EXPECT_THAT(ErrorOf(root_ + "/inner"), HasSubstr("lists run_9.db3, which is not there"));
   Write("metadata.yaml", "name: [");
   EXPECT_THAT(ErrorOf(root_), HasSubstr("metadata.yaml: YAML says"));
   Write("metadata.yaml", "just text");
