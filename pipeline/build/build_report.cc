@@ -94,7 +94,7 @@ std::string FlowText(const Json& report) {
                      taken_over.empty() ? "" : " (" + taken_over + " taken over)");
 }
 
-// All files of one stage: several where it is sharded.
+// All files of one stage: several where it is sharded.  Each film has a row of its own.
 struct StageRow {
   std::string stage, state;
   double seconds = 0;
@@ -105,7 +105,8 @@ struct StageRow {
 std::vector<StageRow> StageRows(const Json& report) {
   std::vector<StageRow> rows;
   for (const Json& file : report["stages"]) {
-    if (rows.empty() || rows.back().stage != file["stage"]) rows.push_back({file["stage"], file["state"]});
+    if (rows.empty() || rows.back().stage != file["stage"] || file["stage"] == "import")
+      rows.push_back({file["stage"], file["state"]});
     StageRow& row = rows.back();
     if (file["state"] == "ran") row.state = "ran";
     row.seconds += file["seconds"].get<double>();

