@@ -11,6 +11,7 @@ PACKAGES := build-essential cmake ninja-build ccache pkg-config \
     libopencv-dev libceres-dev libeigen3-dev libsqlite3-dev libsqlitecpp-dev libcli11-dev libtomlplusplus-dev \
     libavformat-dev libavcodec-dev libavutil-dev libswscale-dev \
     nlohmann-json3-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libxxhash-dev libexif-dev libsodium-dev libzstd-dev \
+    liblz4-dev libbz2-dev zlib1g-dev \
     coinor-libcbc-dev libgeos++-dev libjs-leaflet libjs-chart.js jq
 # Captures without poses, Python's module, ROS's node:
 PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
@@ -19,6 +20,7 @@ PACKAGES_MORE := colmap pybind11-dev python3 python3-dev python3-numpy \
 PACKAGES_TEST := $(PACKAGES_MORE) libgtest-dev libgmock-dev libbenchmark-dev libjpeg-dev sqlite3 ffmpeg \
     slurmctld slurmd slurm-client munge procps time man-db chromium chromium-driver python3-selenium \
     rosout python3-roslaunch python3-rosmaster python3-rospy python3-sensor-msgs python3-geometry-msgs python3-diagnostic-msgs \
+    python3-rosbag python3-nav-msgs python3-tf2-msgs \
     debhelper dh-python lintian debootstrap clang libclang-rt-14-dev clang-format clang-tidy
 # Optional: the demo's picture as PNG; for tests of the matching kernels of other processors, an emulation of Intel's
 # instructions, an ARM compiler and an emulator.

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include <spdlog/spdlog.h>
 
+#include "core/base/printable.h"
+#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/import_bag.h"
 #include "pipeline/exchange/film/import_film.h"
 #include "pipeline/exchange/import/layouts.h"
 #include "pipeline/exchange/import/write_capture.h"
@@ -20,31 +24,37 @@ struct ImportArguments {
   HoldOut hold_out;
   std::string link = "symbolic";
   std::string keyframes = "auto";
+  std::string topic, odometry;
+  std::optional<Argument> max_time_gap;  // whether it is given: bags have a default of their own
 };
 
-// Films have frames of their own: what is said of files, poses and lists is not for them.
-Status CheckIsForFilms(const ImportArguments& arguments) {
+// Films and bags have frames of their own: what is said of files, poses and lists is not for them.
+Status CheckIsForFrames(const ImportArguments& arguments, const char* kind) {
   const ImportArguments unsaid;
   const std::pair<bool, const char*> given[] = {
       {!arguments.options.images_folder.empty(), "--images"},
       {!arguments.options.sequence.empty(), "--sequence"},
       {!arguments.options.sensors.empty(), "--sensors"},
-      {arguments.options.max_time_gap_s != unsaid.options.max_time_gap_s, "--max-time-gap-s"},
       {arguments.hold_out.every != unsaid.hold_out.every, "--every"},
       {!arguments.hold_out.queries_path.empty(), "--queries"},
       {arguments.link != unsaid.link, "--link"},
   };
   for (const auto& [is_given, option] : given) {
     if (is_given) {
-      return MakeError(ErrorCode::kInvalidArgument, "{} is for data sets, and {} is a film; leave it out",
-                       option, arguments.source);
+      return MakeError(ErrorCode::kInvalidArgument, "{} is for data sets, and {} is a {}; leave it out",
+                       option, arguments.source, kind);
     }
   }
   return Ok();
 }
 
 Status RunFilmImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
-  CAIRN_RETURN_IF_ERROR(CheckIsForFilms(arguments));
+  CAIRN_RETURN_IF_ERROR(CheckIsForFrames(arguments, "film"));
+  if (arguments.max_time_gap->IsGiven()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--max-time-gap-s is for poses and odometry, and {} is a film; leave it out",
+                     arguments.source);
+  }
   CAIRN_ASSIGN_OR_RETURN(FilmOptions options, ParseFrameChoice(arguments.keyframes));
   options.camera = arguments.options.camera;
   CAIRN_ASSIGN_OR_RETURN(const FilmReport report, ImportFilm(arguments.source, options, arguments.output,
@@ -65,14 +75,45 @@ Status RunFilmImport(const ImportArguments& arguments, const CommandEnvironment&
   return Ok();
 }
 
+Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
+  CAIRN_RETURN_IF_ERROR(CheckIsForFrames(arguments, "bag"));
+  CAIRN_ASSIGN_OR_RETURN(const FilmOptions choice, ParseFrameChoice(arguments.keyframes));
+  BagOptions options = {.topic = arguments.topic,
+                        .odometry = arguments.odometry,
+                        .camera = arguments.options.camera,
+                        .choice = choice.choice,
+                        .every_s = choice.every_s};
+  if (arguments.max_time_gap->IsGiven()) options.max_time_gap_s = arguments.options.max_time_gap_s;
+  CAIRN_ASSIGN_OR_RETURN(const BagReport report,
+                         ImportBag(arguments.source, options, arguments.output, *environment.progress));
+  for (const std::string& warning : report.warnings) spdlog::warn("{}", Printable(warning));
+  environment.report->in = {{"frames", report.num_messages}};
+  environment.report->out = {{"images", report.num_images}};
+  *environment.out << Printable(
+      fmt::format("import: {} of {} images of {}, {} of them with odometry, {} cameras\n", report.num_images,
+                  report.num_messages, report.topic, report.num_with_odometry, report.num_cameras));
+  return Ok();
+}
+
+// A folder of one of the data sets may have a bag in it too.
+bool IsForBags(const ImportArguments& arguments) {
+  if (arguments.options.layout != "auto") return arguments.options.layout == "bag";
+  return IsBag(arguments.source) && !DetectLayout(arguments.source).ok();
+}
+
 Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
+  if (IsForBags(arguments)) return RunBagImport(arguments, environment);
+  if (!arguments.topic.empty() || !arguments.odometry.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--topic and --odometry are for bags, and {} is none; leave them out", arguments.source);
+  }
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(arguments.source, error);
   if (arguments.options.layout == "film" || (arguments.options.layout == "auto" && is_file))
     return RunFilmImport(arguments, environment);
   if (arguments.keyframes != ImportArguments().keyframes) {
-    return MakeError(ErrorCode::kInvalidArgument, "--keyframes is for films, and {} is none; leave it out",
-                     arguments.source);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--keyframes is for films and bags, and {} is neither; leave it out", arguments.source);
   }
   CAIRN_ASSIGN_OR_RETURN(ImportedSurvey survey, ReadSurvey(arguments.source, arguments.options));
   CAIRN_RETURN_IF_ERROR(ChooseQueries(arguments.hold_out, &survey));
@@ -94,24 +135,31 @@ Status RunImport(const ImportArguments& arguments, const CommandEnvironment& env
 }
 
 void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
-  parser.Add("source", arguments->source, "Film, or folder of a data set or of a COLMAP model")
+  parser.Add("source", arguments->source, "Film, ROS bag, or folder of a data set or of a COLMAP model")
       .Required()
       .Type("SOURCE");
   parser.Add("-o,--output", arguments->output, "Capture folder to write").Required().Type("CAPTURE");
   parser
       .Add("--format", arguments->options.layout,
-           "auto|colmap|tum|7scenes|kitti|euroc|kapture|film; auto: by the files that are there [auto]")
-      .OneOf({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture", "film"})
+           "auto|colmap|tum|7scenes|kitti|euroc|kapture|film|bag; auto: by the files that are there [auto]")
+      .OneOf({"auto", "colmap", "tum", "7scenes", "kitti", "euroc", "kapture", "film", "bag"})
       .Type("FORMAT");
   parser
       .Add("--camera", arguments->options.camera,
-           "Camera of all images, in COLMAP's pixels [as the data set states; of a film: not known]")
+           "Camera of all images, in COLMAP's pixels [as the data set or camera_info states; of a film: not "
+           "known]")
       .Type("MODEL,W,H,P...");
   parser
       .Add("--keyframes", arguments->keyframes,
-           "Frames of a film that become images: auto|all|SECONDS between two; auto: sharp ones from which "
+           "Frames of a film or bag that become images: auto|all|SECONDS between two; auto: sharp ones from "
+           "which "
            "enough of the last is seen [auto]")
       .Type("WHICH");
+  parser.Add("--topic", arguments->topic, "bag: topic of the images [the only one]").Type("TOPIC");
+  parser
+      .Add("--odometry", arguments->odometry,
+           "bag: topic of the odometry; none: without [the only one, if there is one]")
+      .Type("TOPIC");
   parser
       .Add("--images", arguments->options.images_folder,
            "colmap: folder of the images [images/ in or beside the model]")
@@ -123,11 +171,13 @@ void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
            "kapture: all]")
       .SeparatedByCommas()
       .Type("NAME,...");
-  parser
-      .Add("--max-time-gap-s", arguments->options.max_time_gap_s,
-           "tum, euroc: a frame's pose lies between stated poses at most this far from it, seconds [0.02]")
-      .NonNegative()
-      .Type("FLOAT");
+  arguments->max_time_gap =
+      parser
+          .Add("--max-time-gap-s", arguments->options.max_time_gap_s,
+               "tum, euroc, bag: a frame's pose lies between stated poses at most this far from it, seconds "
+               "[0.02; bag: 0.2]")
+          .NonNegative()
+          .Type("FLOAT");
   parser.Add("--every", arguments->hold_out.every, "Hold out every N-th image as a query [none]")
       .Range(2, 1000000000)
       .Type("N");
@@ -147,7 +197,8 @@ Command ImportCommand() {
   auto arguments = std::make_shared<ImportArguments>();
   return {
       .name = "import",
-      .summary = "Make a capture of a film, a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture",
+      .summary =
+          "Make a capture of a film, a ROS bag, a COLMAP model, TUM RGB-D, 7-Scenes, KITTI, EuRoC or kapture",
       .add_arguments = [arguments](ArgumentParser& parser) { AddArguments(parser, arguments.get()); },
       .run =
           [arguments](const CommandEnvironment& environment) { return RunImport(*arguments, environment); },

@@ -35,7 +35,7 @@ int64_t NanosecondsFromSeconds(double seconds) { return std::llround(seconds * 1
 // Times of 1970 to 2250: what an int64_t of nanoseconds holds.
 bool IsTime(double seconds) { return std::abs(seconds) < 9e9; }
 
-Result<Trajectory> ReadGroundTruth(const std::string& path) {
+Result<Trajectory> ReadTumTrajectory(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
   Trajectory trajectory;
   for (const ListLine& line : ListLines(contents, path)) {
@@ -56,7 +56,7 @@ Result<Trajectory> ReadGroundTruth(const std::string& path) {
 }  // namespace
 
 Result<ImportedSurvey> ReadTumSurvey(const std::string& source, const ImportOptions& options) {
-  CAIRN_ASSIGN_OR_RETURN(const Trajectory trajectory, ReadGroundTruth(source + "/groundtruth.txt"));
+  CAIRN_ASSIGN_OR_RETURN(const Trajectory trajectory, ReadTumTrajectory(source + "/groundtruth.txt"));
   ImportedSurvey survey;
   if (options.camera.empty()) {
     const std::optional<Camera> camera = KnownCamera(source);

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/frame_tree.h"
+#include "pipeline/exchange/bags/messages.h"
+
+namespace cairn::pipeline {
+
+// A topic and what its first messages say.
+struct TopicContents {
+  BagTopic topic;
+  int64_t num_messages = 0;
+  std::optional<MessageHeader> header;  // of images, camera_info and odometry
+  std::string encoding;                 // of images: "bgr8", "jpeg"
+  std::string child_frame_id;           // of odometry
+  std::optional<CameraInfoMessage> camera_info;
+  bool camera_info_changes = false;
+  std::string problem;  // why the first message cannot be read; "": it can
+};
+
+struct BagContents {
+  std::map<std::string, TopicContents> topics;  // by name
+  FrameTree frames;
+  std::vector<std::string> damage;  // sentences of Bag::Read
+};
+
+// Reads a bag once, without its images.  Errors: those of Bag::Read.
+Result<BagContents> LookThrough(Bag& bag);
+
+bool IsTransformTopic(const BagTopic& topic);
+
+// The topic of images that is asked for, or the only one whose messages are pictures (depth is not).
+// Errors, with a table of the bag's topics: NotFound (no such topic), NoData (no images), InvalidArgument
+// (the topic has none; several have); Unsupported (an encoding that is not known).
+Result<TopicContents> ChooseImages(const BagContents& contents, const std::string& bag_path,
+                                   const std::string& asked);
+
+// The topic of odometry that is asked for, or the only one; none if there is none, or "none" is asked for.
+// Errors: as ChooseImages.
+Result<std::optional<TopicContents>> ChooseOdometry(const BagContents& contents, const std::string& bag_path,
+                                                    const std::string& asked);
+
+// The camera_info of images: that beside them (/camera/camera_info of /camera/image_raw/compressed), else the
+// only one in their frame.
+std::optional<TopicContents> CameraInfoOf(const BagContents& contents, const TopicContents& images);
+
+// Whether images have been rectified: the name of their topic says so (/camera/image_rect_color).
+bool AreRectified(const TopicContents& images);
+
+}  // namespace cairn::pipeline
