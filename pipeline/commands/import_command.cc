@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/printable.h"
+#include "core/colmap/colmap_model.h"
 #include "pipeline/exchange/bags/bag.h"
 #include "pipeline/exchange/bags/import_bag.h"
 #include "pipeline/exchange/film/import_film.h"
@@ -25,6 +26,7 @@ struct ImportArguments {
   std::string link = "symbolic";
   std::string keyframes = "auto";
   std::string topic, odometry;
+  std::vector<double> camera_on_robot;   // x y z, then the quaternion x y z w
   std::optional<Argument> max_time_gap;  // whether it is given: bags have a default of their own
 };
 
@@ -84,6 +86,12 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
                         .choice = choice.choice,
                         .every_s = choice.every_s};
   if (arguments.max_time_gap->IsGiven()) options.max_time_gap_s = arguments.options.max_time_gap_s;
+  if (const std::vector<double>& v = arguments.camera_on_robot; !v.empty()) {
+    Pose pose{Eigen::Quaterniond(v[6], v[3], v[4], v[5]), Eigen::Vector3d(v[0], v[1], v[2])};
+    if (const Status status = NormalizePose(&pose); !status.ok())
+      return MakeError(ErrorCode::kInvalidArgument, "--camera-on-robot: {}", status.error().message);
+    options.base_from_camera = pose;
+  }
   CAIRN_ASSIGN_OR_RETURN(const BagReport report,
                          ImportBag(arguments.source, options, arguments.output, *environment.progress));
   for (const std::string& warning : report.warnings) spdlog::warn("{}", Printable(warning));
@@ -103,9 +111,10 @@ bool IsForBags(const ImportArguments& arguments) {
 
 Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
   if (IsForBags(arguments)) return RunBagImport(arguments, environment);
-  if (!arguments.topic.empty() || !arguments.odometry.empty()) {
+  if (!arguments.topic.empty() || !arguments.odometry.empty() || !arguments.camera_on_robot.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "--topic and --odometry are for bags, and {} is none; leave them out", arguments.source);
+                     "--topic, --odometry and --camera-on-robot are for bags, and {} is none; leave them out",
+                     arguments.source);
   }
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(arguments.source, error);
@@ -160,6 +169,13 @@ void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
       .Add("--odometry", arguments->odometry,
            "bag: topic of the odometry; none: without [the only one, if there is one]")
       .Type("TOPIC");
+  parser
+      .Add("--camera-on-robot", arguments->camera_on_robot,
+           "bag: the camera's optical frame (x right, y down, z ahead) in the odometry's child frame, metres "
+           "and quaternion [as /tf and /tf_static state]")
+      .Values(7)
+      .SeparatedByCommas()
+      .Type("X,Y,Z,QX,QY,QZ,QW");
   parser
       .Add("--images", arguments->options.images_folder,
            "colmap: folder of the images [images/ in or beside the model]")

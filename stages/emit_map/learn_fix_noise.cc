@@ -154,35 +154,23 @@ class FixNoiseLearner {
     return tried;
   }
 
-  // Least squares through (mean number of inliers, factor) of the steps, each of which counts as its number
-  // of inliers; neither part is negative, and a scale is at least one.
   static std::optional<FixNoise> Fit(const std::vector<Tried>& tried) {
-    double sum = 0, sum_x = 0, sum_y = 0, sum_xx = 0, sum_xy = 0;
+    std::vector<FixFactor> factors;
     for (size_t s = 0; s < kSteps.size(); ++s) {
       std::vector<double> squares;
-      double x = 0;
+      double num_inliers = 0;
       for (const Tried& image : tried) {
         for (const Tried::Placed& placed : image.placed[s]) {
           squares.push_back(placed.squared_error);
-          x += placed.num_inliers;
+          num_inliers += placed.num_inliers;
         }
       }
       if (squares.size() < kMinNumTried) continue;
-      x /= static_cast<double>(squares.size());
-      const double y = Quantile(squares, 0.9) / kNineOfTen;
-      sum += x, sum_x += x * x, sum_y += x * y, sum_xx += x * x * x, sum_xy += x * x * y;
+      factors.push_back(
+          {num_inliers / static_cast<double>(squares.size()), Quantile(squares, 0.9) / kNineOfTen});
     }
-    if (sum == 0) return std::nullopt;
-    const double spread = sum * sum_xx - sum_x * sum_x;
-    double slope = spread > 1e-9 * sum * sum_xx ? std::max(0.0, (sum * sum_xy - sum_x * sum_y) / spread) : 0;
-    double scale = (sum_y - slope * sum_x) / sum;
-    if (scale < 1) {
-      scale = 1;
-      slope = std::max(0.0, (sum_xy - sum_x) / sum_xx);
-    }
-    // In as few digits as it has, as maps are to be small.
-    return FixNoise{std::round(1e3 * std::min(scale, kMaxScale)) / 1e3,
-                    std::round(1e5 * std::min(1.0, 2 * slope / scale)) / 1e5};
+    if (factors.empty()) return std::nullopt;
+    return FitFixNoise(factors);
   }
 
   const MapRows& rows_;
@@ -192,6 +180,27 @@ class FixNoiseLearner {
 };
 
 }  // namespace
+
+FixNoise FitFixNoise(const std::vector<FixFactor>& factors) {
+  double sum = 0, sum_x = 0, sum_y = 0, sum_xx = 0, sum_xy = 0;
+  for (const FixFactor& at : factors) {
+    const double weight = at.num_inliers;
+    sum += weight;
+    sum_x += weight * at.num_inliers;
+    sum_y += weight * at.factor;
+    sum_xx += weight * at.num_inliers * at.num_inliers;
+    sum_xy += weight * at.num_inliers * at.factor;
+  }
+  const double spread = sum * sum_xx - sum_x * sum_x;
+  double slope = spread > 1e-9 * sum * sum_xx ? std::max(0.0, (sum * sum_xy - sum_x * sum_y) / spread) : 0;
+  double scale = (sum_y - slope * sum_x) / sum;
+  if (scale < 1) {
+    scale = 1;
+    slope = std::max(0.0, (sum_xy - sum_x) / sum_xx);
+  }
+  return {std::round(1e3 * std::min(scale, kMaxScale)) / 1e3,
+          std::round(1e5 * std::min(1.0, 2 * slope / scale)) / 1e5};
+}
 
 std::optional<FixNoise> LearnFixNoise(const Classes& classes, const MapRows& rows, int num_threads) {
   return FixNoiseLearner(classes, rows).Run(num_threads);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "core/blocks/map_rows.h"
 #include "core/world/feature_class.h"
@@ -13,6 +14,16 @@ struct FixNoise {
   double covariance_scale = 1;
   double keypoint_correlation = 0;
 };
+
+// By how much fixes of so many inliers were wider off, squared.
+struct FixFactor {
+  double num_inliers = 0;
+  double factor = 1;
+};
+// The line through them, in which each counts as its number of inliers; neither part is negative, and the
+// scale at least one.  Three decimals of the scale, five of the correlation: maps are to be small.  REQUIRES:
+// not empty
+FixNoise FitFixNoise(const std::vector<FixFactor>& factors);
 
 // Measured by left-out runs: of twelve successive survey images the landmarks are placed anew by all others,
 // and each of the twelve is placed by these landmarks as a robot's image is (RefinePoseWithCovariance).  Its

@@ -114,6 +114,37 @@ RefineOptions OptionsOf(const FixNoise& noise) {
   return {.covariance_scale = noise.covariance_scale, .keypoint_correlation = noise.keypoint_correlation};
 }
 
+// factor = 1.5 (1 + n / 2 * 0.02)
+TEST(FitFixNoise, FindsTheLine) {
+  const FixNoise noise = FitFixNoise({{20, 1.8}, {80, 2.7}, {320, 6.3}});
+  EXPECT_DOUBLE_EQ(noise.covariance_scale, 1.5);
+  EXPECT_DOUBLE_EQ(noise.keypoint_correlation, 0.02);
+}
+
+// Of factors that fall, their mean: (10 * 3 + 40 * 2) / 50 = 2.2.
+TEST(FitFixNoise, FactorsThatFallAreTheirMeanByInliers) {
+  const FixNoise noise = FitFixNoise({{10, 3}, {40, 2}});
+  EXPECT_DOUBLE_EQ(noise.covariance_scale, 2.2);
+  EXPECT_EQ(noise.keypoint_correlation, 0);
+}
+
+// Through (0, 1): slope = sum w x (y - 1) / sum w x^2 = (100 * -0.5 + 10000 * 2) / (1000 + 1000000) =
+// 0.01993.
+TEST(FitFixNoise, NoCovarianceBecomesNarrower) {
+  const FixNoise noise = FitFixNoise({{10, 0.5}, {100, 3}});
+  EXPECT_EQ(noise.covariance_scale, 1);
+  EXPECT_DOUBLE_EQ(noise.keypoint_correlation, 0.03986);
+  EXPECT_EQ(FitFixNoise({{50, 0.3}}).covariance_scale, 1);
+  EXPECT_EQ(FitFixNoise({{50, 0.3}}).keypoint_correlation, 0);
+}
+
+TEST(FitFixNoise, OneNumberOfInliersGivesAScaleAndLimitsHold) {
+  EXPECT_DOUBLE_EQ(FitFixNoise({{50, 2.3456}}).covariance_scale, 2.346);
+  EXPECT_EQ(FitFixNoise({{50, 2.3456}}).keypoint_correlation, 0);
+  EXPECT_EQ(FitFixNoise({{50, 1e9}}).covariance_scale, 1e5);
+  EXPECT_EQ(FitFixNoise({{1, 2}, {2, 1000}}).keypoint_correlation, 1);
+}
+
 TEST(LearnFixNoise, IndependentKeypointsNeedNoWiderCovariance) {
   const Row row = MakeRow(120, 900, {}, 1);
   const auto noise = LearnFixNoise(row.classes, row.rows, 2);

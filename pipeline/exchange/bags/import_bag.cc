@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "core/capture/keyframes.h"
 #include "core/colmap/cameras_text.h"
@@ -22,6 +23,9 @@ namespace fs = std::filesystem;
 
 // Cameras that look steeper than this, on the mean, are as likely not stated in their optical frame.
 constexpr double kSteepSine = 0.9;
+// Odometry jumps where it goes farther than this, metres, and faster, metres a second, than robots in
+// buildings do: it was reset, or corrected by a map.
+constexpr double kJumpM = 0.5, kJumpMPerS = 10;
 
 struct TimeSpan {
   int64_t first_ns = 0, last_ns = 0;
@@ -107,6 +111,7 @@ class ImportVisitor : public BagVisitor {
   Status TakeImage(const BagMessage& message);
   Result<HeldImage> DecodeMessage(const BagMessage& message);
   void TakeOdometry(const BagMessage& message);
+  void LookForJump(int64_t time_ns, const Eigen::Vector3d& place);
   void TakeTransforms(const BagMessage& message);
   Status Write(const std::vector<int64_t>& indices);
   Status WriteImage(const HeldImage& image);
@@ -126,8 +131,9 @@ class ImportVisitor : public BagVisitor {
   FrameMotion motion_;
   Trajectory odometry_;
   TimeSpan odometry_times_;
+  std::optional<std::pair<int64_t, Eigen::Vector3d>> last_place_;  // of odometry, with its time
   PassedOver damaged_images_, resized_images_, late_images_, unstamped_images_, damaged_odometry_,
-      damaged_transforms_;
+      damaged_transforms_, jumps_;
 };
 
 Result<ImportVisitor::HeldImage> ImportVisitor::DecodeMessage(const BagMessage& message) {
@@ -202,8 +208,19 @@ void ImportVisitor::TakeOdometry(const BagMessage& message) {
   const Result<OdometryMessage> odometry = DecodeOdometry(message);
   if (!odometry.ok()) return damaged_odometry_.Add(odometry.error().message);
   const int64_t time_ns = TimeOf(odometry->header, message);
+  LookForJump(time_ns, odometry->odom_from_child.translation);
   odometry_.Add(time_ns, odometry->odom_from_child);
   odometry_times_.Add(time_ns);
+}
+
+void ImportVisitor::LookForJump(int64_t time_ns, const Eigen::Vector3d& place) {
+  if (last_place_) {
+    const double length_m = (place - last_place_->second).norm();
+    const double seconds = 1e-9 * static_cast<double>(std::abs(time_ns - last_place_->first));
+    if (length_m > kJumpM && length_m > kJumpMPerS * seconds)
+      jumps_.Add(fmt::format("by {:.2f} m in {:.3f} s at {:.3f} s", length_m, seconds, 1e-9 * time_ns));
+  }
+  last_place_ = {time_ns, place};
 }
 
 void ImportVisitor::TakeTransforms(const BagMessage& message) {
@@ -237,6 +254,10 @@ std::vector<std::string> ImportVisitor::Warnings() const {
                   unstamped_images_.count, topic));
   say(damaged_odometry_, fmt::format("{} messages of odometry are left out; the first: {}",
                                      damaged_odometry_.count, damaged_odometry_.first));
+  say(jumps_,
+      fmt::format("odometry jumps {} times, the first {}: was it reset, or corrected by a map? Lengths "
+                  "across a jump are wrong; --odometry takes another topic, or none",
+                  jumps_.count, jumps_.first));
   say(damaged_transforms_, fmt::format("{} transforms are left out; the first: {}", damaged_transforms_.count,
                                        damaged_transforms_.first));
   return warnings;
@@ -258,7 +279,9 @@ std::string ImportVisitor::OdometryLines(int64_t* num_lines, std::vector<std::st
   double sum_sines = 0;
   for (const WrittenImage& image : written_) {
     const Result<Pose> world_from_base = odometry_.At(image.time_ns, options_.max_time_gap_s);
-    const Result<Pose> base_from_camera = motion_.BaseFromCamera(image.time_ns, options_.max_time_gap_s);
+    const Result<Pose> base_from_camera =
+        options_.base_from_camera ? *options_.base_from_camera
+                                  : motion_.BaseFromCamera(image.time_ns, options_.max_time_gap_s);
     if (!world_from_base.ok() || !base_from_camera.ok()) {
       missing.Add((world_from_base.ok() ? base_from_camera : world_from_base).error().message);
       continue;
@@ -315,18 +338,22 @@ Status ChooseCamera(const BagContents& contents, const BagOptions& options, BagP
 }
 
 // Odometry without the camera's place on the robot says nothing about images.
-void ChooseChain(const BagContents& contents, BagPlan* plan, std::vector<std::string>* warnings) {
+void ChooseChain(const BagContents& contents, const BagOptions& options, BagPlan* plan,
+                 std::vector<std::string>* warnings) {
   if (!plan->odometry) return;
   const Result<FrameChain> chain =
       !plan->odometry->header
           ? Error{ErrorCode::kNoData, "no message of " + plan->odometry->topic.name +
                                           " can be read; the first: " + plan->odometry->problem}
+      : options.base_from_camera
+          ? FrameChain()
           : contents.frames.Chain(plan->odometry->child_frame_id, plan->images.header->frame_id);
   if (chain.ok()) {
     plan->chain = *chain;
     return;
   }
-  warnings->push_back(fmt::format("{}: odometry is left out: {}", plan->path, chain.error().message));
+  warnings->push_back(fmt::format("{}: odometry is left out: {}{}", plan->path, chain.error().message,
+                                  plan->odometry->header ? "; --camera-on-robot states it" : ""));
   plan->odometry.reset();
 }
 
@@ -368,7 +395,7 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
   CAIRN_ASSIGN_OR_RETURN(plan.images, ChooseImages(contents, path, options.topic));
   CAIRN_ASSIGN_OR_RETURN(plan.odometry, ChooseOdometry(contents, path, options.odometry));
   CAIRN_RETURN_IF_ERROR(ChooseCamera(contents, options, &plan, &report.warnings));
-  ChooseChain(contents, &plan, &report.warnings);
+  ChooseChain(contents, options, &plan, &report.warnings);
 
   progress.Begin("import", plan.images.num_messages, "images");
   const Status status =

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
+#include "core/geometry/pose.h"
 #include "pipeline/exchange/film/import_film.h"
 
 namespace cairn::pipeline {
@@ -20,6 +22,8 @@ struct BagOptions {
   // Poses of odometry and of moving frames are interpolated between stated ones at most this far from an
   // image, seconds: ten a second, as slow wheel odometry has them, and one lost.  REQUIRES: >= 0
   double max_time_gap_s = 0.2;
+  // Where the camera's optical frame is on the robot, in the odometry's child frame; none: as /tf states.
+  std::optional<Pose> base_from_camera;
 };
 
 struct BagReport {

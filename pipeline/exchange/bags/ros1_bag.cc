@@ -60,8 +60,14 @@ class Ros1Bag : public Bag {
     uint64_t place = kFirstLine.size();
     CAIRN_ASSIGN_OR_RETURN(const std::optional<Record> first, RecordAt(place));
     if (!first) return Ok();
+    const HeadFields bag_head(first->head);
+    if (const std::string encryptor = bag_head.Text("encryptor"); !encryptor.empty()) {
+      return MakeError(ErrorCode::kUnsupported,
+                       "{}: is encrypted by {}; 'rosbag decrypt' makes one that can be read", file_.path(),
+                       encryptor);
+    }
     // 0 until the recorder ends.
-    place = HeadFields(first->head).Number<uint64_t>("index_pos").value_or(0);
+    place = bag_head.Number<uint64_t>("index_pos").value_or(0);
     is_closed_ = place > 0 && place <= file_.num_bytes();
     while (is_closed_) {
       CAIRN_ASSIGN_OR_RETURN(const std::optional<Record> record, RecordAt(place));

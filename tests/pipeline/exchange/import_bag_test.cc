@@ -435,6 +435,45 @@ TEST_F(ImportedBag, OdometryFarFromAnImageIsNotStretched) {
   EXPECT_EQ(ReadOdometry().size(), 2u);
 }
 
+TEST_F(ImportedBag, TheCamerasPlaceThatIsAskedForCountsMoreThanThatOfTheBag) {
+  BagOptions options = kAll;
+  // Looks to the left from half a metre up: its z is the robot's y, its x the robot's x.
+  options.base_from_camera = Pose{Eigen::Quaterniond(std::sqrt(0.5), -std::sqrt(0.5), 0, 0), {0, 0, 0.5}};
+  for (const bool has_frames : {false, true}) {
+    std::vector<Recorded> messages = {OdometryMessageAt(10, Turned(90, 1, 2, 0)), GreyMessage(10)};
+    if (has_frames) messages.insert(messages.begin(), StaticFrames());
+    ASSERT_TRUE(Import(messages, options).ok());
+    const std::vector<OdometryLine> lines = ReadOdometry();
+    ASSERT_EQ(lines.size(), 1u);
+    const Pose& pose = lines[0].world_from_camera;
+    EXPECT_LT((pose.translation - Eigen::Vector3d(1, 2, 0.5)).norm(), 1e-9);
+    // The robot looks along the world's y; its left is the world's -x.
+    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d(-1, 0, 0)).norm(), 1e-9);
+    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, 1, 0)).norm(), 1e-9);
+  }
+  ASSERT_TRUE(Import({OdometryMessageAt(10, {}), GreyMessage(10)}).ok());
+  EXPECT_FALSE(Has("odometry.txt"));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("--camera-on-robot states it")));
+}
+
+TEST_F(ImportedBag, OdometryThatJumpsIsSaid) {
+  // 1.2 m in a tenth of a second are no drive; 0.4 m are a slip, and 3 m in a second are fast.
+  const auto import = [&](double length_m, double time_s) {
+    ASSERT_TRUE(Import({StaticFrames(), OdometryMessageAt(10, {}), GreyMessage(10),
+                        OdometryMessageAt(10 + time_s, Turned(0, length_m, 0, 0)),
+                        OdometryMessageAt(10.1 + time_s, Turned(0, length_m, 0, 0))})
+                    .ok());
+  };
+  for (const auto& [length_m, time_s] : {std::pair(0.4, 0.001), {3.0, 1.0}}) {
+    import(length_m, time_s);
+    EXPECT_THAT(warnings_, Not(Contains(HasSubstr("jumps")))) << length_m;
+  }
+  import(1.2, 0.1);
+  EXPECT_THAT(warnings_,
+              Contains(HasSubstr("odometry jumps 1 times, the first by 1.20 m in 0.100 s at 10.100 s")));
+  EXPECT_TRUE(Has("odometry.txt"));
+}
+
 TEST_F(ImportedBag, TwoClocksAreNoticed) {
   ASSERT_TRUE(
       Import({StaticFrames(), OdometryMessageAt(5, {}), OdometryMessageAt(6, {}), GreyMessage(1000)}).ok());
