@@ -153,6 +153,15 @@ TEST(LearnFixNoise, IndependentKeypointsNeedNoWiderCovariance) {
   EXPECT_LT(noise->keypoint_correlation, 0.002);
 }
 
+TEST(LearnFixNoise, LandmarksAreWhereTheOtherImagesPutThem) {
+  Row row = MakeRow(120, 900, {}, 1);
+  for (FeatureClass& feature : row.classes.classes) feature.position += Eigen::Vector3d(0.02, -0.01, 0.03);
+  const auto noise = LearnFixNoise(row.classes, row.rows, 2);
+  ASSERT_TRUE(noise);
+  EXPECT_LT(noise->covariance_scale, 1.3);
+  EXPECT_LT(noise->keypoint_correlation, 0.005);
+}
+
 TEST(LearnFixNoise, NineOfTenNewImagesLieWithinTheirBoundWhereKeypointsErrTogether) {
   const Errors errors{.own_px = 1, .shear_px = 1.5};
   const Row row = MakeRow(240, 1500, errors, 2);
