@@ -29,22 +29,6 @@ bool HoldsImages(const std::string& folder) {
   return false;
 }
 
-// Bags of ROS are told by their names: files of a format, folders by rosbag2's list of what they hold.
-bool IsNamedAsBag(const std::string& path) {
-  const std::string extension = fs::path(path).extension().string();
-  std::error_code error;
-  return extension == ".bag" || extension == ".mcap" || extension == ".db3" ||
-         fs::exists(path + "/metadata.yaml", error);
-}
-
-Status RefuseBag(const std::string& path) {
-  const std::string capture = fs::path(path).stem().string() + "_capture";
-  return MakeError(
-      ErrorCode::kInvalidArgument,
-      "{}: a ROS bag; make a capture of it and compile that: cairn import {} -o {} && cairn compile {}", path,
-      path, capture, capture);
-}
-
 Status CheckIsCapture(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder + "/config.mk", error) && fs::is_directory(folder + "/options", error)) {
@@ -52,7 +36,6 @@ Status CheckIsCapture(const std::string& folder) {
                      kWhatIsCompiled);
   }
   if (HoldsImages(folder)) return Ok();
-  if (IsNamedAsBag(folder)) return RefuseBag(folder);
   std::string hint = "are the images in another folder?";
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() == ".toml")
@@ -72,7 +55,6 @@ Status CheckIsText(const std::string& path) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: neither a file nor a folder; {}", path,
                      kWhatIsCompiled);
   }
-  if (IsNamedAsBag(path)) return RefuseBag(path);
   if (IsSqliteFile(path)) {
     const bool is_map = WithDatabaseErrors(path, [&]() -> Status {
                           SQLite::Database database = OpenImmutable(path);

@@ -22,6 +22,7 @@
 #include "pipeline/build/recipe.h"
 #include "pipeline/build/recipe_source.h"
 #include "pipeline/build/run_make.h"
+#include "pipeline/exchange/bags/bag.h"
 #include "pipeline/program/stop_signal.h"
 
 namespace cairn::pipeline {
@@ -61,9 +62,26 @@ Result<BuildPaths> ResolvePaths(const CompileArguments& arguments) {
                     .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
 }
 
+Error RefuseBag(const std::string& path) {
+  const std::string capture = fs::path(path).stem().string() + "_capture";
+  return {ErrorCode::kInvalidArgument,
+          fmt::format("{}: a ROS bag; make a capture of it and compile that: cairn import {} -o {} && cairn "
+                      "compile {}",
+                      path, path, capture, capture)};
+}
+
+// As FindRecipe.  A bag is no recipe; a folder of images that has one in it is a capture.
+Result<RecipeSource> FindRecipeOrBag(const std::string& given, const std::string& map) {
+  std::error_code error;
+  if (!fs::is_directory(given, error) && IsBag(given)) return RefuseBag(given);
+  Result<RecipeSource> source = FindRecipe(given, map);
+  if (!source.ok() && IsBag(given)) return RefuseBag(given);
+  return source;
+}
+
 // Fills in what was not given: the recipe of a folder, the map's name.
 Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, CompileArguments* arguments) {
-  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipe(arguments->recipe, arguments->output));
+  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipeOrBag(arguments->recipe, arguments->output));
   if (source.was_written) {
     *environment.out << fmt::format(
         "{}: the recipe of {}, with defaults; to change something, edit it and compile it\n", source.recipe,

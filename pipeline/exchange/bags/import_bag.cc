@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/capture/capture.h"
 #include "core/capture/keyframes.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
@@ -416,7 +417,7 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
         if (plan.camera)
           CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", {{1, *plan.camera}}));
         const std::string lines = visitor.OdometryLines(&report.num_with_odometry, &report.warnings);
-        return lines.empty() ? Ok() : WriteFileAtomically(folder + "/odometry.txt", lines);
+        return lines.empty() ? Ok() : WriteFileAtomically(folder + "/" + kOdometryFile, lines);
       });
   progress.End();
   if (!status.ok()) return status.error();

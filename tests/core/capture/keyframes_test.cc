@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/capture/frame_motion.h"
+#include "tests/core/capture/drawn_wall.h"
 
 namespace cairn {
 namespace {
@@ -18,22 +19,9 @@ using testing::SizeIs;
 
 const cv::Size kFrame(320, 240);
 
-// A wall of rectangles that has no two places alike.
-cv::Mat Wall(int seed = 1) {
-  cv::RNG random(seed);
-  cv::Mat wall(480, 2400, CV_8UC1, cv::Scalar(128));
-  for (int i = 0; i < 6000; ++i) {
-    const cv::Point corner(random.uniform(0, wall.cols), random.uniform(0, wall.rows));
-    const cv::Size size(random.uniform(4, 30), random.uniform(4, 30));
-    cv::rectangle(wall, {corner, size}, cv::Scalar(random.uniform(20, 236)), cv::FILLED);
-  }
-  cv::GaussianBlur(wall, wall, {}, 0.8);
-  return wall;
-}
-
 // Frames of a camera that goes along a wall, from `begin_px` on.
 std::vector<cv::Mat> Walk(int num_frames, int step_px, int begin_px = 0, int seed = 1) {
-  const cv::Mat wall = Wall(seed);
+  const cv::Mat wall = DrawnWall(seed);
   std::vector<cv::Mat> frames;
   for (int i = 0; i < num_frames; ++i)
     frames.push_back(wall(cv::Rect(cv::Point(begin_px + step_px * i, 100), kFrame)).clone());

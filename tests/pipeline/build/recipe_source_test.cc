@@ -109,14 +109,6 @@ TEST_F(RecipeSourceTest, WhatIsNoRecipeIsNamedAsWhatItIs) {
   EXPECT_THAT(Message("a.build"), HasSubstr("the build folder of a map, not a capture"));
   fs::create_directories("empty");
   EXPECT_THAT(Message("empty"), HasSubstr("a folder without an image"));
-  for (const char* bag : {"drive.bag", "drive.mcap", "drive.db3"}) {
-    Write(bag, "#ROSBAG V2.0");
-    EXPECT_THAT(Message(bag), HasSubstr("a ROS bag; make a capture of it and compile that: cairn import " +
-                                        std::string(bag) + " -o drive_capture"));
-  }
-  fs::create_directories("rosbag2_drive");
-  Write("rosbag2_drive/metadata.yaml", "");
-  EXPECT_THAT(Message("rosbag2_drive"), HasSubstr("cairn compile rosbag2_drive_capture"));
   Write("empty/recipe.toml", "");
   EXPECT_THAT(Message("empty"), HasSubstr("did you mean the recipe empty/recipe.toml?"));
   EXPECT_THAT(Message("/dev/null"), HasSubstr("neither a file nor a folder"));

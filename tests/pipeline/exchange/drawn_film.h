@@ -6,22 +6,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
+
+#include "tests/core/capture/drawn_wall.h"
 
 namespace cairn::pipeline {
-
-// A wall of rectangles, 2400 x 480 pixels, that has no two places alike.
-inline cv::Mat DrawnWall(int seed = 1) {
-  cv::RNG random(seed);
-  cv::Mat wall(480, 2400, CV_8UC1, cv::Scalar(128));
-  for (int i = 0; i < 6000; ++i) {
-    const cv::Point corner(random.uniform(0, wall.cols), random.uniform(0, wall.rows));
-    const cv::Size size(random.uniform(4, 30), random.uniform(4, 30));
-    cv::rectangle(wall, {corner, size}, cv::Scalar(random.uniform(20, 236)), cv::FILLED);
-  }
-  cv::GaussianBlur(wall, wall, {}, 0.8);
-  return wall;
-}
 
 // What a camera of 320 x 240 pixels sees that goes along the wall, `step_px` a frame.
 inline std::vector<cv::Mat> DrawnWalk(int num_frames, int step_px, int seed = 1) {
