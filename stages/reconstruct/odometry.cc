@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "core/base/quantiles.h"
 
@@ -125,6 +127,21 @@ Result<OdometryAlignment> AlignToOdometry(const std::vector<OdometryPose>& odome
   similarity.translation =
       places.front().InOdometry() - similarity.scale * (similarity.rotation * places.front().InModel());
   return alignment;
+}
+
+std::vector<ImageMotion> MotionsOf(const std::vector<OdometryPose>& odometry, const MapperInput& input) {
+  std::map<std::string, int> index;
+  for (const DatabaseImage& image : input.images) index.emplace(image.name, static_cast<int>(index.size()));
+  std::vector<ImageMotion> motions;
+  std::map<std::string, const OdometryPose*> last;  // of each folder
+  for (const OdometryPose& pose : odometry) {
+    if (index.count(pose.name) == 0) continue;
+    const OdometryPose* before = std::exchange(last[FolderOfImage(pose.name)], &pose);
+    if (before == nullptr) continue;
+    motions.push_back({index.at(before->name), index.at(pose.name),
+                       pose.world_from_cam.Inverse() * before->world_from_cam});
+  }
+  return motions;
 }
 
 }  // namespace cairn::reconstruct

@@ -7,6 +7,8 @@
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/similarity.h"
+#include "stages/reconstruct/globally/image_motion.h"
+#include "stages/reconstruct/globally/mapper_input.h"
 #include "stages/reconstruct/known_places.h"
 
 namespace cairn::reconstruct {
@@ -36,5 +38,9 @@ struct OdometryAlignment {
 // cam_from_model by image name.  Pure.  Errors: NoData (fewer than three pieces).
 Result<OdometryAlignment> AlignToOdometry(const std::vector<OdometryPose>& odometry,
                                           const std::map<std::string, Pose>& model);
+
+// How the camera moved from each image to the next one of its folder, by odometry; images of the input that
+// it lacks are skipped.
+std::vector<ImageMotion> MotionsOf(const std::vector<OdometryPose>& odometry, const MapperInput& input);
 
 }  // namespace cairn::reconstruct

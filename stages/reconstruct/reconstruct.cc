@@ -8,6 +8,8 @@
 #include "core/files/write_error.h"
 #include "stages/reconstruct/find_frame.h"
 #include "stages/reconstruct/globally/map_globally.h"
+#include "stages/reconstruct/known_places.h"
+#include "stages/reconstruct/odometry.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -88,6 +90,16 @@ Result<std::vector<ColmapModel>> MapByColmap(const MapperInput& input, const Cap
   return best;
 }
 
+// What the capture's odometry says, if it has any.
+Result<std::vector<ImageMotion>> OdometryMotions(const MapperInput& input, const Capture& capture) {
+  const std::string path = capture.root + "/" + kOdometryFile;
+  if (!std::filesystem::exists(path)) return std::vector<ImageMotion>();
+  const Result<std::vector<OdometryPose>> odometry = ReadOdometry(path, capture);
+  if (odometry.ok()) return MotionsOf(*odometry, input);
+  if (odometry.error().code == ErrorCode::kNoData) return std::vector<ImageMotion>();
+  return odometry.error();
+}
+
 // By the mapper that the options name, or that suits the images.
 Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Capture& capture,
                                            const ReconstructOptions& options, const std::string& work_folder,
@@ -95,11 +107,18 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   const MapperOptions& mapper = options.mapper;
   if (mapper.mapper == "colmap")
     return MapByColmap(input, capture, options, work_folder, progress, &result->warnings);
+  CAIRN_ASSIGN_OR_RETURN(std::vector<ImageMotion> motions, OdometryMotions(input, capture));
   Result<GlobalMap> global = MapGlobally(
-      input,
+      input, std::move(motions),
       {.refine_focal_length = mapper.refine_focal_length, .refine_distortion = mapper.refine_distortion},
       num_threads, progress);
   if (!global.ok() && global.error().code != ErrorCode::kNoData) return global.error();
+  if (global.ok() && !global->why_no_odometry.empty()) {
+    result->warnings.push_back(
+        fmt::format("{}/{}: {}: it does not help to find the images' places; check where it says that the "
+                    "camera is on the robot, and that its poses are those of the images",
+                    capture.root, kOdometryFile, global->why_no_odometry));
+  }
   const auto num_global = global.ok() ? static_cast<double>(global->models.front().images.size()) : 0;
   const bool is_enough =
       num_global >= options.min_registered_ratio * static_cast<double>(input.images.size());

@@ -185,5 +185,27 @@ TEST(AlignToOdometry, NoWayGivesNoScale) {
   EXPECT_FALSE(AlignToOdometry(TrueDrive(10), ModelOf(TrueDrive(10), 1)).ok());  // one piece
 }
 
+TEST(MotionsOf, GoFromEachImageToTheNextOfItsFolder) {
+  MapperInput input;
+  for (const char* name : {"b/0.jpg", "a/0.jpg", "a/2.jpg", "a/1.jpg", "b/1.jpg"})
+    input.images.push_back({static_cast<ImageId>(input.images.size() + 10), name, 1});
+  std::vector<OdometryPose> odometry;
+  for (const char* name : {"a/0.jpg", "b/0.jpg", "a/lost.jpg", "a/1.jpg", "b/1.jpg", "a/2.jpg"}) {
+    const double turn = 0.1 * static_cast<double>(odometry.size());
+    odometry.push_back({name,
+                        {Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ())),
+                         Eigen::Vector3d(static_cast<double>(odometry.size()), 0, 1)}});
+  }
+  const std::vector<ImageMotion> motions = MotionsOf(odometry, input);
+  ASSERT_EQ(motions.size(), 3u);
+  EXPECT_EQ(std::pair(motions[0].image1, motions[0].image2), std::pair(1, 3));  // a/0, a/1
+  EXPECT_EQ(std::pair(motions[1].image1, motions[1].image2), std::pair(0, 4));  // b/0, b/1
+  EXPECT_EQ(std::pair(motions[2].image1, motions[2].image2), std::pair(3, 2));  // a/1, a/2
+  // Three metres ahead as the first camera, which is not turned, sees it; and turned by 0.3.
+  EXPECT_TRUE(motions[0].Way().isApprox(Eigen::Vector3d(3, 0, 0)));
+  EXPECT_NEAR(RotationErrorDeg(motions[0].cam2_from_cam1, Pose()), DegFromRad(0.3), 1e-9);
+  EXPECT_TRUE(MotionsOf({}, input).empty());
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct

@@ -1,5 +1,6 @@
 #include "stages/reconstruct/globally/adjust_model.h"
 
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -68,6 +69,34 @@ struct StepLengthCost {
     return true;
   }
 };
+
+// The motion between two images against the one that odometry says.
+struct MotionCost {
+  Pose cam2_from_cam1;
+  double sigma_rad, sigma_m;
+  template <typename T>
+  bool operator()(const T* pose1, const T* pose2, T* residual) const {
+    const PoseView<T> a(pose1), b(pose2);
+    const Eigen::Quaternion<T> q = b.rotation * a.rotation.conjugate();
+    const Eigen::Matrix<T, 3, 1> t = b.translation - q * a.translation;
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
+    out.template head<3>() =
+        RotationVector(Eigen::Quaternion<T>(q * cam2_from_cam1.rotation.conjugate().cast<T>())) /
+        T(sigma_rad);
+    out.template tail<3>() = (t - cam2_from_cam1.translation.cast<T>()) / T(sigma_m);
+    return true;
+  }
+};
+
+ceres::CostFunction* MakeMotionCost(const AdjustModelOptions& options, const ImageMotion& motion,
+                                    double median_way_m) {
+  const double turn_rad = RadFromDeg(RotationErrorDeg(motion.cam2_from_cam1, Pose()));
+  return new ceres::AutoDiffCostFunction<MotionCost, 6, kPoseBlockSize, kPoseBlockSize>(
+      new MotionCost{motion.cam2_from_cam1,
+                     std::hypot(RadFromDeg(options.turn_sigma_deg), options.turn_sigma_ratio * turn_rad),
+                     std::hypot(options.way_sigma_ratio * motion.Way().norm(),
+                                options.least_way_sigma_ratio * median_way_m)});
+}
 
 double MedianStep(const ModelProblem& problem) {
   std::vector<double> lengths;
@@ -140,6 +169,12 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
         new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
             new StepLengthCost{step, options.step_sigma_ratio}),
         &weak_loss, pose_of(from), pose_of(to));
+  }
+  const double median_way_m = MedianWayM(problem->motions);
+  for (const ImageMotion& motion : problem->motions) {
+    if (!(median_way_m > 0) || !are_known(motion.image1, motion.image2)) continue;
+    ceres_problem.AddResidualBlock(MakeMotionCost(options, motion, median_way_m), &weak_loss,
+                                   pose_of(motion.image1), pose_of(motion.image2));
   }
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (Eigen::Vector3d& point : problem->points) {

@@ -8,6 +8,7 @@
 
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
+#include "stages/reconstruct/globally/image_motion.h"
 
 namespace cairn::reconstruct {
 
@@ -42,6 +43,8 @@ struct ModelProblem {
   std::vector<RelativeRotation> rotations;
   // Images of a drive that follow each other: about as far apart as others.
   std::vector<std::pair<int, int>> steps;
+  // What odometry says of others.
+  std::vector<ImageMotion> motions;
 };
 
 struct AdjustModelOptions {
@@ -51,6 +54,10 @@ struct AdjustModelOptions {
   // > 0
   double rotation_sigma_deg = 0.5;
   double step_sigma_ratio = 0.5;
+  // Standard deviations of a motion, per axis: of its way, as a part of it and of the median one; of its turn,
+  // degrees, and as a part of it.  REQUIRES: > 0
+  double way_sigma_ratio = 0.05, least_way_sigma_ratio = 0.02;
+  double turn_sigma_deg = 0.5, turn_sigma_ratio = 0.05;
   int max_num_iterations = 25;
   double function_tolerance = 1e-4;
   // Whether the cameras' free parameters change, too.

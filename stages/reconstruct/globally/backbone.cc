@@ -22,12 +22,17 @@ constexpr double kWeightOfAmbiguous = 0.3;  // of a pair that may have another r
 
 }  // namespace
 
-bool IsDrive(int num_images, const std::vector<ViewPair>& pairs) {
-  int num_strong = 0;
+bool IsDrive(int num_images, const std::vector<ViewPair>& pairs, const std::vector<ImageMotion>& motions) {
+  std::vector<bool> is_followed(num_images, false);
+  const auto follow = [&](int a, int b) {
+    if (std::abs(a - b) == 1) is_followed[std::min(a, b)] = true;
+  };
   for (const ViewPair& pair : pairs) {
-    if (std::abs(pair.image1 - pair.image2) == 1 && pair.strength >= kMinStrengthOfNext) ++num_strong;
+    if (pair.strength >= kMinStrengthOfNext) follow(pair.image1, pair.image2);
   }
-  return num_strong >= kMinDriveRatio * (num_images - 1);
+  for (const ImageMotion& motion : motions) follow(motion.image1, motion.image2);
+  const auto num_followed = std::count(is_followed.begin(), is_followed.end(), true);
+  return static_cast<double>(num_followed) >= kMinDriveRatio * (num_images - 1);
 }
 
 void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
@@ -39,9 +44,11 @@ void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
   }
 }
 
-std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs, bool is_drive) {
+std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs,
+                          const std::vector<ImageMotion>& motions, bool is_drive) {
   std::vector<bool> is_taken(pairs.size(), false);
   DisjointSets components(num_images);
+  for (const ImageMotion& motion : motions) components.Join(motion.image1, motion.image2);
   for (size_t p = 0; p < pairs.size(); ++p) {
     const int distance = std::abs(pairs[p].image1 - pairs[p].image2);
     is_taken[p] = pairs[p].strength >= kMinStrength && (!is_drive || distance <= kMaxOrderDistance);

@@ -21,56 +21,6 @@ namespace {
 constexpr int kMinNumImages = 3;
 constexpr double kMaxTreeErrorDeg = 20;
 
-// Images that pairs join, with indices of their own.
-struct Part {
-  std::vector<int> images;      // indices into the input's, in the order of their names
-  std::vector<ViewPair> pairs;  // of indices into `images`
-};
-
-Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs) {
-  Part part;
-  std::vector<std::string> names;
-  for (const DatabaseImage& image : input.images) names.push_back(image.name);
-  part.images = NaturalOrder(names);
-  std::vector<int> place(part.images.size());
-  for (size_t i = 0; i < part.images.size(); ++i) place[part.images[i]] = static_cast<int>(i);
-  part.pairs = std::move(pairs);
-  for (ViewPair& pair : part.pairs) {
-    pair.image1 = place[pair.image1];
-    pair.image2 = place[pair.image2];
-  }
-  return part;
-}
-
-std::vector<Part> PartsOf(Part whole) {
-  std::vector<Part> parts;
-  const int num_images = static_cast<int>(whole.images.size());
-  std::vector<int> part_of(num_images, -1), place(num_images, -1);
-  for (const std::vector<int>& members : ConnectedParts(num_images, whole.pairs)) {
-    if (static_cast<int>(members.size()) < kMinNumImages) continue;
-    Part& part = parts.emplace_back();
-    for (const int i : members) {
-      part_of[i] = static_cast<int>(parts.size()) - 1;
-      place[i] = static_cast<int>(part.images.size());
-      part.images.push_back(whole.images[i]);
-    }
-  }
-  for (ViewPair& pair : whole.pairs) {
-    const int p = part_of[pair.image1];
-    if (p < 0) continue;
-    pair.image1 = place[pair.image1];
-    pair.image2 = place[pair.image2];
-    parts[p].pairs.push_back(std::move(pair));
-  }
-  return parts;
-}
-
-// The backbone of a part and its rotations, without the pairs that contradict them.
-struct Untangled {
-  std::vector<int> backbone;
-  std::vector<Eigen::Quaterniond> rotations;
-};
-
 // What rotations are averaged from.
 ViewPair WithoutMatches(const ViewPair& pair) {
   return {.image1 = pair.image1,
@@ -82,19 +32,90 @@ ViewPair WithoutMatches(const ViewPair& pair) {
           .weight = pair.weight};
 }
 
+// Images that pairs and motions join, with indices of their own.
+struct Part {
+  std::vector<int> images;           // indices into the input's, in the order of their names
+  std::vector<ViewPair> pairs;       // of indices into `images`
+  std::vector<ImageMotion> motions;  // likewise
+
+  // What joins the images.
+  std::vector<ViewPair> Links() const {
+    std::vector<ViewPair> links = PairsOf(motions);
+    for (const ViewPair& pair : pairs) links.push_back(WithoutMatches(pair));
+    return links;
+  }
+};
+
+Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs,
+                    std::vector<ImageMotion> motions) {
+  Part part;
+  std::vector<std::string> names;
+  for (const DatabaseImage& image : input.images) names.push_back(image.name);
+  part.images = NaturalOrder(names);
+  std::vector<int> place(part.images.size());
+  for (size_t i = 0; i < part.images.size(); ++i) place[part.images[i]] = static_cast<int>(i);
+  const auto renumber = [&](auto* links) {
+    for (auto& link : *links) {
+      link.image1 = place[link.image1];
+      link.image2 = place[link.image2];
+    }
+  };
+  part.pairs = std::move(pairs);
+  part.motions = std::move(motions);
+  renumber(&part.pairs);
+  renumber(&part.motions);
+  return part;
+}
+
+std::vector<Part> PartsOf(Part whole) {
+  std::vector<Part> parts;
+  const int num_images = static_cast<int>(whole.images.size());
+  std::vector<int> part_of(num_images, -1), place(num_images, -1);
+  for (const std::vector<int>& members : ConnectedParts(num_images, whole.Links())) {
+    if (static_cast<int>(members.size()) < kMinNumImages) continue;
+    Part& part = parts.emplace_back();
+    for (const int i : members) {
+      part_of[i] = static_cast<int>(parts.size()) - 1;
+      place[i] = static_cast<int>(part.images.size());
+      part.images.push_back(whole.images[i]);
+    }
+  }
+  const auto share_out = [&](auto* links, auto links_of) {
+    for (auto& link : *links) {
+      const int p = part_of[link.image1];
+      if (p < 0) continue;
+      link.image1 = place[link.image1];
+      link.image2 = place[link.image2];
+      links_of(parts[p]).push_back(std::move(link));
+    }
+  };
+  share_out(&whole.pairs, [](Part& part) -> auto& { return part.pairs; });
+  share_out(&whole.motions, [](Part& part) -> auto& { return part.motions; });
+  return parts;
+}
+
+// The backbone of a part and its rotations, without the pairs that contradict them.
+struct Untangled {
+  std::vector<int> backbone;
+  std::vector<Eigen::Quaterniond> rotations;
+};
+
 // Nothing where the part falls apart without the pairs that contradict its rotations, which are taken out of
 // it.
 std::optional<Untangled> Untangle(bool is_drive, Part* part) {
   const int num_images = static_cast<int>(part->images.size());
   const AverageRotationsOptions options;
   while (true) {
-    Untangled untangled{.backbone = Backbone(num_images, part->pairs, is_drive), .rotations = {}};
+    Untangled untangled{.backbone = Backbone(num_images, part->pairs, part->motions, is_drive),
+                        .rotations = {}};
     std::vector<ViewPair> pairs;
     for (const int p : untangled.backbone) pairs.push_back(WithoutMatches(part->pairs[p]));
+    const size_t num_seen = pairs.size();
+    for (ViewPair& motion : PairsOf(part->motions)) pairs.push_back(std::move(motion));
     // Chooses the rotations nearest to these, and says which contradict them all the same.
     const auto contradicting = [&](const std::vector<Eigen::Quaterniond>& rotations, double max_error_deg) {
       std::vector<bool> is_wrong(part->pairs.size(), false);
-      for (size_t k = 0; k < pairs.size(); ++k) {
+      for (size_t k = 0; k < num_seen; ++k) {
         const Eigen::Quaterniond between =
             rotations[pairs[k].image2] * rotations[pairs[k].image1].conjugate();
         ChooseRotation(between, &pairs[k]);
@@ -118,20 +139,23 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
     if (count(is_wrong) == 0) return untangled;
     size_t p = 0;
     std::erase_if(part->pairs, [&](const ViewPair&) { return is_wrong[p++]; });
-    const std::vector<std::vector<int>> parts = ConnectedParts(num_images, part->pairs);
+    const std::vector<std::vector<int>> parts = ConnectedParts(num_images, part->Links());
     if (parts.empty() || parts[0].size() < part->images.size()) return std::nullopt;
   }
 }
 
 }  // namespace
 
-Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions& options, int num_threads,
-                              Progress& progress) {
+Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion> motions,
+                              const MapGloballyOptions& options, int num_threads, Progress& progress) {
   const int num_images = static_cast<int>(input.images.size());
   progress.Begin("reconstruct", int64_t{num_images} * PartMapper::NumRounds(), "images in rounds");
   const std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
-  Part whole = InOrderOfNames(input, EstimateViewPairs(input, cameras, {}, num_threads));
-  const size_t num_pairs = whole.pairs.size();
+  std::vector<ViewPair> pairs = EstimateViewPairs(input, cameras, {}, num_threads);
+  const size_t num_pairs = pairs.size();
+  GlobalMap map;
+  map.why_no_odometry = LeaveOutContradicted(pairs, &motions);
+  Part whole = InOrderOfNames(input, std::move(pairs), std::move(motions));
   std::deque<Part> open;
   const auto add_parts = [&](Part part) {
     for (Part& smaller : PartsOf(std::move(part))) open.push_back(std::move(smaller));
@@ -141,7 +165,7 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
   while (!open.empty()) {
     Part part = std::move(open.front());
     open.pop_front();
-    const bool is_drive = IsDrive(static_cast<int>(part.images.size()), part.pairs);
+    const bool is_drive = IsDrive(static_cast<int>(part.images.size()), part.pairs, part.motions);
     SetWeights(is_drive, &part.pairs);
     const auto untangled = Untangle(is_drive, &part);
     if (!untangled) {
@@ -149,7 +173,8 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
       continue;
     }
     ColmapModel model = PartMapper(input, cameras, options, num_threads, std::move(part.images),
-                                   std::move(part.pairs), untangled->backbone, is_drive)
+                                   std::move(part.pairs), std::move(part.motions), untangled->backbone,
+                                   is_drive)
                             .Map(untangled->rotations, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
     if (!model.images.empty()) models.emplace_back(std::move(model), is_drive);
@@ -166,7 +191,7 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, const MapGloballyOptions
     return std::pair(a.first.images.size(), a.first.points.size()) >
            std::pair(b.first.images.size(), b.first.points.size());
   });
-  GlobalMap map{.models = {}, .is_drive = models.front().second};
+  map.is_drive = models.front().second;
   for (auto& [model, is_drive] : models) map.models.push_back(std::move(model));
   return map;
 }

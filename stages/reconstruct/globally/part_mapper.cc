@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -13,7 +14,6 @@
 #include "core/base/quantiles.h"
 #include "core/structure/camera_sensitivity.h"
 #include "stages/reconstruct/globally/average_rotations.h"
-#include "stages/reconstruct/globally/position_images.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -50,7 +50,8 @@ constexpr int kMaxNumObservations = 200000;
 
 PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
                        const MapGloballyOptions& options, int num_threads, std::vector<int> images,
-                       std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive)
+                       std::vector<ViewPair> pairs, std::vector<ImageMotion> motions,
+                       const std::vector<int>& backbone, bool is_drive)
     : input_(input),
       options_(options),
       num_threads_(num_threads),
@@ -59,8 +60,13 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
       pairs_(std::move(pairs)),
       is_accepted_(pairs_.size(), false) {
   for (const int p : backbone) is_accepted_[p] = true;
-  for (int i = 1; i < static_cast<int>(images_.size()) && is_drive; ++i)
-    problem_.steps.emplace_back(i - 1, i);
+  problem_.motions = std::move(motions);
+  std::set<std::pair<int, int>> measured;
+  for (const ImageMotion& motion : problem_.motions)
+    measured.insert(std::minmax(motion.image1, motion.image2));
+  for (int i = 1; i < static_cast<int>(images_.size()) && is_drive; ++i) {
+    if (measured.count({i - 1, i}) == 0) problem_.steps.emplace_back(i - 1, i);
+  }
   std::map<CameraId, int> index;
   for (const auto& [camera_id, camera] : cameras) {
     index.emplace(camera_id, static_cast<int>(problem_.cameras.size()));
@@ -173,6 +179,23 @@ std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
   return chosen;
 }
 
+std::vector<Step> PartMapper::StepsBy(const std::vector<Eigen::Quaterniond>& rotations) const {
+  std::vector<Step> steps;
+  for (const auto& [from, to] : problem_.steps) steps.push_back({from, to, std::nullopt});
+  for (const ImageMotion& motion : problem_.motions) {
+    const Eigen::Vector3d way = rotations[motion.image1].conjugate() * motion.Way();
+    if (motion.image1 < motion.image2) {
+      steps.push_back({motion.image1, motion.image2, way});
+    } else {
+      steps.push_back({motion.image2, motion.image1, -way});
+    }
+  }
+  std::sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) {
+    return std::pair(a.from, a.to) < std::pair(b.from, b.to);
+  });
+  return steps;
+}
+
 void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   std::vector<std::vector<int>> all(tracks_.size());
   for (size_t t = 0; t < tracks_.size(); ++t) {
@@ -191,7 +214,7 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
     }
   }
   const Positions positions = PositionImages(static_cast<int>(images_.size()),
-                                             static_cast<int>(chosen.size()), sights, is_drive_, {});
+                                             static_cast<int>(chosen.size()), sights, StepsBy(rotations), {});
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
   spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());

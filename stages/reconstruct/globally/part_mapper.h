@@ -10,6 +10,8 @@
 #include "core/structure/triangulate.h"
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
+#include "stages/reconstruct/globally/image_motion.h"
+#include "stages/reconstruct/globally/position_images.h"
 #include "stages/reconstruct/globally/view_pairs.h"
 
 namespace cairn::reconstruct {
@@ -26,11 +28,12 @@ struct MapGloballyOptions {
 // triangulates, and adjusts the longest.
 class PartMapper {
  public:
-  // `images`: indices into the input's, of a drive in its order; `pairs`: of indices into `images`;
-  // `backbone`: indices of pairs.
+  // `images`: indices into the input's, of a drive in its order; `pairs` and `motions`: of indices into
+  // `images`; `backbone`: indices of pairs.
   PartMapper(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
              const MapGloballyOptions& options, int num_threads, std::vector<int> images,
-             std::vector<ViewPair> pairs, const std::vector<int>& backbone, bool is_drive);
+             std::vector<ViewPair> pairs, std::vector<ImageMotion> motions, const std::vector<int>& backbone,
+             bool is_drive);
 
   // Rounds of adjustment, for progress: each advances it by as many items as the part has images.
   static int NumRounds();
@@ -52,6 +55,7 @@ class PartMapper {
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
+  std::vector<Step> StepsBy(const std::vector<Eigen::Quaterniond>& rotations) const;
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);

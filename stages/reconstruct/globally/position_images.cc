@@ -5,6 +5,7 @@
 
 #include <ceres/ceres.h>
 
+#include "core/base/quantiles.h"
 #include "core/base/random.h"
 #include "core/structure/bundle_blocks.h"
 
@@ -12,6 +13,8 @@ namespace cairn::reconstruct {
 namespace {
 
 constexpr double kHalfSideOfStart = 100, kLeastFactor = 1e-5;
+// Where ways are known points begin so many steps away.
+constexpr double kStepsToPoints = 10;
 
 // v - d (X - c)
 class SightCost : public ceres::SizedCostFunction<3, 1, 3, 3> {
@@ -63,10 +66,42 @@ class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
   double step_, weight_;
 };
 
+// The way between two centres against a measured one: weight * (to - from - way).
+class WayCost : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  WayCost(const Eigen::Vector3d& way, double weight) : way_(way), weight_(weight) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Map<const Eigen::Vector3d> from(parameters[0]), to(parameters[1]);
+    Eigen::Map<Eigen::Vector3d> residual(residuals);
+    residual = weight_ * (to - from - way_);
+    if (jacobians == nullptr) return true;
+    for (int side = 0; side < 2; ++side) {
+      if (jacobians[side] == nullptr) continue;
+      Eigen::Map<Eigen::Matrix3d> out(jacobians[side]);
+      out = (side == 0 ? -weight_ : weight_) * Eigen::Matrix3d::Identity();
+    }
+    return true;
+  }
+
+ private:
+  Eigen::Vector3d way_;
+  double weight_;
+};
+
+// Median length of the known ways; none known: 0.
+double TypicalWay(const std::vector<Step>& steps) {
+  std::vector<double> lengths;
+  for (const Step& step : steps) {
+    if (step.way) lengths.push_back(step.way->norm());
+  }
+  return lengths.empty() ? 0 : Median(lengths);
+}
+
 }  // namespace
 
-Positions PositionImages(int num_images, int num_points, const std::vector<Sight>& sights, bool is_drive,
-                         const PositionImagesOptions& options) {
+Positions PositionImages(int num_images, int num_points, const std::vector<Sight>& sights,
+                         const std::vector<Step>& steps, const PositionImagesOptions& options) {
   // Centres, points, factors, in one piece: Ceres orders blocks by their addresses, and another order is
   // another rounding.
   const size_t num_places = static_cast<size_t>(num_images) + num_points;
@@ -76,6 +111,28 @@ Positions PositionImages(int num_images, int num_points, const std::vector<Sight
   const auto center_of = [&](int image) { return &values[3 * static_cast<size_t>(image)]; };
   const auto point_of = [&](int point) { return &values[3 * (static_cast<size_t>(num_images) + point)]; };
   const auto factor_of = [&](size_t sight) { return &values[3 * num_places + sight]; };
+
+  const double typical_way = TypicalWay(steps);
+  if (typical_way > 0) {
+    std::fill_n(values.begin(), 3 * num_places, 0.0);
+    std::vector<bool> is_known(num_images, false);
+    for (const Step& step : steps) {
+      if (is_known[step.to] && !step.way) continue;
+      is_known[step.to] = step.way.has_value();
+      for (int k = 0; k < 3; ++k)
+        center_of(step.to)[k] = center_of(step.from)[k] + (step.way ? (*step.way)[k] : 0);
+    }
+    const double depth = kStepsToPoints * typical_way;
+    std::vector<int> num_sights(num_points, 0);
+    for (const Sight& sight : sights) ++num_sights[sight.point];
+    for (size_t s = 0; s < sights.size(); ++s) {
+      const Sight& sight = sights[s];
+      for (int k = 0; k < 3; ++k)
+        point_of(sight.point)[k] +=
+            (center_of(sight.image)[k] + depth * sight.direction[k]) / num_sights[sight.point];
+      *factor_of(s) = 1 / depth;
+    }
+  }
 
   ceres::Problem::Options problem_options;
   problem_options.disable_all_safety_checks = true;
@@ -90,10 +147,14 @@ Positions PositionImages(int num_images, int num_points, const std::vector<Sight
     problem.SetParameterLowerBound(factor_of(s), 0, kLeastFactor);
     ordering->AddElementToGroup(factor_of(s), 0);
   }
-  for (int i = 1; i < num_images && is_drive; ++i) {
-    if (!problem.HasParameterBlock(center_of(i - 1)) || !problem.HasParameterBlock(center_of(i))) continue;
-    problem.AddResidualBlock(new StepCost(1, options.step_weight), &step_loss, center_of(i - 1),
-                             center_of(i));
+  for (const Step& step : steps) {
+    double *from = center_of(step.from), *to = center_of(step.to);
+    if (step.way && typical_way > 0) {
+      problem.AddResidualBlock(new WayCost(*step.way, options.way_weight / typical_way), &loss, from, to);
+    } else if (problem.HasParameterBlock(from) && problem.HasParameterBlock(to)) {
+      problem.AddResidualBlock(new StepCost(typical_way > 0 ? typical_way : 1, options.step_weight), &step_loss,
+                               from, to);
+    }
   }
   for (int k = 0; k < num_points; ++k) {
     if (problem.HasParameterBlock(point_of(k))) ordering->AddElementToGroup(point_of(k), 1);

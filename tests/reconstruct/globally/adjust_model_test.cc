@@ -154,5 +154,46 @@ TEST(AdjustModel, AStepHoldsAnImageWithoutPoints) {
             3 * step);
 }
 
+std::vector<ImageMotion> MotionsOf(const std::vector<Pose>& poses) {
+  std::vector<ImageMotion> motions;
+  for (int i = 1; i < static_cast<int>(poses.size()); ++i)
+    motions.push_back({i - 1, i, poses[i] * poses[i - 1].Inverse()});
+  return motions;
+}
+
+TEST(AdjustModel, MotionsGiveTheScale) {
+  Scene scene = MakeScene(0.2);
+  scene.problem.motions = MotionsOf(scene.truth);
+  for (Pose& pose : scene.problem.cam_from_world) pose.translation *= 0.8;
+  for (Eigen::Vector3d& point : scene.problem.points) point *= 0.8;
+  AdjustModel({.adjust_cameras = false}, &scene.problem);
+  const std::vector<Pose>& found = scene.problem.cam_from_world;
+  EXPECT_NEAR(CenterErrorM(found[0], found[9]) / CenterErrorM(scene.truth[0], scene.truth[9]), 1, 0.02);
+}
+
+// No point joins the first five images with the last five.
+TEST(AdjustModel, MotionsPlaceWhatNoPointDoes) {
+  Scene scene = MakeScene(0.2);
+  std::erase_if(scene.problem.observations, [](const ModelObservation& observation) {
+    return (observation.image < 5) != (observation.point < 60);
+  });
+  scene.problem.motions = MotionsOf(scene.truth);
+  const Pose bend{Eigen::Quaterniond(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitZ())), {0.1, 0, 0.1}};
+  for (int i = 5; i < 10; ++i) scene.problem.cam_from_world[i] = scene.truth[i] * bend;
+  for (int k = 60; k < 120; ++k) scene.problem.points[k] = bend.Inverse() * scene.problem.points[k];
+  EXPECT_GT(LargestTurnDeg(scene), 2.5);
+  AdjustModel({.adjust_cameras = false}, &scene.problem);
+  EXPECT_LT(LargestTurnDeg(scene), 0.3);
+}
+
+TEST(AdjustModel, AMotionThatPointsContradictHasLittleSay) {
+  Scene scene = MakeScene(0.2);
+  scene.problem.motions = MotionsOf(scene.truth);
+  scene.problem.motions[4].cam2_from_cam1.translation += Eigen::Vector3d(2, 0, 0);
+  AdjustModel({.adjust_cameras = false}, &scene.problem);
+  EXPECT_LT(LargestTurnDeg(scene), 0.2);
+  EXPECT_LT(CenterErrorM(scene.problem.cam_from_world[9], scene.truth[9]), 0.05);
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct

@@ -25,12 +25,12 @@ std::vector<ViewPair> MakeDrive(int num_images, double strength) {
 
 TEST(IsDrive, WhereMostImagesShowWhatTheNextOneShows) {
   std::vector<ViewPair> pairs = MakeDrive(11, 0.4);
-  EXPECT_TRUE(IsDrive(11, pairs));
+  EXPECT_TRUE(IsDrive(11, pairs, {}));
   pairs[3].strength = pairs[7].strength = 0.39;
-  EXPECT_TRUE(IsDrive(11, pairs));  // 8 of 10
+  EXPECT_TRUE(IsDrive(11, pairs, {}));  // 8 of 10
   pairs[5].strength = 0.1;
-  EXPECT_FALSE(IsDrive(11, pairs));
-  EXPECT_FALSE(IsDrive(5, {Pair(0, 2, 1), Pair(1, 3, 1), Pair(2, 4, 1)}));
+  EXPECT_FALSE(IsDrive(11, pairs, {}));
+  EXPECT_FALSE(IsDrive(5, {Pair(0, 2, 1), Pair(1, 3, 1), Pair(2, 4, 1)}, {}));
 }
 
 TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
@@ -51,7 +51,7 @@ TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
 
 TEST(Backbone, WithoutAnOrderItIsTheStrongPairs) {
   const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.25), Pair(0, 2, 0.24), Pair(2, 3, 0.7)};
-  EXPECT_THAT(Backbone(4, pairs, false), ElementsAre(0, 1, 3));
+  EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 3));
 }
 
 TEST(Backbone, PartsAreJoinedByTheStrongestOfTheWeakPairs) {
@@ -59,9 +59,9 @@ TEST(Backbone, PartsAreJoinedByTheStrongestOfTheWeakPairs) {
   // not.
   const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9),   Pair(2, 3, 0.9),  Pair(0, 2, 0.155),
                                        Pair(1, 3, 0.145), Pair(1, 2, 0.05), Pair(0, 3, 0.12)};
-  EXPECT_THAT(Backbone(4, pairs, false), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 2, 3));
   // As weak as it need be.
-  EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.012)}, false), ElementsAre(0, 1));
+  EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.012)}, {}, false), ElementsAre(0, 1));
 }
 
 TEST(Backbone, OfADriveItIsWhatIsNearInItsOrder) {
@@ -69,13 +69,31 @@ TEST(Backbone, OfADriveItIsWhatIsNearInItsOrder) {
   pairs.push_back(Pair(3, 13, 0.25));  // 29: near enough
   pairs.push_back(Pair(3, 14, 0.9));   // 30: a loop, however strong
   pairs.push_back(Pair(5, 7, 0.24));   // 31: too weak
-  const std::vector<int> backbone = Backbone(30, pairs, true);
+  const std::vector<int> backbone = Backbone(30, pairs, {}, true);
   EXPECT_EQ(backbone.size(), 30u);
   EXPECT_EQ(backbone.back(), 29);
   // Where the order breaks, what joins is taken.
   pairs.erase(pairs.begin() + 10);  // 10 - 11; now (3, 13) is 28 and (3, 14) is 29
   pairs[28].strength = 0.1;
-  EXPECT_EQ(Backbone(30, pairs, true).back(), 29);
+  EXPECT_EQ(Backbone(30, pairs, {}, true).back(), 29);
+}
+
+TEST(IsDrive, WhereOdometrySaysHowTheNextImageWasReached) {
+  std::vector<ViewPair> pairs = MakeDrive(11, 0.4);
+  pairs.resize(5);
+  std::vector<ImageMotion> motions;
+  for (int i = 6; i < 9; ++i) motions.push_back({i + 1, i, {}});
+  EXPECT_TRUE(IsDrive(11, pairs, motions));  // 8 of 10
+  motions[2] = {6, 8, {}};
+  EXPECT_FALSE(IsDrive(11, pairs, motions));
+  motions[2] = {2, 3, {}};  // one that a pair joins, too
+  EXPECT_FALSE(IsDrive(11, pairs, motions));
+}
+
+TEST(Backbone, WhatMotionsJoinNeedsNoWeakPair) {
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(2, 3, 0.9), Pair(0, 3, 0.1)};
+  EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 2));
+  EXPECT_THAT(Backbone(4, pairs, {{1, 2, {}}}, false), ElementsAre(0, 1));
 }
 
 }  // namespace

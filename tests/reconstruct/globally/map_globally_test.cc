@@ -26,9 +26,10 @@ double LargestErrorM(const ColmapModel& model, const SyntheticSurvey& survey) {
 }
 
 Result<std::vector<ColmapModel>> Map(const SyntheticSurvey& survey, int num_threads = 2,
-                                     const MapGloballyOptions& options = {}) {
+                                     const MapGloballyOptions& options = {},
+                                     const std::vector<ImageMotion>& motions = {}) {
   NoProgress progress;
-  const auto map = MapGlobally(survey.input, options, num_threads, progress);
+  const auto map = MapGlobally(survey.input, motions, options, num_threads, progress);
   if (!map.ok()) return map.error();
   return map->models;
 }
@@ -55,10 +56,10 @@ TEST(MapGlobally, FindsAllPosesAndTheFocalLength) {
 TEST(MapGlobally, SaysWhetherItIsADrive) {
   SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
   NoProgress progress;
-  EXPECT_TRUE(MapGlobally(survey.input, {}, 1, progress)->is_drive);
+  EXPECT_TRUE(MapGlobally(survey.input, {}, {}, 1, progress)->is_drive);
   // The same images under names in another order.
   for (size_t i = 0; i < 20; ++i) survey.input.images[i].name = fmt::format("image{:02}.jpg", 9 * i % 20);
-  const auto shuffled = MapGlobally(survey.input, {}, 1, progress);
+  const auto shuffled = MapGlobally(survey.input, {}, {}, 1, progress);
   EXPECT_FALSE(shuffled->is_drive);
   EXPECT_EQ(shuffled->models.front().images.size(), 20u);
 }
@@ -84,6 +85,45 @@ TEST(MapGlobally, PartsThatNothingJoinsAreModelsOfTheirOwn) {
   EXPECT_EQ(models->at(0).images.size(), 12u);
   EXPECT_EQ(models->at(1).images.size(), 8u);
   EXPECT_EQ(models->at(0).images[0].name, "b00.jpg");
+}
+
+std::vector<ImageMotion> TrueMotions(const SyntheticSurvey& survey) {
+  std::vector<ImageMotion> motions;
+  for (int i = 1; i < static_cast<int>(survey.cams_from_world.size()); ++i)
+    motions.push_back({i - 1, i, survey.cams_from_world[i] * survey.cams_from_world[i - 1].Inverse()});
+  return motions;
+}
+
+double WayOf(const ColmapModel& model, size_t from, size_t to) {
+  return CenterErrorM(model.images[from].cam_from_world, model.images[to].cam_from_world);
+}
+
+TEST(MapGlobally, MotionsJoinWhatNothingElseDoesAndGiveTheScale) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(8, 1, "a");
+  AppendSurvey(MakeSyntheticSurvey(12, 2, "b", 100), &survey);
+  std::vector<ImageMotion> motions = TrueMotions(survey);
+  for (ImageMotion& motion : motions) motion.cam2_from_cam1.translation *= 1.5;  // wheels that are too small
+  const auto models = Map(survey, 2, {}, motions);
+  ASSERT_TRUE(models.ok());
+  ASSERT_EQ(models->size(), 1u);
+  const ColmapModel& model = models->front();
+  EXPECT_EQ(model.images.size(), 20u);
+  EXPECT_LT(LargestErrorM(model, survey), 0.25);  // 13 m are from the one to the other
+  EXPECT_NEAR(WayOf(model, 0, 7) / CenterErrorM(survey.cams_from_world[0], survey.cams_from_world[7]), 1.5,
+              0.03);
+}
+
+TEST(MapGlobally, MotionsOfAnotherFrameHaveNoSay) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(15, 1);
+  std::vector<ImageMotion> motions = TrueMotions(survey);
+  for (ImageMotion& motion : motions)
+    motion.cam2_from_cam1 = {Eigen::Quaterniond::Identity(), {0, 0, -motion.Way().norm()}};
+  NoProgress progress;
+  const auto map = MapGlobally(survey.input, motions, {}, 2, progress);
+  ASSERT_TRUE(map.ok());
+  EXPECT_NE(map->why_no_odometry, "");
+  EXPECT_LT(LargestErrorM(map->models.front(), survey), 0.03);
+  EXPECT_EQ(MapGlobally(survey.input, TrueMotions(survey), {}, 2, progress)->why_no_odometry, "");
 }
 
 TEST(MapGlobally, SameModelForAnyNumberOfThreads) {

@@ -34,6 +34,12 @@ Scene MakeCorridor(int num_images, double noise_rad) {
   return scene;
 }
 
+std::vector<Step> StepsOf(int num_images) {
+  std::vector<Step> steps;
+  for (int i = 1; i < num_images; ++i) steps.push_back({i - 1, i, std::nullopt});
+  return steps;
+}
+
 // Root mean square error after the best similarity, as a part of the line's length.
 double ErrorOf(const Positions& found, const Scene& scene) {
   Eigen::Matrix3Xd from(3, scene.centers.size()), to(3, scene.centers.size());
@@ -57,11 +63,11 @@ double ErrorOf(const Positions& found, const Scene& scene) {
 
 TEST(PositionImages, FindsCamerasOnALineFromNowhere) {
   const Scene scene = MakeCorridor(25, 0);
-  const auto positions = PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, false, {});
+  const auto positions = PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, {}, {});
   EXPECT_LT(ErrorOf(positions, scene), 0.01);
   const Scene noisy = MakeCorridor(25, 0.001);
   EXPECT_LT(
-      ErrorOf(PositionImages(25, static_cast<int>(noisy.points.size()), noisy.sights, false, {}), noisy),
+      ErrorOf(PositionImages(25, static_cast<int>(noisy.points.size()), noisy.sights, {}, {}), noisy),
       0.03);
 }
 
@@ -72,7 +78,7 @@ TEST(PositionImages, WrongSightsHaveLittleSay) {
     scene.sights[s].direction =
         Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1)).normalized();
   EXPECT_LT(
-      ErrorOf(PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, false, {}), scene),
+      ErrorOf(PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, {}, {}), scene),
       0.04);
 }
 
@@ -82,17 +88,52 @@ TEST(PositionImages, StepsTieThePartsOfADrive) {
   std::erase_if(scene.sights,
                 [&](const Sight& sight) { return (sight.image < 12) != (sight.point % 4 < 2); });
   const auto ratio = [&](bool is_drive) {
-    const auto found = PositionImages(24, static_cast<int>(scene.points.size()), scene.sights, is_drive, {});
+    const auto found = PositionImages(24, static_cast<int>(scene.points.size()), scene.sights,
+                                      is_drive ? StepsOf(24) : std::vector<Step>(), {});
     return (found.centers[11] - found.centers[2]).norm() / (found.centers[23] - found.centers[14]).norm();
   };
   EXPECT_NEAR(ratio(true), 1, 0.05);
   EXPECT_GT(std::abs(std::log(ratio(false))), 0.1);
 }
 
+// The same, but the second half goes twice as far as the first, which only measured ways tell; they also give
+// the scale.
+TEST(PositionImages, MeasuredWaysTieThePartsAndGiveTheScale) {
+  Scene scene = MakeCorridor(24, 0);
+  for (int i = 12; i < 24; ++i) scene.centers[i] += Eigen::Vector3d(0.5 * (i - 11), 0, 0);
+  scene.sights.clear();
+  for (int i = 0; i < 24; ++i) {
+    for (size_t k = 0; k < scene.points.size(); ++k) {
+      const Eigen::Vector3d way = scene.points[k] + Eigen::Vector3d(k % 4 < 2 ? 0 : 6, 0, 0) - scene.centers[i];
+      if (way.norm() < 6 && way.x() > 0.5 && (i < 12) == (k % 4 < 2))
+        scene.sights.push_back({i, static_cast<int>(k), way.normalized()});
+    }
+  }
+  std::vector<Step> steps = StepsOf(24);
+  Random random(3);
+  for (Step& step : steps)
+    step.way = (1 + random.Normal(0, 0.02)) * (scene.centers[step.to] - scene.centers[step.from]);
+  // One that is not measured, and one over two images instead.
+  steps[4].way.reset();
+  steps.insert(steps.begin() + 4, {3, 5, scene.centers[5] - scene.centers[3]});
+  const auto found = PositionImages(24, static_cast<int>(scene.points.size()), scene.sights, steps, {});
+  for (const int i : {3, 5, 11, 12, 23})
+    EXPECT_LT((found.centers[i] - found.centers[0] - scene.centers[i] + scene.centers[0]).norm(), 0.15) << i;
+}
+
+TEST(PositionImages, AWrongWayHasLittleSay) {
+  const Scene scene = MakeCorridor(25, 0);
+  std::vector<Step> steps = StepsOf(25);
+  for (Step& step : steps) step.way = scene.centers[step.to] - scene.centers[step.from];
+  *steps[12].way += Eigen::Vector3d(0, 3, 0);
+  const auto found = PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, steps, {});
+  EXPECT_LT((found.centers[24] - found.centers[0] - Eigen::Vector3d(12, 0, 0)).norm(), 0.3);
+}
+
 TEST(PositionImages, SameSeedSameBytes) {
   const Scene scene = MakeCorridor(10, 0.001);
-  const auto first = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, true, {});
-  const auto second = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, true, {});
+  const auto first = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
+  const auto second = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
   for (int i = 0; i < 10; ++i) EXPECT_EQ(first.centers[i], second.centers[i]);
 }
 
