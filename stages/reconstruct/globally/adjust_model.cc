@@ -1,5 +1,6 @@
 #include "stages/reconstruct/globally/adjust_model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -105,6 +106,14 @@ double MedianStep(const ModelProblem& problem) {
   return lengths.empty() ? 0 : UpperMedian(lengths);
 }
 
+// The image with most observations, which holds the frame.  One with few, at the end of a drive, would be
+// held off what all others say of it.
+size_t MostSeeing(const ModelProblem& problem) {
+  std::vector<int> count(problem.cam_from_world.size(), 0);
+  for (const ModelObservation& observation : problem.observations) ++count[observation.image];
+  return std::max_element(count.begin(), count.end()) - count.begin();
+}
+
 struct Seen {
   PixelRay ray;
   CameraSensitivity sensitivity;
@@ -180,13 +189,12 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   for (Eigen::Vector3d& point : problem->points) {
     if (ceres_problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
   }
-  bool is_frame_held = false;
+  if (double* held = pose_of(MostSeeing(*problem)); ceres_problem.HasParameterBlock(held))
+    ceres_problem.SetParameterBlockConstant(held);
   for (size_t i = 0; i < problem->cam_from_world.size(); ++i) {
     if (!ceres_problem.HasParameterBlock(pose_of(i))) continue;
     ceres_problem.SetManifold(pose_of(i), &manifold);
     ordering->AddElementToGroup(pose_of(i), 1);
-    if (!is_frame_held) ceres_problem.SetParameterBlockConstant(pose_of(i));
-    is_frame_held = true;
   }
   for (size_t c = 0; c < problem->cameras.size(); ++c) {
     if (!is_camera_used[c]) continue;

@@ -195,5 +195,28 @@ TEST(AdjustModel, AMotionThatPointsContradictHasLittleSay) {
   EXPECT_LT(CenterErrorM(scene.problem.cam_from_world[9], scene.truth[9]), 0.05);
 }
 
+// The first image sees a twelfth of what others do, and begins half a metre off: it moves, not they.
+TEST(AdjustModel, AnImageThatSeesLittleDoesNotHoldTheFrame) {
+  Scene scene = MakeScene(0.2);
+  std::erase_if(scene.problem.observations, [](const ModelObservation& observation) {
+    return observation.image == 0 && observation.point % 12 != 0;
+  });
+  scene.problem.cam_from_world[0].translation.z() += 0.5;
+  AdjustModel({.adjust_cameras = false}, &scene.problem);
+  const std::vector<Pose>& found = scene.problem.cam_from_world;
+  const double scale =
+      CenterErrorM(found[1], found[9]) / CenterErrorM(scene.truth[1], scene.truth[9]);
+  EXPECT_NEAR(CenterErrorM(found[0], found[5]) / scale, CenterErrorM(scene.truth[0], scene.truth[5]), 0.02);
+}
+
+TEST(AdjustModel, NothingSeenMovesNothing) {
+  Scene scene = MakeScene(0.2);
+  scene.problem.observations.clear();
+  scene.problem.points.clear();
+  AdjustModel({}, &scene.problem);
+  for (size_t i = 0; i < scene.truth.size(); ++i)
+    EXPECT_EQ(scene.problem.cam_from_world[i].translation, scene.truth[i].translation);
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct
