@@ -8,32 +8,16 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
-#include <filesystem>
 #include <thread>
 #include <utility>
 
 #include "core/line/child_environment.h"
+#include "core/line/program_files.h"
 
 namespace cairn::pipeline {
 
-namespace fs = std::filesystem;
-
-Result<std::string> ProgramPath() {
-  std::error_code error;
-  const fs::path path = fs::read_symlink("/proc/self/exe", error);
-  if (error) return MakeError(ErrorCode::kFailed, "/proc/self/exe: cannot be read: {}", error.message());
-  return path.string();
-}
-
 Result<std::string> RulesPath(const std::string& program) {
-  const fs::path folder = fs::path(program).parent_path();
-  for (const char* place : {"share/cairn/map.mk", "../share/cairn/map.mk"}) {
-    const fs::path path = (folder / place).lexically_normal();
-    if (fs::exists(path)) return path.string();
-  }
-  return MakeError(ErrorCode::kNotFound,
-                   "{}: share/cairn/map.mk is neither beside it nor one folder up; install the program again",
-                   program);
+  return InstalledPath(program, "share/cairn/map.mk");
 }
 
 Result<std::vector<std::string>> MakeWords(const std::string& rules, const std::string& build_dir,

@@ -10,11 +10,7 @@
 
 namespace cairn::pipeline {
 
-// This program's own file, for rules that run it.  Errors: Failed.
-Result<std::string> ProgramPath();
-
-// map.mk beside the program: share/cairn/ in a build folder, ../share/cairn/ where it is installed.
-// Errors: NotFound.
+// map.mk of the program's installation (core/line/program_files.h).  Errors: NotFound.
 Result<std::string> RulesPath(const std::string& program);
 
 // A command line of make that makes `goal` by these rules in this build folder.  `progress_style`: of the

@@ -369,8 +369,7 @@ TEST(Memory, StagesFinishWithinAnHonestLimitAndRefuseAnImpossibleOne) {
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_THAT(refused.err, ContainsRegex("takes about [0-9]+ MiB of memory, but --memory allows 60"));
     // With less than the given limit, any failed allocation gives an error that names --memory, and no crash.
-    // Below 44 MiB, what the libraries take, FFmpeg's among them, the system's loader refuses the program.
-    for (const int limit_mib : {46, 52, 64}) {
+    for (const int limit_mib : {32, 48, 64}) {
       const ProgramRun cut_short =
           RunShell(fmt::format("ulimit -d $(({} * 1024)); {} --memory 4000", limit_mib, command));
       if (cut_short.exit_code != 0) {

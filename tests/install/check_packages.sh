@@ -64,6 +64,32 @@ inside cairn --version
 inside cairn localize /packages/poster.cairn /packages/poster.pgm --log-level off | grep -q '"fix":true'
 inside test -e /usr/share/man/man1/cairn-localize.1.gz -o -e /usr/share/man/man1/cairn-localize.1
 
+# Films need FFmpeg, which is recommended: without it the program says what to install, and that is enough.
+if inside dpkg-query -W -f '${Package}\n' | grep -E '^lib(av(format|codec|util)|swscale)'; then
+  echo "FFmpeg's libraries came although nobody asked for films" >&2
+  exit 1
+fi
+for library in libavformat libavcodec libavutil libswscale; do
+  dpkg-deb -f "$folder"/cairn_*.deb Recommends | grep -q "$library" || { echo "cairn does not recommend $library" >&2; exit 1; }
+done
+# A program finds its own files by /proc, which is there for it alone.
+inside_with_proc() { unshare --mount sh -c 'mount -t proc proc "$0/proc" && exec chroot "$0" "$@"' "$system" "$@"; }
+import() { inside_with_proc cairn import /packages/walk.mp4 -o /packages/walk --keyframes all --progress none; }
+if inside_with_proc true 2> /dev/null; then
+  ffmpeg -v error -f lavfi -i testsrc=size=320x240:rate=10:duration=1 -c:v mpeg4 "$system/packages/walk.mp4"
+  if import 2> "$folder/films"; then
+    echo "a film was read without FFmpeg's libraries" >&2
+    exit 1
+  fi
+  cat "$folder/films"
+  said=$(sed -n 's/.*install them (Debian: apt install \(.*\))$/\1/p' "$folder/films")
+  inside apt-get install -y -q --no-install-recommends $said > "$folder/install.log" 2>&1 ||
+    { tail -20 "$folder/install.log" >&2; exit 1; }
+  import
+else
+  echo "films were not tried: /proc cannot be mounted here"
+fi
+
 inside apt-get purge -y -q cairn libcairn-runtime0 libcairn-runtime-dev python3-cairn > "$folder/purge.log" 2>&1 ||
   { tail -20 "$folder/purge.log" >&2; exit 1; }
 inside find / -xdev -path /packages -prune -o -path /proc -prune -o -path '*cairn*' -print > "$folder/after"
