@@ -91,18 +91,6 @@ bool HasImageSuffix(const std::string& path) {
   return kSuffixes.count(suffix) > 0;
 }
 
-bool HoldsImages(const std::string& folder) {
-  std::error_code error;
-  std::filesystem::recursive_directory_iterator it(
-      folder, std::filesystem::directory_options::skip_permission_denied, error),
-      end;
-  for (; !error && it != end; it.increment(error)) {
-    std::error_code type_error;
-    if (it->is_regular_file(type_error) && HasImageSuffix(it->path().string())) return true;
-  }
-  return false;
-}
-
 Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path) {
   if (const std::string defect = FindDefect(bytes); !defect.empty()) {
     return MakeError(ErrorCode::kCorrupt, "{}: {}", path, defect);

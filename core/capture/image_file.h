@@ -12,9 +12,6 @@ namespace cairn {
 // Whether a file's name ends as those of images do (.jpg, .PNG, ...).
 bool HasImageSuffix(const std::string& path);
 
-// Whether a folder, or a folder in it, has a file of such a name.
-bool HoldsImages(const std::string& folder);
-
 // Decodes an image file's bytes to 8-bit grey, CV_8UC1.  EXIF rotation is not applied, whatever its value;
 // 16-bit images lose their low byte; colour and CMYK become grey; alpha is ignored; of an animated PNG the
 // first frame is read.  `path` is for messages only.  Errors: Corrupt, naming the file and what was found:

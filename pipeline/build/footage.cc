@@ -16,6 +16,8 @@
 namespace cairn::pipeline {
 namespace {
 
+namespace fs = std::filesystem;
+
 Status CheckTopic(const std::string& text) {
   const bool is_name =
       !text.empty() && text.front() != '-' && std::all_of(text.begin(), text.end(), [](unsigned char c) {
@@ -63,6 +65,17 @@ Result<std::string> CheckedText(const std::string& name, const std::string& text
   return text;
 }
 
+// Whether a folder is laid out as a capture.  Images deeper in it may be those of a build folder, of a bag
+// that was compiled where it is.
+bool HasImages(const std::string& folder) {
+  std::error_code error;
+  if (fs::is_directory(folder + "/images", error)) return true;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (HasImageSuffix(entry.path().string())) return true;
+  }
+  return false;
+}
+
 const char* KindText(CaptureKind kind) {
   return kind == CaptureKind::kBag ? "a bag" : kind == CaptureKind::kFilm ? "a film" : "a folder of images";
 }
@@ -71,10 +84,10 @@ const char* KindText(CaptureKind kind) {
 
 CaptureKind KindOfCapture(const std::string& path) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    return IsBag(path) && !HoldsImages(path) ? CaptureKind::kBag : CaptureKind::kFolder;
+  if (fs::is_directory(path, error))
+    return IsBag(path) && !HasImages(path) ? CaptureKind::kBag : CaptureKind::kFolder;
   if (IsBag(path)) return CaptureKind::kBag;
-  return std::filesystem::is_regular_file(path, error) ? CaptureKind::kFilm : CaptureKind::kFolder;
+  return fs::is_regular_file(path, error) ? CaptureKind::kFilm : CaptureKind::kFolder;
 }
 
 const std::vector<FootageKey>& FootageKeys() {

@@ -12,7 +12,7 @@ namespace cairn::pipeline {
 enum class CaptureKind {
   kFolder,  // of images
   kFilm,
-  kBag,  // of ROS: a file, or a folder of such files without images
+  kBag,  // of ROS: a file, or a folder of such files, without images beside them
 };
 
 // A file that is no bag is a film, or the import says what it is instead.

@@ -19,6 +19,16 @@ namespace fs = std::filesystem;
 constexpr const char* kWhatIsCompiled =
     "compile takes a recipe (docs/recipe.md), a film, a ROS bag or the folder of a capture";
 
+bool HoldsImages(const std::string& folder) {
+  std::error_code error;
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+  for (; !error && it != end; it.increment(error)) {
+    std::error_code type_error;
+    if (it->is_regular_file(type_error) && HasImageSuffix(it->path().string())) return true;
+  }
+  return false;
+}
+
 Status CheckIsCapture(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder + "/config.mk", error) && fs::is_directory(folder + "/options", error)) {

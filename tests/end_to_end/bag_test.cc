@@ -190,6 +190,23 @@ TEST_F(Bag, OfSeveralCamerasSaysWhichLineToWrite) {
   EXPECT_THAT(Compile("two.toml").err, HasSubstr("no topic /middle/image_raw/compressed; there are\n"));
 }
 
+// Images, and so features and matches, stay the same.
+TEST_F(Bag, OdometryThatIsEditedInTheCaptureFindsPosesAgain) {
+  WriteRos1("east.bag", Messages(0, 100, pipeline::MessageForm::kRos1));
+  ASSERT_EQ(RunShell("cairn import " + Path("east.bag") + " -o " + Path("east")).exit_code, 0);
+  ASSERT_EQ(Compile("east --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("east.build"), "metre");
+  const std::string odometry = *ReadFile(Path("east/odometry.txt"));
+  Write("east/odometry.txt", odometry + "# edited\n");
+  EXPECT_THAT(Compile("east --until reconstruct").err, HasSubstr("poses: odometry.txt changed"));
+  fs::remove(Path("east/odometry.txt"));
+  EXPECT_EQ(Compile("east --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("east.build"), "arbitrary");
+  Write("east/odometry.txt", odometry);
+  EXPECT_EQ(Compile("east --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("east.build"), "metre");
+}
+
 TEST_F(Bag, IsJoinedWithFilmsAndFolders) {
   WriteRos1("west.bag", Messages(0, 30, pipeline::MessageForm::kRos1));
   const ProgramRun encoded =

@@ -140,7 +140,8 @@ const TopicContents* RawTwin(const BagContents& contents, const TopicContents& c
   name.resize(name.size() - kSuffix.size());
   const auto raw = contents.topics.find(name);
   const bool is_twin = raw != contents.topics.end() && raw->second.topic.type == kImageType &&
-                       HasPictures(raw->second) && raw->second.num_messages == compressed.num_messages;
+                       raw->second.header && HasPictures(raw->second) &&
+                       raw->second.num_messages == compressed.num_messages;
   return is_twin ? &raw->second : nullptr;
 }
 

@@ -104,11 +104,18 @@ TEST_F(RecipeTest, ABagSaysHowItIsImported) {
   EXPECT_THAT(FootageWords(folder.kind, folder.footage),
               ElementsAre("--format", "bag", "--keyframes", "auto", "--camera-on-robot", "-1,2,3,0,0,0,1",
                           "--max-time-gap-s", "0"));
-  // With images in it, it is a folder of images, and keys of bags are not for it.
+  // Compiled where it is, it holds the images of its build folder.
+  fs::create_directories(folder_ / "run/run.build/bag-run/images");
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "run/run.build/bag-run/images/a.jpg").string(), "").ok());
+  EXPECT_EQ(Read("name = \"a\"\n[[capture]]\npath = \"run\"\n")->captures[0].kind, CaptureKind::kBag);
+  // With images beside them, it is a folder of images, and keys of bags are not for it.
   ASSERT_TRUE(WriteFileAtomically((folder_ / "run/a.jpg").string(), "").ok());
   const std::string head = "name = \"a\"\n[[capture]]\npath = \"run\"\n";
   EXPECT_EQ(Read(head)->captures[0].kind, CaptureKind::kFolder);
   EXPECT_THAT(Message(head + "topic = \"/a\"\n"), HasSubstr("topic is for bags, and "));
+  fs::remove(folder_ / "run/a.jpg");
+  fs::create_directories(folder_ / "run/images");
+  EXPECT_EQ(Read(head)->captures[0].kind, CaptureKind::kFolder);
 }
 
 TEST_F(RecipeTest, KeysOfBagsAreForBagsAndSayWhatIsWrongWithThem) {

@@ -342,7 +342,10 @@ TEST_F(ImportedBag, ImagesThatWereCompressedTooAreTakenAsTheyWere) {
   ASSERT_TRUE(report.ok()) << report.error().message;
   EXPECT_EQ(report->topic, twin);
   EXPECT_THAT(warnings_, testing::Not(testing::Contains(HasSubstr("as many"))));
-  // Not where some were lost, and not of another camera.
+  // Not where the former cannot be read, ...
+  EXPECT_THAT(ErrorOf({{"/camera/image_raw", kImage, 1, "?"}, compressed(1, twin)}),
+              HasSubstr("several topics"));
+  // ... some were lost, or it is another camera.
   EXPECT_THAT(ErrorOf({GreyMessage(1), compressed(1, twin), compressed(2, twin)}),
               HasSubstr("several topics"));
   EXPECT_THAT(ErrorOf({GreyMessage(1), compressed(1, "/back/image_raw/compressed")}),
