@@ -126,6 +126,19 @@ TEST_F(Bag, ThatIsAFolderCompilesToAMapInMetresAndIsImportedAgainWhereItChanged)
   fs::last_write_time(Path("run/run_1.mcap"), fs::file_time_type::clock::now());
   const ProgramRun touched = Compile("run.toml");
   EXPECT_THAT(touched.err, AllOf(HasSubstr("run_1.mcap changed"), Not(HasSubstr("poses: "))));
+  // Wheels that measured twice as much in front of the same images.
+  std::vector<Recorded> twice = Messages(75, 150);
+  for (Recorded& message : twice) {
+    if (message.topic != "/odom") continue;
+    Pose pose =
+        truth_.images[static_cast<size_t>(4 * message.time_ns / kSecond) - 4].cam_from_world->Inverse() *
+        kBaseFromCamera.Inverse();
+    pose.translation *= 2;
+    message.bytes = pipeline::OdometryBytes(message.time_ns, pose);
+  }
+  Write("run/run_1.mcap", pipeline::McapBytes(twice));
+  EXPECT_THAT(Compile("run --until reconstruct").err, HasSubstr("poses: odometry.txt changed"));
+  Write("run/run_1.mcap", pipeline::McapBytes(Messages(75, 150)));
   // Odometry is what gives metres, although the images stay the same.
   ReplaceInFile(Path("run.toml"), "path = \"run\"", "path = \"run\"\nodometry = \"none\"");
   EXPECT_EQ(Compile("run.toml --until reconstruct").exit_code, 0);
