@@ -24,7 +24,7 @@ std::string WithoutTemporaryMark(const std::string& name) {
 
 bool IsBuildFileName(const std::string& name) {
   static const std::regex kStageFile = [] {
-    std::string stems = "images|film-[-A-Za-z0-9_.]+";
+    std::string stems = "images|(film|bag)-[-A-Za-z0-9_.]+";
     for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
     return std::regex(
         "(" + stems +
@@ -36,10 +36,11 @@ bool IsBuildFileName(const std::string& name) {
 }
 
 bool IsOptionsFileName(const std::string& name) {
-  static const std::set<std::string> kOthers = {"seed",    "name",    "capture",   "films",
+  static const std::regex kFootage("(film|bag)-[-A-Za-z0-9_.]+");
+  static const std::set<std::string> kOthers = {"seed",    "name",    "capture",   "odometry",
                                                 "queries", "program", "floor_plan"};
   const std::string stem = WithoutTemporaryMark(name);
-  return kOthers.contains(stem) ||
+  return kOthers.contains(stem) || std::regex_match(stem, kFootage) ||
          std::any_of(std::begin(kLine), std::end(kLine),
                      [&](const LineStage& stage) { return stem == std::string(stage.name) + ".toml"; });
 }

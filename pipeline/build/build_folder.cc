@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "core/capture/bag_file.h"
+#include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "pipeline/build/make_words.h"
 
@@ -91,7 +93,7 @@ Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
 
 // The folder that a capture is in, or will be.
 std::string FolderOf(const RecipeCapture& capture, const std::string& build_dir) {
-  return capture.IsFile() ? build_dir + "/" + FilmFolderName(capture) : Absolute(capture.path);
+  return capture.IsFootage() ? build_dir + "/" + FootageFolderName(capture) : Absolute(capture.path);
 }
 
 // The folder that the stages read.
@@ -100,25 +102,52 @@ std::string CaptureFolder(const Recipe& recipe, const std::string& build_dir) {
   return FolderOf(recipe.captures.front(), build_dir);
 }
 
-// The captures that are files: NAME=FILE, NAME=KEYFRAMES, and NAME=CAMERA where the recipe gives one.
-struct FilmWords {
-  std::vector<std::pair<std::string, std::string>> files, keyframes, cameras;
+using WordPairs = std::vector<std::pair<std::string, std::string>>;
+
+// The films and bags, by FootageFolderName: where they are, the files in which they are, and the words of
+// options with which they are imported.
+struct FootagePairs {
+  WordPairs sources, files, options;
 };
 
-FilmWords Films(const Recipe& recipe) {
-  FilmWords words;
+FootagePairs Footage(const Recipe& recipe) {
+  FootagePairs pairs;
   for (const RecipeCapture& capture : recipe.captures) {
-    if (!capture.IsFile()) continue;
-    words.files.emplace_back(capture.name, Absolute(capture.path));
-    words.keyframes.emplace_back(capture.name, capture.keyframes);
-    if (!capture.camera.empty()) words.cameras.emplace_back(capture.name, capture.camera);
+    if (!capture.IsFootage()) continue;
+    const std::string name = FootageFolderName(capture), source = Absolute(capture.path);
+    pairs.sources.emplace_back(name, source);
+    for (const std::string& file : FilesOfBag(source)) pairs.files.emplace_back(name, file);
+    for (const std::string& word : FootageWords(capture.kind, capture.footage))
+      pairs.options.emplace_back(name, word);
   }
-  return words;
+  return pairs;
+}
+
+// Those of `pairs` that are for this name, a line each.
+std::string LinesOf(const std::string& name, const WordPairs& pairs) {
+  std::string lines;
+  for (const auto& [first, second] : pairs) lines += first == name ? second + "\n" : "";
+  return lines;
+}
+
+// Whose odometry gives poses their scale, and what of it: a line for each capture that may have some.
+std::string OdometryLines(const Recipe& recipe) {
+  std::string lines;
+  for (const RecipeCapture& capture : recipe.captures) {
+    const FootageOptions& options = capture.footage;
+    if (capture.kind == CaptureKind::kBag) {
+      lines += fmt::format("{}: {} {} {}\n", capture.name, options.odometry, options.camera_on_robot,
+                           options.max_time_gap_s);
+    } else if (fs::exists(capture.path + "/" + kOdometryFile)) {
+      lines += capture.name + "\n";
+    }
+  }
+  return lines;
 }
 
 // What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
 struct SessionWords {
-  std::vector<std::pair<std::string, std::string>> folders, queries;
+  WordPairs folders, queries;
 };
 
 SessionWords JoinedSessions(const Recipe& recipe, const std::string& build_dir) {
@@ -132,7 +161,7 @@ SessionWords JoinedSessions(const Recipe& recipe, const std::string& build_dir) 
   return words;
 }
 
-std::string PairsLine(const std::vector<std::pair<std::string, std::string>>& pairs) {
+std::string PairsLine(const WordPairs& pairs) {
   std::string line;
   for (const auto& [first, second] : pairs)
     line += fmt::format("{}{}={}", line.empty() ? "" : " ", first, second);
@@ -163,7 +192,9 @@ std::string FloorPlanPath(const Recipe& recipe, const std::string& capture) {
 
 }  // namespace
 
-std::string FilmFolderName(const RecipeCapture& capture) { return "film-" + capture.name; }
+std::string FootageFolderName(const RecipeCapture& capture) {
+  return (capture.kind == CaptureKind::kBag ? "bag-" : "film-") + capture.name;
+}
 
 bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empty(); }
 
@@ -176,7 +207,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   const std::string floor_plan = FloorPlanPath(recipe, capture);
   const SessionWords sessions = JoinedSessions(recipe, paths.build_dir);
-  const FilmWords films = Films(recipe);
+  const FootagePairs footage = Footage(recipe);
   const std::string seed = std::to_string(recipe.seed);
   std::vector<std::string> known_places;
   if (IsReconstructed(recipe)) {
@@ -197,9 +228,9 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));
   CAIRN_RETURN_IF_ERROR(config.Set("SEED", "the seed", {seed}));
   CAIRN_RETURN_IF_ERROR(config.Set("PROGRAM", "the program", {SizeAndDate(paths.program)}));
-  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILMS", "the film", films.files));
-  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILM_KEYFRAMES", "keyframes", films.keyframes));
-  CAIRN_RETURN_IF_ERROR(config.SetPairs("FILM_CAMERAS", "the camera", films.cameras));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FOOTAGE", "the film or bag", footage.sources));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FOOTAGE_FILES", "the file of a film or bag", footage.files));
+  CAIRN_RETURN_IF_ERROR(config.SetPairs("FOOTAGE_OPTIONS", "the option of a film or bag", footage.options));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSIONS", "the capture", sessions.folders));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
@@ -222,8 +253,12 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
       options + "/capture",
       IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) : capture + "\n"));
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
-      options + "/films", PairsLine(films.files) + PairsLine(films.keyframes) + PairsLine(films.cameras)));
+  for (const auto& [name, source] : footage.sources) {
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
+        options + "/" + name,
+        LinesOf(name, footage.sources) + LinesOf(name, footage.files) + LinesOf(name, footage.options)));
+  }
+  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/odometry", OdometryLines(recipe)));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));

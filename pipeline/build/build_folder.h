@@ -15,8 +15,8 @@ struct BuildPaths {
   std::string recipe;     // as an absolute path
 };
 
-// What a capture that is a file, a film, is called in the build folder, once it is imported.
-std::string FilmFolderName(const RecipeCapture& capture);
+// What a film or bag is called in the build folder, once it is imported: "film-NAME", "bag-NAME".
+std::string FootageFolderName(const RecipeCapture& capture);
 
 // Whether the captures have no poses of their own: then `reconstruct` finds them.
 bool IsReconstructed(const Recipe& recipe);
@@ -26,11 +26,12 @@ bool HasFloorPlan(const Recipe& recipe);
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
 //   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
-//   options/films         how the captures that are files are imported, a line each
+//   options/film-NAME, options/bag-NAME     what is imported, and how
+//   options/odometry      whose odometry gives poses their scale, and how bags' is read
 //   options/program       hash of the program: another program redoes every stage, whatever its date
-//   config.mk             MAP, CAPTURE, FILMS, FILM_KEYFRAMES, FILM_CAMERAS, SESSIONS, SESSION_QUERIES,
-//   SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
-//                         QUERIES, NAME, SEED, PROGRAM and VOCABULARY_TREE for map.mk
+//   config.mk             MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES,
+//                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, NAME, SEED, PROGRAM
+//                         and VOCABULARY_TREE for map.mk
 //   recipe                path of the recipe, for people and for `cairn clean`; not part of a Makefile
 // Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names, with several captures), NotFound
 // (a file that [reconstruct] names), Io.

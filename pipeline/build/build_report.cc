@@ -49,7 +49,7 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     CAIRN_ASSIGN_OR_RETURN(Json report, ReadJson(entry.path().string()));
     const std::string stage = report["stage"];
     name.resize(name.size() - std::string_view(kReportSuffix).size());
-    if ((stage == "simulate" && !run.simulated) || (stage == "import" && !run.films.contains(name)) ||
+    if ((stage == "simulate" && !run.simulated) || (stage == "import" && !run.footage.contains(name)) ||
         (stage == "join_captures" && !run.joined) || (stage == "reconstruct" && !run.reconstructed) ||
         (stage == "decompose_views" && !run.has_floor_plan))
       continue;
@@ -94,7 +94,7 @@ std::string FlowText(const Json& report) {
                      taken_over.empty() ? "" : " (" + taken_over + " taken over)");
 }
 
-// All files of one stage: several where it is sharded.  Each film has a row of its own.
+// All files of one stage: several where it is sharded.  Each film or bag has a row of its own.
 struct StageRow {
   std::string stage, state;
   double seconds = 0;

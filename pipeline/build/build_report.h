@@ -17,10 +17,10 @@ struct BuildRun {
   std::string map;     // as given
   uint64_t seed = 0;
   bool simulated = false, joined = false, reconstructed = false,
-       has_floor_plan = false;  // whether the line has these stages
-  std::set<std::string> films;  // names in the build folder of films that are imported: "film-walk"
-  bool whole_line = true;       // false with --until
-  std::set<std::string> ran;    // names in the build folder whose rules ran: "features.db"
+       has_floor_plan = false;    // whether the line has these stages
+  std::set<std::string> footage;  // names in the build folder of what is imported: "film-walk"
+  bool whole_line = true;         // false with --until
+  std::set<std::string> ran;      // names in the build folder whose rules ran: "features.db"
   double seconds = 0;
   std::optional<Error> error;  // why there is no map
 };

@@ -21,8 +21,8 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, FILMS, FILM_KEYFRAMES, FILM_CAMERAS, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN,
-# VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
+# Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
+# QUERIES, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -30,6 +30,9 @@ ifdef RECIPE
 ifneq ($(PROGRAM),$(shell stat -L -c %s-%Y $(CAIRN)))
 $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,cairn-missing)
 endif
+# A file more, or less, in a folder that is a bag.
+CAIRN_VALUES = $(foreach pair,$($(1)),$(lastword $(subst =, ,$(pair))))
+$(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(wildcard $(filter-out $(call CAIRN_VALUES,FOOTAGE_FILES),$(call CAIRN_VALUES,FOOTAGE))))
 # The map's path as the including Makefile spells it.
 MAP := $(CAIRN_MAP)
 endif
@@ -159,36 +162,40 @@ CAIRN_REMOVE_SHARDS = rm -f $(@:.db.stamp=).begun $(@:.db.stamp=)-*of*
 # ---- The capture that map.mk makes: simulated, imported, or joined
 
 CAPTURE_STAMP :=
-# $(call CAIRN_OF_FILM,VARIABLE,NAME): the words that VARIABLE, NAME=WORD ..., has for the film.
-CAIRN_OF_FILM = $(patsubst $(2)=%,%,$(filter $(2)=%,$($(1))))
-# $(call CAIRN_FILM,NAME): what the stamp of a film depends on, and what its rule uses.
-define CAIRN_FILM
-$(BUILD)/film-$(1).stamp: $(call CAIRN_OF_FILM,FILMS,$(1)) $(if $(wildcard $(BUILD)/film-$(1)/images),,cairn-missing)
-$(BUILD)/film-$(1).stamp: FILM := $(call CAIRN_OF_FILM,FILMS,$(1))
-$(BUILD)/film-$(1).stamp: FILM_OPTIONS := --keyframes $(call CAIRN_OF_FILM,FILM_KEYFRAMES,$(1)) \
-    $(addprefix --camera ,$(call CAIRN_OF_FILM,FILM_CAMERAS,$(1)))
+# $(call CAIRN_OF,VARIABLE,NAME): the words that VARIABLE, NAME=WORD ..., has for what is called so.
+CAIRN_OF = $(patsubst $(2)=%,%,$(filter $(2)=%,$($(1))))
+# $(call CAIRN_MADE_LISTS,STAMP,LISTS): lists that the rule of STAMP writes, or may leave out.  Those whose contents stay
+# the same keep their dates.
+define CAIRN_MADE_LISTS
+CAIRN_SAME := $(shell for list in $(2); do [ $(1) -nt $$list ] && echo $$list; done)
+$$(filter-out $$(CAIRN_SAME),$(2)): $(1) ;
+$$(CAIRN_SAME): $(1)
+	+@: # the same bytes as before
 endef
-FILM_NAMES := $(foreach film,$(FILMS),$(firstword $(subst =, ,$(film))))
-FILM_STAMPS := $(FILM_NAMES:%=$(BUILD)/film-%.stamp)
-$(foreach film,$(FILM_NAMES),$(eval $(call CAIRN_FILM,$(film))))
+# $(call CAIRN_FOOTAGE,NAME): what the stamp of a film or bag depends on, and what its rule uses.
+define CAIRN_FOOTAGE
+$(BUILD)/$(1).stamp: $(call CAIRN_OF,FOOTAGE_FILES,$(1)) $(if $(wildcard $(BUILD)/$(1)/images),,cairn-missing)
+$(BUILD)/$(1).stamp: SOURCE := $(call CAIRN_OF,FOOTAGE,$(1))
+$(BUILD)/$(1).stamp: IMPORT_OPTIONS := $(call CAIRN_OF,FOOTAGE_OPTIONS,$(1))
+$(call CAIRN_MADE_LISTS,$(BUILD)/$(1).stamp,$(wildcard $(BUILD)/$(1)/cameras.txt $(BUILD)/$(1)/odometry.txt))
+endef
+FOOTAGE_NAMES := $(foreach source,$(FOOTAGE),$(firstword $(subst =, ,$(source))))
+FOOTAGE_STAMPS := $(FOOTAGE_NAMES:%=$(BUILD)/%.stamp)
+$(foreach name,$(FOOTAGE_NAMES),$(eval $(call CAIRN_FOOTAGE,$(name))))
 ifeq ($(SESSIONS),)
-CAPTURE_STAMP := $(FILM_STAMPS)
+CAPTURE_STAMP := $(FOOTAGE_STAMPS)
 endif
 ifeq ($(SIMULATED),yes)
 CAPTURE_STAMP := $(BUILD)/capture.stamp
 $(if $(wildcard $(CAPTURE)/images.txt),,$(eval $(BUILD)/capture.stamp: cairn-missing))
 endif
-# Lists whose contents stay the same keep their dates.
 ifneq ($(SESSIONS),)
 $(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
-UNCHANGED := $(shell for list in $(CAPTURE_LISTS); do [ $(BUILD)/capture.stamp -nt $$list ] && echo $$list; done)
-$(filter-out $(UNCHANGED),$(CAPTURE_LISTS)): $(BUILD)/capture.stamp ;
-$(UNCHANGED): $(BUILD)/capture.stamp
-	+@: # the same bytes as before
+$(eval $(call CAIRN_MADE_LISTS,$(BUILD)/capture.stamp,$(CAPTURE_LISTS)))
 SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
 SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
-$(BUILD)/capture.stamp: $(FILM_STAMPS)
+$(BUILD)/capture.stamp: $(FOOTAGE_STAMPS)
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
 endif
 # Where the stages after matching read poses.

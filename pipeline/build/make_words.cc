@@ -30,6 +30,14 @@ Status CheckMakePath(const std::string& what, const std::string& path) {
                    path, found);
 }
 
+Status CheckMakeWord(const std::string& what, const std::string& word) {
+  const std::string found =
+      word.starts_with('~') ? "'~' at its beginning" : FindSpecial(word, kSpecialInPaths);
+  if (found.empty()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "{} '{}' has {}, which Make cannot handle; write it without",
+                   what, word, found);
+}
+
 Status MakeVariables::Set(const std::string& variable, const std::string& what,
                           const std::vector<std::string>& words) {
   for (const std::string& word : words) CAIRN_RETURN_IF_ERROR(CheckMakePath(what, word));

@@ -14,6 +14,8 @@ namespace cairn::pipeline {
 // Errors: InvalidArgument when a path has characters that Make or a shell would not read as part of a name:
 // white space, control characters and $#%:;&|<>()[]{}*?'"`\=!
 Status CheckMakePath(const std::string& what, const std::string& path);
+// The same for other values; nor may one begin with '~', which a shell would replace.
+Status CheckMakeWord(const std::string& what, const std::string& word);
 
 // Variables for make, in the order in which they were set.  `what` names a value in messages.
 // Errors of all three: InvalidArgument.

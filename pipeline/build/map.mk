@@ -48,11 +48,11 @@ $(BUILD)/capture.stamp: $(call CAIRN_OPTIONS,simulate) $(SEED_FILE)
 	$(CAIRN_LAUNCH) $(CAIRN) stage simulate $(@D)/options/simulate.toml -o $(CAPTURE) $(CAIRN_FLAGS)
 endif
 
-# ... or a film, whose keyframes become a capture; each of several has a name ...
-ifneq ($(FILMS),)
-$(FILM_STAMPS): $(BUILD)/options/films $(PROGRAM_HASH)
+# ... or films and bags, whose keyframes become a capture each ...
+ifneq ($(FOOTAGE),)
+$(FOOTAGE_STAMPS): $(BUILD)/%.stamp: $(BUILD)/options/% $(PROGRAM_HASH)
 	$(CAIRN_WHY)
-	$(CAIRN_LAUNCH) $(CAIRN) import $(FILM) $(FILM_OPTIONS) -o $(@:.stamp=) $(CAIRN_FLAGS)
+	$(CAIRN_LAUNCH) $(CAIRN) import $(SOURCE) $(IMPORT_OPTIONS) -o $(@:.stamp=) $(CAIRN_FLAGS)
 endif
 
 # ... or several captures as one.
@@ -98,8 +98,9 @@ $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
 	$(CAIRN_REMOVE_SHARDS)
 
 # Stage 2b: poses, for captures that have none.  The folder's date is that of its last change.  The hash of each image, and so of
-# its GPS tags, is in features.db.
-$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/features.db $(call CAIRN_OPTIONS,reconstruct) $(SEED_FILE) $(KNOWN_PLACES)
+# its GPS tags, is in features.db; odometry is not.
+$(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/features.db $(call CAIRN_OPTIONS,reconstruct) $(SEED_FILE) $(KNOWN_PLACES) \
+    $(BUILD)/options/odometry $(filter %/odometry.txt,$(CAPTURE_LISTS))
 	$(call CAIRN_RUN,reconstruct,stage reconstruct $(@D)/matches.db --capture $(CAPTURE))
 
 # Stage 3: matches that show the same point become feature classes.

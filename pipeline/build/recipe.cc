@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 
-#include "core/colmap/cameras_text.h"
 #include "core/options/toml_options.h"
 #include "stages/simulate/read_recipe.h"
 
@@ -29,15 +28,8 @@ constexpr Key kCaptureKeys[] = {
      "Name of the session in the map, where there are several captures: letters, digits, '-', '_' and '.'. "
      "Default: the name of the folder."},
     {"path", "text",
-     "Folder of the capture (images/, cameras.txt, images.txt), or a film, relative to the recipe. "
-     "Required."},
-    {"keyframes", "text or number",
-     "Of a film: \"auto\" (sharp frames, from each of which enough of the one before is seen), \"all\", or "
-     "the "
-     "seconds between images. Default \"auto\"."},
-    {"camera", "text",
-     "Of a film: its camera as \"MODEL,WIDTH,HEIGHT,PARAM,...\", of the upright picture. Default: not "
-     "known."},
+     "Folder of the capture (images/, cameras.txt, images.txt), or a film, or a ROS bag (a file or folder), "
+     "relative to the recipe. Required."},
     {"queries", "text",
      "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
      "capture's queries.txt, if there is one."},
@@ -58,6 +50,27 @@ Error UnknownKey(const std::string& path, const toml::key& key, const std::strin
                    what, name,
                    nearest.empty() ? fmt::format("valid are {}", fmt::join(valid, ", "))
                                    : "did you mean '" + nearest + "'?");
+}
+
+const FootageKey* FindFootageKey(const std::string& name) {
+  for (const FootageKey& key : FootageKeys()) {
+    if (key.name == name) return &key;
+  }
+  return nullptr;
+}
+
+// A finite number, or a list of some; nothing for any other node.
+std::optional<std::vector<double>> Numbers(const toml::node& node) {
+  std::vector<double> numbers;
+  const auto add = [&](const toml::node& item) {
+    const std::optional<double> number = item.is_number() ? item.value<double>() : std::nullopt;
+    if (number && std::isfinite(*number)) numbers.push_back(*number);
+  };
+  const toml::array* list = node.as_array();
+  if (list == nullptr) add(node);
+  for (size_t i = 0; list != nullptr && i < list->size(); ++i) add((*list)[i]);
+  if (numbers.empty() || numbers.size() != (list == nullptr ? 1 : list->size())) return std::nullopt;
+  return numbers;
 }
 
 Error WrongType(const std::string& path, const toml::node& node, const std::string& key,
@@ -201,7 +214,7 @@ class RecipeReader {
   Status ReadCaptureTable(const toml::table& table) {
     RecipeCapture capture;
     std::string up;
-    bool is_for_film = false;
+    std::vector<const FootageKey*> footage_keys;
     for (const auto& [key, node] : table) {
       const std::string name(key.str());
       if (name == "path") {
@@ -209,22 +222,19 @@ class RecipeReader {
       } else if (name == "name") {
         CAIRN_ASSIGN_OR_RETURN(capture.name, Text(name, node));
         CAIRN_RETURN_IF_ERROR(CheckName(path_, node, capture.name));
-      } else if (name == "keyframes") {
-        CAIRN_ASSIGN_OR_RETURN(capture.keyframes, TextOrNumber(name, node));
-        is_for_film = true;
-      } else if (name == "camera") {
-        CAIRN_ASSIGN_OR_RETURN(capture.camera, Text(name, node));
-        CAIRN_RETURN_IF_ERROR(CheckCameraText(node, capture.camera));
-        is_for_film = true;
       } else if (name == "queries") {
         CAIRN_ASSIGN_OR_RETURN(capture.queries_path, ExistingPath(name, node));
       } else if (name == "floor_plan") {
         CAIRN_ASSIGN_OR_RETURN(capture.floor_plan_path, ExistingPath(name, node));
       } else if (name == "up") {
         CAIRN_ASSIGN_OR_RETURN(up, UpDirection(node));
+      } else if (const FootageKey* footage_key = FindFootageKey(name); footage_key != nullptr) {
+        CAIRN_RETURN_IF_ERROR(ReadFootageKey(*footage_key, node, &capture.footage));
+        footage_keys.push_back(footage_key);
       } else {
         std::vector<std::string> valid;
         for (const Key& k : kCaptureKeys) valid.emplace_back(k.name);
+        for (const FootageKey& k : FootageKeys()) valid.emplace_back(k.name);
         return UnknownKey(path_, key, "key of [[capture]]", valid);
       }
     }
@@ -232,11 +242,10 @@ class RecipeReader {
       return MakeError(ErrorCode::kInvalidArgument, "{}: [[capture]] has no path; add path = \"FOLDER\"",
                        TomlPlace(path_, table));
     }
-    if (is_for_film && !capture.IsFile()) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: keyframes and camera are for films, and {} is a folder; leave them out (a folder "
-                       "has its cameras in cameras.txt)",
-                       TomlPlace(path_, table), capture.path);
+    capture.kind = KindOfCapture(capture.path);
+    for (const FootageKey* key : footage_keys) {
+      const Status status = CheckIsFor(*key, capture.kind, capture.path);
+      if (!status.ok()) return AtPlace(table, status.error());
     }
     if (!up.empty() && up != "auto") {
       if (recipe_.up != "auto" && recipe_.up != up) {
@@ -285,16 +294,21 @@ class RecipeReader {
     return WrongType(path_, node, key, "a text in quotes");
   }
 
-  Result<std::string> TextOrNumber(const std::string& key, const toml::node& node) const {
-    if (const auto number = node.value<double>(); node.is_number() && number)
-      return fmt::format("{}", *number);
-    return Text(key, node);
+  Error AtPlace(const toml::node& node, const Error& error) const {
+    return {error.code, fmt::format("{}: {}", TomlPlace(path_, node), error.message)};
   }
 
-  Status CheckCameraText(const toml::node& node, const std::string& text) const {
-    const auto camera = ParseCamera(text);
-    if (camera.ok()) return Ok();
-    return MakeError(camera.error().code, "{}: camera: {}", TomlPlace(path_, node), camera.error().message);
+  Status ReadFootageKey(const FootageKey& key, const toml::node& node, FootageOptions* options) const {
+    std::string text;
+    const bool may_be_numbers = key.type != std::string("text");
+    if (const std::optional<std::vector<double>> list = Numbers(node); may_be_numbers && list) {
+      text = fmt::format("{}", fmt::join(*list, ","));
+    } else {
+      if (!node.is_string()) return WrongType(path_, node, key.name, key.type);
+      text = node.as_string()->get();
+    }
+    const Status status = SetFootageOption(key, text, options);
+    return status.ok() ? Ok() : Status(AtPlace(node, status.error()));
   }
 
   Result<std::string> ExistingPath(const std::string& key, const toml::node& node) const {
@@ -308,14 +322,10 @@ class RecipeReader {
 
   Result<std::string> UpDirection(const toml::node& node) const {
     if (const auto* text = node.as_string(); text != nullptr && text->get() == "auto") return text->get();
-    const toml::array* list = node.as_array();
-    std::vector<double> up;
-    for (size_t i = 0; list != nullptr && i < list->size(); ++i) {
-      if (const auto value = (*list)[i].value<double>(); value && std::isfinite(*value)) up.push_back(*value);
-    }
-    const bool valid = up.size() == 3 && list->size() == 3 && (up[0] != 0 || up[1] != 0 || up[2] != 0);
+    const std::optional<std::vector<double>> up = node.is_array() ? Numbers(node) : std::nullopt;
+    const bool valid = up && up->size() == 3 && ((*up)[0] != 0 || (*up)[1] != 0 || (*up)[2] != 0);
     if (!valid) return WrongType(path_, node, "up", "\"auto\" or three numbers [x, y, z] that are not all 0");
-    return fmt::format("{}", fmt::join(up, ","));
+    return fmt::format("{}", fmt::join(*up, ","));
   }
 
   std::string path_;
@@ -381,11 +391,6 @@ std::vector<std::string> UnreadKeys(const Recipe& recipe,
   return lines;
 }
 
-bool RecipeCapture::IsFile() const {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
 std::string NameOfFolder(const std::string& path) {
   fs::path folder(path);
   if (!folder.has_filename()) folder = folder.parent_path();
@@ -417,6 +422,8 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
       "\n## `[[capture]]`\n\nOne survey. Several of these tables are several sessions (cameras, days), all "
       "in one frame ([captures](captures.md)). A recipe has either this or `[simulate]`.\n";
   AppendKeys(&page, kCaptureKeys);
+  for (const FootageKey& key : FootageKeys())
+    page += fmt::format("| `{}` | {} | {} |\n", key.name, key.type, key.help);
   page += "\n## `[gate]`\n\nBelow these figures no map is written. They are options of `[check_map]`.\n";
   AppendOptions(&page, GateOptions(stages));
   for (const StageOptions& stage : stages) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "pipeline/build/footage.h"
 #include "pipeline/build/stage_options.h"
 
 namespace cairn::pipeline {
@@ -14,16 +15,14 @@ struct RecipeCapture {
   // The session's name in the map: that of the capture's folder where the recipe gives none.
   std::string name;
   std::string path;
-  // Of a capture that is a file, a film: which frames become images (`cairn import --keyframes`), and the
-  // camera as MODEL,WIDTH,HEIGHT,PARAM,... (empty: not known).
-  std::string keyframes = "auto";
-  std::string camera;
+  CaptureKind kind = CaptureKind::kFolder;
+  FootageOptions footage;  // of films and bags
   // Held-out images for the self-test; empty = the capture's queries.txt, if it has one.
   std::string queries_path;
   std::string floor_plan_path;  // empty = none
 
-  // A file is imported into the build folder first.
-  bool IsFile() const;
+  // Films and bags are imported into the build folder first.
+  bool IsFootage() const { return kind != CaptureKind::kFolder; }
 };
 
 // What a map is made from: a TOML file with `name`, `seed`, captures (or [simulate]), and a table of options

@@ -1,13 +1,13 @@
 #include "pipeline/build/recipe_source.h"
 
 #include <filesystem>
-#include <fstream>
 
 #include "core/capture/film_file.h"
 #include "core/capture/image_file.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_head_tables.h"
+#include "pipeline/build/footage.h"
 #include "pipeline/build/make_words.h"
 #include "pipeline/build/recipe.h"
 
@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kWhatIsCompiled =
-    "compile takes a recipe (docs/recipe.md), a film or the folder of a capture";
+    "compile takes a recipe (docs/recipe.md), a film, a ROS bag or the folder of a capture";
 
 bool HoldsImages(const std::string& folder) {
   std::error_code error;
@@ -78,8 +78,8 @@ Status CheckIsText(const std::string& path) {
   return Ok();
 }
 
-// The recipe that compiles a folder or a film with defaults.  The path has no character that TOML needs
-// escaped.
+// The recipe that compiles a folder, a film or a bag with defaults.  The path has no character that TOML
+// needs escaped.
 std::string DefaultRecipe(const std::string& name, const std::string& folder) {
   return fmt::format(
       "# Every key that is not here has its default; docs/recipe.md lists them.\n"
@@ -92,13 +92,14 @@ std::string DefaultRecipe(const std::string& name, const std::string& folder) {
 Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map) {
   std::error_code error;
   const bool is_folder = fs::is_directory(given, error);
-  if (!is_folder && !IsFilm(given)) {
+  const bool is_bag = KindOfCapture(given) == CaptureKind::kBag;
+  if (!is_folder && !is_bag && !IsFilm(given)) {
     CAIRN_RETURN_IF_ERROR(CheckIsText(given));
     return RecipeSource{.recipe = given, .map = map};
   }
   fs::path folder = fs::absolute(given).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // a trailing '/'
-  if (is_folder) CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
+  if (is_folder && !is_bag) CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
   const std::string name = NameOfFolder(folder.string());
   RecipeSource source{.map = map.empty() ? name + ".cairn" : map};
   if (fs::path(source.map).extension() != ".cairn")

@@ -13,9 +13,9 @@ struct RecipeSource {
   bool was_written = false;  // the recipe is new
 };
 
-// Finds the recipe that `compile`, `configure` and `pareto` are given: a recipe, a film, or the folder of a
-// capture.  For a film or a folder, the recipe that compiles it with defaults is written beside the map:
-// NAME.toml beside NAME.cairn; without `map`, NAME is its name (without the film's suffix), in the current
+// Finds the recipe that `compile`, `configure` and `pareto` are given: a recipe, a film, a bag, or the folder
+// of a capture.  For all but a recipe, the recipe that compiles it with defaults is written beside the map:
+// NAME.toml beside NAME.cairn; without `map`, NAME is its name (without a file's suffix), in the current
 // folder.  An existing recipe with the same content stays; one with other content is never overwritten.
 // Errors: NotFound; InvalidArgument, each with what to do instead: a folder without images, a build folder, a
 // file that is an image, a map or another database, another NAME.toml, a name that Make cannot handle; Io.

@@ -23,7 +23,6 @@
 #include "pipeline/build/recipe.h"
 #include "pipeline/build/recipe_source.h"
 #include "pipeline/build/run_make.h"
-#include "pipeline/exchange/bags/bag.h"
 #include "pipeline/program/stop_signal.h"
 
 namespace cairn::pipeline {
@@ -63,26 +62,9 @@ Result<BuildPaths> ResolvePaths(const CompileArguments& arguments) {
                     .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
 }
 
-Error RefuseBag(const std::string& path) {
-  const std::string capture = fs::path(path).stem().string() + "_capture";
-  return {ErrorCode::kInvalidArgument,
-          fmt::format("{}: a ROS bag; make a capture of it and compile that: cairn import {} -o {} && cairn "
-                      "compile {}",
-                      path, path, capture, capture)};
-}
-
-// As FindRecipe.  A bag is no recipe; a folder of images that has one in it is a capture.
-Result<RecipeSource> FindRecipeOrBag(const std::string& given, const std::string& map) {
-  std::error_code error;
-  if (!fs::is_directory(given, error) && IsBag(given)) return RefuseBag(given);
-  Result<RecipeSource> source = FindRecipe(given, map);
-  if (!source.ok() && IsBag(given)) return RefuseBag(given);
-  return source;
-}
-
 // Fills in what was not given: the recipe of a folder, the map's name.
 Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, CompileArguments* arguments) {
-  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipeOrBag(arguments->recipe, arguments->output));
+  CAIRN_ASSIGN_OR_RETURN(const RecipeSource source, FindRecipe(arguments->recipe, arguments->output));
   if (source.was_written) {
     *environment.out << fmt::format(
         "{}: the recipe of {}, with defaults; to change something, edit it and compile it\n", source.recipe,
@@ -95,11 +77,11 @@ Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, Compile
   return recipe;
 }
 
-// What the films of the recipe are called in the build folder.
-std::set<std::string> FilmFolders(const Recipe& recipe) {
+// What the films and bags of the recipe are called in the build folder.
+std::set<std::string> FootageFolders(const Recipe& recipe) {
   std::set<std::string> names;
   for (const RecipeCapture& capture : recipe.captures) {
-    if (capture.IsFile()) names.insert(FilmFolderName(capture));
+    if (capture.IsFootage()) names.insert(FootageFolderName(capture));
   }
   return names;
 }
@@ -123,9 +105,10 @@ Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, con
     const std::string file = of_line.file;
     if (std::string(of_line.name) == "join_captures") continue;
     if (std::string(of_line.name) == "import") {
-      const std::set<std::string> films = FilmFolders(recipe);
-      if (films.empty()) continue;
-      const std::string last = recipe.captures.size() > 1 ? "capture" : *films.begin();  // several are joined
+      const std::set<std::string> footage = FootageFolders(recipe);
+      if (footage.empty()) continue;
+      const std::string last =
+          recipe.captures.size() > 1 ? "capture" : *footage.begin();  // several are joined
       if (stage == of_line.name) return paths.build_dir + "/" + last + ".stamp";
     }
     if (stage == of_line.name) return paths.build_dir + "/" + (file == "capture" ? "capture.stamp" : file);
@@ -147,11 +130,27 @@ std::map<std::string, fs::file_time_type> StampDates(const std::string& build_di
   return dates;
 }
 
+// Whether other keys of a [[capture]] may help: the bag has other topics, or no keyframe was found.
+bool MayBeAnotherKey(const StageFailure& failure) {
+  return failure.stage == "import" &&
+         (failure.code == ErrorCode::kInvalidArgument || failure.code == ErrorCode::kNotFound ||
+          failure.code == ErrorCode::kNoData);
+}
+
 // The stage has printed its message already.
-Error StageError(const BuildPaths& paths) {
+Error StageError(const BuildPaths& paths, const CompileArguments& arguments) {
   const std::optional<StageFailure> failure = ReadErrorFile(paths.build_dir);
-  if (failure)
-    return MakeError(failure->code, "stage {} failed; {} was not written", failure->stage, paths.map);
+  if (failure) {
+    const std::string remedy =
+        MayBeAnotherKey(*failure)
+            ? fmt::format(
+                  "; {0} says under [[capture]] how it is imported: edit that, then run cairn compile {0} "
+                  "-o {1}",
+                  arguments.recipe, arguments.output)
+            : "";
+    return MakeError(failure->code, "stage {} failed; {} was not written{}", failure->stage, paths.map,
+                     remedy);
+  }
   return MakeError(
       ErrorCode::kFailed,
       "make stopped before a stage could report why: a stage was killed (out of memory? see --memory), or a "
@@ -227,10 +226,10 @@ Status Compile(CompileArguments arguments, const CommandEnvironment& environment
                   .joined = recipe.captures.size() > 1,
                   .reconstructed = IsReconstructed(recipe),
                   .has_floor_plan = HasFloorPlan(recipe),
-                  .films = FilmFolders(recipe),
+                  .footage = FootageFolders(recipe),
                   .whole_line = goal == paths.map,
                   .ran = RanSince(dates_before, paths.build_dir)};
-  if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths);
+  if (!WIFEXITED(wait_status) || WEXITSTATUS(wait_status) != 0) run.error = StageError(paths, arguments);
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   RemoveStaleTemporaries(paths.build_dir);  // of stages that were stopped
   const Status told = TellOfRun(run, paths, *environment.out);
@@ -253,14 +252,13 @@ Status Configure(CompileArguments arguments, const CommandEnvironment& environme
 void AddRecipeArguments(ArgumentParser& parser, CompileArguments* arguments) {
   parser
       .Add("recipe", arguments->recipe,
-           "Recipe of the map (docs/recipe.md), or a film, or the folder of a capture: then it is compiled "
-           "with "
-           "defaults, by the recipe NAME.toml that is written beside the map")
+           "Recipe of the map (docs/recipe.md), or a film, a ROS bag or the folder of a capture: then it is "
+           "compiled with defaults, by the recipe NAME.toml that is written beside the map")
       .Required()
-      .Type("RECIPE.toml|FILM|FOLDER");
+      .Type("RECIPE.toml|FILM|BAG|FOLDER");
   parser
       .Add("-o,--output", arguments->output,
-           "Map to write [by the name of the recipe, the film or the folder, in the current folder]")
+           "Map to write [by the name of the recipe, film, bag or folder, in the current folder]")
       .Type("NAME.cairn");
   parser.Add("--build-dir", arguments->build_dir, "Folder for the stages' files [NAME.build beside the map]")
       .Type("FOLDER");
@@ -272,7 +270,8 @@ Command CompileCommand() {
   const auto arguments = std::make_shared<CompileArguments>();
   return {
       .name = "compile",
-      .summary = "Compile a recipe, a film or the folder of a capture into a map, or redo what changed",
+      .summary =
+          "Compile a recipe, a film, a ROS bag or the folder of a capture into a map, or redo what changed",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             AddRecipeArguments(parser, arguments.get());

@@ -8,8 +8,9 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/printable.h"
+#include "core/capture/bag_file.h"
 #include "core/colmap/colmap_model.h"
-#include "pipeline/exchange/bags/bag.h"
+#include "core/files/database.h"
 #include "pipeline/exchange/bags/import_bag.h"
 #include "pipeline/exchange/film/import_film.h"
 #include "pipeline/exchange/import/layouts.h"
@@ -57,8 +58,9 @@ Status RunFilmImport(const ImportArguments& arguments, const CommandEnvironment&
                      "--max-time-gap-s is for poses and odometry, and {} is a film; leave it out",
                      arguments.source);
   }
-  CAIRN_ASSIGN_OR_RETURN(FilmOptions options, ParseFrameChoice(arguments.keyframes));
-  options.camera = arguments.options.camera;
+  CAIRN_ASSIGN_OR_RETURN(const WantedFrames wanted, ParseFrameChoice(arguments.keyframes));
+  const FilmOptions options = {
+      .choice = wanted.choice, .every_s = wanted.every_s, .camera = arguments.options.camera};
   CAIRN_ASSIGN_OR_RETURN(const FilmReport report, ImportFilm(arguments.source, options, arguments.output,
                                                              environment.num_threads, *environment.progress));
   for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
@@ -79,12 +81,12 @@ Status RunFilmImport(const ImportArguments& arguments, const CommandEnvironment&
 
 Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(CheckIsForFrames(arguments, "bag"));
-  CAIRN_ASSIGN_OR_RETURN(const FilmOptions choice, ParseFrameChoice(arguments.keyframes));
+  CAIRN_ASSIGN_OR_RETURN(const WantedFrames wanted, ParseFrameChoice(arguments.keyframes));
   BagOptions options = {.topic = arguments.topic,
                         .odometry = arguments.odometry,
                         .camera = arguments.options.camera,
-                        .choice = choice.choice,
-                        .every_s = choice.every_s};
+                        .choice = wanted.choice,
+                        .every_s = wanted.every_s};
   if (arguments.max_time_gap->IsGiven()) options.max_time_gap_s = arguments.options.max_time_gap_s;
   if (const std::vector<double>& v = arguments.camera_on_robot; !v.empty()) {
     Pose pose{Eigen::Quaterniond(v[6], v[3], v[4], v[5]), Eigen::Vector3d(v[0], v[1], v[2])};
@@ -103,10 +105,11 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
   return Ok();
 }
 
-// A folder of one of the data sets may have a bag in it too.
+// A folder of one of the data sets may have a bag in it too.  What a SQLite file lacks to be a bag is said by
+// the reader of bags.
 bool IsForBags(const ImportArguments& arguments) {
   if (arguments.options.layout != "auto") return arguments.options.layout == "bag";
-  return IsBag(arguments.source) && !DetectLayout(arguments.source).ok();
+  return (IsBag(arguments.source) || IsSqliteFile(arguments.source)) && !DetectLayout(arguments.source).ok();
 }
 
 Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {

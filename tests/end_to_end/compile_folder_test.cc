@@ -39,24 +39,6 @@ TEST(CompileFolder, WritesTheRecipeThatItUsesAndNeverOverAnother) {
   EXPECT_EQ(compile("survey.toml").exit_code, 0);
 }
 
-TEST(CompileFolder, ABagIsToBeImportedFirst) {
-  TemporaryFolder folder("compile_bag_test");
-  const auto message = [&](const std::string& bag) {
-    const ProgramRun run =
-        RunShell("cd " + folder.string() + " && cairn compile " + bag + " --progress none");
-    EXPECT_EQ(run.exit_code, 2);
-    return run.err;
-  };
-  for (const std::string bag : {"drive.bag", "drive.mcap", "drive.db3", "drive"}) {
-    std::ofstream(folder / bag) << "#ROSBAG V2.0\n";
-    EXPECT_THAT(message(bag), HasSubstr("a ROS bag; make a capture of it and compile that: cairn import " +
-                                        bag + " -o drive_capture"));
-  }
-  fs::create_directories(folder / "rosbag2_drive");
-  std::ofstream(folder / "rosbag2_drive/metadata.yaml") << "rosbag2_bagfile_information:\n";
-  EXPECT_THAT(message("rosbag2_drive"), HasSubstr("cairn compile rosbag2_drive_capture"));
-}
-
 // What no stage reads is told, not refused: one recipe may serve several captures.
 TEST(CompileFolder, KeysThatNothingReadsAreTold) {
   TemporaryFolder folder("unread_keys_test");

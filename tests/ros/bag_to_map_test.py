@@ -1,7 +1,8 @@
-"""ROS 1's bags as rosbag itself writes them, with each compression: `cairn import` reads them, and what is left of them.
+"""ROS 1's bags as rosbag itself writes them: what is left of a cut one is imported, and `cairn compile` makes a map of a drive.
 
-rosbag_test.py CAIRN SOURCES
+bag_to_map_test.py CAIRN
 """
+import json
 import math
 import pathlib
 import subprocess
@@ -16,7 +17,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-CAIRN = sys.argv[1]
+CAIRN = str(pathlib.Path(sys.argv[1]).resolve())
 BAG_OF_CAPTURE = pathlib.Path(__file__).with_name("bag_of_capture.py")
 NUM_IMAGES = 20
 WIDTH, HEIGHT = 64, 48
@@ -100,7 +101,7 @@ class ABag(unittest.TestCase):
         for name in images:
             self.assertEqual(after[name], before[name])
 
-    def test_a_rendered_drive_becomes_a_map(self):
+    def test_a_rendered_drive_becomes_a_capture(self):
         """Odometry that measures all lengths 2 % too long, and each step by 2 % more or less."""
         (self.folder / "simulate.toml").write_text("width_m = 5.5\ndepth_m = 6\nnum_rooms = 2\nsurvey = 'driven'\nstep_m = 0.15\n"
                                                    "image_width_px = 320\nimage_height_px = 240\nnum_queries = 0\n")
@@ -119,11 +120,29 @@ class ABag(unittest.TestCase):
         true = [self.centre(line) for line in sorted((line for line in (truth / "images.txt").read_text().splitlines()
                                                       if line.endswith(".jpg")), key=lambda line: line.split()[9])[:40]]
         self.assertAlmostEqual(length(measured) / length(true), 1.02, delta=0.01)
-        (self.folder / "drive.toml").write_text("name = 'drive'\n[capture]\npath = 'drive'\n")
-        compile_run = subprocess.run([CAIRN, "compile", self.folder / "drive.toml", "-o", self.folder / "drive.cairn"],
-                                     capture_output=True, text=True)
-        self.assertEqual(compile_run.returncode, 0, compile_run.stderr)
-        self.assertTrue((self.folder / "drive.cairn").is_file())
+
+    def test_one_command_makes_a_map_in_metres_of_a_bag(self):
+        (self.folder / "simulate.toml").write_text("width_m = 5.5\ndepth_m = 6\nnum_rooms = 2\nsurvey = 'driven'\nstep_m = 0.08\n"
+                                                   "max_turn_deg = 5\ntexel_m = 0.006\nimage_width_px = 400\n"
+                                                   "image_height_px = 300\nnum_queries = 0\n")
+        for command in ([CAIRN, "stage", "simulate", self.folder / "simulate.toml", "-o", self.folder / "truth"],
+                        [sys.executable, BAG_OF_CAPTURE, self.folder / "truth", self.folder / "drive.bag", "--images", "0,150"]):
+            subprocess.run(command, check=True, capture_output=True)
+
+        def compile_again(what):
+            run = subprocess.run([CAIRN, "compile", what, "-o", "map.cairn"], capture_output=True, text=True, cwd=self.folder)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            return run
+        self.assertIn("map.toml: the recipe of drive.bag", compile_again("drive.bag").stdout)
+        frame = json.loads((self.folder / "map.build/poses/frame.json").read_text())
+        self.assertEqual((frame["unit"], frame["source"]), ("metre", "odometry"))
+        inspected = subprocess.run([CAIRN, "inspect", "map.cairn"], capture_output=True, text=True, cwd=self.folder)
+        self.assertRegex(inspected.stdout, r"unit +metre\n")
+        self.assertIn("up to date", compile_again("drive.bag").stdout)
+        with open(self.folder / "map.toml", "a") as recipe:
+            recipe.write("topic = '/camera/image_raw/compressed'\n")
+        self.assertIn("bag-drive: options/bag-drive changed", compile_again("map.toml").stderr)
+        self.assertIn("up to date", compile_again("map.toml").stdout)
 
     def centre(self, line):
         w, x, y, z, *t = map(float, line.split()[1:8])

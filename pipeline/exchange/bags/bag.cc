@@ -1,12 +1,10 @@
 #include "pipeline/exchange/bags/bag.h"
 
-#include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include <yaml-cpp/yaml.h>
 
-#include "core/base/text.h"
+#include "core/capture/bag_file.h"
 #include "core/files/file.h"
 #include "core/files/input_file.h"
 
@@ -14,33 +12,6 @@ namespace cairn::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct BagKind {
-  std::string_view suffix;
-  std::string_view magic;
-  Result<std::unique_ptr<Bag>> (*open)(const std::string&);
-};
-
-constexpr BagKind kBagKinds[] = {
-    {".db3", "SQLite format 3", OpenSqliteBag},
-    {".mcap", "\x89MCAP", OpenMcapBag},
-    {".bag", "#ROSBAG V", OpenRos1Bag},
-};
-constexpr size_t kMaxMagicBytes = 16;
-
-std::string BagHead(const std::string& path) {
-  if (!CheckInputFile(path).ok()) return {};
-  std::string head(kMaxMagicBytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(file.gcount()));
-  return head;
-}
-
-bool HasBagSuffix(const std::string& path) {
-  return std::any_of(std::begin(kBagKinds), std::end(kBagKinds),
-                     [&](const BagKind& kind) { return path.ends_with(kind.suffix); });
-}
 
 Result<std::unique_ptr<Bag>> OpenBagFile(const std::string& path) {
   if (path.ends_with(".zstd") || path.ends_with(".zst")) {
@@ -50,10 +21,18 @@ Result<std::unique_ptr<Bag>> OpenBagFile(const std::string& path) {
                      path);
   }
   CAIRN_RETURN_IF_ERROR(CheckInputFile(path));
-  const std::string head = BagHead(path);
-  if (head.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: no bytes, expected a bag", path);
-  for (const BagKind& kind : kBagKinds) {
-    if (head.starts_with(kind.magic)) return kind.open(path);
+  std::error_code error;
+  if (fs::file_size(path, error) == 0 && !error)
+    return MakeError(ErrorCode::kEmptyFile, "{}: no bytes, expected a bag", path);
+  switch (BagStorageOf(path)) {
+    case BagStorage::kSqlite:
+      return OpenSqliteBag(path);
+    case BagStorage::kMcap:
+      return OpenMcapBag(path);
+    case BagStorage::kRos1:
+      return OpenRos1Bag(path);
+    case BagStorage::kNone:
+      break;
   }
   return MakeError(
       ErrorCode::kCorrupt,
@@ -82,7 +61,7 @@ class SeveralFilesBag : public Bag {
 };
 
 Result<std::vector<std::string>> ListedFiles(const std::string& folder) {
-  const std::string path = folder + "/metadata.yaml";
+  const std::string path = folder + "/" + kBagMetadataFile;
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   std::vector<std::string> files;
   try {
@@ -99,32 +78,16 @@ Result<std::vector<std::string>> ListedFiles(const std::string& folder) {
                      path);
   }
   for (std::string& file : files) {
-    // Old versions of rosbag2 wrote BAG/BAG_0.db3.
+    // Old versions of rosbag2 wrote BAG/BAG_0.db3; nothing outside of the folder is opened.
     const std::string name = fs::path(file).filename().string();
-    const fs::path relative(file);
-    const bool leads_out = relative.is_absolute() || std::any_of(relative.begin(), relative.end(),
-                                                                 [](const auto& p) { return p == ".."; });
+    file = folder + "/" + name;
     std::error_code error;
-    file = !leads_out && fs::exists(folder + "/" + file, error) ? folder + "/" + file : folder + "/" + name;
     if (!fs::exists(file, error)) {
       return MakeError(ErrorCode::kNotFound, "{}: lists {}, which is not there; copy the whole folder", path,
                        name);
     }
   }
   return files;
-}
-
-std::vector<std::string> BagsIn(const std::string& folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (HasBagSuffix(name)) names.push_back(name);
-  }
-  std::sort(names.begin(), names.end());
-  std::vector<std::string> paths;
-  for (const int i : NaturalOrder(names)) paths.push_back(folder + "/" + names[i]);
-  return paths;
 }
 
 }  // namespace
@@ -134,24 +97,11 @@ std::string TypeWithoutMsg(const std::string& type) {
   return middle == std::string::npos ? type : type.substr(0, middle) + type.substr(middle + 4);
 }
 
-bool IsBag(const std::string& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) {
-    if (!BagsIn(path).empty()) return true;
-    const Result<std::string> text = ReadFile(path + "/metadata.yaml");
-    return text.ok() && text->find("rosbag2_bagfile_information") != std::string::npos;
-  }
-  if (HasBagSuffix(path)) return true;
-  const std::string head = BagHead(path);
-  return std::any_of(std::begin(kBagKinds), std::end(kBagKinds),
-                     [&](const BagKind& kind) { return head.starts_with(kind.magic); });
-}
-
 Result<std::unique_ptr<Bag>> OpenBag(const std::string& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) return OpenBagFile(path);
-  std::vector<std::string> files = BagsIn(path);
-  if (fs::exists(path + "/metadata.yaml", error)) {
+  std::vector<std::string> files = BagsInFolder(path);
+  if (fs::exists(path + "/" + kBagMetadataFile, error)) {
     CAIRN_ASSIGN_OR_RETURN(files, ListedFiles(path));
   }
   if (files.empty())

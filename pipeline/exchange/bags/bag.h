@@ -34,8 +34,9 @@ struct BagMessage {
 class BagVisitor {
  public:
   virtual ~BagVisitor() = default;
-  // Asked for every message that is there.  Those that are not wanted cost little.
-  virtual bool Wants(const BagTopic& topic) = 0;
+  // Asked for every message that is there, with the time at which it was recorded, since 1970.  Those that
+  // are not wanted cost little.
+  virtual bool Wants(const BagTopic& topic, int64_t record_time_ns) = 0;
   // An error ends the reading and is returned by it.
   virtual Status Take(const BagMessage& message) = 0;
 };
@@ -49,10 +50,6 @@ class Bag {
   // and where.  Errors: those of the visitor, Io; Corrupt, Unsupported where nothing can be read.
   virtual Result<std::vector<std::string>> Read(BagVisitor& visitor) = 0;
 };
-
-// Whether it is for OpenBag: a file that begins as bags do or is called .db3, .mcap or .bag, or a folder
-// with rosbag2's metadata.yaml or such files.
-bool IsBag(const std::string& path);
 
 // Opens a bag of ROS 2 (SQLite's .db3, .mcap) or ROS 1 (.bag); or a folder of them, recorded one after the
 // other: those that metadata.yaml lists, in its order; without it all that are there, in the order of names.

@@ -1,6 +1,8 @@
 #include "pipeline/exchange/bags/choose_topics.h"
 
 #include <algorithm>
+#include <functional>
+#include <string_view>
 
 #include "core/base/printable.h"
 #include "pipeline/exchange/bags/image_pixels.h"
@@ -19,10 +21,12 @@ bool IsImageTopic(const BagTopic& topic) {
 
 class ContentsVisitor : public BagVisitor {
  public:
-  bool Wants(const BagTopic& topic) override {
+  bool Wants(const BagTopic& topic, int64_t record_time_ns) override {
     TopicContents& contents = contents_.topics[topic.name];
     contents.topic = topic;
-    ++contents.num_messages;
+    const bool is_new = contents.num_messages++ == 0;
+    contents.first_time_ns = is_new ? record_time_ns : std::min(contents.first_time_ns, record_time_ns);
+    contents.last_time_ns = is_new ? record_time_ns : std::max(contents.last_time_ns, record_time_ns);
     const bool is_first = !contents.header;
     return topic.type == kCameraInfoType || IsTransformTopic(topic) ||
            (is_first && (IsImageTopic(topic) || topic.type == kOdometryType));
@@ -48,12 +52,18 @@ class ContentsVisitor : public BagVisitor {
     CAIRN_ASSIGN_OR_RETURN(const ImageMessage image, DecodeImage(message));
     contents->header = image.header;
     contents->encoding = image.encoding;
+    contents->width = image.width;
+    contents->height = image.height;
     return Ok();
   }
   static Status TakeCompressedImage(const BagMessage& message, TopicContents* contents) {
     CAIRN_ASSIGN_OR_RETURN(const CompressedImageMessage image, DecodeCompressedImage(message));
     contents->header = image.header;
     contents->encoding = image.format;
+    if (const Result<BagPicture> picture = PictureOf(image); picture.ok()) {
+      contents->width = picture->grey.cols;
+      contents->height = picture->grey.rows;
+    }
     return Ok();
   }
   static Status TakeCameraInfo(const BagMessage& message, TopicContents* contents) {
@@ -88,27 +98,59 @@ bool HasPictures(const TopicContents& contents) {
   return contents.topic.type == kImageType && (!contents.header || IsPictureEncoding(contents.encoding));
 }
 
+std::string RateText(const TopicContents& contents) {
+  const double seconds = 1e-9 * static_cast<double>(contents.last_time_ns - contents.first_time_ns);
+  if (!(seconds > 0)) return "";
+  return fmt::format("{:.1f}", static_cast<double>(contents.num_messages - 1) / seconds);
+}
+
+std::string SizeText(const TopicContents& contents) {
+  return contents.width > 0 ? fmt::format("{} x {}", contents.width, contents.height) : "";
+}
+
 std::string TopicTable(const BagContents& contents) {
-  size_t name_width = 5, type_width = 4;
+  size_t name_width = 5, type_width = 4, size_width = 4;
   for (const auto& [name, topic] : contents.topics) {
     name_width = std::max(name_width, name.size());
     type_width = std::max(type_width, topic.topic.type.size());
+    size_width = std::max(size_width, SizeText(topic).size());
   }
-  std::string table =
-      fmt::format("\n  {:{}}  {:{}}  {:>8}", "topic", name_width, "type", type_width, "messages");
+  std::string table;
+  const auto add = [&](const std::string& name, const std::string& type, const std::string& messages,
+                       const std::string& rate, const std::string& size, const std::string& encoding) {
+    std::string line = fmt::format("  {:{}}  {:{}}  {:>8}  {:>7}  {:{}}  {}", name, name_width, type,
+                                   type_width, messages, rate, size, size_width, encoding);
+    line.resize(line.find_last_not_of(' ') + 1);
+    table += "\n" + line;
+  };
+  add("topic", "type", "messages", "Hz", "size", "encoding");
   for (const auto& [name, topic] : contents.topics) {
-    table += fmt::format("\n  {:{}}  {:{}}  {:>8}", name, name_width, topic.topic.type, type_width,
-                         topic.num_messages);
-    if (!topic.encoding.empty()) table += "  " + topic.encoding;
+    add(name, topic.topic.type, std::to_string(topic.num_messages), RateText(topic), SizeText(topic),
+        topic.encoding);
   }
   return Printable(table);
+}
+
+// The topic of the same camera's images as they were before they were compressed, with as many of them; null:
+// none.
+const TopicContents* RawTwin(const BagContents& contents, const TopicContents& compressed) {
+  constexpr std::string_view kSuffix = "/compressed";
+  std::string name = compressed.topic.name;
+  if (compressed.topic.type != kCompressedImageType || !name.ends_with(kSuffix)) return nullptr;
+  name.resize(name.size() - kSuffix.size());
+  const auto raw = contents.topics.find(name);
+  const bool is_twin = raw != contents.topics.end() && raw->second.topic.type == kImageType &&
+                       raw->second.header && HasPictures(raw->second) &&
+                       raw->second.num_messages == compressed.num_messages;
+  return is_twin ? &raw->second : nullptr;
 }
 
 // What messages say of choosing one kind of topic.
 struct TopicKind {
   const char* things;
   const char* option;
-  bool (*fits)(const TopicContents&);
+  const char* key;  // of a recipe
+  std::function<bool(const TopicContents&)> fits;
 };
 
 // The topic that is asked for, or the only one that fits; none if none does and none is asked for.
@@ -127,8 +169,12 @@ Result<std::optional<TopicContents>> Choose(const BagContents& contents, const s
   for (const auto& [name, topic] : contents.topics) {
     if (!kind.fits(topic)) continue;
     if (only) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: several topics have {}; choose one with {} {}{}",
-                       bag_path, kind.things, kind.option, only->topic.name, TopicTable(contents));
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: several topics have {}; choose one with {} {}, or in a recipe's [[capture]] with {} = "
+          "\"{}\"{}",
+          bag_path, kind.things, kind.option, only->topic.name, kind.key, only->topic.name,
+          TopicTable(contents));
     }
     only = topic;
   }
@@ -148,9 +194,12 @@ Result<BagContents> LookThrough(Bag& bag) {
 }
 
 Result<TopicContents> ChooseImages(const BagContents& contents, const std::string& bag_path,
-                                   const std::string& asked) {
+                                   const std::string& asked, std::vector<std::string>* warnings) {
+  const auto fits = [&](const TopicContents& topic) {
+    return HasPictures(topic) && RawTwin(contents, topic) == nullptr;
+  };
   CAIRN_ASSIGN_OR_RETURN(const std::optional<TopicContents> chosen,
-                         Choose(contents, bag_path, asked, {"images", "--topic", HasPictures}));
+                         Choose(contents, bag_path, asked, {"images", "--topic", "topic", fits}));
   if (!chosen) {
     return MakeError(ErrorCode::kNoData, "{}: no topic has images ({} or {}, no depth); the bag has {}",
                      bag_path, kImageType, kCompressedImageType,
@@ -164,17 +213,23 @@ Result<TopicContents> ChooseImages(const BagContents& contents, const std::strin
     return MakeError(ErrorCode::kCorrupt, "{}: no message of {} can be read; the first: {}", bag_path,
                      chosen->topic.name, chosen->problem);
   }
+  const auto compressed = contents.topics.find(chosen->topic.name + "/compressed");
+  if (asked.empty() && compressed != contents.topics.end() &&
+      RawTwin(contents, compressed->second) != nullptr) {
+    warnings->push_back(
+        fmt::format("{}: the images of {} are taken, not those of {}, of which there are as many", bag_path,
+                    chosen->topic.name, compressed->first));
+  }
   return *chosen;
 }
 
 Result<std::optional<TopicContents>> ChooseOdometry(const BagContents& contents, const std::string& bag_path,
                                                     const std::string& asked) {
   if (asked == "none") return std::optional<TopicContents>();
-  CAIRN_ASSIGN_OR_RETURN(
-      std::optional<TopicContents> chosen,
-      Choose(contents, bag_path, asked, {"odometry", "--odometry none, or --odometry", [](const auto& topic) {
-                                           return topic.topic.type == kOdometryType;
-                                         }}));
+  CAIRN_ASSIGN_OR_RETURN(std::optional<TopicContents> chosen,
+                         Choose(contents, bag_path, asked,
+                                {"odometry", "--odometry none, or --odometry", "odometry",
+                                 [](const auto& topic) { return topic.topic.type == kOdometryType; }}));
   if (chosen && chosen->topic.type != kOdometryType) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: the topic {} has no odometry ({}), but {}; there are{}", bag_path, asked,

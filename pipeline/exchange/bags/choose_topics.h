@@ -16,9 +16,11 @@ namespace cairn::pipeline {
 struct TopicContents {
   BagTopic topic;
   int64_t num_messages = 0;
-  std::optional<MessageHeader> header;  // of images, camera_info and odometry
-  std::string encoding;                 // of images: "bgr8", "jpeg"
-  std::string child_frame_id;           // of odometry
+  int64_t first_time_ns = 0, last_time_ns = 0;  // at which messages were recorded, since 1970
+  std::optional<MessageHeader> header;          // of images, camera_info and odometry
+  std::string encoding;                         // of images: "bgr8", "jpeg"
+  int64_t width = 0, height = 0;                // of images, px; 0: not known
+  std::string child_frame_id;                   // of odometry
   std::optional<CameraInfoMessage> camera_info;
   bool camera_info_changes = false;
   std::string problem;  // why the first message cannot be read; "": it can
@@ -35,11 +37,13 @@ Result<BagContents> LookThrough(Bag& bag);
 
 bool IsTransformTopic(const BagTopic& topic);
 
-// The topic of images that is asked for, or the only one whose messages are pictures (depth is not).
+// The topic of images that is asked for, or the only one whose messages are pictures (depth is not).  A topic
+// and its NAME/compressed with as many messages are one camera: then the former is taken, which `warnings`
+// say.
 // Errors, with a table of the bag's topics: NotFound (no such topic), NoData (no images), InvalidArgument
 // (the topic has none; several have); Unsupported (an encoding that is not known).
 Result<TopicContents> ChooseImages(const BagContents& contents, const std::string& bag_path,
-                                   const std::string& asked);
+                                   const std::string& asked, std::vector<std::string>* warnings);
 
 // The topic of odometry that is asked for, or the only one; none if there is none, or "none" is asked for.
 // Errors: as ChooseImages.

@@ -72,7 +72,7 @@ class ImportVisitor : public BagVisitor {
         progress_(progress),
         motion_(plan.chain.value_or(FrameChain())) {}
 
-  bool Wants(const BagTopic& topic) override {
+  bool Wants(const BagTopic& topic, int64_t /*record_time_ns*/) override {
     return topic.name == plan_.images.topic.name ||
            (plan_.odometry && (topic.name == plan_.odometry->topic.name || IsTransformTopic(topic)));
   }
@@ -393,7 +393,7 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
   CAIRN_ASSIGN_OR_RETURN(const BagContents contents, LookThrough(*bag));
   BagReport report = {.warnings = contents.damage};
   BagPlan plan = {.path = path};
-  CAIRN_ASSIGN_OR_RETURN(plan.images, ChooseImages(contents, path, options.topic));
+  CAIRN_ASSIGN_OR_RETURN(plan.images, ChooseImages(contents, path, options.topic, &report.warnings));
   CAIRN_ASSIGN_OR_RETURN(plan.odometry, ChooseOdometry(contents, path, options.odometry));
   CAIRN_RETURN_IF_ERROR(ChooseCamera(contents, options, &plan, &report.warnings));
   ChooseChain(contents, options, &plan, &report.warnings);

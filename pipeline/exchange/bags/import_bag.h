@@ -7,8 +7,8 @@
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
+#include "core/capture/frame_choice.h"
 #include "core/geometry/pose.h"
-#include "pipeline/exchange/film/import_film.h"
 
 namespace cairn::pipeline {
 

@@ -145,8 +145,9 @@ class McapBag : public Bag {
       damage_.records.Add(where);
       return Ok();
     }
-    if (!visitor.Wants(channel->second)) return Ok();
-    return visitor.Take({channel->second, static_cast<int64_t>(log_time), cursor.Take(cursor.num_left())});
+    const auto time_ns = static_cast<int64_t>(log_time);
+    if (!visitor.Wants(channel->second, time_ns)) return Ok();
+    return visitor.Take({channel->second, time_ns, cursor.Take(cursor.num_left())});
   }
 
   // Keeps a schema's name, or a channel.  The first of a number counts, which later ones repeat.

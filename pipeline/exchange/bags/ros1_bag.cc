@@ -166,9 +166,9 @@ class Ros1Bag : public Bag {
       damage_.records.Add(where);
       return Ok();
     }
-    if (!visitor.Wants(connection->second)) return Ok();
     // Seconds, then nanoseconds.
     const auto time_ns = static_cast<int64_t>((*time & 0xffffffff) * 1'000'000'000 + (*time >> 32));
+    if (!visitor.Wants(connection->second, time_ns)) return Ok();
     return visitor.Take({connection->second, time_ns, contents});
   }
 

@@ -62,7 +62,7 @@ class SqliteBag : public Bag {
           continue;
         }
         ++num_shown;
-        if (visitor.Wants(topic->second))
+        if (visitor.Wants(topic->second, query.getColumn(1).getInt64()))
           CAIRN_RETURN_IF_ERROR(Show(topic->second, query, visitor, &num_lost));
       }
       return Ok();

@@ -12,7 +12,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/base/parallel.h"
-#include "core/base/text.h"
 #include "core/camera/camera.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
@@ -256,20 +255,6 @@ class FilmImporter {
 };
 
 }  // namespace
-
-Result<FilmOptions> ParseFrameChoice(const std::string& text) {
-  FilmOptions options;
-  if (text == "auto") return options;
-  if (text == "all") {
-    options.choice = FrameChoice::kAll;
-    return options;
-  }
-  options.choice = FrameChoice::kEvery;
-  if (ParseNumber(text, &options.every_s) && std::isfinite(options.every_s) && options.every_s > 0)
-    return options;
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "keyframes '{}': must be auto, all, or the seconds between images, such as 0.5", text);
-}
 
 Result<FilmReport> ImportFilm(const std::string& path, const FilmOptions& options, const std::string& output,
                               int num_threads, Progress& progress) {

@@ -6,16 +6,10 @@
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
+#include "core/capture/frame_choice.h"
 #include "core/capture/keyframes.h"
 
 namespace cairn::pipeline {
-
-// Which frames of a film become images.
-enum class FrameChoice {
-  kKeyframes,  // as KeyframeChooser decides
-  kAll,
-  kEvery,  // by time alone
-};
 
 struct FilmOptions {
   FrameChoice choice = FrameChoice::kKeyframes;
@@ -26,9 +20,6 @@ struct FilmOptions {
   // Of the JPEG files; 95: see docs/captures.md.  REQUIRES: in [1, 100]
   int jpeg_quality = 95;
 };
-
-// Parses "auto", "all" or seconds.  Errors: InvalidArgument.
-Result<FilmOptions> ParseFrameChoice(const std::string& text);
 
 struct FilmReport {
   KeyframeStats frames;  // of kAll and kEvery only num_frames and num_keyframes

@@ -126,7 +126,7 @@ Result<std::string> DetectLayout(const std::string& source) {
   std::error_code error;
   if (!fs::is_directory(source, error)) {
     return MakeError(ErrorCode::kNotFound,
-                     "{}: no such file or folder; name a film, or the folder of a data set", source);
+                     "{}: no such file or folder; name a film, a bag, or the folder of a data set", source);
   }
   std::string expected;
   for (const Layout& layout : Layouts()) {

@@ -69,14 +69,19 @@ TEST_F(BuildFolderTest, OptionsAreRewrittenOnlyWhenTheirContentChanges) {
 TEST_F(BuildFolderTest, AFilmIsImportedIntoAFolderOfItsNameAndReconstructed) {
   const std::string film = (folder_ / "walk.mp4").string();
   ASSERT_TRUE(WriteFileAtomically(film, "").ok());
-  recipe_.captures = {{.name = "walk", .path = film, .keyframes = "0.5", .camera = "PINHOLE,4,4,2,2,2,2"}};
+  recipe_.captures = {{.name = "walk",
+                       .path = film,
+                       .kind = CaptureKind::kFilm,
+                       .footage = {.keyframes = "0.5", .camera = "PINHOLE,4,4,2,2,2,2"}}};
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_TRUE(IsReconstructed(recipe_));
   const std::string config = Text("config.mk");
   EXPECT_THAT(config, HasSubstr("\nCAPTURE := " + paths_.build_dir + "/film-walk\n"));
-  EXPECT_THAT(config, HasSubstr("\nFILMS := walk=" + film + "\n"));
-  EXPECT_THAT(config, HasSubstr("\nFILM_KEYFRAMES := walk=0.5\n"));
-  EXPECT_THAT(config, HasSubstr("\nFILM_CAMERAS := walk=PINHOLE,4,4,2,2,2,2\n"));
+  EXPECT_THAT(config, HasSubstr("\nFOOTAGE := film-walk=" + film + "\n"));
+  EXPECT_THAT(config, HasSubstr("\nFOOTAGE_FILES := film-walk=" + film + "\n"));
+  EXPECT_THAT(config,
+              HasSubstr("\nFOOTAGE_OPTIONS := film-walk=--format film-walk=film film-walk=--keyframes "
+                        "film-walk=0.5 film-walk=--camera film-walk=PINHOLE,4,4,2,2,2,2\n"));
   for (const char* name : {"film-walk", "film-walk.stamp", "film-walk.report.json"})
     EXPECT_TRUE(IsBuildFileName(name)) << name;
   EXPECT_FALSE(IsBuildFileName("film.mp4"));
@@ -84,6 +89,49 @@ TEST_F(BuildFolderTest, AFilmIsImportedIntoAFolderOfItsNameAndReconstructed) {
   recipe_.captures.push_back({.name = "survey", .path = (folder_ / "survey").string()});
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_THAT(Text("config.mk"), HasSubstr("\nSESSIONS := walk=" + paths_.build_dir + "/film-walk survey="));
+}
+
+TEST_F(BuildFolderTest, ABagThatIsAFolderDependsOnTheFilesInIt) {
+  const std::string bag = (folder_ / "run").string();
+  fs::create_directories(bag);
+  for (const char* name : {"/metadata.yaml", "/run_1.mcap", "/run_0.mcap", "/notes of the day.txt"})
+    ASSERT_TRUE(WriteFileAtomically(bag + name, "").ok());
+  recipe_.captures = {
+      {.name = "run", .path = bag + "/", .kind = CaptureKind::kBag, .footage = {.topic = "/left"}}};
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nCAPTURE := " + paths_.build_dir + "/bag-run\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nFOOTAGE := bag-run=" + bag + "\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nFOOTAGE_FILES := bag-run=" + bag + "/metadata.yaml bag-run=" +
+                                           bag + "/run_0.mcap bag-run=" + bag + "/run_1.mcap\n"));
+  const std::string how = Text("options/bag-run");
+  EXPECT_THAT(how, HasSubstr("--topic\n/left\n"));
+  EXPECT_EQ(Text("options/odometry"), "run:   \n");
+  // A file less is another bag, of which odometry is taken as before.
+  fs::remove(bag + "/run_1.mcap");
+  const fs::file_time_type date = Date("options/odometry");
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_NE(Text("options/bag-run"), how);
+  EXPECT_EQ(Date("options/odometry"), date);
+  recipe_.captures[0].footage.odometry = "none";
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/odometry"), "run: none  \n");
+  for (const char* name : {"bag-run", "bag-run.stamp", "bag-run.report.json"})
+    EXPECT_TRUE(IsBuildFileName(name)) << name;
+  EXPECT_FALSE(IsBuildFileName("drive.bag"));
+  for (const char* name : {"bag-run", "film-walk", "odometry"}) EXPECT_TRUE(IsOptionsFileName(name)) << name;
+  EXPECT_FALSE(IsOptionsFileName("bag"));
+  // Make cannot depend on such names.
+  ASSERT_TRUE(WriteFileAtomically(bag + "/run 2.mcap", "").ok());
+  EXPECT_THAT(WriteBuildFolder(recipe_, paths_).error().message,
+              testing::AllOf(HasSubstr("run 2.mcap' has a space"), HasSubstr("the file of a film or bag")));
+}
+
+TEST_F(BuildFolderTest, OdometryOfFoldersIsNoted) {
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/odometry"), "");
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/odometry.txt", "").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/odometry"), "survey\n");
 }
 
 TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {

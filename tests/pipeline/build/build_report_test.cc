@@ -109,7 +109,7 @@ TEST_F(BuildReportTest, TableAddsUpShardsAndTakesCountsFromTheWhole) {
 TEST_F(BuildReportTest, EachFilmHasARowAndOneThatTheRecipeDoesNotNameHasNone) {
   for (const char* name : {"film-east", "film-north", "film-former"})
     Write(std::string(name) + ".report.json", StageJson("import", 1, 1));
-  run_.films = {"film-east", "film-north"};
+  run_.footage = {"film-east", "film-north"};
   const Json report = Make();
   ASSERT_EQ(report["stages"].size(), 4);
   EXPECT_EQ(report["stages"][0]["file"], "film-east");

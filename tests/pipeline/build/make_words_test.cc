@@ -83,6 +83,14 @@ TEST_F(MakeWords, WhatMakeOrAShellWouldReadOtherwiseIsRefusedWithASentence) {
   EXPECT_THAT(CheckMakePath("the map", "a\x1b[31m").error().message, HasSubstr("a control character"));
 }
 
+TEST_F(MakeWords, OtherValuesAreNoPaths) {
+  EXPECT_TRUE(CheckMakeWord("topic", "/camera/image_raw").ok());
+  EXPECT_TRUE(CheckMakeWord("topic", "a~b").ok());
+  EXPECT_THAT(CheckMakeWord("topic", "a b").error().message,
+              "topic 'a b' has a space, which Make cannot handle; write it without");
+  EXPECT_THAT(CheckMakeWord("topic", "~root").error().message, HasSubstr("has '~' at its beginning"));
+}
+
 TEST_F(MakeWords, LaunchersAreWordsAndNothingElse) {
   MakeVariables variables;
   ASSERT_TRUE(

@@ -132,9 +132,30 @@ TEST_F(RecipeSourceTest, AFilmIsCompiledByARecipeOfItsNameWithoutTheSuffix) {
   const Recipe recipe = ReadRecipe(source.recipe, TestStages()).value();
   ASSERT_EQ(recipe.captures.size(), 1u);
   EXPECT_EQ(recipe.captures[0].name, "walk.v2");
-  EXPECT_TRUE(recipe.captures[0].IsFile());
+  EXPECT_EQ(recipe.captures[0].kind, CaptureKind::kFilm);
   EXPECT_TRUE(fs::equivalent(recipe.captures[0].path, "survey/walk.v2.mp4"));
   EXPECT_THAT(Message("survey/Walk 1.MOV"), HasSubstr("has a space"));
+}
+
+TEST_F(RecipeSourceTest, ABagIsCompiledByARecipeOfItsName) {
+  Write("drive.v2.bag", "");
+  const RecipeSource file = FindRecipe("drive.v2.bag", "").value();
+  EXPECT_EQ(file.map, "drive.v2.cairn");
+  EXPECT_TRUE(file.was_written);
+  EXPECT_EQ(ReadRecipe(file.recipe, TestStages())->captures[0].kind, CaptureKind::kBag);
+  fs::create_directories("rosbag2_2024_05_01-10_00_00");
+  Write("rosbag2_2024_05_01-10_00_00/metadata.yaml", "rosbag2_bagfile_information:\n");
+  const RecipeSource folder = FindRecipe("rosbag2_2024_05_01-10_00_00/", "").value();
+  EXPECT_EQ(folder.map, "rosbag2_2024_05_01-10_00_00.cairn");
+  const Recipe recipe = ReadRecipe(folder.recipe, TestStages()).value();
+  EXPECT_EQ(recipe.captures[0].kind, CaptureKind::kBag);
+  EXPECT_TRUE(fs::equivalent(recipe.captures[0].path, "rosbag2_2024_05_01-10_00_00"));
+  // A folder of images that has a bag in it, too, is a capture.
+  Write("survey/hall_A/drive.bag", "");
+  EXPECT_EQ(ReadRecipe(FindRecipe("survey/hall_A", "")->recipe, TestStages())->captures[0].kind,
+            CaptureKind::kFolder);
+  Write("drive 1.bag", "");
+  EXPECT_THAT(Message("drive 1.bag"), HasSubstr("has a space"));
 }
 
 }  // namespace

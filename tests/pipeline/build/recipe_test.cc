@@ -15,6 +15,8 @@ namespace cairn::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
 
@@ -56,20 +58,95 @@ TEST_F(RecipeTest, NameAndCaptureAreEnough) {
   }
 }
 
-TEST_F(RecipeTest, KeyframesAndCameraAreForFilms) {
+TEST_F(RecipeTest, KeyframesAndCameraAreForFilmsAndBags) {
   ASSERT_TRUE(WriteFileAtomically((folder_ / "walk.mp4").string(), "").ok());
   const std::string film = "name = \"a\"\n[[capture]]\npath = \"walk.mp4\"\n";
   const auto recipe = Read(film + "keyframes = 0.5\ncamera = \"SIMPLE_PINHOLE,640,480,500,320,240\"\n");
   ASSERT_TRUE(recipe.ok()) << recipe.error().message;
-  EXPECT_TRUE(recipe->captures[0].IsFile());
+  EXPECT_EQ(recipe->captures[0].kind, CaptureKind::kFilm);
   EXPECT_EQ(recipe->captures[0].name, "walk");
-  EXPECT_EQ(recipe->captures[0].keyframes, "0.5");
-  EXPECT_EQ(recipe->captures[0].camera, "SIMPLE_PINHOLE,640,480,500,320,240");
-  EXPECT_EQ(Read(film)->captures[0].keyframes, "auto");
+  EXPECT_EQ(recipe->captures[0].footage.keyframes, "0.5");
+  EXPECT_EQ(recipe->captures[0].footage.camera, "SIMPLE_PINHOLE,640,480,500,320,240");
+  EXPECT_EQ(Read(film)->captures[0].footage.keyframes, "auto");
   EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\nkeyframes = \"all\"\n"),
-              HasSubstr("keyframes and camera are for films"));
+              AllOf(HasSubstr("recipe.toml:2: keyframes is for films and bags"),
+                    HasSubstr("survey is a folder of images; leave it out")));
+  EXPECT_THAT(Message("name = \"a\"\n[[capture]]\npath = \"survey\"\ncamera = \"PINHOLE,4,4,2,2,2,2\"\n"),
+              HasSubstr("leave it out (a folder has its cameras in cameras.txt)"));
+  for (const char* keyframes :
+       {"0", "-1", "inf", "\"often\"", "\"0.5s\"", "[1, 2]", "\"\"", "true", "\"~\""}) {
+    EXPECT_THAT(Message(film + "keyframes = " + keyframes + "\n"), HasSubstr("recipe.toml:4: keyframes: "))
+        << keyframes;
+  }
   EXPECT_THAT(Message(film + "camera = \"PINHOLE,640\"\n", ErrorCode::kCorrupt),
               HasSubstr("recipe.toml:4: camera"));
+}
+
+TEST_F(RecipeTest, ABagSaysHowItIsImported) {
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "drive.bag").string(), "").ok());
+  fs::create_directories(folder_ / "run");
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "run/run_0.mcap").string(), "").ok());
+  const auto recipe = Read(
+      "name = \"a\"\n[[capture]]\npath = \"drive.bag\"\ntopic = \"/camera/left/image_raw\"\nodometry = "
+      "\"none\"\n"
+      "camera_on_robot = [0.25, 0, -1.5, -0.5, 0.5, -0.5, 0.5]\nmax_time_gap_s = 0.05\nkeyframes = \"all\"\n"
+      "[[capture]]\npath = \"run\"\ncamera_on_robot = \"-1, 2,3,0,0,0,1\"\nmax_time_gap_s = 0\n");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  const RecipeCapture &file = recipe->captures[0], &folder = recipe->captures[1];
+  EXPECT_EQ(file.kind, CaptureKind::kBag);
+  EXPECT_EQ(file.name, "drive");
+  EXPECT_THAT(
+      FootageWords(file.kind, file.footage),
+      ElementsAre("--format", "bag", "--keyframes", "all", "--topic", "/camera/left/image_raw", "--odometry",
+                  "none", "--camera-on-robot", "0.25,0,-1.5,-0.5,0.5,-0.5,0.5", "--max-time-gap-s", "0.05"));
+  EXPECT_EQ(folder.kind, CaptureKind::kBag);
+  EXPECT_EQ(folder.name, "run");
+  EXPECT_THAT(FootageWords(folder.kind, folder.footage),
+              ElementsAre("--format", "bag", "--keyframes", "auto", "--camera-on-robot", "-1,2,3,0,0,0,1",
+                          "--max-time-gap-s", "0"));
+  // Compiled where it is, it holds the images of its build folder.
+  fs::create_directories(folder_ / "run/run.build/bag-run/images");
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "run/run.build/bag-run/images/a.jpg").string(), "").ok());
+  EXPECT_EQ(Read("name = \"a\"\n[[capture]]\npath = \"run\"\n")->captures[0].kind, CaptureKind::kBag);
+  // With images beside them, it is a folder of images, and keys of bags are not for it.
+  ASSERT_TRUE(WriteFileAtomically((folder_ / "run/a.jpg").string(), "").ok());
+  const std::string head = "name = \"a\"\n[[capture]]\npath = \"run\"\n";
+  EXPECT_EQ(Read(head)->captures[0].kind, CaptureKind::kFolder);
+  EXPECT_THAT(Message(head + "topic = \"/a\"\n"), HasSubstr("topic is for bags, and "));
+  fs::remove(folder_ / "run/a.jpg");
+  fs::create_directories(folder_ / "run/images");
+  EXPECT_EQ(Read(head)->captures[0].kind, CaptureKind::kFolder);
+}
+
+TEST_F(RecipeTest, KeysOfBagsAreForBagsAndSayWhatIsWrongWithThem) {
+  for (const char* name : {"walk.mp4", "drive.bag"})
+    ASSERT_TRUE(WriteFileAtomically((folder_ / name).string(), "").ok());
+  const std::string film = "name = \"a\"\n[[capture]]\npath = \"walk.mp4\"\n";
+  for (const char* key : {"topic = \"/a\"", "odometry = \"none\"", "camera_on_robot = [0, 0, 0, 0, 0, 0, 1]",
+                          "max_time_gap_s = 1"}) {
+    EXPECT_THAT(Message(film + key + "\n"),
+                AllOf(HasSubstr("is for bags, and "), HasSubstr("walk.mp4 is a film")));
+  }
+  const std::string bag = "name = \"a\"\n[[capture]]\npath = \"drive.bag\"\n";
+  // Nothing that make or a shell would read in its own way.
+  for (const char* topic :
+       {"", "a b", "~root", "-o", "$(touch x)", "`x`", "a;b", "/a=b", "/a%", "/\\u00e4", "/a\\n"}) {
+    EXPECT_THAT(Message(bag + "topic = \"" + topic + "\"\n"), HasSubstr("topic: ")) << topic;
+    EXPECT_THAT(Message(bag + "odometry = \"" + topic + "\"\n"), HasSubstr("not a topic's name")) << topic;
+  }
+  EXPECT_THAT(Message(bag + "topic = 5\n"), HasSubstr("recipe.toml:4: topic: expected text"));
+  EXPECT_THAT(Message(bag + "topic = true\n"), HasSubstr("recipe.toml:4: topic: expected text"));
+  EXPECT_THAT(Message(bag + "camera = \"PINHOLE, 4, 4, 2, 2, 2, 2\"\n"), HasSubstr("camera 'PINHOLE, 4"));
+  for (const char* place : {"[1, 2, 3]", "[0, 0, 0, 0, 0, 0, 1, 2]", "\"0 0 0 0 0 0 1\"", "1", "\"here\""})
+    EXPECT_THAT(Message(bag + "camera_on_robot = " + place + "\n"), HasSubstr("expected seven numbers"))
+        << place;
+  EXPECT_THAT(Message(bag + "camera_on_robot = [0, 0, 0, 0, 0, 0, \"1\"]\n"), HasSubstr("expected list"));
+  EXPECT_THAT(Message(bag + "camera_on_robot = [0, 0, 0, 0, 0, 0, 2]\n", ErrorCode::kCorrupt),
+              HasSubstr("camera_on_robot: "));
+  for (const char* gap : {"-0.1", "\"long\"", "[1, 2]"})
+    EXPECT_THAT(Message(bag + "max_time_gap_s = " + gap + "\n"), HasSubstr("expected seconds, at least 0"))
+        << gap;
+  EXPECT_THAT(Message(bag + "odometri = \"none\"\n"), HasSubstr("did you mean 'odometry'?"));
 }
 
 TEST_F(RecipeTest, StageTablesOverrideDefaults) {

@@ -266,9 +266,10 @@ TEST_F(ImportedBag, TopicsAreAskedForWhereSeveralFit) {
   const std::vector<Recorded> two = {GreyMessage(1, "/left/image_raw"), GreyMessage(1, "/right/image_raw"),
                                      OdometryMessageAt(1, {})};
   const std::string message = ErrorOf(two);
-  EXPECT_THAT(message, HasSubstr("several topics have images; choose one with --topic /left/image_raw\n"));
-  EXPECT_THAT(message, HasSubstr("/right/image_raw  sensor_msgs/Image         1  mono8"));
-  EXPECT_THAT(message, HasSubstr("/odom             nav_msgs/Odometry         1"));
+  EXPECT_THAT(message, HasSubstr("several topics have images; choose one with --topic /left/image_raw, or in "
+                                 "a recipe's [[capture]] with topic = \"/left/image_raw\"\n"));
+  EXPECT_THAT(message, HasSubstr("/right/image_raw  sensor_msgs/Image         1           8 x 6  mono8"));
+  EXPECT_THAT(message, HasSubstr("/odom             nav_msgs/Odometry         1\n"));
   EXPECT_FALSE(Has(""));
   auto report = Import(two, {.topic = "/right/image_raw", .choice = FrameChoice::kAll});
   ASSERT_TRUE(report.ok()) << report.error().message;
@@ -283,12 +284,72 @@ TEST_F(ImportedBag, TopicsAreAskedForWhereSeveralFit) {
                                         OdometryMessageAt(1, Turned(0, 1, 0, 0), "/wheels"),
                                         OdometryMessageAt(1, Turned(0, 5, 0, 0), "/visual")};
   EXPECT_THAT(ErrorOf(wheels), HasSubstr("several topics have odometry; choose one with --odometry none, or "
-                                         "--odometry /visual"));
+                                         "--odometry /visual, or in a recipe's [[capture]] with odometry = "
+                                         "\"/visual\"\n"));
   ASSERT_TRUE(Import(wheels, {.odometry = "/wheels", .choice = FrameChoice::kAll}).ok());
   EXPECT_NEAR(ReadOdometry().at(0).world_from_camera.translation.x(), 1.3, 1e-9);
   ASSERT_TRUE(Import(wheels, {.odometry = "none", .choice = FrameChoice::kAll}).ok());
   EXPECT_FALSE(Has("odometry.txt"));
   EXPECT_THAT(ErrorOf(wheels, {.odometry = "/tf_static"}), HasSubstr("has no odometry"));
+}
+
+TEST_F(ImportedBag, TheTableOfTopicsHasRatesAndSizes) {
+  cv::Mat picture(30, 40, CV_8UC1, cv::Scalar(90));
+  std::vector<uchar> jpeg;
+  cv::imencode(".jpg", picture, jpeg);
+  const std::string file(jpeg.begin(), jpeg.end());
+  std::vector<Recorded> messages;
+  for (int i = 0; i < 5; ++i) {  // five in two seconds are two a second and a bit; the order does not matter
+    const int64_t time_ns = (i == 1 ? 4 : i == 4 ? 1 : i) * kSecond / 2;
+    messages.push_back({"/b/compressed", kCompressed, time_ns, CompressedImageBytes(time_ns, "jpeg", file)});
+  }
+  messages.push_back({"/a", kImage, 3, ImageBytes(Grey(1))});
+  messages.push_back({"/c", kCompressed, 3, CompressedImageBytes(1, "jpeg", "damaged")});
+  const std::string message = ErrorOf(messages);
+  EXPECT_THAT(
+      message,
+      HasSubstr("\n  topic          type                         messages       Hz  size     encoding\n"));
+  EXPECT_THAT(
+      message,
+      HasSubstr("\n  /a             sensor_msgs/Image                   1           8 x 6    mono8\n"));
+  EXPECT_THAT(
+      message,
+      HasSubstr("\n  /b/compressed  sensor_msgs/CompressedImage         5      2.0  40 x 30  jpeg\n"));
+  EXPECT_THAT(
+      message,
+      testing::EndsWith("\n  /c             sensor_msgs/CompressedImage         1                    jpeg"));
+}
+
+TEST_F(ImportedBag, ImagesThatWereCompressedTooAreTakenAsTheyWere) {
+  cv::Mat picture(6, 8, CV_8UC1, cv::Scalar(90));
+  std::vector<uchar> jpeg;
+  cv::imencode(".jpg", picture, jpeg);
+  const auto compressed = [&](int64_t i, const std::string& topic) {
+    return Recorded{topic, kCompressed, i * kSecond,
+                    CompressedImageBytes(i * kSecond, "jpeg", std::string(jpeg.begin(), jpeg.end()))};
+  };
+  const std::string twin = "/camera/image_raw/compressed";
+  const std::vector<Recorded> both = {GreyMessage(1), compressed(1, twin), GreyMessage(2),
+                                      compressed(2, twin)};
+  auto report = Import(both, {.choice = FrameChoice::kAll});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->topic, "/camera/image_raw");
+  EXPECT_THAT(warnings_,
+              testing::Contains(HasSubstr("the images of /camera/image_raw are taken, not those of "
+                                          "/camera/image_raw/compressed, of which there are as many")));
+  // The other one where it is asked for, which needs no warning.
+  report = Import(both, {.topic = twin, .choice = FrameChoice::kAll});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->topic, twin);
+  EXPECT_THAT(warnings_, testing::Not(testing::Contains(HasSubstr("as many"))));
+  // Not where the former cannot be read, ...
+  EXPECT_THAT(ErrorOf({{"/camera/image_raw", kImage, 1, "?"}, compressed(1, twin)}),
+              HasSubstr("several topics"));
+  // ... some were lost, or it is another camera.
+  EXPECT_THAT(ErrorOf({GreyMessage(1), compressed(1, twin), compressed(2, twin)}),
+              HasSubstr("several topics"));
+  EXPECT_THAT(ErrorOf({GreyMessage(1), compressed(1, "/back/image_raw/compressed")}),
+              HasSubstr("several topics"));
 }
 
 TEST_F(ImportedBag, DepthIsNoPicture) {

@@ -21,6 +21,12 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 
+// Options for the frames that `cairn import --keyframes` names so.
+FilmOptions Frames(const std::string& text) {
+  const WantedFrames wanted = ParseFrameChoice(text).value();
+  return {.choice = wanted.choice, .every_s = wanted.every_s};
+}
+
 class ImportFilmTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -105,12 +111,12 @@ TEST_F(ImportFilmTest, SameFilesForAnyNumberOfThreads) {
 
 TEST_F(ImportFilmTest, FramesMayBeChosenByTime) {
   EncodeFilm(Path("walk.mp4"), DrawnWalk(60, 4));
-  ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("0.5").value()).ok());
+  ASSERT_TRUE(Import("walk.mp4", Frames("0.5")).ok());
   EXPECT_THAT(Images(), ElementsAre("000000.000.jpg", "000000.500.jpg", "000001.000.jpg", "000001.500.jpg"));
   // Each third frame, although sums of 0.1 and times in units of a film do not meet exactly.
-  ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("0.1").value(), "thirds").ok());
+  ASSERT_TRUE(Import("walk.mp4", Frames("0.1"), "thirds").ok());
   EXPECT_THAT(Images("thirds"), testing::AllOf(SizeIs(20), Contains("000001.900.jpg")));
-  ASSERT_TRUE(Import("walk.mp4", ParseFrameChoice("all").value(), "all").ok());
+  ASSERT_TRUE(Import("walk.mp4", Frames("all"), "all").ok());
   EXPECT_THAT(Images("all"), SizeIs(60));
   for (const char* text : {"0", "-1", "nan", "inf", "often", ""})
     EXPECT_THAT(ParseFrameChoice(text).error().message, HasSubstr("must be auto, all, or the seconds"))
@@ -155,7 +161,7 @@ TEST_F(ImportFilmTest, ACameraThatStandsIsTold) {
   const Error error = ImportError("still.mp4");
   EXPECT_EQ(error.code, ErrorCode::kNoData);
   EXPECT_THAT(error.message, HasSubstr("the camera never moves: 60 frames in 2.0 s show the same"));
-  ASSERT_TRUE(Import("still.mp4", ParseFrameChoice("all").value()).ok());
+  ASSERT_TRUE(Import("still.mp4", Frames("all")).ok());
 }
 
 TEST_F(ImportFilmTest, RepeatedFramesAddNothing) {
@@ -251,7 +257,7 @@ TEST_F(ImportFilmTest, ACaptureThatSomeoneChangedIsNotReplaced) {
   ASSERT_TRUE(Import("walk.mp4").ok());
   ASSERT_TRUE(Import("walk.mp4").ok()) << "the same again";
   ASSERT_TRUE(WriteFileAtomically(Path("capture/notes.txt"), "mine").ok());
-  const auto again = Import("walk.mp4", ParseFrameChoice("all").value());
+  const auto again = Import("walk.mp4", Frames("all"));
   ASSERT_FALSE(again.ok());
   EXPECT_THAT(again.error().message, HasSubstr("notes.txt"));
   EXPECT_TRUE(fs::exists(Path("capture/notes.txt")));

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 class Contents : public BagVisitor {
  public:
-  bool Wants(const BagTopic&) override { return true; }
+  bool Wants(const BagTopic&, int64_t) override { return true; }
   Status Take(const BagMessage& message) override {
     messages.emplace_back(message.bytes);
     return Ok();
