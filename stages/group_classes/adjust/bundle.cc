@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <ceres/ceres.h>
+#include <spdlog/spdlog.h>
 #include <Eigen/LU>
 #include <Eigen/Sparse>
-#include <spdlog/spdlog.h>
 
 #include "core/structure/bundle_blocks.h"
 #include "stages/group_classes/adjust/evidence.h"
@@ -121,12 +121,13 @@ class CeresBundle {
     options.max_num_iterations = options_.max_num_iterations;
     options.function_tolerance = options_.function_tolerance;
     const ceres::Solver::Summary summary = SolveOnOneThread(options, &problem_);
-    spdlog::debug("group_classes: {} images, {} points, {} keypoints adjusted in {} steps: cost {:.6g} -> {:.6g}",
-                  num_images_, bundle_.points.size(), bundle_.observations.size(),
-                  summary.num_successful_steps + summary.num_unsuccessful_steps, summary.initial_cost,
-                  summary.final_cost);
-    spdlog::debug("group_classes: {:.1f} s, of them {:.1f} s in the linear solver", summary.total_time_in_seconds,
-                  summary.linear_solver_time_in_seconds);
+    spdlog::debug(
+        "group_classes: {} images, {} points, {} keypoints adjusted in {} steps: cost {:.6g} -> {:.6g}",
+        num_images_, bundle_.points.size(), bundle_.observations.size(),
+        summary.num_successful_steps + summary.num_unsuccessful_steps, summary.initial_cost,
+        summary.final_cost);
+    spdlog::debug("group_classes: {:.1f} s, of them {:.1f} s in the linear solver",
+                  summary.total_time_in_seconds, summary.linear_solver_time_in_seconds);
     for (size_t i = 0; i < num_images_; ++i) {
       bundle_.images[i].cam_from_world = LoadPose(CamFromWorld(i));
       bundle_.images[i].drifted = LoadPose(Drifted(i));

@@ -13,6 +13,7 @@
 namespace cairn::reconstruct {
 namespace {
 
+constexpr double kShortestLength = 0.1;  // of a typical one: of a camera that stands
 // Sensitivities hold for so large a change, in standard deviations of what is likely.
 constexpr double kMaxChangeSigmas = 0.5;
 
@@ -56,7 +57,7 @@ struct RelativeRotationCost {
 };
 
 struct StepLengthCost {
-  double step, sigma_ratio;
+  double step, log_sigma;
   template <typename T>
   bool operator()(const T* pose1, const T* pose2, T* residual) const {
     const auto center = [](const T* pose) {
@@ -64,9 +65,10 @@ struct StepLengthCost {
       return Eigen::Matrix<T, 3, 1>(-(view.rotation.conjugate() * view.translation));
     };
     const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
-    // Smooth where nothing moves.
-    const T length = ceres::sqrt(way.squaredNorm() + T(1e-6 * step * step));
-    residual[0] = (length / T(step) - T(1)) / T(sigma_ratio);
+    // Of the logarithm, which shrinking steps resist as growing ones do; smooth where nothing moves.
+    const double shortest = kShortestLength * step;
+    residual[0] = T(0.5) * ceres::log((way.squaredNorm() + T(shortest * shortest)) / T(step * step)) /
+                  T(log_sigma);
     return true;
   }
 };
@@ -172,12 +174,13 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
         rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
   }
   const double step = MedianStep(*problem);
+  ceres::HuberLoss step_loss(1);
   for (const auto& [from, to] : problem->steps) {
     if (!(step > 0) || !are_known(from, to)) continue;
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
-            new StepLengthCost{step, options.step_sigma_ratio}),
-        &weak_loss, pose_of(from), pose_of(to));
+            new StepLengthCost{step, options.step_log_sigma}),
+        &step_loss, pose_of(from), pose_of(to));
   }
   const double median_way_m = MedianWayM(problem->motions);
   for (const ImageMotion& motion : problem->motions) {

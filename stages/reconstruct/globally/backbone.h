@@ -16,11 +16,11 @@ bool IsDrive(int num_images, const std::vector<ViewPair>& pairs, const std::vect
 void SetWeights(bool is_drive, std::vector<ViewPair>* pairs);
 
 // The pairs to begin with: those that show most of the same, relative to the most that one of the two shares
-// with any image; as few weaker ones as join all images that no motion joins.  Of a drive only near ones in its order, and others
-// only where those do not join it.  Rooms that share a panel or a door look alike in a part of the image:
-// such pairs are weaker than those of one place, but agree with each other, and would bend the map before it
-// is made; it tells them once it is there [after Cui & Tan 2015 and Heinly et al. 2014, who filter by cycles
-// and by what is missing]. Indices of pairs, ascending.
+// with any image; as few weaker ones as join all images that no motion joins.  Of a drive only near ones in
+// its order, and others only where those do not join it.  Rooms that share a panel or a door look alike in a
+// part of the image: such pairs are weaker than those of one place, but agree with each other, and would bend
+// the map before it is made; it tells them once it is there [after Cui & Tan 2015 and Heinly et al. 2014, who
+// filter by cycles and by what is missing]. Indices of pairs, ascending.
 std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs,
                           const std::vector<ImageMotion>& motions, bool is_drive);
 

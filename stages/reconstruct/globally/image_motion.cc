@@ -63,8 +63,7 @@ double MedianWayM(const std::vector<ImageMotion>& motions) {
 std::string LeaveOutContradicted(const std::vector<ViewPair>& pairs, std::vector<ImageMotion>* motions) {
   std::map<std::pair<int, int>, const ViewPair*> sure_pairs;
   for (const ViewPair& pair : pairs) {
-    if (pair.matches.size() >= kMinNumTestMatches)
-      sure_pairs[std::minmax(pair.image1, pair.image2)] = &pair;
+    if (pair.matches.size() >= kMinNumTestMatches) sure_pairs[std::minmax(pair.image1, pair.image2)] = &pair;
   }
   const double median_way_m = MedianWayM(*motions);
   int num_tested = 0, num_wrong_turns = 0;
@@ -83,8 +82,8 @@ std::string LeaveOutContradicted(const std::vector<ViewPair>& pairs, std::vector
   }
   if (num_tested >= kMinNumTested && 2 * num_wrong_turns > num_tested) {
     motions->clear();
-    return fmt::format("on {} of {} steps the camera turned otherwise than the odometry says", num_wrong_turns,
-                       num_tested);
+    return fmt::format("on {} of {} steps the camera turned otherwise than the odometry says",
+                       num_wrong_turns, num_tested);
   }
   if (std::ssize(directions) >= kMinNumTested && Median(directions) > kMaxDirectionErrorDeg) {
     const double median_deg = Median(directions);

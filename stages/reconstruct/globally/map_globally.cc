@@ -46,8 +46,7 @@ struct Part {
   }
 };
 
-Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs,
-                    std::vector<ImageMotion> motions) {
+Part InOrderOfNames(const MapperInput& input, std::vector<ViewPair> pairs, std::vector<ImageMotion> motions) {
   Part part;
   std::vector<std::string> names;
   for (const DatabaseImage& image : input.images) names.push_back(image.name);
@@ -89,8 +88,10 @@ std::vector<Part> PartsOf(Part whole) {
       links_of(parts[p]).push_back(std::move(link));
     }
   };
-  share_out(&whole.pairs, [](Part& part) -> auto& { return part.pairs; });
-  share_out(&whole.motions, [](Part& part) -> auto& { return part.motions; });
+  share_out(
+      &whole.pairs, [](Part & part) -> auto& { return part.pairs; });
+  share_out(
+      &whole.motions, [](Part & part) -> auto& { return part.motions; });
   return parts;
 }
 
@@ -172,10 +173,10 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion>
       add_parts(std::move(part));
       continue;
     }
-    ColmapModel model = PartMapper(input, cameras, options, num_threads, std::move(part.images),
-                                   std::move(part.pairs), std::move(part.motions), untangled->backbone,
-                                   is_drive)
-                            .Map(untangled->rotations, progress);
+    ColmapModel model =
+        PartMapper(input, cameras, options, num_threads, std::move(part.images), std::move(part.pairs),
+                   std::move(part.motions), untangled->backbone, is_drive)
+            .Map(untangled->rotations, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
     if (!model.images.empty()) models.emplace_back(std::move(model), is_drive);
   }

@@ -13,7 +13,8 @@
 namespace cairn::reconstruct {
 
 struct GlobalMap {
-  // Of each part that pairs or motions join, most images first (ties: more points), in frames and scales of their own.
+  // Of each part that pairs or motions join, most images first (ties: more points), in frames and scales of
+  // their own.
   std::vector<ColmapModel> models;
   // Whether the largest part is a drive, whose images follow each other by name: then what looks alike bends
   // nothing.  Without an order, pairs of places that look alike in most of an image may.

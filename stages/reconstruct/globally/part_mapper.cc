@@ -37,9 +37,9 @@ struct Round {
   bool adjust_cameras;
   bool reposition;  // by the pairs that were taken in, before the adjustment
 };
-constexpr Round kRounds[] = {{0, 24, 100, false, false},  {0, 12, 120, true, false},
-                             {0.2, 12, 120, true, true},  {0.2, 12, 120, true, true},
-                             {0.2, 12, 120, true, true},  {0.1, 6, 150, true, false},
+constexpr Round kRounds[] = {{0, 24, 100, false, false}, {0, 12, 120, true, false},
+                             {0.2, 12, 120, true, true}, {0.2, 12, 120, true, true},
+                             {0.2, 12, 120, true, true}, {0.1, 6, 150, true, false},
                              {0.05, 4, 0, true, false}};
 // A round that takes in as far as the one before is left out if it would change fewer than this part of the
 // pairs.
@@ -201,9 +201,8 @@ std::vector<Step> PartMapper::StepsBy(const std::vector<Eigen::Quaterniond>& rot
       steps.push_back({motion.image2, motion.image1, -way});
     }
   }
-  std::sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) {
-    return std::pair(a.from, a.to) < std::pair(b.from, b.to);
-  });
+  std::sort(steps.begin(), steps.end(),
+            [](const Step& a, const Step& b) { return std::pair(a.from, a.to) < std::pair(b.from, b.to); });
   return steps;
 }
 

@@ -1,6 +1,7 @@
 #include "stages/reconstruct/globally/position_images.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include <ceres/ceres.h>
@@ -13,6 +14,7 @@ namespace cairn::reconstruct {
 namespace {
 
 constexpr double kHalfSideOfStart = 100, kLeastFactor = 1e-5;
+constexpr double kShortestStep = 0.1;  // of a typical one
 // Where ways are known points begin so many steps away.
 constexpr double kStepsToPoints = 10;
 
@@ -42,7 +44,8 @@ class SightCost : public ceres::SizedCostFunction<3, 1, 3, 3> {
   Eigen::Vector3d direction_;
 };
 
-// How far two centres are apart, against a typical step of a drive: weight * (length / step - 1).
+// How far two centres are apart, against a typical step of a drive: weight * log(length / step), which shrinking
+// steps resist as growing ones do.  A camera that stands has kShortestStep.
 class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
  public:
   StepCost(double step, double weight) : step_(step), weight_(weight) {}
@@ -50,11 +53,10 @@ class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Map<const Eigen::Vector3d> from(parameters[0]), to(parameters[1]);
     const Eigen::Vector3d way = to - from;
-    const double length = way.norm();
-    residuals[0] = weight_ * (length / step_ - 1);
+    const double squared = way.squaredNorm() + kShortestStep * kShortestStep * step_ * step_;
+    residuals[0] = weight_ * 0.5 * std::log(squared / (step_ * step_));
     if (jacobians == nullptr) return true;
-    const Eigen::Vector3d slope =
-        length > 0 ? Eigen::Vector3d(way * (weight_ / (length * step_))) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d slope = way * (weight_ / squared);
     for (int side = 0; side < 2; ++side) {
       if (jacobians[side] == nullptr) continue;
       for (int k = 0; k < 3; ++k) jacobians[side][k] = side == 0 ? -slope[k] : slope[k];
@@ -103,7 +105,9 @@ double TypicalWay(const std::vector<Step>& steps) {
 class Places {
  public:
   Places(size_t num_images, size_t num_points, size_t num_sights)
-      : num_images_(num_images), num_points_(num_points), values_(3 * (num_images + num_points) + num_sights, 1) {}
+      : num_images_(num_images),
+        num_points_(num_points),
+        values_(3 * (num_images + num_points) + num_sights, 1) {}
 
   double* Center(size_t image) { return &values_[3 * image]; }
   double* Point(size_t point) { return &values_[3 * (num_images_ + point)]; }
@@ -176,8 +180,8 @@ void Solve(const std::vector<Sight>& sights, const std::vector<Step>& steps, dou
     if (step.way && typical_way > 0) {
       problem.AddResidualBlock(new WayCost(*step.way, options.way_weight / typical_way), &loss, from, to);
     } else if (problem.HasParameterBlock(from) && problem.HasParameterBlock(to)) {
-      problem.AddResidualBlock(new StepCost(typical_way > 0 ? typical_way : 1, options.step_weight), &step_loss,
-                               from, to);
+      problem.AddResidualBlock(new StepCost(typical_way > 0 ? typical_way : 1, options.step_weight),
+                               &step_loss, from, to);
     }
   }
   for (size_t k = 0; k < places->num_points(); ++k) {

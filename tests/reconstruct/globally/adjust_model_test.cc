@@ -204,8 +204,7 @@ TEST(AdjustModel, AnImageThatSeesLittleDoesNotHoldTheFrame) {
   scene.problem.cam_from_world[0].translation.z() += 0.5;
   AdjustModel({.adjust_cameras = false}, &scene.problem);
   const std::vector<Pose>& found = scene.problem.cam_from_world;
-  const double scale =
-      CenterErrorM(found[1], found[9]) / CenterErrorM(scene.truth[1], scene.truth[9]);
+  const double scale = CenterErrorM(found[1], found[9]) / CenterErrorM(scene.truth[1], scene.truth[9]);
   EXPECT_NEAR(CenterErrorM(found[0], found[5]) / scale, CenterErrorM(scene.truth[0], scene.truth[5]), 0.02);
 }
 

@@ -11,8 +11,7 @@ using testing::HasSubstr;
 
 // Ahead by a metre, and a turn to the left about the camera's y axis, which points down.
 Pose Step(double turn_deg, double way_m = 1) {
-  const Eigen::Quaterniond cam2_from_cam1(
-      Eigen::AngleAxisd(RadFromDeg(turn_deg), Eigen::Vector3d::UnitY()));
+  const Eigen::Quaterniond cam2_from_cam1(Eigen::AngleAxisd(RadFromDeg(turn_deg), Eigen::Vector3d::UnitY()));
   return {cam2_from_cam1, -(cam2_from_cam1 * Eigen::Vector3d(0, 0, way_m))};
 }
 

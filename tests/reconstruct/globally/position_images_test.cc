@@ -66,9 +66,8 @@ TEST(PositionImages, FindsCamerasOnALineFromNowhere) {
   const auto positions = PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, {}, {});
   EXPECT_LT(ErrorOf(positions, scene), 0.01);
   const Scene noisy = MakeCorridor(25, 0.001);
-  EXPECT_LT(
-      ErrorOf(PositionImages(25, static_cast<int>(noisy.points.size()), noisy.sights, {}, {}), noisy),
-      0.03);
+  EXPECT_LT(ErrorOf(PositionImages(25, static_cast<int>(noisy.points.size()), noisy.sights, {}, {}), noisy),
+            0.03);
 }
 
 TEST(PositionImages, WrongSightsHaveLittleSay) {
@@ -77,9 +76,8 @@ TEST(PositionImages, WrongSightsHaveLittleSay) {
   for (size_t s = 0; s < scene.sights.size(); s += 20)
     scene.sights[s].direction =
         Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1)).normalized();
-  EXPECT_LT(
-      ErrorOf(PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, {}, {}), scene),
-      0.04);
+  EXPECT_LT(ErrorOf(PositionImages(25, static_cast<int>(scene.points.size()), scene.sights, {}, {}), scene),
+            0.04);
 }
 
 // The two halves of a drive share no point: only its steps tell how large one is beside the other.
@@ -104,7 +102,8 @@ TEST(PositionImages, MeasuredWaysTieThePartsAndGiveTheScale) {
   scene.sights.clear();
   for (int i = 0; i < 24; ++i) {
     for (size_t k = 0; k < scene.points.size(); ++k) {
-      const Eigen::Vector3d way = scene.points[k] + Eigen::Vector3d(k % 4 < 2 ? 0 : 6, 0, 0) - scene.centers[i];
+      const Eigen::Vector3d way =
+          scene.points[k] + Eigen::Vector3d(k % 4 < 2 ? 0 : 6, 0, 0) - scene.centers[i];
       if (way.norm() < 6 && way.x() > 0.5 && (i < 12) == (k % 4 < 2))
         scene.sights.push_back({i, static_cast<int>(k), way.normalized()});
     }
@@ -133,7 +132,8 @@ TEST(PositionImages, AWrongWayHasLittleSay) {
 TEST(PositionImages, SameSeedSameBytes) {
   const Scene scene = MakeCorridor(10, 0.001);
   const auto first = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
-  const auto second = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
+  const auto second =
+      PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
   for (int i = 0; i < 10; ++i) EXPECT_EQ(first.centers[i], second.centers[i]);
 }
 
