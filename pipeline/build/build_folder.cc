@@ -140,8 +140,11 @@ std::string PairsLine(const std::vector<std::pair<std::string, std::string>>& pa
   return line + "\n";
 }
 
-// Whether a list of images has a line that is none of its comments.
+// Whether a list of images has a line that is none of its comments.  What is there and no file is not read: a
+// pipe would block.
 bool HasLines(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return fs::exists(path, error);
   std::ifstream list(path);
   for (std::string line; std::getline(list, line);) {
     const size_t first = line.find_first_not_of(" \t\r");

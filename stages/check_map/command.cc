@@ -252,8 +252,8 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
 Status CheckWhatIsRead(const Arguments& arguments) {
   if (arguments.queries_path.empty() && arguments.left_out_path.empty() && !arguments.capture_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "--capture {}: is used for the images of --queries or --left-out only; give one of "
-                     "these, or leave it out",
+                     "--capture {}: is used for the images of --queries or --left-out only; give --queries, "
+                     "--left-out, or leave it out",
                      arguments.capture_path);
   }
   if (!arguments.left_out_path.empty() && arguments.capture_path.empty()) {
