@@ -2,12 +2,14 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "core/blocks/map_rows.h"
+#include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
 
@@ -82,6 +84,25 @@ TEST_F(LeftOut, RunsTryTheMapAndAreInIt) {
   EXPECT_GT(map.images.size(), without.images.size());
   EXPECT_GE(4 * without.images.size(), 3 * map.images.size());
   EXPECT_FALSE(without.sealed);
+  std::vector<Reject> rejects;
+  std::set<std::string> names;
+  for (const MapImage& image : without.images) names.insert(image.name);
+  for (const CaptureImage& tried : *ReadImagesText(Path("tiny.build/left_out/0.txt"), &rejects))
+    EXPECT_FALSE(names.contains(tried.name)) << tried.name;
+  // Landmarks that they saw are where the others see them, and look as they do to these.
+  std::map<ClassId, size_t> of_class;
+  for (size_t i = 0; i < map.landmarks.size(); ++i) of_class[map.landmarks[i].class_id] = i;
+  size_t num_moved = 0, num_look_other = 0, num_fewer = 0;
+  for (size_t i = 0; i < without.landmarks.size(); ++i) {
+    const size_t whole = of_class.at(without.landmarks[i].class_id);
+    if (without.landmarks[i].num_observations == map.landmarks[whole].num_observations) continue;
+    ++num_fewer;
+    num_moved += without.landmarks[i].position != map.landmarks[whole].position ? 1 : 0;
+    num_look_other += without.descriptors.row(i) != map.descriptors.row(whole) ? 1 : 0;
+  }
+  EXPECT_GT(num_fewer, 100U);
+  EXPECT_GT(num_moved, num_fewer / 2);
+  EXPECT_GT(num_look_other, num_fewer / 2);
   EXPECT_THAT(first_.out, HasSubstr("left-out images        "));
   EXPECT_THAT(first_.out, HasSubstr("runs of the survey, in maps without them"));
   EXPECT_THAT(first_.out, Not(HasSubstr("held-out images")));
