@@ -47,8 +47,9 @@ TEST(ChooseRuns, ATenthIsTriedOfManyAndAtLeast24AndAtMost200) {
   };
   EXPECT_EQ(NumTried(of(20)), 10);  // half of few: five runs of two
   EXPECT_EQ(of(20).num_runs, 5);
-  EXPECT_EQ(NumTried(of(120)), 24);  // four runs of six
-  EXPECT_EQ(NumTried(of(480)), 48);  // four runs of twelve
+  EXPECT_EQ(of(40).rounds.size(), 2U);  // ten runs of two, of which five are a quarter
+  EXPECT_EQ(NumTried(of(120)), 24);     // four runs of six
+  EXPECT_EQ(NumTried(of(480)), 48);     // four runs of twelve
   EXPECT_EQ(of(480).num_runs, 4);
   EXPECT_EQ(of(480).rounds.size(), 1U);
   EXPECT_EQ(NumTried(of(3000)), 204);  // seventeen runs of twelve
