@@ -74,6 +74,11 @@ struct MapHead {
   std::vector<Camera> stated_cameras;
 };
 
+// The figure of a self-test by runs of the survey's own images, in maps without them: how many runs.
+inline constexpr const char* kLeftOutRunsFigure = "num_left_out_runs";
+// What the images of the self-test are called: "left-out" in that case, else "held-out".
+std::string TriedWord(const MapHead& head);
+
 // As CheckMapRows (core/blocks/map_rows.h), of the head alone.
 Status CheckMapHead(const MapHead& head);
 

@@ -171,6 +171,10 @@ std::vector<std::vector<int>> LandmarkSessions(const MapRows& rows) {
   return sessions;
 }
 
+std::string TriedWord(const MapHead& head) {
+  return head.self_test.contains(kLeftOutRunsFigure) ? "left-out" : "held-out";
+}
+
 Status CheckMapHead(const MapHead& head) {
   for (const std::string* text : {&head.name, &head.writer, &head.instruction_set, &head.landmark_choice,
                                   &head.algorithm, &head.frame.unit, &head.frame.source}) {

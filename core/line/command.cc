@@ -1,7 +1,7 @@
 #include "core/line/command.h"
 
 #include <algorithm>
-#include <cmath>
+#include <variant>
 
 namespace cairn {
 namespace {
@@ -19,11 +19,9 @@ const char* TypeText(const Option& option) {
 std::string HelpText(const Option& option) {
   std::string help = option.help;
   if (!option.choices.empty()) help += fmt::format("; one of {}", fmt::join(option.choices, "|"));
-  if (!std::isinf(option.min) && !std::isinf(option.max)) {
-    help += fmt::format("; {:g} to {:g}", option.min, option.max);
-  } else if (!std::isinf(option.min)) {
-    help += fmt::format("; at least {:g}", option.min);
-  }
+  const bool is_number =
+      std::holds_alternative<int*>(option.value) || std::holds_alternative<double*>(option.value);
+  if (is_number && !ValuesText(option).empty()) help += "; " + ValuesText(option);
   const std::string value = OptionValueText(option);
   return value.empty() ? help : help + " [" + value + "]";
 }

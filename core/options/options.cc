@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/base/text.h"
 
@@ -11,6 +12,21 @@ namespace cairn {
 namespace {
 
 constexpr std::string_view kNot = "not ";
+
+// The word that stands for an option's value; nothing for a plain number.
+std::optional<std::string> WordOf(const Option& option) {
+  auto* const* number = std::get_if<double*>(&option.value);
+  for (const auto& [word, value] : option.words) {
+    if (number != nullptr && **number == value) return word;
+  }
+  return std::nullopt;
+}
+
+std::string WordsText(const Option& option) {
+  std::string text;
+  for (const auto& [word, value] : option.words) text += word + ", or ";
+  return text;
+}
 
 std::string RangeText(const Option& option) {
   if (std::isinf(option.min) && std::isinf(option.max)) return "a finite number";
@@ -21,15 +37,15 @@ std::string RangeText(const Option& option) {
 
 Status CheckRange(const Option& option, double value) {
   if (std::isfinite(value) && value >= option.min && value <= option.max) return Ok();
-  return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}", option.name, value,
-                   RangeText(option));
+  return MakeError(ErrorCode::kInvalidArgument, "option {} = {:g}: must be {}{}", option.name, value,
+                   WordsText(option), RangeText(option));
 }
 
 Error WrongType(const Option& option, const std::string& found) {
   static constexpr const char* kTypes[] = {"true or false", "an integer", "a number", "a text",
                                            "a list of numbers"};
-  return MakeError(ErrorCode::kInvalidArgument, "option {}: expected {}, found '{}'", option.name,
-                   kTypes[option.value.index()], found);
+  return MakeError(ErrorCode::kInvalidArgument, "option {}: expected {}{}, found '{}'", option.name,
+                   WordsText(option), kTypes[option.value.index()], found);
 }
 
 }  // namespace
@@ -41,7 +57,13 @@ Status SetOption(const Option& option, const std::string& text) {
   } else if (auto* const* integer = std::get_if<int*>(&option.value)) {
     if (!ParseNumber(text, *integer)) return WrongType(option, text);
   } else if (auto* const* number = std::get_if<double*>(&option.value)) {
-    if (!ParseNumber(text, *number)) return WrongType(option, text);
+    const auto word = std::find_if(option.words.begin(), option.words.end(),
+                                   [&](const auto& known) { return known.first == text; });
+    if (word != option.words.end()) {
+      **number = word->second;
+    } else if (!ParseNumber(text, *number)) {
+      return WrongType(option, text);
+    }
   } else if (auto* const* string = std::get_if<std::string*>(&option.value)) {
     **string = text;
   } else {
@@ -61,6 +83,7 @@ Status SetOption(const Option& option, const std::string& text) {
 }
 
 std::string OptionValueText(const Option& option) {
+  if (const std::optional<std::string> word = WordOf(option)) return *word;
   if (auto* const* flag = std::get_if<bool*>(&option.value)) return **flag ? "true" : "false";
   if (auto* const* integer = std::get_if<int*>(&option.value)) return fmt::format("{}", **integer);
   if (auto* const* number = std::get_if<double*>(&option.value)) return fmt::format("{}", **number);
@@ -72,7 +95,7 @@ Status CheckOptions(const OptionTable& table) {
   for (const Option& option : table) {
     if (auto* const* integer = std::get_if<int*>(&option.value))
       CAIRN_RETURN_IF_ERROR(CheckRange(option, **integer));
-    if (auto* const* number = std::get_if<double*>(&option.value))
+    if (auto* const* number = std::get_if<double*>(&option.value); number != nullptr && !WordOf(option))
       CAIRN_RETURN_IF_ERROR(CheckRange(option, **number));
     auto* const* text = std::get_if<std::string*>(&option.value);
     if (text && !option.choices.empty() &&
@@ -96,6 +119,16 @@ void AddCondition(const OptionCondition& condition, const std::vector<std::strin
     const auto is_named = [&](const Option& option) { return option.name == name; };
     std::find_if(table->begin(), table->end(), is_named)->only_where.push_back(condition);
   }
+}
+
+std::string ValuesText(const Option& option) {
+  if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
+  const std::string words = WordsText(option);
+  if (std::isfinite(option.min) && std::isfinite(option.max))
+    return fmt::format("{}{:g} to {:g}", words, option.min, option.max);
+  if (std::isfinite(option.min)) return fmt::format("{}at least {:g}", words, option.min);
+  if (std::isfinite(option.max)) return fmt::format("{}at most {:g}", words, option.max);
+  return std::holds_alternative<bool*>(option.value) ? "true, false" : "";
 }
 
 Status CheckIsRead(const Option& option, const OptionTable& table) {

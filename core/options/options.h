@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -28,6 +29,8 @@ struct Option {
   // Where the other options have other values, this one has no effect: it is then refused on the command
   // line, and a warning is given for it in a recipe.
   std::vector<OptionCondition> only_where = {};
+  // Numbers (double): words that stand for values, which may lie outside of the range: "auto" for -1.
+  std::vector<std::pair<std::string, double>> words = {};
 };
 using OptionTable = std::vector<Option>;
 
@@ -43,6 +46,9 @@ std::vector<std::string> NamesOf(const OptionTable& table);
 // Adds a condition to options of the table.  REQUIRES: the table has all of them
 void AddCondition(const OptionCondition& condition, const std::vector<std::string>& names,
                   OptionTable* table);
+// The words of an option, and its range, as documents say them: "auto, or 0 to 0.5"; empty where any value
+// will do.
+std::string ValuesText(const Option& option);
 // Whether this option of the table has an effect, by its conditions.  Errors: InvalidArgument, naming the
 // condition that does not hold.
 Status CheckIsRead(const Option& option, const OptionTable& table);

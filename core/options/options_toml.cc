@@ -35,6 +35,10 @@ std::string TextFromToml(const toml::node& node) {
 
 Result<toml::table> ReadTomlFile(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(const std::string contents, ReadFile(path));
+  return ParseToml(contents, path);
+}
+
+Result<toml::table> ParseToml(const std::string& contents, const std::string& path) {
   try {
     return toml::table(toml::parse(contents, path));
   } catch (const toml::parse_error& error) {
@@ -72,7 +76,9 @@ std::string OptionsToml(const OptionTable& table) {
   std::string document;
   for (const Option& option : table) {
     std::string value = OptionValueText(option);
-    if (std::holds_alternative<std::string*>(option.value)) {
+    const bool is_word = std::any_of(option.words.begin(), option.words.end(),
+                                     [&](const auto& word) { return word.first == value; });
+    if (is_word || std::holds_alternative<std::string*>(option.value)) {
       std::ostringstream quoted;
       quoted << toml::value<std::string>(value);
       value = quoted.str();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "core/capture/bag_file.h"
 #include "core/capture/capture.h"
@@ -168,17 +169,31 @@ std::string PairsLine(const WordPairs& pairs) {
   return line + "\n";
 }
 
-// The held-out images that check_map localizes; empty = the map is sealed without a self-test.
+// Whether a list of images has a line that is none of its comments.  What is there and no file is not read: a
+// pipe would block.
+bool HasLines(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return fs::exists(path, error);
+  std::ifstream list(path);
+  for (std::string line; std::getline(list, line);) {
+    const size_t first = line.find_first_not_of(" \t\r");
+    if (first != std::string::npos && line[first] != '#') return true;
+  }
+  return false;
+}
+
+// The held-out images that check_map localizes; empty = none are given.
 std::string QueriesPath(const Recipe& recipe, const std::string& capture, const std::string& build_dir) {
   const auto has_queries = [](const RecipeCapture& c) {
-    return !c.queries_path.empty() || fs::exists(c.path + "/queries.txt");
+    return !c.queries_path.empty() || HasLines(c.path + "/queries.txt");
   };
   if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
     return Absolute(recipe.captures.front().queries_path);
   if (IsReconstructed(recipe))
     return OptionText(recipe, "reconstruct", "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
   const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
-  return recipe.simulated || is_any ? capture + "/queries.txt" : "";
+  const bool are_rendered = recipe.simulated && OptionText(recipe, "simulate", "num_queries") != "0";
+  return are_rendered || is_any ? capture + "/queries.txt" : "";
 }
 
 // The floor plan of the place; empty = none.
@@ -200,6 +215,12 @@ bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empt
 
 bool IsReconstructed(const Recipe& recipe) {
   return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
+}
+
+bool HasQueries(const Recipe& recipe) { return !QueriesPath(recipe, "", "").empty(); }
+
+bool LeavesOut(const Recipe& recipe) {
+  return !HasQueries(recipe) && OptionText(recipe, "leave_out", "hold_out") != "0";
 }
 
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
@@ -225,6 +246,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(
       config.Set("KNOWN_PLACES", "[reconstruct] control_points or distances", known_places));
   CAIRN_RETURN_IF_ERROR(config.Set("QUERIES", "the list of queries", {queries}));
+  CAIRN_RETURN_IF_ERROR(config.Set("LEFT_OUT", "", {LeavesOut(recipe) ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));
   CAIRN_RETURN_IF_ERROR(config.Set("SEED", "the seed", {seed}));
   CAIRN_RETURN_IF_ERROR(config.Set("PROGRAM", "the program", {SizeAndDate(paths.program)}));
@@ -259,7 +281,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
         LinesOf(name, footage.sources) + LinesOf(name, footage.files) + LinesOf(name, footage.options)));
   }
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/odometry", OdometryLines(recipe)));
-  CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/queries", queries + "\n"));
+  CAIRN_RETURN_IF_ERROR(
+      WriteFileAtomically(options + "/queries", (LeavesOut(recipe) ? "left_out" : queries) + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/floor_plan", floor_plan + "\n"));
   CAIRN_ASSIGN_OR_RETURN(const std::string program_hash, HashFile(paths.program));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/program", program_hash + "\n"));

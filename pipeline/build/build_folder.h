@@ -22,16 +22,21 @@ std::string FootageFolderName(const RecipeCapture& capture);
 bool IsReconstructed(const Recipe& recipe);
 // Whether the recipe names a floor plan: then `decompose_views` divides it.
 bool HasFloorPlan(const Recipe& recipe);
+// Whether images are held out of the survey: listed, rendered, or by `reconstruct`.
+bool HasQueries(const Recipe& recipe);
+// Whether runs of the survey's images try maps without them instead: then `leave_out` makes these.
+bool LeavesOut(const Recipe& recipe);
 
 // Splits a recipe into the files that map.mk's rules depend on, each rewritten only when its content changes:
 //   options/STAGE.toml    every option of the stage, in canonical form (OptionsToml)
-//   options/seed, name, capture, queries    one value each; `capture` has a line for each of several
+//   options/seed, name, capture, queries    one value each; `capture` has a line for each of several,
+//                         `queries` is "left_out" where LeavesOut
 //   options/film-NAME, options/bag-NAME     what is imported, and how
 //   options/odometry      whose odometry gives poses their scale, and how bags' is read
 //   options/program       hash of the program: another program redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES,
-//                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, FLOOR_PLAN, NAME, SEED, PROGRAM
-//                         and VOCABULARY_TREE for map.mk
+//                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, LEFT_OUT, FLOOR_PLAN, NAME, SEED,
+//                         PROGRAM and VOCABULARY_TREE for map.mk
 //   recipe                path of the recipe, for people and for `cairn clean`; not part of a Makefile
 // Errors: InvalidArgument (CheckMakePath; places that [reconstruct] names, with several captures), NotFound
 // (a file that [reconstruct] names), Io.

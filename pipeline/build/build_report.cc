@@ -51,7 +51,7 @@ Result<std::vector<StageFile>> ReadStageFiles(const BuildRun& run) {
     name.resize(name.size() - std::string_view(kReportSuffix).size());
     if ((stage == "simulate" && !run.simulated) || (stage == "import" && !run.footage.contains(name)) ||
         (stage == "join_captures" && !run.joined) || (stage == "reconstruct" && !run.reconstructed) ||
-        (stage == "decompose_views" && !run.has_floor_plan))
+        (stage == "decompose_views" && !run.has_floor_plan) || (stage == "leave_out" && !run.leaves_out))
       continue;
     const size_t place = std::find_if(std::begin(kLine), std::end(kLine),
                                       [&](const LineStage& of_line) { return stage == of_line.name; }) -

@@ -16,8 +16,8 @@ struct BuildRun {
   std::string recipe;  // as given
   std::string map;     // as given
   uint64_t seed = 0;
-  bool simulated = false, joined = false, reconstructed = false,
-       has_floor_plan = false;    // whether the line has these stages
+  bool simulated = false, joined = false, reconstructed = false, has_floor_plan = false,
+       leaves_out = false;        // whether the line has these stages
   std::set<std::string> footage;  // names in the build folder of what is imported: "film-walk"
   bool whole_line = true;         // false with --until
   std::set<std::string> ran;      // names in the build folder whose rules ran: "features.db"

@@ -22,6 +22,7 @@ inline constexpr LineStage kLine[] = {{"simulate", "capture"},
                                       {"link_appearance", "appearance.db"},
                                       {"decompose_views", "views.db"},
                                       {"emit_map", "unsealed.cairn"},
+                                      {"leave_out", "left_out"},
                                       {"check_map", "map"}};
 
 }  // namespace cairn::pipeline

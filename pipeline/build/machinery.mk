@@ -22,7 +22,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 endif
 
 # Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
-# QUERIES, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
+# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE

@@ -38,7 +38,7 @@ LOG_LEVEL ?= info
 
 # What the stages make in the build folder.
 CAIRN_OUTPUTS = features.db matches.db $(if $(filter yes,$(RECONSTRUCTED)),poses) classes.db world.db regions.db \
-    vocabulary.db appearance.db $(if $(FLOOR_PLAN),views.db) unsealed.cairn
+    vocabulary.db appearance.db $(if $(FLOOR_PLAN),views.db) unsealed.cairn $(if $(filter yes,$(LEFT_OUT)),left_out)
 include $(CAIRN_RULES)machinery.mk
 
 # Stage 0: a capture that the recipe describes, rendered ...
@@ -151,12 +151,22 @@ $(BUILD)/unsealed.cairn.stamp: $(EMIT_INPUTS)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) $(call CAIRN_EMIT,$(@D)) -o $(@:.stamp=) $(CAIRN_FLAGS)
 
-# Stage 10: held-out images are localized in the map, which is then sealed.
-$(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(call CAIRN_OPTIONS,check_map) $(SEED_FILE) $(BUILD)/options/queries \
-    $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
+# Stage 9b: where no images are held out, maps without runs of the survey's images, which try them.
+LEFT_OUT_FOLDER := $(if $(filter yes,$(LEFT_OUT)),$(BUILD)/left_out)
+$(BUILD)/%: LEFT_OUT_FOLDER := $(LEFT_OUT_FOLDER)
+ifneq ($(LEFT_OUT_FOLDER),)
+$(BUILD)/left_out.stamp: $(BUILD)/unsealed.cairn $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db \
+    $(BUILD)/vocabulary.db $(BUILD)/appearance.db $(call CAIRN_OPTIONS,leave_out)
+	$(call CAIRN_RUN,leave_out,stage leave-out $(@D)/unsealed.cairn --matches $(@D)/matches.db --classes $(@D)/classes.db \
+	    --world $(@D)/world.db --regions $(@D)/regions.db --vocabulary $(@D)/vocabulary.db --appearance $(@D)/appearance.db)
+endif
+
+# Stage 10: held-out or left-out images are localized, and the map is sealed.
+$(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(LEFT_OUT_FOLDER) $(call CAIRN_OPTIONS,check_map) $(SEED_FILE) \
+    $(BUILD)/options/queries $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
-	    --options $(@D)/options/check_map.toml --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)
+	    $(if $(LEFT_OUT_FOLDER),--left-out $(LEFT_OUT_FOLDER) --capture $(POSES)) --options $(@D)/options/check_map.toml --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)
 
 # The map in other sizes, for `cairn pareto`: pareto/N.cairn has at most N bytes (0: every class) and pareto/N.json
 # the results of the held-out images; no gate.

@@ -337,15 +337,6 @@ void AppendKeys(std::string* page, const auto& keys) {
   for (const Key& key : keys) *page += fmt::format("| `{}` | {} | {} |\n", key.name, key.type, key.help);
 }
 
-std::string RangeText(const Option& option) {
-  if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
-  if (std::isfinite(option.min) && std::isfinite(option.max))
-    return fmt::format("{:g} to {:g}", option.min, option.max);
-  if (std::isfinite(option.min)) return fmt::format("at least {:g}", option.min);
-  if (std::isfinite(option.max)) return fmt::format("at most {:g}", option.max);
-  return std::holds_alternative<bool*>(option.value) ? "true, false" : "";
-}
-
 std::string EscapePipes(std::string text) {
   for (size_t at = text.find('|'); at != std::string::npos; at = text.find('|', at + 2))
     text.insert(at, 1, '\\');
@@ -361,7 +352,7 @@ void AppendOptions(std::string* page, const OptionTable& table) {
   for (const Option& option : table) {
     const std::string line = OptionsToml({option});  // "key = value\n"
     const std::string value = line.substr(option.name.size() + 3, line.size() - option.name.size() - 4);
-    *page += fmt::format("| `{}` | `{}` | {} | {} |\n", option.name, value, EscapePipes(RangeText(option)),
+    *page += fmt::format("| `{}` | `{}` | {} | {} |\n", option.name, value, EscapePipes(ValuesText(option)),
                          EscapePipes(option.help));
   }
 }

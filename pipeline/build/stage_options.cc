@@ -6,6 +6,7 @@
 #include "stages/decompose_regions/decompose_regions.h"
 #include "stages/decompose_views/decompose_views.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/leave_out/choose_runs.h"
 #include "stages/extract_features/extract_features.h"
 #include "stages/filter_visibility/filter_visibility.h"
 #include "stages/group_classes/group_classes.h"
@@ -28,6 +29,7 @@ std::vector<StageOptions> AllStageOptions() {
       MakeStageOptions<link_appearance::LinkAppearanceOptions>("link_appearance"),
       MakeStageOptions<decompose_views::DecomposeViewsOptions>("decompose_views"),
       MakeStageOptions<emit_map::EmitMapOptions>("emit_map"),
+      MakeStageOptions<emit_map::LeaveOutOptions>("leave_out"),
       MakeStageOptions<check_map::CheckMapOptions>("check_map"),
   };
 }

@@ -9,6 +9,7 @@
 #include "stages/decompose_regions/command.h"
 #include "stages/decompose_views/command.h"
 #include "stages/emit_map/command.h"
+#include "stages/emit_map/leave_out/command.h"
 #include "stages/extract_features/command.h"
 #include "stages/filter_visibility/command.h"
 #include "stages/group_classes/command.h"
@@ -32,8 +33,8 @@ Command StageFamily() {
                  group_classes::GroupClassesCommand(), filter_visibility::FilterVisibilityCommand(),
                  decompose_regions::DecomposeRegionsCommand(), build_vocabulary::BuildVocabularyCommand(),
                  link_appearance::LinkAppearanceCommand(), emit_map::EmitMapCommand(),
-                 decompose_regions::CheckRegionsCommand(), link_appearance::CheckAppearanceCommand(),
-                 sim::SimulateWorldsCommand()});
+                 emit_map::LeaveOutCommand(), decompose_regions::CheckRegionsCommand(),
+                 link_appearance::CheckAppearanceCommand(), sim::SimulateWorldsCommand()});
 }
 
 Command PlanFamily() {

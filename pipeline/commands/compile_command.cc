@@ -100,6 +100,12 @@ Result<std::string> MakeGoal(const std::string& until, const Recipe& recipe, con
                      "--until {}: the recipe names no floor plan; add floor_plan = \"FILE\" to [[capture]]",
                      until);
   }
+  if (stage == "leave_out" && !LeavesOut(recipe)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--until {}: nothing is left out of the survey: the capture has held-out images of its "
+                     "own, or [leave_out] hold_out is 0",
+                     until);
+  }
   std::vector<std::string> stages;
   for (const LineStage& of_line : kLine) {
     const std::string file = of_line.file;
@@ -184,6 +190,7 @@ void WarnOfUnreadKeys(const Recipe& recipe) {
   std::vector<std::pair<std::string, std::string>> skipped;
   if (!IsReconstructed(recipe)) skipped.emplace_back("reconstruct", "the capture has poses of its own");
   if (!HasFloorPlan(recipe)) skipped.emplace_back("decompose_views", "the recipe names no floor plan");
+  if (HasQueries(recipe)) skipped.emplace_back("leave_out", "the capture has held-out images of its own");
   for (const std::string& line : UnreadKeys(recipe, skipped)) spdlog::warn("{}", line);
 }
 
@@ -226,6 +233,7 @@ Status Compile(CompileArguments arguments, const CommandEnvironment& environment
                   .joined = recipe.captures.size() > 1,
                   .reconstructed = IsReconstructed(recipe),
                   .has_floor_plan = HasFloorPlan(recipe),
+                  .leaves_out = LeavesOut(recipe),
                   .footage = FootageFolders(recipe),
                   .whole_line = goal == paths.map,
                   .ran = RanSince(dates_before, paths.build_dir)};

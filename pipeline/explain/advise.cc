@@ -184,10 +184,10 @@ void AddPoorRegions(const MapRows& rows, const std::vector<StationIdx>& about,
     const MapRegion& region = rows.regions[test->region];
     advice->push_back(
         {.text = fmt::format(
-             "Region {} ({}) localizes {} of {} held-out image{} with its {} landmarks. {}mages between its "
+             "Region {} ({}) localizes {} of {} {} image{} with its {} landmarks. {}mages between its "
              "stations would help.",
              test->region, WhereText(rows, region.stations), test->num_localized, test->num_held_out,
-             test->num_held_out == 1 ? "" : "s", region.landmarks.size(),
+             TriedWord(rows), test->num_held_out == 1 ? "" : "s", region.landmarks.size(),
              rows.k > 0 ? "A larger k, or i" : "I"),
          .stations = region.stations,
          .region = test->region,
@@ -263,10 +263,10 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
       rows.landmark_choice == "regions") {
     advice->push_back(
         {.text = fmt::format(
-             "{:.1f} % of the held-out images are localized, and {} features that regions could keep "
+             "{:.1f} % of the {} images are localized, and {} features that regions could keep "
              "were not chosen: [decompose_regions] k above {} keeps more of them, about in proportion "
              "in bytes; [emit_map] landmarks = \"all\" keeps every one.",
-             100 * localized->second, num_not_chosen, rows.k)});
+             100 * localized->second, TriedWord(rows), num_not_chosen, rows.k)});
   }
   const auto nees = rows.self_test.find("mean_nees"), nees_high = rows.self_test.find("nees_high");
   if (nees != rows.self_test.end() && nees_high != rows.self_test.end() && nees->second > nees_high->second) {
@@ -274,23 +274,24 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
         {.text = fmt::format(
              "Poses are less exact than the map says: their errors are {:.1f} times what the covariances "
              "state (mean normalised error squared {:.1f}, at most {:.1f} where they are right). Check the "
-             "survey's poses against those of the held-out images; [check_map] covariance_scale widens "
+             "survey's poses against those of the {} images; [check_map] covariance_scale widens "
              "what is stated.",
-             std::sqrt(nees->second / 6), nees->second, nees_high->second)});
+             std::sqrt(nees->second / 6), nees->second, nees_high->second, TriedWord(rows))});
   }
   const auto within = rows.self_test.find("within_10cm_5deg_ratio");
   if (rows.frame.unit == "metre" && localized != rows.self_test.end() && within != rows.self_test.end() &&
       within->second < kManyWithin * localized->second) {
     advice->push_back(
         {.text = fmt::format(
-             "Of the {:.1f} % of held-out images that are localized, only {:.0f} % lie within 10 cm and 5 "
+             "Of the {:.1f} % of {} images that are localized, only {:.0f} % lie within 10 cm and 5 "
              "degrees of where they were taken. Causes are landmarks far away, few images around, or inexact "
              "poses of the survey; [group_classes] refine_poses = \"always\" improves poses.",
-             100 * localized->second, 100 * within->second / localized->second)});
+             100 * localized->second, TriedWord(rows), 100 * within->second / localized->second)});
   }
   if (rows.self_test.empty()) {
-    advice->push_back({.text = "No images were held out: queries = \"queries.txt\" in the capture shows how "
-                               "well the map localizes."});
+    advice->push_back({.text = "No images tried the map: queries = \"queries.txt\" in the capture, or "
+                               "[leave_out] hold_out = \"auto\" for a survey of twelve images or more, shows "
+                               "how well it localizes."});
   }
 }
 
@@ -348,10 +349,10 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
         size.median_error_m ? fmt::format(", median error {:.2f} cm", 100 * *size.median_error_m) : "";
     const std::string limit = size.max_bytes > 0 ? fmt::format(", max_bytes = {}", size.max_bytes) : "";
     return fmt::format(
-        "a map of {} ([emit_map] landmarks = \"all\"{}) localizes {:.1f} % of the held-out images{}; "
+        "a map of {} ([emit_map] landmarks = \"all\"{}) localizes {:.1f} % of the {} images{}; "
         "this one of {} {:.1f} %.",
-        BytesText(static_cast<double>(size.num_bytes)), limit, 100 * size.localized_ratio, error,
-        BytesText(bytes), 100 * localized->second);
+        BytesText(static_cast<double>(size.num_bytes)), limit, 100 * size.localized_ratio, TriedWord(rows),
+        error, BytesText(bytes), 100 * localized->second);
   };
   if (better != nullptr) {
     advice->insert(advice->begin(), {.text = "A map that localizes more is possible: " + text(*better)});
@@ -360,7 +361,8 @@ void AddSizes(const MapRows& rows, int64_t num_bytes, const std::vector<ParetoPo
   }
 }
 
-void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>* advice) {
+void AddFailedImages(const MapHead& head, const std::vector<FailedImage>& failed,
+                     std::vector<Advice>* advice) {
   std::map<size_t, std::vector<Advice::View>> views;  // by advice
   Advice elsewhere;
   std::set<StationIdx> stations;
@@ -387,9 +389,11 @@ void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>
   if (num_elsewhere == 0) return;
   elsewhere.stations.assign(stations.begin(), stations.end());
   elsewhere.text = fmt::format(
-      "{} held-out image{} failed where most are localized ({}{}). Survey images taken there, looking the "
-      "same way, would help.",
-      num_elsewhere, num_elsewhere == 1 ? "" : "s", names, num_elsewhere > kMaxNames ? ", ..." : "");
+      "{} {} image{} failed where most are localized ({}{}). {} taken there, looking the same way, would "
+      "help.",
+      num_elsewhere, TriedWord(head), num_elsewhere == 1 ? "" : "s", names,
+      num_elsewhere > kMaxNames ? ", ..." : "",
+      head.self_test.contains(kLeftOutRunsFigure) ? "More survey images" : "Survey images");
   // Advice about the map as a whole stays last.
   const auto place = std::find_if(advice->begin(), advice->end(),
                                   [](const Advice& entry) { return entry.stations.empty(); });

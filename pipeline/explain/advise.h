@@ -47,7 +47,8 @@ struct FailedImage {
 };
 // Adds images to take where held-out images failed: first in the advice about their places, or in advice
 // of their own where there is none.
-void AddFailedImages(const std::vector<FailedImage>& failed, std::vector<Advice>* advice);
+void AddFailedImages(const MapHead& head, const std::vector<FailedImage>& failed,
+                     std::vector<Advice>* advice);
 
 // Where held-out images were taken, and where the map puts them, floor frame, metres.
 struct PlacedImage {

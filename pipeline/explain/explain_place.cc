@@ -72,8 +72,9 @@ const RegionSelfTest* SelfTestOf(const MapRows& rows, RegionIdx region) {
   return nullptr;
 }
 
-std::string SelfTestText(const RegionSelfTest& test) {
-  std::string text = fmt::format("{} of {} held-out images localized", test.num_localized, test.num_held_out);
+std::string SelfTestText(const RegionSelfTest& test, const std::string& tried) {
+  std::string text =
+      fmt::format("{} of {} {} images localized", test.num_localized, test.num_held_out, tried);
   if (test.num_gross_errors > 0) text += fmt::format(", {} of them wrong", test.num_gross_errors);
   if (test.errors)
     text += fmt::format(", median error {:.1f} cm, {:.2f} deg", 100 * test.errors->median_m,
@@ -144,7 +145,8 @@ std::string CoverageText(const MapRows& rows, const StationLosses& losses, Stati
     text += fmt::format("  region {}: {} of its {} landmarks; {} stations", region,
                         NumSeenOf(rows, row, images), row.landmarks.size(), row.stations.size());
     const RegionSelfTest* test = SelfTestOf(rows, region);
-    text += test ? "; self-test: " + SelfTestText(*test) + "\n" : "; no held-out image\n";
+    text += test ? "; self-test: " + SelfTestText(*test, TriedWord(rows)) + "\n"
+                 : "; no " + TriedWord(rows) + " image\n";
   }
   return text;
 }

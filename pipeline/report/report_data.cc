@@ -309,8 +309,10 @@ void AddCheckAdvice(const Json& check, const MapRows& rows, std::vector<Advice>*
     failed.back().view.position = PlaceOf(taken);
     if (taken.size() > 2) failed.back().view.heading_deg = taken[2].get<double>();
   }
-  AddFailedImages(failed, advice);
-  if (rows.frame.unit == "metre") AddMisalignment(placed, advice);
+  AddFailedImages(rows, failed, advice);
+  // The poses of left-out images are the map's own.
+  if (rows.frame.unit == "metre" && !rows.self_test.contains(kLeftOutRunsFigure))
+    AddMisalignment(placed, advice);
 }
 
 // The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees,

@@ -65,10 +65,12 @@ class LayoutMaker {
     const double strip =
         (d - num_corridors * (corridor + 2 * t) - (num_corridors - 1) * t) / (2 * num_corridors);
     if (strip < kMinRoomM) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "a building of depth_m = {:g} with corridor_width_m = {:g} leaves {:.2f} m for rooms "
-                       "on either side, but {:g} m are needed; make it deeper or the corridor narrower",
-                       d, corridor, strip, kMinRoomM);
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "a building of depth_m = {:g} with corridor_width_m = {:g} and wall_thickness_m = {:g} "
+          "leaves {:.2f} m for rooms on either side, but {:g} m are needed; make it deeper, or "
+          "the corridor narrower or the walls thinner",
+          d, corridor, t, strip, kMinRoomM);
     }
     std::vector<std::pair<double, double>> intervals = {{0, w}};
     if (num_corridors > 1) {

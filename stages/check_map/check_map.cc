@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -26,7 +27,9 @@ double MillisecondsSince(Clock::time_point start) {
 // Localizes in two steps so that SIFT's time is known.
 Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
                                    const LocalizerOptions& options, HeldOutResult* result) {
-  CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image.path));
+  CAIRN_ASSIGN_OR_RETURN(cv::Mat grey, ReadGreyImage(image.path));
+  if (image.view)
+    grey = CutPanoramaView(grey, image.view->camera, image.view->of.view, image.view->of.num_views);
   if (grey.cols != image.camera.width || grey.rows != image.camera.height) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} px, but its camera takes {} x {} px",
                      image.path, grey.cols, grey.rows, image.camera.width, image.camera.height);
@@ -144,10 +147,10 @@ Status CheckRegionGate(const CheckMapReport& report, const CheckMapOptions& opti
           std::tuple("precision_ratio", row.PrecisionRatio(), options.min_region_precision_ratio)}) {
       if (found >= least) continue;
       return MakeError(ErrorCode::kGate,
-                       "below the gate: {} of region {} is {:.3f} ({} of its {} held-out images are "
+                       "below the gate: {} of region {} is {:.3f} ({} of its {} {} images are "
                        "localized, {} of them wrong), at least {:.3f} is required",
-                       name, row.region, found, row.num_localized, row.num_held_out, row.num_gross_errors,
-                       least);
+                       name, row.region, found, row.num_localized, row.num_held_out,
+                       IsOfLeftOutRuns(report) ? "left-out" : "held-out", row.num_gross_errors, least);
     }
   }
   return Ok();
@@ -235,14 +238,25 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
 Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
                                 const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
                                 int num_threads, Progress& progress) {
+  return CheckMaps({{map, images}}, options, num_threads, progress);
+}
+
+bool IsOfLeftOutRuns(const CheckMapReport& report) { return report.figures.contains(kLeftOutRunsFigure); }
+
+Result<CheckMapReport> CheckMaps(const std::vector<MapTrial>& trials, const CheckMapOptions& options,
+                                 int num_threads, Progress& progress) {
   CheckMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+  std::vector<std::pair<const MapTrial*, const HeldOutImage*>> images;
+  for (const MapTrial& trial : trials) {
+    for (const HeldOutImage& image : trial.images) images.emplace_back(&trial, &image);
+  }
   CheckMapReport report;
   report.images.resize(images.size());
   progress.Begin("localizing", static_cast<int64_t>(images.size()), "images");
   ParallelFor(static_cast<int64_t>(images.size()), num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
-    report.images[i] = TryImage(map, images[i], options);
+    report.images[i] = TryImage(images[i].first->map, *images[i].second, options);
     progress.Advance();
   });
   progress.End();
@@ -290,8 +304,8 @@ Status CheckGate(const CheckMapReport& report, const CheckMapOptions& options) {
   if (report.images.empty() && most_asked > 0) {
     return MakeError(ErrorCode::kGate,
                      "below the gate: a ratio of at least {:.3f} is required, but there are no held-out "
-                     "images; list some in queries.txt, or remove the gate",
-                     most_asked);
+                     "images{}; list some in queries.txt, or remove the gate",
+                     most_asked, report.why_none.empty() ? "" : " and no left-out runs: " + report.why_none);
   }
   const auto check = [&](const std::string& name, double least) -> Status {
     if (least <= 0) return Ok();

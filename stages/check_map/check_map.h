@@ -10,6 +10,7 @@
 #include "core/base/progress.h"
 #include "core/blocks/map_findings.h"
 #include "core/camera/camera.h"
+#include "core/camera/panorama.h"
 #include "core/geometry/pose.h"
 #include "core/options/options.h"
 #include "runtime/localize/localizer.h"
@@ -19,8 +20,9 @@
 namespace cairn::check_map {
 
 // Tries a map on images that it was not made from: how many are localized, how accurately, how certain the
-// map is, and whether images of another place are refused.  Before: emit_map.  The last stage: its figures
-// are sealed into the map.
+// map is, and whether images of another place are refused.  Where no images were held out, runs of the
+// survey's images try maps that lack them (core/map/left_out_folder.h), as the map itself would be without
+// them.  Before: emit_map, leave_out.  The last stage: its figures are sealed into the map.
 struct CheckMapOptions {
   // A fix farther than this from the truth is wrong: it counts against precision.  REQUIRES: > 0
   double gross_error_m = 0.5;
@@ -59,6 +61,12 @@ struct HeldOutImage {
   std::string path;
   Camera camera;
   std::optional<Pose> cam_from_world;
+  // Of a left-out image that is a view of a panorama (core/camera/panorama.h): `path` is the panorama's.
+  struct View {
+    PanoramaView of;
+    Camera camera;  // by which the view was cut when the survey was compiled
+  };
+  std::optional<View> view = std::nullopt;
 };
 
 struct HeldOutResult {
@@ -75,6 +83,12 @@ struct HeldOutResult {
   double sift_ms = 0;
   double total_ms = 0;  // SIFT included, decoding not
   bool has_fix() const { return rejected.empty() && localization.has_fix(); }
+};
+
+// A map, and images that it was not made from.
+struct MapTrial {
+  std::shared_ptr<const Map> map;
+  std::vector<HeldOutImage> images;
 };
 
 // REQUIRES: a fix of an image with a true pose
@@ -96,7 +110,10 @@ struct CheckMapReport {
   // and of a map with a promise what AddPromiseFigures (promise_figures.h) says; and of a map with a floor
   // plan what AddPlanFigures (plan_fit.h) and CompareWithPlan (plan_agreement.h) say.
   std::map<std::string, double> figures;
+  // and of left-out runs: num_left_out_runs; then the images are the survey's own, num_held_out counts those
+  // that were tried, and their true poses are those that the map has for them.
   std::string plan_verdict;  // PlanVerdict; empty where there is no floor plan
+  std::string why_none;      // why no run was left out; else empty
   // The same by region, of images with a true pose: filled by SummarizeRegions (region_figures.h).
   std::vector<RegionSelfTest> regions;
   // Means over the images tried.
@@ -104,12 +121,18 @@ struct CheckMapReport {
   double mean_total_ms = 0;
 };
 
-// Localizes every image, several at a time, one localizer per image.  Same figures for any number of threads.
-// An unreadable image is listed as rejected and counts as not localized.
+// Localizes every image of every trial in its map, several at a time, one localizer per image.  Same figures
+// for any number of threads.  An unreadable image is listed as rejected and counts as not localized.
 // Errors: InvalidArgument (an option), Cancelled.
+Result<CheckMapReport> CheckMaps(const std::vector<MapTrial>& trials, const CheckMapOptions& options,
+                                 int num_threads, Progress& progress);
+// The same of one map.
 Result<CheckMapReport> CheckMap(const std::shared_ptr<const Map>& map,
                                 const std::vector<HeldOutImage>& images, const CheckMapOptions& options,
                                 int num_threads, Progress& progress);
+
+// Whether the report is of runs of the survey's images.
+bool IsOfLeftOutRuns(const CheckMapReport& report);
 
 // Adds to a sparse map's figures what the same map would do with all images as documents.
 void AddFullFigures(const CheckMapReport& full, CheckMapReport* sparse);

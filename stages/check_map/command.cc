@@ -1,10 +1,13 @@
 #include "stages/check_map/command.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <spdlog/spdlog.h>
@@ -14,6 +17,7 @@
 #include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "core/files/output_path.h"
+#include "core/map/left_out_folder.h"
 #include "runtime/scans/read_scans.h"
 #include "stages/check_map/check_map.h"
 #include "stages/check_map/plan_agreement.h"
@@ -32,6 +36,7 @@ constexpr double kSameFocalRatio = 0.1;
 struct Arguments {
   std::string map_path;
   std::string queries_path;
+  std::string left_out_path;
   std::string capture_path;
   std::vector<std::string> foreign_paths;
   std::string scans_path;
@@ -60,21 +65,112 @@ Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const
   return given->second;
 }
 
-Result<std::vector<HeldOutImage>> ReadHeldOutImages(const Arguments& arguments, const MapHead& rows) {
-  const std::string root =
-      arguments.capture_path.empty() ? FolderOf(arguments.queries_path) : arguments.capture_path;
-  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(root));
+Result<std::vector<HeldOutImage>> ReadHeldOutImages(const std::string& list, const Capture& capture,
+                                                    const MapHead& rows) {
   std::vector<Reject> rejects;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> queries,
-                         ReadImagesText(arguments.queries_path, &rejects));
-  for (const Reject& reject : rejects)
-    spdlog::warn("{}: {}: {}", arguments.queries_path, reject.name, reject.reason);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> queries, ReadImagesText(list, &rejects));
+  for (const Reject& reject : rejects) spdlog::warn("{}: {}: {}", list, reject.name, reject.reason);
   std::vector<HeldOutImage> images;
   for (const CaptureImage& query : queries) {
     CAIRN_ASSIGN_OR_RETURN(Camera camera, CameraOf(query, capture, rows));
     images.push_back({query.name, capture.ImagePath(query), std::move(camera), query.cam_from_world});
   }
   return images;
+}
+
+// Images of the survey that a map lacks, with the cameras that it has for them.
+Result<std::vector<HeldOutImage>> ReadLeftOutImages(const std::string& list, const Capture& capture,
+                                                    const MapHead& head) {
+  const auto find = [](const std::vector<Camera>& cameras, CameraId camera_id) {
+    return std::find_if(cameras.begin(), cameras.end(),
+                        [&](const Camera& camera) { return camera.camera_id == camera_id; });
+  };
+  std::vector<Reject> rejects;
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<CaptureImage> listed, ReadImagesText(list, &rejects));
+  std::vector<HeldOutImage> images;
+  for (const CaptureImage& row : listed) {
+    const auto camera = find(head.cameras, row.camera_id);
+    if (camera == head.cameras.end()) {
+      return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the map beside it lacks", list,
+                       row.name, row.camera_id);
+    }
+    HeldOutImage image{row.name, capture.ImagePath(row), *camera, row.cam_from_world};
+    if (const std::optional<PanoramaView> view = ParsePanoramaViewName(row.name)) {
+      const auto stated = find(head.stated_cameras, row.camera_id);
+      image.path = capture.ImagePath({.name = view->panorama_name});
+      image.view = {*view, stated == head.stated_cameras.end() ? *camera : *stated};
+    }
+    images.push_back(std::move(image));
+  }
+  return images;
+}
+
+// The maps that are tried, and the images that try them: the map itself, or those of left-out runs.
+struct Trials {
+  std::vector<MapTrial> trials;
+  std::vector<MapRows> rows;  // of the maps of left-out runs
+  int num_left_out_runs = 0;
+  std::string why_none;
+  std::map<std::string, std::string> stage_options;  // of leave_out
+};
+
+Result<Trials> ReadTrials(const Arguments& arguments, const std::shared_ptr<const Map>& map,
+                          const MapRows& rows) {
+  Trials trials;
+  const bool is_given = !arguments.queries_path.empty();
+  if (!is_given && arguments.left_out_path.empty()) return trials;
+  const std::string root =
+      arguments.capture_path.empty() ? FolderOf(arguments.queries_path) : arguments.capture_path;
+  CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(root));
+  if (is_given) {
+    CAIRN_ASSIGN_OR_RETURN(std::vector<HeldOutImage> images,
+                           ReadHeldOutImages(arguments.queries_path, capture, rows));
+    trials.trials.push_back({map, std::move(images)});
+    return trials;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const LeftOutFolder left_out, ReadLeftOutFolder(arguments.left_out_path));
+  trials.num_left_out_runs = left_out.num_runs;
+  trials.why_none = left_out.why_none;
+  for (const LeftOutFolder::Round& round : left_out.rounds) {
+    CAIRN_ASSIGN_OR_RETURN(MapRows without, ReadMapRows(round.map_path));
+    CAIRN_ASSIGN_OR_RETURN(std::vector<HeldOutImage> images,
+                           ReadLeftOutImages(round.list_path, capture, without));
+    CAIRN_ASSIGN_OR_RETURN(std::shared_ptr<const Map> map_without, Map::Open(round.map_path));
+    trials.trials.push_back({std::move(map_without), std::move(images)});
+    const auto options = without.stage_options.find("leave_out");
+    if (options != without.stage_options.end()) trials.stage_options.insert(*options);
+    trials.rows.push_back(std::move(without));
+  }
+  return trials;
+}
+
+// Localizes the images and adds what is known of them; figures are of all trials together.
+Result<CheckMapReport> CheckTrials(const Trials& trials, const MapRows& rows, const Arguments& arguments,
+                                   const CommandEnvironment& environment) {
+  CheckMapReport report;
+  report.why_none = trials.why_none;
+  if (trials.trials.empty()) return report;
+  CAIRN_ASSIGN_OR_RETURN(
+      report, CheckMaps(trials.trials, arguments.options, environment.num_threads, *environment.progress));
+  if (rows.documents != "all") {
+    std::vector<MapTrial> full = trials.trials;
+    for (size_t i = 0; i < full.size(); ++i) {
+      CAIRN_ASSIGN_OR_RETURN(full[i].map,
+                             Map::FromRows(WithAllDocuments(trials.rows.empty() ? rows : trials.rows[i])));
+    }
+    CAIRN_ASSIGN_OR_RETURN(
+        const CheckMapReport all_images,
+        CheckMaps(full, arguments.options, environment.num_threads, *environment.progress));
+    AddFullFigures(all_images, &report);
+  }
+  FindStations(rows, arguments.options, &report.images);
+  report.regions = SummarizeRegions(rows, report.images, arguments.options);
+  if (trials.num_left_out_runs > 0) {
+    report.figures[kLeftOutRunsFigure] = trials.num_left_out_runs;
+  } else if (rows.findings.promise) {  // which was made with left-out images
+    AddPromiseFigures(rows, report.images, &report.figures);
+  }
+  return report;
 }
 
 Result<std::vector<HeldOutImage>> ReadForeignImages(const std::vector<std::string>& roots) {
@@ -99,7 +195,8 @@ void WarnOfRejects(const CheckMapReport& report) {
 }
 
 void ReportHeldOut(const CheckMapReport& held_out, StageReport* report) {
-  report->in = {{"held-out images", static_cast<int64_t>(held_out.images.size())}};
+  report->in = {{IsOfLeftOutRuns(held_out) ? "left-out images" : "held-out images",
+                 static_cast<int64_t>(held_out.images.size())}};
   const auto localized = held_out.figures.find("num_localized");
   if (localized != held_out.figures.end())
     report->out = {{"localized", static_cast<int64_t>(localized->second)}};
@@ -110,14 +207,15 @@ void ReportHeldOut(const CheckMapReport& held_out, StageReport* report) {
   AddRejects("images", rejects, report);
 }
 
-Status Seal(MapRows rows, const CheckMapReport& report, const CheckMapOptions& checked,
+Status Seal(MapRows rows, const CheckMapReport& report, const Trials& trials, const CheckMapOptions& checked,
             const std::string& path) {
   CheckMapOptions options = checked;
+  rows.stage_options.insert(trials.stage_options.begin(), trials.stage_options.end());
   rows.sealed = true;
   if (!report.images.empty() || !report.plan_verdict.empty()) rows.self_test = report.figures;
   if (!report.images.empty()) {
     rows.findings.self_test_regions = report.regions;
-    if (rows.findings.promise)
+    if (rows.findings.promise && !IsOfLeftOutRuns(report))
       rows.findings.promise->held_out = CalibrationCurve(PromiseOutcomes(rows, report.images));
   }
   rows.stage_options["check_map"] = OptionsToml(DescribeOptions(&options));
@@ -152,18 +250,23 @@ Status CheckPlan(const MapRows& rows, const Arguments& arguments, const CommandE
 
 // Refuses arguments for held-out images or scans where there are none.
 Status CheckWhatIsRead(const Arguments& arguments) {
-  if (arguments.queries_path.empty() && !arguments.capture_path.empty()) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "--capture {}: is used for the images of --queries only; give --queries, or leave it out",
-        arguments.capture_path);
+  if (arguments.queries_path.empty() && arguments.left_out_path.empty() && !arguments.capture_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--capture {}: is used for the images of --queries or --left-out only; give --queries, "
+                     "--left-out, or leave it out",
+                     arguments.capture_path);
+  }
+  if (!arguments.left_out_path.empty() && arguments.capture_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--left-out {}: has the names of images; give --capture, which has the images",
+                     arguments.left_out_path);
   }
   if (arguments.queries_path.empty() && !arguments.scans_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--scans {}: scan i was taken with held-out image i; give --queries, or leave it out",
                      arguments.scans_path);
   }
-  if (arguments.queries_path.empty() && arguments.output_path.empty()) {
+  if (arguments.queries_path.empty() && arguments.left_out_path.empty() && arguments.output_path.empty()) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"min_localized_ratio", "min_precision_ratio", "min_region_localized_ratio",
          "min_region_precision_ratio", "min_region_held_out", "plan_must_fit"},
@@ -190,23 +293,9 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is already sealed; -o is for a map from emit-map",
                      arguments.map_path);
   }
-  CheckMapReport held_out;
-  if (!arguments.queries_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<HeldOutImage> images, ReadHeldOutImages(arguments, rows));
-    CAIRN_ASSIGN_OR_RETURN(
-        held_out, CheckMap(map, images, arguments.options, environment.num_threads, *environment.progress));
-    if (rows.documents != "all") {
-      CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> full, Map::FromRows(WithAllDocuments(rows)));
-      CAIRN_ASSIGN_OR_RETURN(
-          const CheckMapReport all_images,
-          CheckMap(full, images, arguments.options, environment.num_threads, *environment.progress));
-      AddFullFigures(all_images, &held_out);
-    }
-    FindStations(rows, arguments.options, &held_out.images);
-    held_out.regions = SummarizeRegions(rows, held_out.images, arguments.options);
-    if (rows.findings.promise) AddPromiseFigures(rows, held_out.images, &held_out.figures);
-    WarnOfRejects(held_out);
-  }
+  CAIRN_ASSIGN_OR_RETURN(const Trials trials, ReadTrials(arguments, map, rows));
+  CAIRN_ASSIGN_OR_RETURN(CheckMapReport held_out, CheckTrials(trials, rows, arguments, environment));
+  WarnOfRejects(held_out);
   CAIRN_RETURN_IF_ERROR(CheckPlan(rows, arguments, environment, &held_out));
   std::optional<CheckMapReport> foreign;
   if (!arguments.foreign_paths.empty()) {
@@ -229,7 +318,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (!held_out.images.empty() || !arguments.output_path.empty())
     CAIRN_RETURN_IF_ERROR(CheckGate(held_out, arguments.options));
   if (arguments.output_path.empty()) return Ok();
-  return Seal(std::move(rows), held_out, arguments.options, arguments.output_path);
+  return Seal(std::move(rows), held_out, trials, arguments.options, arguments.output_path);
 }
 
 }  // namespace
@@ -242,8 +331,16 @@ Command CheckMapCommand() {
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             parser.Add("map", arguments->map_path, "map").Required().Type("MAP");
-            parser.Add("--queries", arguments->queries_path, "held-out images with their poses (queries.txt)")
-                .Type("queries.txt");
+            const Argument queries = parser
+                                         .Add("--queries", arguments->queries_path,
+                                              "held-out images with their poses (queries.txt)")
+                                         .Type("queries.txt");
+            parser
+                .Add("--left-out", arguments->left_out_path,
+                     "folder of cairn stage leave-out: maps without runs of the survey's images, which try "
+                     "them")
+                .Type("FOLDER")
+                .Excludes(queries);
             parser
                 .Add("--capture", arguments->capture_path,
                      "capture that has the images [the folder of queries.txt]")

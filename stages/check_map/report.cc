@@ -114,7 +114,12 @@ std::string ReportText(const PrintedReport& report) {
   if (report.held_out != nullptr && !report.held_out->images.empty()) {
     const CheckMapReport& held_out = *report.held_out;
     const auto figure = [&](const char* name) { return Figure(held_out, name); };
-    line("held-out images", fmt::format("{}", held_out.images.size()));
+    if (IsOfLeftOutRuns(held_out)) {
+      line("left-out images", fmt::format("{}, in {} runs of the survey, in maps without them",
+                                          held_out.images.size(), *figure(kLeftOutRunsFigure)));
+    } else {
+      line("held-out images", fmt::format("{}", held_out.images.size()));
+    }
     line("localized", fmt::format("{} ({} %)", NumFixes(held_out), Text(figure("localized_ratio"), 0.01, 1)));
     if (figure("num_by_retrieval")) {
       line("with all images",
@@ -155,6 +160,8 @@ std::string ReportText(const PrintedReport& report) {
     line("ms per image",
          fmt::format("{:.1f} (SIFT alone {:.1f})", held_out.mean_total_ms, held_out.mean_sift_ms));
   }
+  if (report.held_out != nullptr && !report.held_out->why_none.empty())
+    line("self-test", "none: " + report.held_out->why_none);
   if (report.held_out != nullptr) text += PlanText(*report.held_out);
   if (report.foreign != nullptr) {
     line("other places",
@@ -174,6 +181,8 @@ std::string ReportJson(const PrintedReport& report, bool with_times) {
                          {"k", report.rows->k},
                          {"map_bytes", report.map_bytes}};
   if (report.rows->lower_bound) json["lower_bound"] = *report.rows->lower_bound;
+  if (report.held_out != nullptr && !report.held_out->why_none.empty())
+    json["no_self_test"] = report.held_out->why_none;
   if (report.held_out != nullptr && !report.held_out->plan_verdict.empty())
     json["floor_plan"] = report.held_out->plan_verdict;
   if (report.held_out != nullptr) {

@@ -181,7 +181,10 @@ Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
       return by_odometry;
     }
     // What cannot be read is an error; what says nothing leaves the question to others.
-    if (from == "odometry" || by_odometry.error().code != ErrorCode::kNoData) return by_odometry;
+    if (from == "odometry") {
+      return MakeError(by_odometry.error().code, "scale_from = odometry: {}", by_odometry.error().message);
+    }
+    if (by_odometry.error().code != ErrorCode::kNoData) return by_odometry;
     result->warnings.push_back(by_odometry.error().message);
   }
   Result<Similarity> similarity = AlignToGps(model, capture, options, result);

@@ -55,7 +55,7 @@ function regionTable() {
   if (!rows.length) return;
   $('charts').append(element('details', {class: 'whole'}, element('summary', {}, 'recall and error by region, as a table'),
     table(rows.slice(0, 500).map(([i, test]) => [button(String(i), () => pickRegion(i)), test.held_out, test.localized, test.wrong, test.median_m === undefined ? '' : lengthText(test.median_m), test.p90_m === undefined ? '' : lengthText(test.p90_m)]),
-          ['region', 'held-out images', 'localized', 'wrong', 'median error', 'nine of ten within'])));
+          ['region', `${tried} images`, 'localized', 'wrong', 'median error', 'nine of ten within'])));
 }
 // Maps of other sizes, and this one among them.
 function drawSizes() {
@@ -67,7 +67,7 @@ function drawSizes() {
   }
   chart('Size against recall', {type: 'line', data: {datasets: sets}, options: {
     plugins: {legend: {labels: {color: styled('--ink'), usePointStyle: true}}, tooltip: {callbacks: {label: item => `${item.dataset.label}: ${bytes(item.raw.x)}, ${item.raw.y.toFixed(1)} %${item.raw.point.median_m === null ? '' : `, median error ${lengthText(item.raw.point.median_m)}`}`}}},
-    scales: {x: axis('bytes of the map', {type: 'logarithmic', ticks: {callback: value => /^[125]/.test(String(value)) ? roundBytes(value) : '', maxRotation: 0}}), y: axis('held-out images, %', {scale: {max: 100}})}}},
+    scales: {x: axis('bytes of the map', {type: 'logarithmic', ticks: {callback: value => /^[125]/.test(String(value)) ? roundBytes(value) : '', maxRotation: 0}}), y: axis(`${tried} images, %`, {scale: {max: 100}})}}},
     data.pareto.map(point => `${bytes(point.bytes)} ${percent(point.localized)}`).join(', '));
 }
 // How often promises of about the same probability were kept: on the line where the map knows what it says.

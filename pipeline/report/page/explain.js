@@ -11,7 +11,7 @@ function say(...nodes) {
 }
 // Before anything is chosen: where to look first.
 function sayFirst() {
-  const nodes = [element('p', {}, 'Click a station, a region or a held-out image, or find one by its number or name: what is seen there, what the stages dropped and why.')];
+  const nodes = [element('p', {}, `Click a station, a region or a ${tried} image, or find one by its number or name: what is seen there, what the stages dropped and why.`)];
   const first = data.advice.filter(entry => entry.stations.length).slice(0, 3);
   if (first.length) {
     nodes.push(element('h3', {}, 'Weakest places'), ...first.map(entry => {
@@ -53,8 +53,8 @@ function choose({station = -1, region = -1, image = -1}) {
   showLegend();
 }
 function testText(test) {
-  if (!test) return 'no held-out image was taken there';
-  let text = `${test.localized} of ${counted(test.held_out, 'held-out image')} localized`;
+  if (!test) return `no ${tried} image was taken there`;
+  let text = `${test.localized} of ${counted(test.held_out, `${tried} image`)} localized`;
   if (test.wrong) text += `, ${test.wrong} of them wrong`;
   if (test.median_m !== undefined) text += `; median error ${lengthText(test.median_m)}, ${degrees(test.median_deg)}`;
   return text;
@@ -79,7 +79,7 @@ function heldOutNodes(images) {
   if (!images.length) return [];
   const order = images.slice().sort((a, b) => isBad(heldOut[b]) - isBad(heldOut[a]) || a - b);
   const line = i => element('li', isBad(heldOut[i]) ? {class: 'bad'} : {}, button(heldOut[i].name, () => { explainImage(i); }), ' ', outcome(heldOut[i]));
-  const nodes = [element('h3', {}, term('held-out', 'Held-out images'), ' nearest to here'), element('ul', {class: 'plain'}, ...order.slice(0, 12).map(line))];
+  const nodes = [element('h3', {}, term('held-out', numRuns ? 'Left-out images' : 'Held-out images'), ' nearest to here'), element('ul', {class: 'plain'}, ...order.slice(0, 12).map(line))];
   if (order.length > 12) nodes.push(element('p', {class: 'soft'}, `and ${order.length - 12} more`));
   return nodes;
 }
@@ -115,12 +115,12 @@ function explainRegion(i, others = []) {
 }
 function explainImage(i) {
   choose({image: i});
-  show('held-out images');
+  show(`${tried} images`);
   const image = heldOut[i], place = ([x, y, heading]) => `${metres(x / 100)}, ${metres(y / 100)}${heading === undefined ? '' : `, ${Math.round(heading)}\u00B0`}`;
   const rows = [['taken at', place(image.at)]];
   if (image.found) rows.push(['localized at', place(image.found)], ['error', `${lengthText(image.error_m)}, ${degrees(image.error_deg)}`]);
   if (image.inliers !== undefined) rows.push([term('inliers'), image.inliers]);
-  const nodes = [element('h3', {}, image.name), element('p', {class: 'soft'}, 'held-out image'),
+  const nodes = [element('h3', {}, image.name), element('p', {class: 'soft'}, `${tried} image`),
     element('p', isBad(image) ? {class: 'bad'} : {}, image.found ? (image.wrong ? 'localized at a wrong place' : 'localized') : outcome(image)), table(rows)];
   if (image.station === null) nodes.push(element('p', {class: 'bad'}, 'No station is near it: the survey was not there, or did not look this way.'));
   else {
@@ -163,7 +163,7 @@ function aheadOf(x, y, heading, size) {
 }
 const markPlace = i => aheadOf(S.x[i], S.y[i], S.heading[i], markSize(scaleNow()));
 const stationNear = latlng => isShown('stations') || isShown('uncovered') ? nearest(latlng, numStations, markPlace, Math.max(1.3 * markSize(scaleNow()), 9)) : -1;
-const imageNear = latlng => isShown('held-out images') ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
+const imageNear = latlng => isShown(`${tried} images`) ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
 const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => aheadOf(viewsToTake[i].x, viewsToTake[i].y, viewsToTake[i].heading, viewSize(scaleNow())), 9) : -1;
 const isSmallScreen = () => window.innerWidth <= 800;
 // All stations whose marks are under the pointer, nearest first.

@@ -24,7 +24,7 @@ const says = (...marks) => () => element('div', {}, ...marks.map(([kind, colour,
 // Layers without content in a map are left out.
 const layers = [
   {name: 'recall', group: 'how well', draw: drawRecall, exists: missed.length > 0,
-   legend: () => element('div', {}, 'of the regions there, the one that localizes the smallest part of its held-out images: ', ...recallClasses.map(([, colour, text]) => element('span', {class: 'key'}, mark('block', colour), ` ${text} `)))},
+   legend: () => element('div', {}, `of the regions there, the one that localizes the smallest part of its ${tried} images: `, ...recallClasses.map(([, colour, text]) => element('span', {class: 'key'}, mark('block', colour), ` ${text} `)))},
   {name: 'entropy', group: 'how well', draw: drawEntropy, exists: heat.length > 0,
    legend: () => scaleOf(heatShade, 'entropy, and the number of places that look alike', '0 nats: 1 place', `${mostEntropy.toFixed(2)} nats: ${Math.exp(mostEntropy).toFixed(1)} places`)},
   {name: 'regions', group: 'the map', draw: drawRegions, on: true, exists: R.length > 0,
@@ -50,7 +50,7 @@ const layers = [
    legend: () => element('div', {}, mark('arrow', blue), ` from where an image was taken to where the map puts it${errorFactor > 1 ? `, ${errorFactor} times as long` : ''}`)},
   {name: 'images to take', group: 'images', draw: drawViewsToTake, exists: viewsToTake.length > 0,
    legend: says(...[['wedge', purple, 'images to take next', true], ['ring', purple, 'images to take next, in all directions', false]].filter(([, , , hasHeading]) => viewsToTake.some(view => (view.heading !== null) === hasHeading)))},
-  {name: 'held-out images', group: 'how well', draw: drawHeldOut, on: true, exists: heldOut.length > 0,
+  {name: `${tried} images`, group: 'how well', draw: drawHeldOut, on: true, exists: heldOut.length > 0,
    legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(heldOut.some(image => image.wrong) ? [['diamond', pink, 'wrong']] : []))},
   {name: 'changes', group: 'the map', draw: drawChanges, on: true, exists: Boolean(data.changes),
    legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'landmarks gone'], ['ring', orange, 'coverage lost'])},

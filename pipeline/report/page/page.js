@@ -47,6 +47,9 @@ const most = values => values.reduce((a, b) => Math.max(a, b), 0);
 const quantile = (values, part) => values.slice().sort((a, b) => a - b)[Math.ceil(part * values.length) - 1];
 
 // ---- terms
+// What tried the map: images that were held out, or else runs of the survey's own, in maps without them.
+const numRuns = data.self_test.num_left_out_runs || 0;
+const tried = numRuns ? 'left-out' : 'held-out';
 const terms = {
   station: 'a place where the survey stood, with the direction it looked in if the camera sees only forward',
   landmark: 'a feature of the place that the map keeps: robots find where they are by landmarks',
@@ -56,8 +59,8 @@ const terms = {
   region: 'neighbouring stations that all see the same k landmarks or more',
   k: 'the minimum number of common landmarks of a region, [decompose_regions] k',
   class: 'one feature of the place, seen in several images',
-  'held-out': 'images that the map was not made from; they test it',
-  recall: 'part of the held-out images that the map localizes',
+  'held-out': numRuns ? 'runs of the survey\u2019s images: they test maps that were made without them' : 'images that the map was not made from; they test it',
+  recall: `part of the ${tried} images that the map localizes`,
   entropy: 'how many places look like this one, itself counted: 0 nats one, 0.69 two, 1.1 three',
   covered: data.tau > 0 ? `some region has this station, and all stations within tau = ${data.tau} hops of it` : 'some region has this station',
   inliers: 'landmarks that agree with the pose that was found',

@@ -30,7 +30,7 @@ if (data.promise) {
   card(`${count(P.num_kept)} of ${count(P.num_nodes)}`, ['places and headings keep the ', defined('promise', `${percent(P.probability, 0)} of the images taken there find ${P.min_matches} landmarks at least and are localized within ${lengthText(P.max_error_m)}, ${degrees(P.max_error_deg)}`)], {bad: P.num_kept < P.num_nodes});
 }
 if (tested) {
-  card(`${tested.localized} of ${tested.held_out}`, [term('held-out', 'held-out images'), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.held_out});
+  card(`${tested.localized} of ${tested.held_out}`, [term('held-out', `${tried} images`), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.held_out});
   if (tested.median_m !== undefined && tested.median_deg !== undefined) {
     card(`${lengthText(tested.median_m)}, ${degrees(tested.median_deg)}`, tested.p90_m === undefined || tested.p90_deg === undefined ? 'median error' : `median error; nine of ten within ${lengthText(tested.p90_m)}, ${degrees(tested.p90_deg)}`);
   }
@@ -107,7 +107,7 @@ function failedNodes() {
   const failed = [...heldOut.keys()].filter(i => isBad(heldOut[i]));
   if (!heldOut.length) return [];
   const source = data.held_out_is_self_test ? '' : ' (of other images than the self-test\u2019s)';
-  if (!failed.length) return [element('p', {}, `All ${counted(heldOut.length, 'held-out image')} were localized right${source}.`)];
+  if (!failed.length) return [element('p', {}, `All ${counted(heldOut.length, `${tried} image`)} were localized right${source}.`)];
   const rows = failed.slice(0, 30).map(i => {
     const image = heldOut[i];
     return [button(image.name, () => {
@@ -117,12 +117,15 @@ function failedNodes() {
             image.found ? outcome(image) : reason(image)];
   });
   return [element('h3', {}, `${counted(failed.length, 'image')} not localized, or wrong${source}`), table(rows, ['image', 'taken at', 'station', 'why']),
-          ...(failed.length > 30 ? [element('p', {class: 'soft'}, `and ${failed.length - 30} more: the layer \u201Cheld-out images\u201D shows all`)] : [])];
+          ...(failed.length > 30 ? [element('p', {class: 'soft'}, `and ${failed.length - 30} more: the layer \u201C${tried} images\u201D shows all`)] : [])];
 }
 if (hasSelfTest) {
   const figures = Object.entries(data.self_test);
+  if (numRuns) {
+    $('self-test-text').append(element('p', {}, `No images were held out. ${counted(data.self_test.num_held_out, 'image')} of the survey were left out instead, in ${counted(numRuns, 'run')}, and localized in maps that were made without them; this map has them all. Its poses, cameras and visual words were found with them: images of another day can fare worse.`));
+  }
   $('self-test-text').append(table(selfTestRows(), ['', 'found', 'asked for']), ...failedNodes(),
     element('details', {}, element('summary', {}, 'all figures, by the names that cairn check gives them'), table(figures.map(([name, value]) => [name, String(Number(value.toPrecision(6)))]))));
 } else {
-  $('self-test-text').append(element('p', {}, data.sealed ? 'No held-out images were tried: the map has no self-test.' : 'The map is not sealed: it has no self-test.'), ...failedNodes());
+  $('self-test-text').append(element('p', {}, data.sealed ? 'No images were tried: the map has no self-test.' : 'The map is not sealed: it has no self-test.'), ...failedNodes());
 }

@@ -36,7 +36,7 @@ constexpr int kFewestBits = 3;
 // longer names.
 constexpr int kNumFigures = 30;
 constexpr size_t kFigureNameBytes = 26;
-constexpr size_t kCheckMapOptionsBytes = 2048;
+constexpr size_t kCheckMapOptionsBytes = 2048, kLeaveOutOptionsBytes = 64;
 constexpr int kMaxNumBins = 8;  // of CalibrationCurve
 
 // Bytes of the file including its self-test.
@@ -44,6 +44,7 @@ Result<int64_t> SealedBytes(MapRows rows, const std::string& scratch_path) {
   for (int i = 0; i < kNumFigures; ++i)
     rows.self_test[fmt::format("{:a>{}}", i, kFigureNameBytes)] = 1.0 / (i + 3);
   rows.stage_options["check_map"] = std::string(kCheckMapOptionsBytes, 'a');
+  rows.stage_options["leave_out"] = std::string(kLeaveOutOptionsBytes, 'a');
   if (rows.findings.promise) {
     rows.findings.promise->held_out.clear();
     for (int i = 0; i < kMaxNumBins; ++i)

@@ -15,8 +15,6 @@
 namespace cairn::emit_map {
 namespace {
 
-constexpr size_t kMinNumSurveyImages = 12;
-constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 constexpr int kPlentyOfInliers = 50;
 constexpr size_t kMinNumObservations = 2;
 

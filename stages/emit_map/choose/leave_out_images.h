@@ -33,6 +33,8 @@ struct LeftOutImages {
 // images were found to be too easy.  At most about `max_num_images` are tried, spread over the survey, in as
 // many rounds as it takes to leave out no more than one image in four at a time; at most `kMaxNumRounds`.
 // Errors: NoData (fewer than twelve survey images).
+inline constexpr size_t kMinNumSurveyImages = 12;
+inline constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 inline constexpr size_t kMaxNumRounds = 6;
 Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images);
 

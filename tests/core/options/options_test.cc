@@ -41,6 +41,24 @@ TEST(Options, TomlRoundTripKeepsEveryValue) {
   EXPECT_THAT(read.up, testing::ElementsAre(1, 0, 0.5));
 }
 
+TEST(Options, AWordStandsForANumberOutsideOfTheRange) {
+  double ratio = -1;
+  const OptionTable table = {
+      {.name = "ratio", .value = &ratio, .help = "a ratio", .min = 0, .max = 0.5, .words = {{"auto", -1}}}};
+  EXPECT_EQ(OptionsToml(table), "ratio = 'auto'\n");
+  EXPECT_TRUE(CheckOptions(table).ok());
+  EXPECT_EQ(ValuesText(table[0]), "auto, or 0 to 0.5");
+  ASSERT_TRUE(ReadOptionsFile(WriteToml("ratio = 0.25\n"), table).ok());
+  EXPECT_EQ(ratio, 0.25);
+  EXPECT_EQ(OptionsToml(table), "ratio = 0.25\n");
+  ASSERT_TRUE(ReadOptionsFile(WriteToml("ratio = \"auto\"\n"), table).ok());
+  EXPECT_EQ(ratio, -1);
+  EXPECT_THAT(SetOption(table[0], "0.6").error().message,
+              testing::HasSubstr("option ratio = 0.6: must be auto, or in [0, 0.5]"));
+  EXPECT_THAT(SetOption(table[0], "most").error().message,
+              testing::HasSubstr("option ratio: expected auto, or a number, found 'most'"));
+}
+
 TEST(Options, UnknownKeyNamesTheNearestOne) {
   Fields fields;
   const Status status = ReadOptionsFile(WriteToml("flag = true\nmin_cuont = 3\n"), Describe(&fields));

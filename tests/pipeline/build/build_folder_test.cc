@@ -138,10 +138,16 @@ TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
   ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/images.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_THAT(Text("config.mk"), HasSubstr("CAPTURE := " + recipe_.captures[0].path + "\n"));
-  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \n"));
-  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/queries.txt", "").ok());
+  const std::string list = recipe_.captures[0].path + "/queries.txt";
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \nLEFT_OUT := yes\n"));
+  EXPECT_EQ(Text("options/queries"), "left_out\n");
+  ASSERT_TRUE(WriteFileAtomically(list, " \n# nothing\n").ok());  // holds nothing out
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
-  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + recipe_.captures[0].path + "/queries.txt\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := \nLEFT_OUT := yes\n"));
+  ASSERT_TRUE(WriteFileAtomically(list, "# one\n1 1 0 0 0 0 0 0 1 a.jpg\n").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("QUERIES := " + list + "\nLEFT_OUT := no\n"));
+  EXPECT_EQ(Text("options/queries"), list + "\n");
 }
 
 TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {

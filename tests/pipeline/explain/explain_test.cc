@@ -243,7 +243,7 @@ TEST(Advise, SendsTheSurveyWhereHeldOutImagesFailed) {
   const auto failed = [](const char* name, std::optional<StationIdx> station, double x) {
     return FailedImage{.name = name, .station = station, .view = {.position = {x, 0}, .heading_deg = 45}};
   };
-  AddFailedImages({failed("a.jpg", 1, 1.1), failed("b.jpg", 3, 3.1), failed("c.jpg", std::nullopt, 9)},
+  AddFailedImages({}, {failed("a.jpg", 1, 1.1), failed("b.jpg", 3, 3.1), failed("c.jpg", std::nullopt, 9)},
                   &advice);
   ASSERT_THAT(advice, SizeIs(3));
   ASSERT_THAT(advice[0].images_to_take, SizeIs(2));
@@ -252,7 +252,7 @@ TEST(Advise, SendsTheSurveyWhereHeldOutImagesFailed) {
   EXPECT_THAT(advice[1].stations, ElementsAre(3));
   EXPECT_THAT(advice[1].images_to_take, SizeIs(2));
   EXPECT_EQ(advice[2].text, "an option");
-  for (int i = 0; i < 20; ++i) AddFailedImages({failed("a.jpg", 1, i)}, &advice);
+  for (int i = 0; i < 20; ++i) AddFailedImages({}, {failed("a.jpg", 1, i)}, &advice);
   EXPECT_THAT(advice[0].images_to_take, SizeIs(Advice::kMaxViews));
 }
 

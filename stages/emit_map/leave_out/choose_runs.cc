@@ -1,0 +1,115 @@
+#include "stages/emit_map/leave_out/choose_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include "core/camera/panorama.h"
+#include "core/promise/view_distance.h"
+
+namespace cairn::emit_map {
+namespace {
+
+constexpr size_t kMaxRunLength = 12, kMinRunLength = 2;
+constexpr size_t kRunsPerSurvey = 20;  // a run is at most one image in so many
+constexpr double kAutoRatio = 0.1;
+constexpr size_t kMinNumTried = 24, kMaxNumTried = 200;  // auto
+
+size_t NumWanted(size_t num_images, const LeaveOutOptions& options) {
+  const auto part = [&](double ratio) {
+    return static_cast<size_t>(std::lround(ratio * static_cast<double>(num_images)));
+  };
+  if (options.hold_out != LeaveOutOptions::kAutoHoldOut) return std::max<size_t>(1, part(options.hold_out));
+  return std::min(std::clamp(part(kAutoRatio), kMinNumTried, kMaxNumTried), num_images / 2);
+}
+
+// Of each image, the first of those that are views of one panorama; else itself.
+std::vector<size_t> FirstOfPanorama(const std::vector<SurveyImage>& images) {
+  std::map<std::string, size_t> first;
+  std::vector<size_t> result;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const auto view = ParsePanoramaViewName(images[i].name);
+    result.push_back(view ? first.emplace(view->panorama_name, i).first->second : i);
+  }
+  return result;
+}
+
+// The images of the views of images [begin, begin + length), and of the panoramas that these are of.
+std::set<size_t> ViewsOf(const ViewDistance& distance, const std::vector<size_t>& panorama, size_t begin,
+                         size_t length) {
+  std::set<size_t> views;
+  for (size_t tried = begin; tried < begin + length; ++tried) {
+    for (size_t image = 0; image < panorama.size(); ++image) {
+      if (panorama[image] == panorama[tried] || distance.Squared(tried, image) < 1) views.insert(image);
+    }
+  }
+  return views;
+}
+
+}  // namespace
+
+OptionTable DescribeOptions(LeaveOutOptions* options) {
+  return {{.name = "hold_out",
+           .value = &options->hold_out,
+           .help = "where a capture has no held-out images: part of the survey's images that try a map made "
+                   "without them, in runs; 0: the map gets no self-test",
+           .min = 0,
+           .max = 0.5,
+           .words = {{"auto", LeaveOutOptions::kAutoHoldOut}}}};
+}
+
+Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& options) {
+  const size_t num_images = classes.images.size();
+  if (num_images < kMinNumSurveyImages) {
+    return MakeError(ErrorCode::kNoData,
+                     "the survey has {} images with poses, and runs are left out of {} at least; take more, "
+                     "or hold some out yourself (queries.txt)",
+                     num_images, kMinNumSurveyImages);
+  }
+  const size_t num_wanted = NumWanted(num_images, options);
+  const size_t length =
+      std::min(std::clamp(num_images / kRunsPerSurvey, kMinRunLength, kMaxRunLength), num_wanted);
+  const size_t num_runs = (num_wanted + length / 2) / length;
+  const ViewDistance distance(classes, {});
+  const std::vector<size_t> panorama = FirstOfPanorama(classes.images);
+  LeftOutRuns runs;
+  std::vector<std::set<size_t>> left_out;  // per round
+  for (size_t run = 0; run < num_runs; ++run) {
+    const size_t middle = (2 * run + 1) * num_images / (2 * num_runs);
+    for (size_t shorter = length; shorter > 0; shorter /= 2) {
+      const size_t begin = std::min(middle - std::min(middle, shorter / 2), num_images - shorter);
+      const std::set<size_t> views = ViewsOf(distance, panorama, begin, shorter);
+      if (kMinNumLeft * views.size() > num_images) continue;
+      size_t round = 0;
+      for (; round < left_out.size(); ++round) {
+        std::set<size_t> both = left_out[round];
+        both.insert(views.begin(), views.end());
+        if (kMinNumLeft * both.size() > num_images) continue;
+        left_out[round] = std::move(both);
+        break;
+      }
+      if (round == kMaxNumRounds) break;
+      if (round == left_out.size()) {
+        left_out.push_back(views);
+        runs.rounds.emplace_back();
+      }
+      for (size_t i = begin; i < begin + shorter; ++i) runs.rounds[round].tried.push_back(i);
+      ++runs.num_runs;
+      break;
+    }
+  }
+  if (runs.num_runs == 0) {
+    return MakeError(ErrorCode::kNoData,
+                     "each of the survey's {} images has more than a quarter of the others in its view, so "
+                     "that a map without these is another one; survey more places, or hold some out yourself "
+                     "(queries.txt)",
+                     num_images);
+  }
+  for (size_t round = 0; round < left_out.size(); ++round)
+    runs.rounds[round].left_out.assign(left_out[round].begin(), left_out[round].end());
+  return runs;
+}
+
+}  // namespace cairn::emit_map
