@@ -10,6 +10,7 @@
 #include "stages/reconstruct/globally/map_globally.h"
 #include "stages/reconstruct/known_places.h"
 #include "stages/reconstruct/odometry.h"
+#include "stages/reconstruct/uneven_steps.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -108,6 +109,7 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   if (mapper.mapper == "colmap")
     return MapByColmap(input, capture, options, work_folder, progress, &result->warnings);
   CAIRN_ASSIGN_OR_RETURN(std::vector<ImageMotion> motions, OdometryMotions(input, capture));
+  const bool has_odometry = !motions.empty();
   Result<GlobalMap> global = MapGlobally(
       input, std::move(motions),
       {.refine_focal_length = mapper.refine_focal_length, .refine_distortion = mapper.refine_distortion},
@@ -118,6 +120,10 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
         fmt::format("{}/{}: {}: it does not help to find the images' places; check where it says that the "
                     "camera is on the robot, and that its poses are those of the images",
                     capture.root, kOdometryFile, global->why_no_odometry));
+  }
+  if (global.ok() && global->is_drive && !has_odometry) {
+    const std::string uneven = UnevenSteps(global->models.front());
+    if (!uneven.empty()) result->warnings.push_back(fmt::format("{}: {}", capture.root, uneven));
   }
   const auto num_global = global.ok() ? static_cast<double>(global->models.front().images.size()) : 0;
   const bool is_enough =

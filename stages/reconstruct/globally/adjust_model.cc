@@ -67,8 +67,8 @@ struct StepLengthCost {
     const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
     // Of the logarithm, which shrinking steps resist as growing ones do; smooth where nothing moves.
     const double shortest = kShortestLength * step;
-    residual[0] = T(0.5) * ceres::log((way.squaredNorm() + T(shortest * shortest)) / T(step * step)) /
-                  T(log_sigma);
+    residual[0] =
+        T(0.5) * ceres::log((way.squaredNorm() + T(shortest * shortest)) / T(step * step)) / T(log_sigma);
     return true;
   }
 };

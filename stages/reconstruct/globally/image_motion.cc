@@ -19,7 +19,7 @@ constexpr size_t kMinNumTestMatches = 50;
 constexpr double kMaxErrorDeg = 5, kMaxErrorOfTurn = 0.5;
 // Directions of pairs are not as sure as their turns.
 constexpr double kMaxDirectionErrorDeg = 45;
-constexpr int kMinNumTested = 5;
+constexpr int kMinNumTestedMotions = 5;
 // A way longer than this many typical ones is a jump.
 constexpr double kMaxWays = 10;
 constexpr double kWeight = 0.3;
@@ -80,12 +80,12 @@ std::string LeaveOutContradicted(const std::vector<ViewPair>& pairs, std::vector
     num_wrong_turns += is_wrong.back() ? 1 : 0;
     if (tested.moves) directions.push_back(tested.direction_error_deg);
   }
-  if (num_tested >= kMinNumTested && 2 * num_wrong_turns > num_tested) {
+  if (num_tested >= kMinNumTestedMotions && 2 * num_wrong_turns > num_tested) {
     motions->clear();
     return fmt::format("on {} of {} steps the camera turned otherwise than the odometry says",
                        num_wrong_turns, num_tested);
   }
-  if (std::ssize(directions) >= kMinNumTested && Median(directions) > kMaxDirectionErrorDeg) {
+  if (std::ssize(directions) >= kMinNumTestedMotions && Median(directions) > kMaxDirectionErrorDeg) {
     const double median_deg = Median(directions);
     motions->clear();
     return fmt::format(

@@ -36,16 +36,19 @@ struct Round {
   int num_keypoints;    // of an image that decide; 0: as many as the budget allows
   bool adjust_cameras;
   bool reposition;  // by the pairs that were taken in, before the adjustment
+  // Of pairs that are taken in.  A look-alike, a panel or a door, is a small part of an image, and would draw
+  // a piece of the way that is loose yet to where it is not; then such pairs do no more harm.
+  double min_strength;
 };
-constexpr Round kRounds[] = {{0, 24, 100, false, false}, {0, 12, 120, true, false},
-                             {0.2, 12, 120, true, true}, {0.2, 12, 120, true, true},
-                             {0.2, 12, 120, true, true}, {0.1, 6, 150, true, false},
-                             {0.05, 4, 0, true, false}};
+constexpr Round kRounds[] = {{0, 24, 100, false, false, 0},    {0, 12, 120, true, false, 0},
+                             {0.2, 12, 120, true, true, 0.25}, {0.2, 12, 120, true, true, 0.25},
+                             {0.2, 12, 120, true, false, 0},   {0.1, 6, 150, true, false, 0},
+                             {0.05, 4, 0, true, false, 0}};
 // A round that takes in as far as the one before is left out if it would change fewer than this part of the
 // pairs.
 constexpr double kMinPartAccepted = 0.01;
 // Steps of a drive whose median tells whether it has collapsed there: so many times as short as others.
-constexpr int kNumStepsOfPiece = 15;
+constexpr int kNumStepsOfPiece = 25;
 constexpr double kCollapsed = 5;
 // Keypoints that decide in the last round: of an image, and of all.
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
@@ -93,7 +96,7 @@ ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Pr
     TriangulateAll(round.max_error_px);
     if (round.accepted_rad > 0) {
       const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
-      const int num_changed = AcceptPairs(round.accepted_rad);
+      const int num_changed = AcceptPairs(round.accepted_rad, round.min_strength);
       if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) continue;
       if (num_changed > 0) {
         MakeTracks();
@@ -330,7 +333,7 @@ void PartMapper::TriangulateAll(double max_error_px) {
 
 // A pair agrees with the map where the points of its keypoints in one image are, on the median, seen in the
 // other where they match.
-int PartMapper::AcceptPairs(double max_error_rad) {
+int PartMapper::AcceptPairs(double max_error_rad, double min_strength) {
   std::vector<std::vector<int>> track_of(images_.size());
   for (size_t i = 0; i < images_.size(); ++i) track_of[i].assign(input_.keypoints[images_[i]].size(), -1);
   for (size_t t = 0; t < tracks_.size(); ++t) {
@@ -361,6 +364,7 @@ int PartMapper::AcceptPairs(double max_error_rad) {
   });
   int num_changed = 0;
   for (size_t p = 0; p < pairs_.size(); ++p) {
+    if (!is_accepted_[p] && pairs_[p].strength < min_strength) continue;
     const bool is_accepted = verdict[p] == 0 ? is_accepted_[p] : verdict[p] > 0;
     if (is_accepted != is_accepted_[p]) ++num_changed;
     is_accepted_[p] = is_accepted;

@@ -62,7 +62,7 @@ class PartMapper {
   void Reposition();
   void UnfoldCollapsed();
   void TriangulateAll(double max_error_px);
-  int AcceptPairs(double max_error_rad);
+  int AcceptPairs(double max_error_rad, double min_strength);
   void Adjust(int num_keypoints, bool adjust_cameras);
   ColmapModel MakeModel() const;
 

@@ -44,8 +44,8 @@ class SightCost : public ceres::SizedCostFunction<3, 1, 3, 3> {
   Eigen::Vector3d direction_;
 };
 
-// How far two centres are apart, against a typical step of a drive: weight * log(length / step), which shrinking
-// steps resist as growing ones do.  A camera that stands has kShortestStep.
+// How far two centres are apart, against a typical step of a drive: weight * log(length / step), which
+// shrinking steps resist as growing ones do.  A camera that stands has kShortestStep.
 class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
  public:
   StepCost(double step, double weight) : step_(step), weight_(weight) {}

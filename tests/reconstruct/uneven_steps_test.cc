@@ -1,0 +1,54 @@
+#include "stages/reconstruct/uneven_steps.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace cairn::reconstruct {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+// Images at these places along x, in the order of their names, listed backwards.
+ColmapModel DriveOf(const std::vector<double>& steps) {
+  ColmapModel model;
+  double x = 0;
+  for (size_t i = 0; i <= steps.size(); ++i) {
+    ModelImage image;
+    image.name = fmt::format("{}.jpg", i);
+    image.cam_from_world.translation = {-x, 0, 0};
+    model.images.insert(model.images.begin(), image);
+    if (i < steps.size()) x += steps[i];
+  }
+  return model;
+}
+
+TEST(UnevenSteps, SayNothingWhereStepsAreEven) {
+  std::vector<double> steps(100, 0.5);
+  EXPECT_EQ(UnevenSteps(DriveOf(steps)), "");
+  EXPECT_EQ(UnevenSteps({}), "");
+  for (int i = 30; i < 55; ++i) steps[i] = 0.13;  // 3.8 times as short
+  EXPECT_EQ(UnevenSteps(DriveOf(steps)), "");
+  for (int i = 30; i < 42; ++i) steps[i] = 0;  // it stands, over fewer than half of 25 steps
+  EXPECT_EQ(UnevenSteps(DriveOf(steps)), "");
+}
+
+TEST(UnevenSteps, NameThePieceThatDiffersMost) {
+  std::vector<double> steps(100, 0.5);
+  for (int i = 30; i < 55; ++i) steps[i] = 0.1;
+  EXPECT_THAT(UnevenSteps(DriveOf(steps)), AllOf(HasSubstr("5.0 times as short as elsewhere"),
+                                                 HasSubstr("from 1"), HasSubstr("odometry.txt")));
+  for (int i = 75; i < 100; ++i) steps[i] = 4;
+  EXPECT_THAT(UnevenSteps(DriveOf(steps)), HasSubstr("8.0 times as long as elsewhere"));
+}
+
+TEST(UnevenSteps, NeedFiftySteps) {
+  std::vector<double> steps(50, 0.5);
+  for (int i = 0; i < 20; ++i) steps[i] = 0.1;
+  EXPECT_NE(UnevenSteps(DriveOf(steps)), "");
+  steps.pop_back();
+  EXPECT_EQ(UnevenSteps(DriveOf(steps)), "");
+}
+
+}  // namespace
+}  // namespace cairn::reconstruct
