@@ -35,7 +35,7 @@ std::string UnevenSteps(const ColmapModel& model) {
     const double local = UpperMedian({steps.begin() + first, steps.begin() + first + kNumSteps});
     if (!(local > 0) || !(typical > 0)) continue;
     const double ratio = std::max(local / typical, typical / local);
-    if (ratio < most) continue;
+    if (ratio < most || (at >= 0 && ratio == most)) continue;
     most = ratio;
     at = first;
     is_short = local < typical;
