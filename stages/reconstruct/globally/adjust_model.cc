@@ -13,7 +13,6 @@
 namespace cairn::reconstruct {
 namespace {
 
-constexpr double kShortestLength = 0.1;  // of a typical one: of a camera that stands
 // Sensitivities hold for so large a change, in standard deviations of what is likely.
 constexpr double kMaxChangeSigmas = 0.5;
 
@@ -57,7 +56,7 @@ struct RelativeRotationCost {
 };
 
 struct StepLengthCost {
-  double step, log_sigma;
+  double step, sigma_ratio;
   template <typename T>
   bool operator()(const T* pose1, const T* pose2, T* residual) const {
     const auto center = [](const T* pose) {
@@ -65,10 +64,9 @@ struct StepLengthCost {
       return Eigen::Matrix<T, 3, 1>(-(view.rotation.conjugate() * view.translation));
     };
     const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
-    // Of the logarithm, which shrinking steps resist as growing ones do; smooth where nothing moves.
-    const double shortest = kShortestLength * step;
-    residual[0] =
-        T(0.5) * ceres::log((way.squaredNorm() + T(shortest * shortest)) / T(step * step)) / T(log_sigma);
+    // Smooth where nothing moves.
+    const T length = ceres::sqrt(way.squaredNorm() + T(1e-6 * step * step));
+    residual[0] = (length / T(step) - T(1)) / T(sigma_ratio);
     return true;
   }
 };
@@ -108,9 +106,16 @@ double MedianStep(const ModelProblem& problem) {
   return lengths.empty() ? 0 : UpperMedian(lengths);
 }
 
-// The image with most observations, which holds the frame.  One with few, at the end of a drive, would be
-// held off what all others say of it.
-size_t MostSeeing(const ModelProblem& problem) {
+// The image that holds the frame: that with most observations where there are motions.  The first of a drive
+// has few, and would be held off what all others say of it.  Without motions the first holds it all the same:
+// adjustments that end early leave weak images farther off else.  REQUIRES: an observation
+size_t HoldingFrame(const ModelProblem& problem) {
+  if (problem.motions.empty()) {
+    int first = problem.observations.front().image;
+    for (const ModelObservation& observation : problem.observations)
+      first = std::min(first, observation.image);
+    return static_cast<size_t>(first);
+  }
   std::vector<int> count(problem.cam_from_world.size(), 0);
   for (const ModelObservation& observation : problem.observations) ++count[observation.image];
   return std::max_element(count.begin(), count.end()) - count.begin();
@@ -174,13 +179,12 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
         rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
   }
   const double step = MedianStep(*problem);
-  ceres::HuberLoss step_loss(1);
   for (const auto& [from, to] : problem->steps) {
     if (!(step > 0) || !are_known(from, to)) continue;
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
-            new StepLengthCost{step, options.step_log_sigma}),
-        &step_loss, pose_of(from), pose_of(to));
+            new StepLengthCost{step, options.step_sigma_ratio}),
+        &weak_loss, pose_of(from), pose_of(to));
   }
   const double median_way_m = MedianWayM(problem->motions);
   for (const ImageMotion& motion : problem->motions) {
@@ -192,8 +196,10 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   for (Eigen::Vector3d& point : problem->points) {
     if (ceres_problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
   }
-  if (double* held = pose_of(MostSeeing(*problem)); ceres_problem.HasParameterBlock(held))
-    ceres_problem.SetParameterBlockConstant(held);
+  if (!problem->observations.empty()) {
+    double* held = pose_of(HoldingFrame(*problem));
+    if (ceres_problem.HasParameterBlock(held)) ceres_problem.SetParameterBlockConstant(held);
+  }
   for (size_t i = 0; i < problem->cam_from_world.size(); ++i) {
     if (!ceres_problem.HasParameterBlock(pose_of(i))) continue;
     ceres_problem.SetManifold(pose_of(i), &manifold);

@@ -53,7 +53,7 @@ struct AdjustModelOptions {
   // Standard deviations of a pair's rotation, degrees, and of a step, as a part of the median one.  REQUIRES:
   // > 0
   double rotation_sigma_deg = 0.5;
-  double step_log_sigma = 0.5;
+  double step_sigma_ratio = 0.5;
   // Standard deviations of a motion, per axis: of its way, as a part of it and of the median one; of its
   // turn, degrees, and as a part of it.  REQUIRES: > 0
   double way_sigma_ratio = 0.05, least_way_sigma_ratio = 0.02;

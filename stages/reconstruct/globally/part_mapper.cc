@@ -35,21 +35,13 @@ struct Round {
   double max_error_px;  // of what is triangulated
   int num_keypoints;    // of an image that decide; 0: as many as the budget allows
   bool adjust_cameras;
-  bool reposition;  // by the pairs that were taken in, before the adjustment
-  // Of pairs that are taken in.  A look-alike, a panel or a door, is a small part of an image, and would draw
-  // a piece of the way that is loose yet to where it is not; then such pairs do no more harm.
-  double min_strength;
 };
-constexpr Round kRounds[] = {{0, 24, 100, false, false, 0},    {0, 12, 120, true, false, 0},
-                             {0.2, 12, 120, true, true, 0.25}, {0.2, 12, 120, true, true, 0.25},
-                             {0.2, 12, 120, true, false, 0},   {0.1, 6, 150, true, false, 0},
-                             {0.05, 4, 0, true, false, 0}};
+constexpr Round kRounds[] = {{0, 24, 100, false},  {0, 12, 120, true},   {0.2, 12, 120, true},
+                             {0.2, 12, 120, true}, {0.2, 12, 120, true}, {0.1, 6, 150, true},
+                             {0.05, 4, 0, true}};
 // A round that takes in as far as the one before is left out if it would change fewer than this part of the
 // pairs.
 constexpr double kMinPartAccepted = 0.01;
-// Steps of a drive whose median tells whether it has collapsed there: so many times as short as others.
-constexpr int kNumStepsOfPiece = 25;
-constexpr double kCollapsed = 5;
 // Keypoints that decide in the last round: of an image, and of all.
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
 constexpr int kMaxNumObservations = 200000;
@@ -89,23 +81,17 @@ ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Pr
   KeepRotations(rotations);
   MakeTracks();
   Position(rotations);
-  UnfoldCollapsed();
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return {};
     progress.Advance(static_cast<int64_t>(images_.size()));
     TriangulateAll(round.max_error_px);
     if (round.accepted_rad > 0) {
       const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
-      const int num_changed = AcceptPairs(round.accepted_rad, round.min_strength);
+      const int num_changed = AcceptPairs(round.accepted_rad);
       if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) continue;
       if (num_changed > 0) {
         MakeTracks();
         TriangulateAll(round.max_error_px);
-        if (round.reposition) {
-          Reposition();
-          UnfoldCollapsed();
-          TriangulateAll(round.max_error_px);
-        }
       }
     }
     int num_keypoints = round.num_keypoints;
@@ -209,104 +195,28 @@ std::vector<Step> PartMapper::StepsBy(const std::vector<Eigen::Quaterniond>& rot
   return steps;
 }
 
-// What long tracks' elements see, of all their elements: also those that do not fit the map.
-struct PartMapper::Sights {
-  std::vector<int> tracks;  // per point
-  std::vector<Sight> sights;
-};
-
-PartMapper::Sights PartMapper::SightsBy(const std::vector<Eigen::Quaterniond>& rotations) const {
+void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   std::vector<std::vector<int>> all(tracks_.size());
   for (size_t t = 0; t < tracks_.size(); ++t) {
     all[t].resize(tracks_[t].size());
     std::iota(all[t].begin(), all[t].end(), 0);
   }
-  Sights found;
-  for (const Chosen& chosen : ChooseTracks(kNumKeypointsPositioned, all)) {
-    for (const int e : chosen.elements) {
-      const TrackElement& element = tracks_[chosen.track][e];
+  std::vector<Sight> sights;
+  const std::vector<Chosen> chosen = ChooseTracks(kNumKeypointsPositioned, all);
+  for (size_t k = 0; k < chosen.size(); ++k) {
+    for (const int e : chosen[k].elements) {
+      const TrackElement& element = tracks_[chosen[k].track][e];
       const auto bearing = BearingFromImage(CameraOf(element.image_idx), PixelOf(element));
       if (!bearing) continue;
-      found.sights.push_back({element.image_idx, static_cast<int>(found.tracks.size()),
-                              rotations[element.image_idx].conjugate() * *bearing});
+      sights.push_back(
+          {element.image_idx, static_cast<int>(k), rotations[element.image_idx].conjugate() * *bearing});
     }
-    found.tracks.push_back(chosen.track);
   }
-  return found;
-}
-
-void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
-  const Sights sights = SightsBy(rotations);
-  const Positions positions =
-      PositionImages(static_cast<int>(images_.size()), static_cast<int>(sights.tracks.size()), sights.sights,
-                     StepsBy(rotations), {});
+  const Positions positions = PositionImages(static_cast<int>(images_.size()),
+                                             static_cast<int>(chosen.size()), sights, StepsBy(rotations), {});
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
-  spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), sights.tracks.size());
-}
-
-// Once more, by the pairs that were taken in: an adjustment, which believes a point where it is seen to some
-// pixels, closes a loop as slowly as a zip.
-void PartMapper::Reposition() {
-  std::vector<Eigen::Quaterniond> rotations;
-  Positions start;
-  for (const Pose& pose : problem_.cam_from_world) {
-    rotations.push_back(pose.rotation);
-    start.centers.push_back(pose.Center());
-  }
-  Sights sights = SightsBy(rotations);
-  std::vector<double> depths;
-  for (const Sight& sight : sights.sights) {
-    const Triangulation& triangulation = triangulations_[sights.tracks[sight.point]];
-    if (triangulation.outcome == TriangulateOutcome::kOk)
-      depths.push_back((triangulation.position - start.centers[sight.image]).norm());
-  }
-  if (depths.empty()) return;
-  const double depth = UpperMedian(depths);
-  start.points.resize(sights.tracks.size());
-  std::vector<bool> has_start(sights.tracks.size(), false);
-  for (const Sight& sight : sights.sights) {
-    if (has_start[sight.point]) continue;
-    const Triangulation& triangulation = triangulations_[sights.tracks[sight.point]];
-    start.points[sight.point] = triangulation.outcome == TriangulateOutcome::kOk
-                                    ? triangulation.position
-                                    : Eigen::Vector3d(start.centers[sight.image] + depth * sight.direction);
-    has_start[sight.point] = true;
-  }
-  const Positions positions = RepositionImages(start, sights.sights, StepsBy(rotations), {});
-  for (size_t i = 0; i < images_.size(); ++i)
-    problem_.cam_from_world[i].translation = -(rotations[i] * positions.centers[i]);
-}
-
-// A piece of a drive that hangs on a turn on the spot has no scale but that of its steps, and little resists
-// when it shrinks to a point: its steps are made as long as others.
-void PartMapper::UnfoldCollapsed() {
-  if (!is_drive_ || !problem_.motions.empty() || std::ssize(images_) <= kNumStepsOfPiece) return;
-  std::vector<Eigen::Vector3d> centers, ways;
-  for (const Pose& pose : problem_.cam_from_world) centers.push_back(pose.Center());
-  std::vector<double> lengths;
-  for (size_t i = 1; i < centers.size(); ++i) {
-    ways.push_back(centers[i] - centers[i - 1]);
-    lengths.push_back(ways.back().norm());
-  }
-  const double typical = UpperMedian(lengths);
-  const auto num_steps = static_cast<int>(ways.size());
-  int num_unfolded = 0;
-  for (int i = 0; i < num_steps; ++i) {
-    const int first = std::clamp(i - kNumStepsOfPiece / 2, 0, num_steps - kNumStepsOfPiece);
-    const double local = UpperMedian({lengths.begin() + first, lengths.begin() + first + kNumStepsOfPiece});
-    if (local > 0 && local * kCollapsed < typical) {
-      ways[i] *= typical / local;
-      ++num_unfolded;
-    }
-    centers[i + 1] = centers[i] + ways[i];
-  }
-  if (num_unfolded == 0) return;
-  spdlog::debug("reconstruct: {} steps had collapsed", num_unfolded);
-  for (size_t i = 0; i < centers.size(); ++i) {
-    Pose& pose = problem_.cam_from_world[i];
-    pose.translation = -(pose.rotation * centers[i]);
-  }
+  spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());
 }
 
 void PartMapper::TriangulateAll(double max_error_px) {
@@ -333,7 +243,7 @@ void PartMapper::TriangulateAll(double max_error_px) {
 
 // A pair agrees with the map where the points of its keypoints in one image are, on the median, seen in the
 // other where they match.
-int PartMapper::AcceptPairs(double max_error_rad, double min_strength) {
+int PartMapper::AcceptPairs(double max_error_rad) {
   std::vector<std::vector<int>> track_of(images_.size());
   for (size_t i = 0; i < images_.size(); ++i) track_of[i].assign(input_.keypoints[images_[i]].size(), -1);
   for (size_t t = 0; t < tracks_.size(); ++t) {
@@ -364,7 +274,6 @@ int PartMapper::AcceptPairs(double max_error_rad, double min_strength) {
   });
   int num_changed = 0;
   for (size_t p = 0; p < pairs_.size(); ++p) {
-    if (!is_accepted_[p] && pairs_[p].strength < min_strength) continue;
     const bool is_accepted = verdict[p] == 0 ? is_accepted_[p] : verdict[p] > 0;
     if (is_accepted != is_accepted_[p]) ++num_changed;
     is_accepted_[p] = is_accepted;

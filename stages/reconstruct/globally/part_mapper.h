@@ -55,14 +55,10 @@ class PartMapper {
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
-  struct Sights;
-  Sights SightsBy(const std::vector<Eigen::Quaterniond>& rotations) const;
   std::vector<Step> StepsBy(const std::vector<Eigen::Quaterniond>& rotations) const;
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
-  void Reposition();
-  void UnfoldCollapsed();
   void TriangulateAll(double max_error_px);
-  int AcceptPairs(double max_error_rad, double min_strength);
+  int AcceptPairs(double max_error_rad);
   void Adjust(int num_keypoints, bool adjust_cameras);
   ColmapModel MakeModel() const;
 

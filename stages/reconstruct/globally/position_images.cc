@@ -1,7 +1,6 @@
 #include "stages/reconstruct/globally/position_images.h"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 #include <ceres/ceres.h>
@@ -14,7 +13,6 @@ namespace cairn::reconstruct {
 namespace {
 
 constexpr double kHalfSideOfStart = 100, kLeastFactor = 1e-5;
-constexpr double kShortestStep = 0.1;  // of a typical one
 // Where ways are known points begin so many steps away.
 constexpr double kStepsToPoints = 10;
 
@@ -44,8 +42,7 @@ class SightCost : public ceres::SizedCostFunction<3, 1, 3, 3> {
   Eigen::Vector3d direction_;
 };
 
-// How far two centres are apart, against a typical step of a drive: weight * log(length / step), which
-// shrinking steps resist as growing ones do.  A camera that stands has kShortestStep.
+// How far two centres are apart, against a typical step of a drive: weight * (length / step - 1).
 class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
  public:
   StepCost(double step, double weight) : step_(step), weight_(weight) {}
@@ -53,10 +50,11 @@ class StepCost : public ceres::SizedCostFunction<1, 3, 3> {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Map<const Eigen::Vector3d> from(parameters[0]), to(parameters[1]);
     const Eigen::Vector3d way = to - from;
-    const double squared = way.squaredNorm() + kShortestStep * kShortestStep * step_ * step_;
-    residuals[0] = weight_ * 0.5 * std::log(squared / (step_ * step_));
+    const double length = way.norm();
+    residuals[0] = weight_ * (length / step_ - 1);
     if (jacobians == nullptr) return true;
-    const Eigen::Vector3d slope = way * (weight_ / squared);
+    const Eigen::Vector3d slope =
+        length > 0 ? Eigen::Vector3d(way * (weight_ / (length * step_))) : Eigen::Vector3d::Zero();
     for (int side = 0; side < 2; ++side) {
       if (jacobians[side] == nullptr) continue;
       for (int k = 0; k < 3; ++k) jacobians[side][k] = side == 0 ? -slope[k] : slope[k];
@@ -100,68 +98,42 @@ double TypicalWay(const std::vector<Step>& steps) {
   return lengths.empty() ? 0 : Median(lengths);
 }
 
-// Centres, points, factors, in one piece: Ceres orders blocks by their addresses, and another order is
-// another rounding.
-class Places {
- public:
-  Places(size_t num_images, size_t num_points, size_t num_sights)
-      : num_images_(num_images),
-        num_points_(num_points),
-        values_(3 * (num_images + num_points) + num_sights, 1) {}
+}  // namespace
 
-  double* Center(size_t image) { return &values_[3 * image]; }
-  double* Point(size_t point) { return &values_[3 * (num_images_ + point)]; }
-  double* Factor(size_t sight) { return &values_[3 * (num_images_ + num_points_) + sight]; }
+Positions PositionImages(int num_images, int num_points, const std::vector<Sight>& sights,
+                         const std::vector<Step>& steps, const PositionImagesOptions& options) {
+  // Centres, points, factors, in one piece: Ceres orders blocks by their addresses, and another order is
+  // another rounding.
+  const size_t num_places = static_cast<size_t>(num_images) + num_points;
+  std::vector<double> values(3 * num_places + sights.size(), 1);
+  Random random(options.seed);
+  for (size_t i = 0; i < 3 * num_places; ++i) values[i] = random.Uniform(-kHalfSideOfStart, kHalfSideOfStart);
+  const auto center_of = [&](int image) { return &values[3 * static_cast<size_t>(image)]; };
+  const auto point_of = [&](int point) { return &values[3 * (static_cast<size_t>(num_images) + point)]; };
+  const auto factor_of = [&](size_t sight) { return &values[3 * num_places + sight]; };
 
-  Positions Found() {
-    Positions positions;
-    for (size_t i = 0; i < num_images_; ++i) positions.centers.emplace_back(Center(i));
-    for (size_t k = 0; k < num_points_; ++k) positions.points.emplace_back(Point(k));
-    return positions;
+  const double typical_way = TypicalWay(steps);
+  if (typical_way > 0) {
+    std::fill_n(values.begin(), 3 * num_places, 0.0);
+    std::vector<bool> is_known(num_images, false);
+    for (const Step& step : steps) {
+      if (is_known[step.to] && !step.way) continue;
+      is_known[step.to] = step.way.has_value();
+      for (int k = 0; k < 3; ++k)
+        center_of(step.to)[k] = center_of(step.from)[k] + (step.way ? (*step.way)[k] : 0);
+    }
+    const double depth = kStepsToPoints * typical_way;
+    std::vector<int> num_sights(num_points, 0);
+    for (const Sight& sight : sights) ++num_sights[sight.point];
+    for (size_t s = 0; s < sights.size(); ++s) {
+      const Sight& sight = sights[s];
+      for (int k = 0; k < 3; ++k)
+        point_of(sight.point)[k] +=
+            (center_of(sight.image)[k] + depth * sight.direction[k]) / num_sights[sight.point];
+      *factor_of(s) = 1 / depth;
+    }
   }
 
-  size_t num_images() const { return num_images_; }
-  size_t num_points() const { return num_points_; }
-
- private:
-  size_t num_images_, num_points_;
-  std::vector<double> values_;
-};
-
-void BeginAnywhere(uint64_t seed, Places* places) {
-  Random random(seed);
-  const auto draw = [&](double* place) {
-    for (int k = 0; k < 3; ++k) place[k] = random.Uniform(-kHalfSideOfStart, kHalfSideOfStart);
-  };
-  for (size_t i = 0; i < places->num_images(); ++i) draw(places->Center(i));
-  for (size_t k = 0; k < places->num_points(); ++k) draw(places->Point(k));
-}
-
-void BeginAlongWays(const std::vector<Step>& steps, const std::vector<Sight>& sights, double typical_way,
-                    Places* places) {
-  for (size_t i = 0; i < places->num_images(); ++i) std::fill_n(places->Center(i), 3, 0.0);
-  for (size_t k = 0; k < places->num_points(); ++k) std::fill_n(places->Point(k), 3, 0.0);
-  std::vector<bool> is_known(places->num_images(), false);
-  for (const Step& step : steps) {
-    if (is_known[step.to] && !step.way) continue;
-    is_known[step.to] = step.way.has_value();
-    for (int k = 0; k < 3; ++k)
-      places->Center(step.to)[k] = places->Center(step.from)[k] + (step.way ? (*step.way)[k] : 0);
-  }
-  const double depth = kStepsToPoints * typical_way;
-  std::vector<int> num_sights(places->num_points(), 0);
-  for (const Sight& sight : sights) ++num_sights[sight.point];
-  for (size_t s = 0; s < sights.size(); ++s) {
-    const Sight& sight = sights[s];
-    for (int k = 0; k < 3; ++k)
-      places->Point(sight.point)[k] +=
-          (places->Center(sight.image)[k] + depth * sight.direction[k]) / num_sights[sight.point];
-    *places->Factor(s) = 1 / depth;
-  }
-}
-
-void Solve(const std::vector<Sight>& sights, const std::vector<Step>& steps, double typical_way,
-           const PositionImagesOptions& options, Places* places) {
   ceres::Problem::Options problem_options;
   problem_options.disable_all_safety_checks = true;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -170,13 +142,13 @@ void Solve(const std::vector<Sight>& sights, const std::vector<Step>& steps, dou
   ceres::Problem problem(problem_options);
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (size_t s = 0; s < sights.size(); ++s) {
-    problem.AddResidualBlock(new SightCost(sights[s].direction), &loss, places->Factor(s),
-                             places->Point(sights[s].point), places->Center(sights[s].image));
-    problem.SetParameterLowerBound(places->Factor(s), 0, kLeastFactor);
-    ordering->AddElementToGroup(places->Factor(s), 0);
+    problem.AddResidualBlock(new SightCost(sights[s].direction), &loss, factor_of(s),
+                             point_of(sights[s].point), center_of(sights[s].image));
+    problem.SetParameterLowerBound(factor_of(s), 0, kLeastFactor);
+    ordering->AddElementToGroup(factor_of(s), 0);
   }
   for (const Step& step : steps) {
-    double *from = places->Center(step.from), *to = places->Center(step.to);
+    double *from = center_of(step.from), *to = center_of(step.to);
     if (step.way && typical_way > 0) {
       problem.AddResidualBlock(new WayCost(*step.way, options.way_weight / typical_way), &loss, from, to);
     } else if (problem.HasParameterBlock(from) && problem.HasParameterBlock(to)) {
@@ -184,48 +156,21 @@ void Solve(const std::vector<Sight>& sights, const std::vector<Step>& steps, dou
                                &step_loss, from, to);
     }
   }
-  for (size_t k = 0; k < places->num_points(); ++k) {
-    if (problem.HasParameterBlock(places->Point(k))) ordering->AddElementToGroup(places->Point(k), 1);
+  for (int k = 0; k < num_points; ++k) {
+    if (problem.HasParameterBlock(point_of(k))) ordering->AddElementToGroup(point_of(k), 1);
   }
-  for (size_t i = 0; i < places->num_images(); ++i) {
-    if (problem.HasParameterBlock(places->Center(i))) ordering->AddElementToGroup(places->Center(i), 2);
+  for (int i = 0; i < num_images; ++i) {
+    if (problem.HasParameterBlock(center_of(i))) ordering->AddElementToGroup(center_of(i), 2);
   }
   ceres::Solver::Options solver;
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = 1e-5;
   SolveOnOneThread(solver, &problem);
-}
-
-}  // namespace
-
-Positions PositionImages(int num_images, int num_points, const std::vector<Sight>& sights,
-                         const std::vector<Step>& steps, const PositionImagesOptions& options) {
-  Places places(num_images, num_points, sights.size());
-  const double typical_way = TypicalWay(steps);
-  if (typical_way > 0) {
-    BeginAlongWays(steps, sights, typical_way, &places);
-  } else {
-    BeginAnywhere(options.seed, &places);
-  }
-  Solve(sights, steps, typical_way, options, &places);
-  return places.Found();
-}
-
-Positions RepositionImages(const Positions& start, const std::vector<Sight>& sights,
-                           const std::vector<Step>& steps, const PositionImagesOptions& options) {
-  Places places(start.centers.size(), start.points.size(), sights.size());
-  for (size_t i = 0; i < start.centers.size(); ++i)
-    Eigen::Map<Eigen::Vector3d>(places.Center(i)) = start.centers[i];
-  for (size_t k = 0; k < start.points.size(); ++k)
-    Eigen::Map<Eigen::Vector3d>(places.Point(k)) = start.points[k];
-  for (size_t s = 0; s < sights.size(); ++s) {
-    const Eigen::Vector3d way = start.points[sights[s].point] - start.centers[sights[s].image];
-    *places.Factor(s) =
-        std::max(kLeastFactor, way.dot(sights[s].direction) / std::max(way.squaredNorm(), 1e-12));
-  }
-  Solve(sights, steps, TypicalWay(steps), options, &places);
-  return places.Found();
+  Positions positions;
+  for (int i = 0; i < num_images; ++i) positions.centers.emplace_back(center_of(i));
+  for (int k = 0; k < num_points; ++k) positions.points.emplace_back(point_of(k));
+  return positions;
 }
 
 }  // namespace cairn::reconstruct

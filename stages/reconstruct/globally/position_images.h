@@ -47,8 +47,4 @@ struct PositionImagesOptions {
 Positions PositionImages(int num_images, int num_points, const std::vector<Sight>& sights,
                          const std::vector<Step>& steps, const PositionImagesOptions& options);
 
-// The same, from places that are nearly right.
-Positions RepositionImages(const Positions& start, const std::vector<Sight>& sights,
-                           const std::vector<Step>& steps, const PositionImagesOptions& options);
-
 }  // namespace cairn::reconstruct

@@ -129,25 +129,6 @@ TEST(PositionImages, AWrongWayHasLittleSay) {
   EXPECT_LT((found.centers[24] - found.centers[0] - Eigen::Vector3d(12, 0, 0)).norm(), 0.3);
 }
 
-// The second half of a drive along a line was put twice as large; sights of its points from the first half
-// say how large it is.
-TEST(RepositionImages, ClosesWhatWasOpen) {
-  const Scene scene = MakeCorridor(25, 0);
-  Positions start{scene.centers, scene.points};
-  const auto stretch = [](Eigen::Vector3d* place) { place->x() += std::max(0.0, place->x() - 6); };
-  for (Eigen::Vector3d& center : start.centers) stretch(&center);
-  for (Eigen::Vector3d& point : start.points) stretch(&point);
-  const auto found = RepositionImages(start, scene.sights, {}, {});
-  EXPECT_GT(ErrorOf(start, scene), 0.03);
-  EXPECT_LT(ErrorOf(found, scene), 0.005);
-}
-
-TEST(RepositionImages, WhatIsRightStays) {
-  const Scene scene = MakeCorridor(25, 0);
-  const auto found = RepositionImages({scene.centers, scene.points}, scene.sights, {}, {});
-  for (int i = 0; i < 25; ++i) EXPECT_LT((found.centers[i] - scene.centers[i]).norm(), 1e-6);
-}
-
 TEST(PositionImages, SameSeedSameBytes) {
   const Scene scene = MakeCorridor(10, 0.001);
   const auto first = PositionImages(10, static_cast<int>(scene.points.size()), scene.sights, StepsOf(10), {});
