@@ -44,6 +44,24 @@ class ReprojectionCost : public ceres::CostFunction {
   double weight_;
 };
 
+// The motion between two images, later_from_earlier, against one that is stated: turn, then the translation.
+// Blocks: the earlier pose, the later one.
+struct MotionCost {
+  Pose motion;  // stated
+  double sigma_rad, sigma_m;
+  template <typename T>
+  bool operator()(const T* earlier, const T* later, T* residual) const {
+    const PoseView<T> a(earlier), b(later);
+    const Eigen::Quaternion<T> q = b.rotation * a.rotation.conjugate();
+    const Eigen::Matrix<T, 3, 1> t = b.translation - q * a.translation;
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
+    out.template head<3>() =
+        RotationVector(Eigen::Quaternion<T>(q * motion.rotation.conjugate().cast<T>())) / T(sigma_rad);
+    out.template tail<3>() = (t - motion.translation.cast<T>()) / T(sigma_m);
+    return true;
+  }
+};
+
 // Sparse Schur on one thread: bit-stable.  Sets what the options say of solver and threads.
 ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem);
 

@@ -30,18 +30,16 @@ Status CheckTopic(const std::string& text) {
 }
 
 Result<std::string> CameraOnRobotText(const std::string& text) {
-  const std::optional<std::vector<double>> v = ParseNumbers(text);
-  if (!v || v->size() != 7) {
+  const std::optional<std::vector<double>> numbers = ParseNumbers(text);
+  if (!numbers || numbers->size() != 7) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "'{}': expected seven numbers [x, y, z, qx, qy, qz, qw]: where the camera's optical frame is on "
         "the robot, metres, and its quaternion",
         text);
   }
-  Pose pose{Eigen::Quaterniond((*v)[6], (*v)[3], (*v)[4], (*v)[5]),
-            Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2])};
-  CAIRN_RETURN_IF_ERROR(NormalizePose(&pose));
-  return fmt::format("{}", fmt::join(*v, ","));
+  if (const Result<Pose> pose = CameraOnRobot(*numbers); !pose.ok()) return pose.error();
+  return fmt::format("{}", fmt::join(*numbers, ","));
 }
 
 Result<std::string> TimeGapText(const std::string& text) {
@@ -81,6 +79,12 @@ const char* KindText(CaptureKind kind) {
 }
 
 }  // namespace
+
+Result<Pose> CameraOnRobot(const std::vector<double>& v) {
+  Pose pose{Eigen::Quaterniond(v[6], v[3], v[4], v[5]), Eigen::Vector3d(v[0], v[1], v[2])};
+  CAIRN_RETURN_IF_ERROR(NormalizePose(&pose));
+  return pose;
+}
 
 CaptureKind KindOfCapture(const std::string& path) {
   std::error_code error;

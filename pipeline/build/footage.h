@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/geometry/pose.h"
 
 namespace cairn::pipeline {
 
@@ -45,6 +46,10 @@ Status SetFootageOption(const FootageKey& key, const std::string& text, FootageO
 
 // Errors: InvalidArgument where a key is for another kind of capture.
 Status CheckIsFor(const FootageKey& key, CaptureKind kind, const std::string& path);
+
+// Where a camera's optical frame is on the robot, of seven numbers: x, y, z, metres, and the quaternion qx,
+// qy, qz, qw.  REQUIRES: seven.  Errors: those of NormalizePose.
+Result<Pose> CameraOnRobot(const std::vector<double>& numbers);
 
 // The options as words of a command line.
 std::vector<std::string> FootageWords(CaptureKind kind, const FootageOptions& options);

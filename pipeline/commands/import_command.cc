@@ -9,8 +9,8 @@
 
 #include "core/base/printable.h"
 #include "core/capture/bag_file.h"
-#include "core/colmap/colmap_model.h"
 #include "core/files/database.h"
+#include "pipeline/build/footage.h"
 #include "pipeline/exchange/bags/import_bag.h"
 #include "pipeline/exchange/film/import_film.h"
 #include "pipeline/exchange/import/layouts.h"
@@ -88,11 +88,11 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
                         .choice = wanted.choice,
                         .every_s = wanted.every_s};
   if (arguments.max_time_gap->IsGiven()) options.max_time_gap_s = arguments.options.max_time_gap_s;
-  if (const std::vector<double>& v = arguments.camera_on_robot; !v.empty()) {
-    Pose pose{Eigen::Quaterniond(v[6], v[3], v[4], v[5]), Eigen::Vector3d(v[0], v[1], v[2])};
-    if (const Status status = NormalizePose(&pose); !status.ok())
-      return MakeError(ErrorCode::kInvalidArgument, "--camera-on-robot: {}", status.error().message);
-    options.base_from_camera = pose;
+  if (!arguments.camera_on_robot.empty()) {
+    const Result<Pose> pose = CameraOnRobot(arguments.camera_on_robot);
+    if (!pose.ok())
+      return MakeError(ErrorCode::kInvalidArgument, "--camera-on-robot: {}", pose.error().message);
+    options.base_from_camera = *pose;
   }
   CAIRN_ASSIGN_OR_RETURN(const BagReport report,
                          ImportBag(arguments.source, options, arguments.output, *environment.progress));

@@ -24,17 +24,14 @@
 #include "stages/emit_map/learn_fix_noise.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
+#include "stages/emit_map/survey_files.h"
 
 namespace cairn::emit_map {
 namespace {
 
 struct Arguments {
   std::string matches_path;
-  std::string classes_path;
-  std::string world_path;
-  std::string regions_path;
-  std::string vocabulary_path;
-  std::string appearance_path;
+  SurveyFiles files;
   std::string views_path;
   std::string frame_path;
   std::string sessions_path;
@@ -61,14 +58,14 @@ Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   head.writer = std::string("cairn ") + ProgramVersion();
   head.instruction_set = SiftInstructionSet();
   head.seed = seed;
-  for (const auto& [name, path] :
-       {std::pair("classes.db", arguments.classes_path), std::pair("world.db", arguments.world_path),
-        std::pair("regions.db", arguments.regions_path),
-        std::pair("vocabulary.db", arguments.vocabulary_path)}) {
+  for (const auto& [name, path] : {std::pair("classes.db", arguments.files.classes_path),
+                                   std::pair("world.db", arguments.files.world_path),
+                                   std::pair("regions.db", arguments.files.regions_path),
+                                   std::pair("vocabulary.db", arguments.files.vocabulary_path)}) {
     CAIRN_ASSIGN_OR_RETURN(head.input_hashes[name], HashFile(path));
   }
-  if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(head.input_hashes["appearance.db"], HashFile(arguments.appearance_path));
+  if (!arguments.files.appearance_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(head.input_hashes["appearance.db"], HashFile(arguments.files.appearance_path));
   }
   if (!arguments.views_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(head.input_hashes["views.db"], HashFile(arguments.views_path));
@@ -100,7 +97,8 @@ Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
     return Ok();
   };
   CAIRN_RETURN_IF_ERROR(add(arguments.matches_path, kColmapDroppedItemsTable));
-  for (const std::string& path : {arguments.classes_path, arguments.world_path, arguments.regions_path})
+  for (const std::string& path :
+       {arguments.files.classes_path, arguments.files.world_path, arguments.files.regions_path})
     CAIRN_RETURN_IF_ERROR(add(path, kDroppedItemsTable));
   if (arguments.matches_path.empty()) return all;
   CAIRN_ASSIGN_OR_RETURN(const int64_t num_rejects, CountRejects(arguments.matches_path));
@@ -109,10 +107,7 @@ Result<std::vector<DroppedItem>> ReadAllDropped(const Arguments& arguments) {
 }
 
 // What emit-map reads.
-struct Inputs {
-  Classes classes;
-  SurveyParts parts;
-  Vocabulary vocabulary;
+struct Inputs : SurveyData {
   std::optional<Views> views;
   MapHead provenance;
   std::vector<DroppedItem> dropped;
@@ -120,13 +115,7 @@ struct Inputs {
 
 Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
   Inputs inputs;
-  CAIRN_ASSIGN_OR_RETURN(inputs.classes, ReadClasses(arguments.classes_path));
-  CAIRN_ASSIGN_OR_RETURN(inputs.parts.world, ReadWorld(arguments.world_path));
-  CAIRN_ASSIGN_OR_RETURN(inputs.parts.decomposition, ReadDecomposition(arguments.regions_path));
-  CAIRN_ASSIGN_OR_RETURN(inputs.vocabulary, ReadVocabulary(arguments.vocabulary_path));
-  if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(inputs.parts.appearance, ReadAppearance(arguments.appearance_path));
-  }
+  CAIRN_ASSIGN_OR_RETURN(static_cast<SurveyData&>(inputs), ReadSurveyFiles(arguments.files));
   if (!arguments.views_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(inputs.views, ReadViews(arguments.views_path));
   }
@@ -356,16 +345,8 @@ Command EmitMapCommand() {
                 .Add("--matches", arguments->matches_path,
                      "matches.db, to count which images and pairs were dropped [not counted]")
                 .Type("matches.db");
-            parser.Add("--classes", arguments->classes_path, "classes.db").Required().Type("classes.db");
-            parser.Add("--world", arguments->world_path, "world.db").Required().Type("world.db");
-            parser.Add("--regions", arguments->regions_path, "regions.db").Required().Type("regions.db");
-            parser.Add("--vocabulary", arguments->vocabulary_path, "vocabulary.db")
-                .Required()
-                .Type("vocabulary.db");
-            parser
-                .Add("--appearance", arguments->appearance_path,
-                     "appearance.db: which images show the same, and which are kept [not in the map]")
-                .Type("appearance.db");
+            AddSurveyFiles("appearance.db: which images show the same, and which are kept [not in the map]",
+                           parser, &arguments->files);
             parser
                 .Add("--views", arguments->views_path,
                      "views.db: the floor plan and its view-invariant regions [not in the map]")

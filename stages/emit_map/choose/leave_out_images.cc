@@ -15,6 +15,7 @@
 namespace cairn::emit_map {
 namespace {
 
+constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 constexpr int kPlentyOfInliers = 50;
 constexpr size_t kMinNumObservations = 2;
 
@@ -87,6 +88,35 @@ void LeaveOutNodes(const std::set<ImageId>& images, Appearance* appearance) {
 
 }  // namespace
 
+bool LeftOutRounds::MayLeaveOut(const std::set<size_t>& images) const {
+  return kMinNumLeft * images.size() <= num_survey_images_;
+}
+
+bool LeftOutRounds::Add(const std::vector<size_t>& tried, const std::set<size_t>& left_out) {
+  size_t round = 0;
+  for (; round < left_out_.size(); ++round) {
+    std::set<size_t> both = left_out_[round];
+    both.insert(left_out.begin(), left_out.end());
+    if (!MayLeaveOut(both)) continue;
+    left_out_[round] = std::move(both);
+    break;
+  }
+  if (round == left_out_.size()) {
+    if (round == kMaxNumRounds || !MayLeaveOut(left_out)) return false;
+    left_out_.push_back(left_out);
+    tried_.emplace_back();
+  }
+  tried_[round].insert(tried_[round].end(), tried.begin(), tried.end());
+  return true;
+}
+
+std::vector<LeftOutImages> LeftOutRounds::Rounds() const {
+  std::vector<LeftOutImages> rounds;
+  for (size_t round = 0; round < tried_.size(); ++round)
+    rounds.push_back({{left_out_[round].begin(), left_out_[round].end()}, tried_[round]});
+  return rounds;
+}
+
 Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images) {
   const size_t num_images = classes.images.size();
   if (num_images < kMinNumSurveyImages) {
@@ -97,32 +127,15 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
   }
   const ViewDistance distance(classes, {});
   const size_t step = (num_images + max_num_images - 1) / max_num_images;
-  std::vector<std::set<size_t>> left_out;
-  std::vector<LeftOutImages> rounds;
+  LeftOutRounds rounds(num_images);
   for (size_t tried = step / 2; tried < num_images; tried += step) {
     std::set<size_t> view;
     for (size_t image = 0; image < num_images; ++image) {
       if (image == tried || distance.Squared(tried, image) < 1) view.insert(image);
     }
-    size_t round = 0;
-    for (; round < rounds.size(); ++round) {
-      std::set<size_t> both = left_out[round];
-      both.insert(view.begin(), view.end());
-      if (kMinNumLeft * both.size() > num_images) continue;
-      left_out[round] = std::move(both);
-      break;
-    }
-    if (round == kMaxNumRounds) continue;
-    if (round == rounds.size()) {
-      if (kMinNumLeft * view.size() > num_images) continue;  // the whole survey is about one view
-      rounds.emplace_back();
-      left_out.push_back(std::move(view));
-    }
-    rounds[round].tried.push_back(tried);
+    rounds.Add({tried}, view);
   }
-  for (size_t round = 0; round < rounds.size(); ++round)
-    rounds[round].left_out.assign(left_out[round].begin(), left_out[round].end());
-  return rounds;
+  return rounds.Rounds();
 }
 
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,

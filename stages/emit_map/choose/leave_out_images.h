@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,9 +35,25 @@ struct LeftOutImages {
 // many rounds as it takes to leave out no more than one image in four at a time; at most `kMaxNumRounds`.
 // Errors: NoData (fewer than twelve survey images).
 inline constexpr size_t kMinNumSurveyImages = 12;
-inline constexpr size_t kMinNumLeft = 4;  // at most one image in so many is left out
 inline constexpr size_t kMaxNumRounds = 6;
 Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images);
+
+// Shares out images among the rounds in which they are left out, first fit.
+class LeftOutRounds {
+ public:
+  explicit LeftOutRounds(size_t num_survey_images) : num_survey_images_(num_survey_images) {}
+
+  // Whether so many may be left out at a time: one in four.
+  bool MayLeaveOut(const std::set<size_t>& images) const;
+  // False where no round has room for them, or they are too many for any.
+  bool Add(const std::vector<size_t>& tried, const std::set<size_t>& left_out);
+  std::vector<LeftOutImages> Rounds() const;
+
+ private:
+  size_t num_survey_images_;
+  std::vector<std::vector<size_t>> tried_;  // per round
+  std::vector<std::set<size_t>> left_out_;  // likewise
+};
 
 // The survey without some of its images, so that a map can be tried on these before any held-out
 // image is used.

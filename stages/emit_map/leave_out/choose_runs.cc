@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -75,28 +76,16 @@ Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& op
   const ViewDistance distance(classes, {});
   const std::vector<size_t> panorama = FirstOfPanorama(classes.images);
   LeftOutRuns runs;
-  std::vector<std::set<size_t>> left_out;  // per round
+  LeftOutRounds rounds(num_images);
   for (size_t run = 0; run < num_runs; ++run) {
     const size_t middle = (2 * run + 1) * num_images / (2 * num_runs);
     for (size_t shorter = length; shorter > 0; shorter /= 2) {
       const size_t begin = std::min(middle - std::min(middle, shorter / 2), num_images - shorter);
       const std::set<size_t> views = ViewsOf(distance, panorama, begin, shorter);
-      if (kMinNumLeft * views.size() > num_images) continue;
-      size_t round = 0;
-      for (; round < left_out.size(); ++round) {
-        std::set<size_t> both = left_out[round];
-        both.insert(views.begin(), views.end());
-        if (kMinNumLeft * both.size() > num_images) continue;
-        left_out[round] = std::move(both);
-        break;
-      }
-      if (round == kMaxNumRounds) break;
-      if (round == left_out.size()) {
-        left_out.push_back(views);
-        runs.rounds.emplace_back();
-      }
-      for (size_t i = begin; i < begin + shorter; ++i) runs.rounds[round].tried.push_back(i);
-      ++runs.num_runs;
+      if (!rounds.MayLeaveOut(views)) continue;
+      std::vector<size_t> tried(shorter);
+      std::iota(tried.begin(), tried.end(), begin);
+      if (rounds.Add(tried, views)) ++runs.num_runs;
       break;
     }
   }
@@ -107,8 +96,7 @@ Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& op
                      "(queries.txt)",
                      num_images);
   }
-  for (size_t round = 0; round < left_out.size(); ++round)
-    runs.rounds[round].left_out.assign(left_out[round].begin(), left_out[round].end());
+  runs.rounds = rounds.Rounds();
   return runs;
 }
 

@@ -21,11 +21,7 @@ namespace {
 struct Arguments {
   std::string map_path;
   std::string matches_path;
-  std::string classes_path;
-  std::string world_path;
-  std::string regions_path;
-  std::string vocabulary_path;
-  std::string appearance_path;
+  SurveyFiles files;
   std::string output_path;
   LeaveOutOptions options;
   OptionArguments option_arguments;
@@ -60,13 +56,7 @@ Result<WholeMap> ReadWholeMap(const Arguments& arguments) {
        {.name = "min_triangulation_angle_deg",
         .value = &triangulation.min_triangulation_angle_deg,
         .help = ""}}));
-  CAIRN_ASSIGN_OR_RETURN(whole.classes, ReadClasses(arguments.classes_path));
-  CAIRN_ASSIGN_OR_RETURN(whole.parts.world, ReadWorld(arguments.world_path));
-  CAIRN_ASSIGN_OR_RETURN(whole.parts.decomposition, ReadDecomposition(arguments.regions_path));
-  CAIRN_ASSIGN_OR_RETURN(whole.vocabulary, ReadVocabulary(arguments.vocabulary_path));
-  if (!arguments.appearance_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(whole.parts.appearance, ReadAppearance(arguments.appearance_path));
-  }
+  CAIRN_ASSIGN_OR_RETURN(static_cast<SurveyData&>(whole), ReadSurveyFiles(arguments.files));
   return whole;
 }
 
@@ -136,16 +126,8 @@ Command LeaveOutCommand() {
             parser.Add("--matches", arguments->matches_path, "matches.db, for the features")
                 .Required()
                 .Type("matches.db");
-            parser.Add("--classes", arguments->classes_path, "classes.db").Required().Type("classes.db");
-            parser.Add("--world", arguments->world_path, "world.db").Required().Type("world.db");
-            parser.Add("--regions", arguments->regions_path, "regions.db").Required().Type("regions.db");
-            parser.Add("--vocabulary", arguments->vocabulary_path, "vocabulary.db")
-                .Required()
-                .Type("vocabulary.db");
-            parser
-                .Add("--appearance", arguments->appearance_path,
-                     "appearance.db: which images are kept [not in the maps]")
-                .Type("appearance.db");
+            AddSurveyFiles("appearance.db: which images are kept [not in the maps]", parser,
+                           &arguments->files);
             parser.Add("-o,--output", arguments->output_path, "folder to write, for cairn check --left-out")
                 .Required()
                 .Type("FOLDER");

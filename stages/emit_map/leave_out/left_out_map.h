@@ -7,22 +7,19 @@
 #include "core/blocks/map_rows.h"
 #include "core/capture/capture.h"
 #include "core/structure/triangulate.h"
-#include "core/vocabulary/vocabulary_tree.h"
 #include "core/world/feature_class.h"
 #include "stages/emit_map/choose/leave_out_images.h"
 #include "stages/emit_map/emit_map.h"
+#include "stages/emit_map/survey_files.h"
 
 namespace cairn::emit_map {
 
 // What a map was made of, and how.
-struct WholeMap {
+struct WholeMap : SurveyData {
   MapRows rows;
   EmitMapOptions options;            // with the bits of its descriptors, where trials chose them
   TriangulateOptions triangulation;  // of its landmarks
-  Classes classes;
-  SurveyParts parts;
-  Vocabulary vocabulary;
-  std::string matches_path;  // matches.db, for the features
+  std::string matches_path;          // matches.db, for the features
 };
 
 // The map as it would be without some images of the survey: their observations are gone, and with them

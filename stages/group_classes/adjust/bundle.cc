@@ -33,23 +33,6 @@ struct OwnErrorCost {
   }
 };
 
-// The motion between two drifted poses against the stated one.
-struct WalkCost {
-  Pose motion;  // stated, later_from_earlier
-  double sigma_rad, sigma_m;
-  template <typename T>
-  bool operator()(const T* earlier, const T* later, T* residual) const {
-    const PoseView<T> a(earlier), b(later);
-    const Eigen::Quaternion<T> q = b.rotation * a.rotation.conjugate();
-    const Eigen::Matrix<T, 3, 1> t = b.translation - q * a.translation;
-    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
-    out.template head<3>() =
-        RotationVector(Eigen::Quaternion<T>(q * motion.rotation.conjugate().cast<T>())) / T(sigma_rad);
-    out.template tail<3>() = (t - motion.translation.cast<T>()) / T(sigma_m);
-    return true;
-  }
-};
-
 struct OffsetPriorCost {
   double sigma_rad, sigma_m;
   template <typename T>
@@ -271,9 +254,9 @@ class CeresBundle {
     if (i == 0) return;
     const double root = std::sqrt(image.way_m);
     stated_pose_blocks_.push_back(
-        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<WalkCost, 6, 7, 7>(
-                                      new WalkCost{image.stated * bundle_.images[i - 1].stated.Inverse(),
-                                                   RadFromDeg(noise.walk_deg) * root, noise.walk_m * root}),
+        problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<MotionCost, 6, 7, 7>(
+                                      new MotionCost{image.stated * bundle_.images[i - 1].stated.Inverse(),
+                                                     RadFromDeg(noise.walk_deg) * root, noise.walk_m * root}),
                                   nullptr, Drifted(i - 1), Drifted(i)));
     is_walk_block_.push_back(true);
   }

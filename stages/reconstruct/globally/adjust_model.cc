@@ -71,24 +71,6 @@ struct StepLengthCost {
   }
 };
 
-// The motion between two images against the one that odometry says.
-struct MotionCost {
-  Pose cam2_from_cam1;
-  double sigma_rad, sigma_m;
-  template <typename T>
-  bool operator()(const T* pose1, const T* pose2, T* residual) const {
-    const PoseView<T> a(pose1), b(pose2);
-    const Eigen::Quaternion<T> q = b.rotation * a.rotation.conjugate();
-    const Eigen::Matrix<T, 3, 1> t = b.translation - q * a.translation;
-    Eigen::Map<Eigen::Matrix<T, 6, 1>> out(residual);
-    out.template head<3>() =
-        RotationVector(Eigen::Quaternion<T>(q * cam2_from_cam1.rotation.conjugate().cast<T>())) /
-        T(sigma_rad);
-    out.template tail<3>() = (t - cam2_from_cam1.translation.cast<T>()) / T(sigma_m);
-    return true;
-  }
-};
-
 ceres::CostFunction* MakeMotionCost(const AdjustModelOptions& options, const ImageMotion& motion,
                                     double median_way_m) {
   const double turn_rad = RadFromDeg(RotationErrorDeg(motion.cam2_from_cam1, Pose()));

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+#include "core/line/arguments.h"
+#include "core/vocabulary/vocabulary_tree.h"
+#include "core/world/feature_class.h"
+#include "stages/emit_map/choose/leave_out_images.h"
+
+namespace cairn::emit_map {
+
+// The stages' files of which a map is made.
+struct SurveyFiles {
+  std::string classes_path;
+  std::string world_path;
+  std::string regions_path;
+  std::string vocabulary_path;
+  std::string appearance_path;  // empty: none
+};
+
+// Adds --classes to --appearance.
+void AddSurveyFiles(const std::string& appearance_help, ArgumentParser& parser, SurveyFiles* files);
+
+// What stands in them.
+struct SurveyData {
+  Classes classes;
+  SurveyParts parts;
+  Vocabulary vocabulary;
+};
+// Errors: those of the files' readers.
+Result<SurveyData> ReadSurveyFiles(const SurveyFiles& files);
+
+}  // namespace cairn::emit_map
