@@ -43,6 +43,12 @@ TEST(UnevenSteps, NameThePieceThatDiffersMost) {
   EXPECT_THAT(UnevenSteps(DriveOf(steps)), HasSubstr("8.0 times as long as elsewhere"));
 }
 
+TEST(UnevenSteps, LookAtTheLastStepsToo) {
+  std::vector<double> steps(100, 0.5);
+  for (int i = 87; i < 100; ++i) steps[i] = 0.1;  // 13 of the last 25
+  EXPECT_THAT(UnevenSteps(DriveOf(steps)), HasSubstr("from 75.jpg to 100.jpg"));
+}
+
 TEST(UnevenSteps, NeedFiftySteps) {
   std::vector<double> steps(50, 0.5);
   for (int i = 0; i < 20; ++i) steps[i] = 0.1;
