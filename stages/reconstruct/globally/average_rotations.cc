@@ -4,9 +4,8 @@
 #include <cmath>
 #include <queue>
 
-#include <Eigen/SparseCholesky>
-
 #include "core/structure/disjoint_sets.h"
+#include "stages/reconstruct/globally/differences.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -34,30 +33,6 @@ std::vector<std::vector<int>> PairsOfImages(int num_images, const std::vector<Vi
     of_images[pairs[p].image2].push_back(static_cast<int>(p));
   }
   return of_images;
-}
-
-// Solves the weighted least squares for small turns of all images but the first: turn2 - turn1 = error.
-Eigen::MatrixX3d SolveTurns(int num_images, const std::vector<ViewPair>& pairs,
-                            const std::vector<Eigen::Vector3d>& errors, const std::vector<double>& weights) {
-  std::vector<Eigen::Triplet<double>> triplets;
-  Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(num_images - 1, 3);
-  const auto add = [&](int row, int column, double value) {
-    if (row > 0 && column > 0) triplets.emplace_back(row - 1, column - 1, value);
-  };
-  for (size_t p = 0; p < pairs.size(); ++p) {
-    const int a = pairs[p].image1, b = pairs[p].image2;
-    add(a, a, weights[p]);
-    add(b, b, weights[p]);
-    add(a, b, -weights[p]);
-    add(b, a, -weights[p]);
-    if (a > 0) right.row(a - 1) -= weights[p] * errors[p].transpose();
-    if (b > 0) right.row(b - 1) += weights[p] * errors[p].transpose();
-  }
-  Eigen::SparseMatrix<double> laplacian(num_images - 1, num_images - 1);
-  laplacian.setFromTriplets(triplets.begin(), triplets.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors(laplacian);
-  if (factors.info() != Eigen::Success) return Eigen::MatrixX3d::Zero(num_images - 1, 3);
-  return factors.solve(right);
 }
 
 }  // namespace
@@ -115,18 +90,21 @@ std::vector<Eigen::Quaterniond> AverageRotations(int num_images, const std::vect
                                                  const AverageRotationsOptions& options) {
   std::vector<Eigen::Quaterniond> rotations = RotationsAlongTree(num_images, pairs);
   if (num_images < 2) return rotations;
-  std::vector<Eigen::Vector3d> errors(pairs.size());
+  std::vector<Link> links;
+  for (const ViewPair& pair : pairs) links.push_back({pair.image1, pair.image2});
+  Eigen::MatrixXd errors(std::ssize(pairs), 3);
   std::vector<double> weights(pairs.size());
   // Returns the largest turn.
   const auto step = [&](const auto& weight_of) {
     for (size_t p = 0; p < pairs.size(); ++p) {
-      errors[p] = ErrorOf(pairs[p], rotations);
-      weights[p] = weight_of(errors[p].squaredNorm()) * std::max(pairs[p].weight, kLeastWeight);
+      const Eigen::Vector3d error = ErrorOf(pairs[p], rotations);
+      errors.row(static_cast<Eigen::Index>(p)) = error.transpose();
+      weights[p] = weight_of(error.squaredNorm()) * std::max(pairs[p].weight, kLeastWeight);
     }
-    const Eigen::MatrixX3d turns = SolveTurns(num_images, pairs, errors, weights);
+    const Eigen::MatrixXd turns = SolveDifferences(num_images, links, errors, weights);
     double largest = 0;
     for (int i = 1; i < num_images; ++i) {
-      const Eigen::Vector3d turn = turns.row(i - 1).transpose();
+      const Eigen::Vector3d turn = turns.row(i).transpose();
       const double angle = turn.norm();
       largest = std::max(largest, angle);
       if (angle > 0) rotations[i] = (rotations[i] * Eigen::AngleAxisd(angle, turn / angle)).normalized();

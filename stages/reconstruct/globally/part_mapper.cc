@@ -14,6 +14,7 @@
 #include "core/base/quantiles.h"
 #include "core/structure/camera_sensitivity.h"
 #include "stages/reconstruct/globally/average_rotations.h"
+#include "stages/reconstruct/globally/image_ways.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -179,23 +180,21 @@ std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
   return chosen;
 }
 
-std::vector<Step> PartMapper::StepsBy(const std::vector<Eigen::Quaterniond>& rotations) const {
-  std::vector<Step> steps;
-  for (const auto& [from, to] : problem_.steps) steps.push_back({from, to, std::nullopt});
-  for (const ImageMotion& motion : problem_.motions) {
-    const Eigen::Vector3d way = rotations[motion.image1].conjugate() * motion.Way();
-    if (motion.image1 < motion.image2) {
-      steps.push_back({motion.image1, motion.image2, way});
-    } else {
-      steps.push_back({motion.image2, motion.image1, -way});
-    }
-  }
-  std::sort(steps.begin(), steps.end(),
-            [](const Step& a, const Step& b) { return std::pair(a.from, a.to) < std::pair(b.from, b.to); });
-  return steps;
-}
-
 void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
+  std::vector<ViewPair> pairs;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    if (is_accepted_[p]) pairs.push_back(pairs_[p]);
+  }
+  const auto bearing_of = [&](int image, KeypointIdx keypoint) {
+    return BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
+  };
+  const ImageWays by_pairs = WaysBy(rotations, pairs, problem_.motions, problem_.steps, bearing_of,
+                                    1 / CameraOf(0).MeanFocal(), num_threads_);
+  const std::vector<Eigen::Vector3d> start = CentersAlong(static_cast<int>(images_.size()), by_pairs.ways);
+  std::vector<Way> ways;
+  for (const auto& [from, to] : problem_.steps) ways.push_back({from, to, start[to] - start[from]});
+  for (const ImageMotion& motion : problem_.motions)
+    ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way()});
   std::vector<std::vector<int>> all(tracks_.size());
   for (size_t t = 0; t < tracks_.size(); ++t) {
     all[t].resize(tracks_[t].size());
@@ -206,14 +205,14 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   for (size_t k = 0; k < chosen.size(); ++k) {
     for (const int e : chosen[k].elements) {
       const TrackElement& element = tracks_[chosen[k].track][e];
-      const auto bearing = BearingFromImage(CameraOf(element.image_idx), PixelOf(element));
+      const auto bearing = bearing_of(element.image_idx, element.keypoint_idx);
       if (!bearing) continue;
       sights.push_back(
           {element.image_idx, static_cast<int>(k), rotations[element.image_idx].conjugate() * *bearing});
     }
   }
-  const Positions positions = PositionImages(static_cast<int>(images_.size()),
-                                             static_cast<int>(chosen.size()), sights, StepsBy(rotations), {});
+  const Positions positions =
+      PositionImages(start, static_cast<int>(chosen.size()), sights, ways, by_pairs.unit, {});
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
   spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());

@@ -23,9 +23,9 @@ struct MapGloballyOptions {
   bool refine_distortion = true;
 };
 
-// Maps images that pairs join, from their rotations: places from nowhere by the pairs of the backbone, then
-// rounds, each of which takes in the pairs that agree with the map so far, makes tracks of their matches,
-// triangulates, and adjusts the longest.
+// Maps images that pairs join, from their rotations: places by the pairs of the backbone, then rounds, each
+// of which takes in the pairs that agree with the map so far, makes tracks of their matches, triangulates,
+// and adjusts the longest.
 class PartMapper {
  public:
   // `images`: indices into the input's, of a drive in its order; `pairs` and `motions`: of indices into
@@ -55,7 +55,6 @@ class PartMapper {
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
-  std::vector<Step> StepsBy(const std::vector<Eigen::Quaterniond>& rotations) const;
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
