@@ -15,6 +15,8 @@ namespace {
 
 // Sensitivities hold for so large a change, in standard deviations of what is likely.
 constexpr double kMaxChangeSigmas = 0.5;
+// In typical steps.
+constexpr double kSmoothLength = 0.1, kHalfAStep = 0.5;
 
 // Changes of a camera, about what is stated.
 class CameraPriorCost : public ceres::CostFunction {
@@ -55,18 +57,19 @@ struct RelativeRotationCost {
   }
 };
 
+// The length of a step, in typical ones.  Smooth where nothing moves.
 struct StepLengthCost {
-  double step, sigma_ratio;
+  double unit, length, sigma;
   template <typename T>
   bool operator()(const T* pose1, const T* pose2, T* residual) const {
     const auto center = [](const T* pose) {
       const PoseView<T> view(pose);
       return Eigen::Matrix<T, 3, 1>(-(view.rotation.conjugate() * view.translation));
     };
-    const Eigen::Matrix<T, 3, 1> way = center(pose2) - center(pose1);
-    // Smooth where nothing moves.
-    const T length = ceres::sqrt(way.squaredNorm() + T(1e-6 * step * step));
-    residual[0] = (length / T(step) - T(1)) / T(sigma_ratio);
+    const Eigen::Matrix<T, 3, 1> way = (center(pose2) - center(pose1)) / T(unit);
+    residual[0] = (ceres::sqrt(way.squaredNorm() + T(kSmoothLength * kSmoothLength)) -
+                   T(std::hypot(length, kSmoothLength))) /
+                  T(sigma);
     return true;
   }
 };
@@ -81,11 +84,15 @@ ceres::CostFunction* MakeMotionCost(const AdjustModelOptions& options, const Ima
                                 options.least_way_sigma_ratio * median_way_m)});
 }
 
-double MedianStep(const ModelProblem& problem) {
-  std::vector<double> lengths;
-  for (const auto& [from, to] : problem.steps)
-    lengths.push_back(CenterErrorM(problem.cam_from_world[from], problem.cam_from_world[to]));
-  return lengths.empty() ? 0 : UpperMedian(lengths);
+// The length of a typical step, by those that are likely to be at least half of one; 0: there are none.
+double TypicalStep(const ModelProblem& problem) {
+  std::vector<double> ratios;
+  for (const ModelStep& step : problem.steps) {
+    if (step.length < kHalfAStep) continue;
+    ratios.push_back(CenterErrorM(problem.cam_from_world[step.from], problem.cam_from_world[step.to]) /
+                     step.length);
+  }
+  return ratios.empty() ? 0 : UpperMedian(ratios);
 }
 
 // The image that holds the frame: that with most observations where there are motions.  The first of a drive
@@ -160,13 +167,13 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
             new RelativeRotationCost{rotation.cam2_from_cam1, RadFromDeg(options.rotation_sigma_deg)}),
         rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
   }
-  const double step = MedianStep(*problem);
-  for (const auto& [from, to] : problem->steps) {
-    if (!(step > 0) || !are_known(from, to)) continue;
+  const double typical_step = TypicalStep(*problem);
+  for (const ModelStep& step : problem->steps) {
+    if (!(typical_step > 0) || !are_known(step.from, step.to)) continue;
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
-            new StepLengthCost{step, options.step_sigma_ratio}),
-        &weak_loss, pose_of(from), pose_of(to));
+            new StepLengthCost{typical_step, step.length, options.step_sigma}),
+        &weak_loss, pose_of(step.from), pose_of(step.to));
   }
   const double median_way_m = MedianWayM(problem->motions);
   for (const ImageMotion& motion : problem->motions) {

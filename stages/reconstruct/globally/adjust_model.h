@@ -33,6 +33,12 @@ struct RelativeRotation {
   bool is_sure = false;  // no points outvote it
 };
 
+// How far apart two images are likely to be, beside a typical step; near 0: the camera turned on the spot.
+struct ModelStep {
+  int from = 0, to = 0;
+  double length = 1;
+};
+
 // A reconstruction in a frame of its own, and what was seen.
 struct ModelProblem {
   std::vector<Pose> cam_from_world;  // refined
@@ -41,8 +47,8 @@ struct ModelProblem {
   std::vector<Eigen::Vector3d> points;  // refined
   std::vector<ModelObservation> observations;
   std::vector<RelativeRotation> rotations;
-  // Images of a drive that follow each other: about as far apart as others.
-  std::vector<std::pair<int, int>> steps;
+  // Images of a drive that follow each other.
+  std::vector<ModelStep> steps;
   // What odometry says of others.
   std::vector<ImageMotion> motions;
 };
@@ -50,10 +56,10 @@ struct ModelProblem {
 struct AdjustModelOptions {
   // Cauchy's scale of reprojection errors, pixels.  REQUIRES: > 0
   double loss_scale_px = 2;
-  // Standard deviations of a pair's rotation, degrees, and of a step, as a part of the median one.  REQUIRES:
-  // > 0
+  // Standard deviations of a pair's rotation, degrees, and of a step's length, in typical ones.  REQUIRES: >
+  // 0
   double rotation_sigma_deg = 0.5;
-  double step_sigma_ratio = 0.5;
+  double step_sigma = 0.5;
   // Standard deviations of a motion, per axis: of its way, as a part of it and of the median one; of its
   // turn, degrees, and as a part of it.  REQUIRES: > 0
   double way_sigma_ratio = 0.05, least_way_sigma_ratio = 0.02;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,6 +21,10 @@ namespace {
 
 constexpr int kMinNumImages = 3;
 constexpr double kMaxTreeErrorDeg = 20;
+// A focal length that is off by this much bends what turns: by some per cent of the scale in every sharp
+// turn.
+constexpr double kMaxFocalChangeRatio = 0.01;
+constexpr int kMaxNumBegun = 3;
 
 // What rotations are averaged from.
 ViewPair WithoutMatches(const ViewPair& pair) {
@@ -145,14 +150,15 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
   }
 }
 
-}  // namespace
-
-Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion> motions,
-                              const MapGloballyOptions& options, int num_threads, Progress& progress) {
+// The map by these cameras; nothing where they turn out to be others by more than this ratio of their focal
+// lengths, to which they are set.
+Result<std::optional<GlobalMap>> MapBy(const MapperInput& input, std::vector<ImageMotion> motions,
+                                       const MapGloballyOptions& options, double max_focal_change_ratio,
+                                       int num_threads, std::map<CameraId, Camera>* cameras,
+                                       Progress& progress) {
   const int num_images = static_cast<int>(input.images.size());
   progress.Begin("reconstruct", int64_t{num_images} * PartMapper::NumRounds(), "images in rounds");
-  const std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
-  std::vector<ViewPair> pairs = EstimateViewPairs(input, cameras, {}, num_threads);
+  std::vector<ViewPair> pairs = EstimateViewPairs(input, *cameras, {}, num_threads);
   const size_t num_pairs = pairs.size();
   GlobalMap map;
   map.why_no_odometry = LeaveOutContradicted(pairs, &motions);
@@ -173,12 +179,15 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion>
       add_parts(std::move(part));
       continue;
     }
-    ColmapModel model =
-        PartMapper(input, cameras, options, num_threads, std::move(part.images), std::move(part.pairs),
-                   std::move(part.motions), untangled->backbone, is_drive)
-            .Map(untangled->rotations, progress);
+    PartMapper mapper(input, *cameras, options, num_threads, std::move(part.images), std::move(part.pairs),
+                      std::move(part.motions), untangled->backbone, is_drive);
+    std::optional<ColmapModel> model = mapper.Map(untangled->rotations, max_focal_change_ratio, progress);
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
-    if (!model.images.empty()) models.emplace_back(std::move(model), is_drive);
+    if (!model) {
+      for (const auto& [camera_id, camera] : mapper.Cameras()) cameras->insert_or_assign(camera_id, camera);
+      return std::optional<GlobalMap>();
+    }
+    if (!model->images.empty()) models.emplace_back(std::move(*model), is_drive);
   }
   progress.End();
   if (models.empty()) {
@@ -194,7 +203,24 @@ Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion>
   });
   map.is_drive = models.front().second;
   for (auto& [model, is_drive] : models) map.models.push_back(std::move(model));
-  return map;
+  return std::optional(std::move(map));
+}
+
+}  // namespace
+
+Result<GlobalMap> MapGlobally(const MapperInput& input, const std::vector<ImageMotion>& motions,
+                              const MapGloballyOptions& options, int num_threads, Progress& progress) {
+  std::map<CameraId, Camera> cameras = CalibrateFromPairs(input);
+  for (int num_begun = 1;; ++num_begun) {
+    for (const auto& [camera_id, camera] : cameras)
+      spdlog::debug("reconstruct: camera {}: {:.1f} px", camera_id, camera.MeanFocal());
+    auto map =
+        MapBy(input, motions, options,
+              num_begun < kMaxNumBegun ? kMaxFocalChangeRatio : std::numeric_limits<double>::infinity(),
+              num_threads, &cameras, progress);
+    if (!map.ok()) return map.error();
+    if (*map) return std::move(**map);
+  }
 }
 
 }  // namespace cairn::reconstruct

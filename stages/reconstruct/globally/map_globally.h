@@ -25,11 +25,12 @@ struct GlobalMap {
 // Poses of all images at once instead of one after the other [Pan, Barath, Pollefeys & Schönberger, "Global
 // structure-from-motion revisited" (GLOMAP), ECCV 2024]: focal lengths that are guesses from the pairs,
 // relative poses, rotations averaged, wrong pairs cut, lengths of ways averaged, tracks, places of cameras
-// and points, then bundle adjustments, each with tracks triangulated anew.  `motions` are measurements in all
+// and points, then bundle adjustments, each with tracks triangulated anew; all anew where the first of these
+// find another focal length.  `motions` are measurements in all
 // of that: they join what no match joins, and give the scale.  Every part that pairs or motions join becomes
 // a model. Returns them, most images first (ties: more points), in frames and scales of their own.  The same
 // for any number of threads. Errors: NoData (no pair of images has a relative pose); Cancelled.
-Result<GlobalMap> MapGlobally(const MapperInput& input, std::vector<ImageMotion> motions,
+Result<GlobalMap> MapGlobally(const MapperInput& input, const std::vector<ImageMotion>& motions,
                               const MapGloballyOptions& options, int num_threads, Progress& progress);
 
 }  // namespace cairn::reconstruct

@@ -40,6 +40,9 @@ struct Round {
 constexpr Round kRounds[] = {{0, 24, 100, false},  {0, 12, 120, true},   {0.2, 12, 120, true},
                              {0.2, 12, 120, true}, {0.2, 12, 120, true}, {0.1, 6, 150, true},
                              {0.05, 4, 0, true}};
+constexpr double kTypicalQuantile = 0.75;
+// Rounds up to this one take in no pairs.
+constexpr int kLastStartingRound = 1;
 // A round that takes in as far as the one before is left out if it would change fewer than this part of the
 // pairs.
 constexpr double kMinPartAccepted = 0.01;
@@ -66,7 +69,7 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
   for (const ImageMotion& motion : problem_.motions)
     measured.insert(std::minmax(motion.image1, motion.image2));
   for (int i = 1; i < static_cast<int>(images_.size()) && is_drive; ++i) {
-    if (measured.count({i - 1, i}) == 0) problem_.steps.emplace_back(i - 1, i);
+    if (measured.count({i - 1, i}) == 0) steps_.emplace_back(i - 1, i);
   }
   std::map<CameraId, int> index;
   for (const auto& [camera_id, camera] : cameras) {
@@ -78,12 +81,27 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
 
 int PartMapper::NumRounds() { return static_cast<int>(std::size(kRounds)); }
 
-ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Progress& progress) {
+std::map<CameraId, Camera> PartMapper::Cameras() const {
+  std::map<CameraId, Camera> cameras;
+  for (size_t i = 0; i < images_.size(); ++i)
+    cameras.insert_or_assign(input_.images[images_[i]].camera_id, CameraOf(static_cast<int>(i)));
+  return cameras;
+}
+
+double PartMapper::FocalChange() const {
+  double largest = 0;
+  for (const FreeCamera& camera : problem_.cameras)
+    largest = std::max(largest, std::abs(camera.camera.MeanFocal() / camera.stated.MeanFocal() - 1));
+  return largest;
+}
+
+std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations,
+                                           double max_focal_change_ratio, Progress& progress) {
   KeepRotations(rotations);
   MakeTracks();
   Position(rotations);
   for (const Round& round : kRounds) {
-    if (progress.Cancelled()) return {};
+    if (progress.Cancelled()) return ColmapModel();
     progress.Advance(static_cast<int64_t>(images_.size()));
     TriangulateAll(round.max_error_px);
     if (round.accepted_rad > 0) {
@@ -100,6 +118,7 @@ ColmapModel PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations, Pr
       num_keypoints = std::clamp(kMaxNumObservations / static_cast<int>(images_.size()), kMinNumKeypoints,
                                  kMaxNumKeypoints);
     Adjust(num_keypoints, round.adjust_cameras);
+    if (&round == &kRounds[kLastStartingRound] && FocalChange() > max_focal_change_ratio) return std::nullopt;
   }
   TriangulateAll(std::end(kRounds)[-1].max_error_px);
   return MakeModel();
@@ -180,6 +199,16 @@ std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
   return chosen;
 }
 
+// A typical one is as long as one of those that are longer than most: images may turn on the spot in many.
+void PartMapper::KeepSteps(const std::vector<Way>& steps) {
+  std::vector<double> lengths;
+  for (const Way& step : steps) lengths.push_back(step.way.norm());
+  const double typical = lengths.empty() ? 0 : Quantile(lengths, kTypicalQuantile);
+  for (const Way& step : steps) {
+    if (typical > 0) problem_.steps.push_back({step.from, step.to, step.way.norm() / typical});
+  }
+}
+
 void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   std::vector<ViewPair> pairs;
   for (size_t p = 0; p < pairs_.size(); ++p) {
@@ -188,11 +217,12 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   const auto bearing_of = [&](int image, KeypointIdx keypoint) {
     return BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
   };
-  const ImageWays by_pairs = WaysBy(rotations, pairs, problem_.motions, problem_.steps, bearing_of,
+  const ImageWays by_pairs = WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of,
                                     1 / CameraOf(0).MeanFocal(), num_threads_);
   const std::vector<Eigen::Vector3d> start = CentersAlong(static_cast<int>(images_.size()), by_pairs.ways);
   std::vector<Way> ways;
-  for (const auto& [from, to] : problem_.steps) ways.push_back({from, to, start[to] - start[from]});
+  for (const auto& [from, to] : steps_) ways.push_back({from, to, start[to] - start[from]});
+  KeepSteps(ways);
   for (const ImageMotion& motion : problem_.motions)
     ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way()});
   std::vector<std::vector<int>> all(tracks_.size());

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -38,9 +40,14 @@ class PartMapper {
   // Rounds of adjustment, for progress: each advances it by as many items as the part has images.
   static int NumRounds();
 
-  // Images that see too few points are not in the model.  Ends early, without one, when progress is
-  // cancelled.
-  ColmapModel Map(const std::vector<Eigen::Quaterniond>& rotations, Progress& progress);
+  // Images that see too few points are not in the model.  Nothing where a focal length is found off by more
+  // than this ratio before pairs are taken in: then relative poses and rotations are, too, and Cameras() says
+  // by what cameras to find them anew.  Ends early, with an empty model, when progress is cancelled.
+  std::optional<ColmapModel> Map(const std::vector<Eigen::Quaterniond>& rotations,
+                                 double max_focal_change_ratio, Progress& progress);
+
+  // As refined so far.
+  std::map<CameraId, Camera> Cameras() const;
 
  private:
   // Elements of a track that decide on poses.
@@ -49,12 +56,14 @@ class PartMapper {
     std::vector<int> elements;
   };
 
+  double FocalChange() const;
   FreeCamera FreeOf(const Camera& stated) const;
   Eigen::Vector2d PixelOf(const TrackElement& element) const;
   const Camera& CameraOf(int image) const { return problem_.cameras[problem_.camera_idx[image]].camera; }
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
+  void KeepSteps(const std::vector<Way>& steps);
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
@@ -68,6 +77,7 @@ class PartMapper {
   std::vector<int> images_;
   std::vector<ViewPair> pairs_;
   std::vector<bool> is_accepted_;              // per pair
+  std::vector<std::pair<int, int>> steps_;     // of a drive, that no motion measures
   std::vector<Track> tracks_;                  // longest first
   std::vector<Triangulation> triangulations_;  // per track; inliers are its elements
   ModelProblem problem_;

@@ -4,7 +4,9 @@
 #include <map>
 
 #include <gtest/gtest.h>
+
 #include <Eigen/Geometry>
+#include "core/base/quantiles.h"
 
 #include "core/base/random.h"
 
@@ -145,13 +147,35 @@ TEST(AdjustModel, AStepHoldsAnImageWithoutPoints) {
   std::erase_if(scene.problem.observations, [&](const ModelObservation& observation) {
     return observation.image == last && observation.point >= 1;
   });
-  for (int i = 1; i <= last; ++i) scene.problem.steps.emplace_back(i - 1, i);
+  for (int i = 1; i <= last; ++i) scene.problem.steps.push_back({i - 1, i});
   double step = 0;
   for (int i = 1; i < last; ++i) step = std::max(step, CenterErrorM(scene.truth[i], scene.truth[i - 1]));
   scene.problem.cam_from_world[last].translation *= 6;
   AdjustModel({.max_num_iterations = 200, .function_tolerance = 1e-10}, &scene.problem);
   EXPECT_LT(CenterErrorM(scene.problem.cam_from_world[last], scene.problem.cam_from_world[last - 1]),
             3 * step);
+}
+
+// An image that sees nothing and is said to be where the one before it is, and one a step and a half away.
+TEST(AdjustModel, AnImageWithoutPointsIsAsFarAwayAsItsStepSays) {
+  for (const double length : {0.0, 1.5}) {
+    Scene scene = MakeScene(0);
+    const int last = static_cast<int>(scene.truth.size()) - 1;
+    std::erase_if(scene.problem.observations, [&](const ModelObservation& observation) {
+      return observation.image == last && observation.point >= 1;
+    });
+    std::vector<double> steps;
+    for (int i = 1; i < last; ++i) {
+      scene.problem.steps.push_back({i - 1, i, 1});
+      steps.push_back(CenterErrorM(scene.truth[i], scene.truth[i - 1]));
+    }
+    // Shorter ones than half a step say nothing of a typical one's length.
+    scene.problem.steps[2].length = 0.4;
+    scene.problem.steps.push_back({last - 1, last, length});
+    AdjustModel({.max_num_iterations = 200, .function_tolerance = 1e-12}, &scene.problem);
+    const std::vector<Pose>& found = scene.problem.cam_from_world;
+    EXPECT_NEAR(CenterErrorM(found[last], found[last - 1]) / Median(steps), length, 0.3) << length;
+  }
 }
 
 std::vector<ImageMotion> MotionsOf(const std::vector<Pose>& poses) {

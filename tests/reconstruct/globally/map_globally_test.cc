@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "stages/reconstruct/globally/part_mapper.h"
+#include "stages/reconstruct/globally/view_pairs.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
 namespace cairn::reconstruct {
@@ -74,6 +76,45 @@ TEST(MapGlobally, CamerasStayWhereTheyAreNotToBeRefined) {
   EXPECT_EQ(models->front().cameras.at(1).params, camera.params);
   EXPECT_EQ(models->front().cameras.at(1).model, CameraModel::kSimplePinhole);
   EXPECT_LT(LargestErrorM(models->front(), survey), 0.03);
+}
+
+// Nothing is made of relative poses by a focal length that is an eighth off, but a better one.
+TEST(PartMapper, SaysByWhatCameraToBeginAnew) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  std::map<CameraId, Camera> cameras = {{1, survey.camera}};
+  cameras[1].has_focal_prior = false;
+  cameras[1].params[0] = 560;
+  std::vector<int> images(20), backbone;
+  std::vector<Eigen::Quaterniond> rotations;
+  for (int i = 0; i < 20; ++i) {
+    images[i] = i;
+    rotations.push_back(survey.cams_from_world[i].rotation);
+  }
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, cameras, {}, 2);
+  for (size_t p = 0; p < pairs.size(); ++p) backbone.push_back(static_cast<int>(p));
+  NoProgress progress;
+  const MapGloballyOptions options;
+  PartMapper mapper(survey.input, cameras, options, 2, images, pairs, {}, backbone, true);
+  EXPECT_FALSE(mapper.Map(rotations, 0.01, progress).has_value());
+  EXPECT_LT(std::abs(mapper.Cameras().at(1).MeanFocal() - 500), 45);
+  PartMapper patient(survey.input, cameras, options, 2, images, pairs, {}, backbone, true);
+  const auto model = patient.Map(rotations, 0.2, progress);
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->images.size(), 20u);
+}
+
+// One that is stated as such, and wrong, is begun anew with until it is found.
+TEST(MapGlobally, FindsAFocalLengthThatIsStatedWrongly) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  survey.input.cameras[1] = survey.camera;
+  survey.input.cameras[1].camera_id = 1;
+  survey.input.cameras[1].has_focal_prior = true;
+  survey.input.cameras[1].params[0] = 550;
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  EXPECT_EQ(models->front().images.size(), 20u);
+  EXPECT_NEAR(models->front().cameras.at(1).FocalX(), 500, 10);
+  EXPECT_LT(LargestErrorM(models->front(), survey), 0.05);
 }
 
 TEST(MapGlobally, PartsThatNothingJoinsAreModelsOfTheirOwn) {
