@@ -217,6 +217,17 @@ void CollectImages(const ColmapModel& model, const Similarity& world_from_model,
   }
 }
 
+Verdict JudgeModels(const std::vector<ColmapModel>& models, const Similarity& world_from_model,
+                    const ReconstructResult& result) {
+  JudgedModels judged{.models = &models,
+                      .cam_from_world = {},
+                      .rejects = result.rejects,
+                      .is_metric = result.frame.unit == "metre"};
+  for (const ModelImage& image : models[0].images)
+    judged.cam_from_world.push_back(TransformPose(world_from_model, image.cam_from_world));
+  return Judge(judged, {});
+}
+
 Status CheckReconstructOptions(const ReconstructOptions& options) {
   ReconstructOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
@@ -335,6 +346,7 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
   for (const ModelImage& image : model.images) poses.emplace(image.name, image.cam_from_world);
   CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(poses, capture, options, &result));
   CollectImages(model, world_from_model, options.hold_out_every, &result);
+  result.verdict = JudgeModels(models, world_from_model, result);
   return result;
 }
 
