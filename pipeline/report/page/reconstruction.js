@@ -20,9 +20,9 @@ if (data.reconstruction) {
   const text = joining.text[0].toUpperCase() + joining.text.slice(1);
   $('reconstruction-verdict').append(element('p', joining.is_whole ? {} : {class: 'bad'}, `${text}.`));
   $('reconstruction-text').append(
-    ...shortened('Where it is weak', joining.weak.map(([what, from, to, by]) => [what, to === null ? from : `${from} to ${to}`, by]), ['', 'images', '']),
+    ...shortened('Where it is weak', joining.weak.map(([what, from, to, by]) => [what, to === null ? from : `${from} to ${to}`, by]), ['', 'images', 'points or length']),
     ...shortened(counted(joining.num_loops, 'loop'), joining.loops, ['way', 'from', 'to', 'points in common'], joining.num_loops),
     ...shortened('Not joined with the rest', joining.parts, ['images', 'from', 'to']),
-    ...shortened('Folders', joining.folders, ['', 'joined', 'images', defined('points of others', 'of the points that its images see those that other folders\u2019 images see too')]),
+    ...shortened('Folders', joining.folders.map(([name, ...counts]) => [name || '(none)', ...counts]), ['folder', 'joined', 'images', defined('points of others', 'of the points that its images see those that other folders\u2019 images see too')]),
     ...shortened(`${counted(joining.num_missing, 'image')} missing`, joining.missing, ['image', 'why'], joining.num_missing));
 }

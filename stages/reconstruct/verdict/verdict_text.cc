@@ -114,8 +114,9 @@ std::string WalksLine(const Verdict& verdict) {
   });
   return "of folders: " + FirstOf(indices, [&](int w) {
            const Walk& walk = verdict.walks[w];
-           return fmt::format("{}: {} of {} images, {} of others", walk.folder.empty() ? "." : walk.folder,
-                              walk.num_joined, walk.num_images, Counted(walk.num_points_of_others, "point"));
+           return fmt::format("{}: {} of {} images, {} of others",
+                              walk.folder.empty() ? "(none)" : walk.folder, walk.num_joined, walk.num_images,
+                              Counted(walk.num_points_of_others, "point"));
          });
 }
 

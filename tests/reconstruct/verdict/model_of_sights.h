@@ -22,9 +22,10 @@ inline ColmapModel ModelOfSights(const std::vector<std::string>& names,
                                  const std::vector<Sight>& sights) {
   ColmapModel model;
   for (size_t i = 0; i < names.size(); ++i) {
-    model.images.push_back({.image_id = static_cast<ImageId>(i + 1),
-                            .name = names[i],
-                            .cam_from_world = {Eigen::Quaterniond::Identity(), -places[i]}});
+    ModelImage& image = model.images.emplace_back();
+    image.image_id = static_cast<ImageId>(i + 1);
+    image.name = names[i];
+    image.cam_from_world.translation = -places[i];
   }
   for (const Sight& sight : sights) {
     for (int p = 0; p < sight.num_points; ++p) {
