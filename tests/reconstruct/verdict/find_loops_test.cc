@@ -113,6 +113,10 @@ TEST(FindLoops, StretchesThatNoLoopSpansAreOpen) {
   EXPECT_EQ(longer.open_stretches[1].image2, 59);
 }
 
+TEST(FindLoops, ALoopWithinALoopOpensNothing) {
+  EXPECT_THAT(LoopsOf(45, {{{0, 40}, 60}, {{10, 25}, 60}}).open_stretches, IsEmpty());
+}
+
 // Another drive saw 3 and 18, too.
 TEST(FindLoops, WhatOtherDrivesHoldIsNotOpen) {
   EXPECT_THAT(LoopsOf(40, {{{10, 25}, 60}}, {}, {}, {3, 18}).open_stretches, SizeIs(1));

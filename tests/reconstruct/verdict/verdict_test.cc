@@ -148,6 +148,16 @@ TEST(Judge, ImagesInNoOrderAreJoinedByTheLinksOfMostPoints) {
   EXPECT_THAT(verdict.loops, IsEmpty());
 }
 
+// Of the 61 points that an image has in common with the next but one, the next must see 0.4 times as many.
+TEST(Judge, ADriveIsWhereTheNextImageSeesMuchOfTheSame) {
+  for (const int num_next : {24, 25}) {
+    std::vector<Sight> sights = SightsOfNext(12, num_next);
+    for (int i = 0; i + 2 < 12; ++i) sights.push_back({{i, i + 2}, 61});
+    const Verdict verdict = JudgeModels({ModelOfSights(NumberedNames(12), PlacesInARow(12), sights)});
+    EXPECT_EQ(verdict.is_drive, num_next == 25);
+  }
+}
+
 TEST(Judge, FoldersAreWalksOfTheirOwnThatCommonPointsJoin) {
   std::vector<std::string> names = NumberedNames(6, "monday/");
   const std::vector<std::string> tuesday = NumberedNames(6, "tuesday/");
