@@ -69,7 +69,7 @@ TEST(Judge, NamesFollowEachOtherAsNumbersDoWhateverTheModelsOrder) {
 // 0 1 . . 4 5 . : two are missing within, one at the end, and one of a folder that is not joined at all.
 TEST(Judge, MissingImagesStandBetweenTheirNeighboursByName) {
   const ColmapModel model = ModelOfSights({"0.jpg", "1.jpg", "4.jpg", "5.jpg"},
-                                          {{0, 0, 0}, {1, 0, 0}, {4, 0, 0}, {5, 0, 0}}, SightsOfNext(4, 100));
+                                          {{0, 0, 0}, {1, 0, 0}, {7, 0, 0}, {8, 0, 0}}, SightsOfNext(4, 100));
   const Verdict verdict = JudgeModels(
       {model}, {{"2.jpg", "no matches"}, {"3.jpg", "no pose"}, {"10.jpg", "dark"}, {"a/2.jpg", "dark"}});
   EXPECT_FALSE(verdict.is_whole());
@@ -85,7 +85,7 @@ TEST(Judge, MissingImagesStandBetweenTheirNeighboursByName) {
   EXPECT_EQ(verdict.missing[3].before, -1);
   EXPECT_EQ(verdict.missing[3].after, -1);
   EXPECT_EQ(verdict.links[1].num_missing, 2);
-  EXPECT_THAT(verdict.long_steps, IsEmpty()) << "3 m with two images missing is a metre each";
+  EXPECT_THAT(verdict.long_steps, IsEmpty()) << "6 m with two images missing are two metres each";
   EXPECT_THAT(WholeText(verdict), HasSubstr("not whole: 4 of 8 images are joined, 4 to no other; a way of"));
 }
 
