@@ -24,7 +24,8 @@ struct FloorFrame {
 std::string ArrowPoints(const Eigen::Vector2d& center, double heading_deg, double size_px);
 
 // A bar with its length: the longest of 1, 2 or 5 times a power of ten metres that has at most `most_px`.
-// Its left upper end is at (x_px, y_px); it is 8 pixels high, and the text stands to its right.
-std::string ScaleBar(double x_px, double y_px, double px_per_m, double most_px);
+// Its left upper end is at (x_px, y_px); it is 8 pixels high, and the text stands to its right.  `unit`:
+// where lengths are no metres.
+std::string ScaleBar(double x_px, double y_px, double px_per_m, double most_px, const char* unit = "m");
 
 }  // namespace cairn

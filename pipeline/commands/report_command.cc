@@ -17,9 +17,12 @@
 #include "pipeline/explain/block_bytes.h"
 #include "pipeline/report/ambiguity_svg.h"
 #include "pipeline/report/floor_svg.h"
+#include "pipeline/report/reconstruction_data.h"
 #include "pipeline/report/report_data.h"
 #include "pipeline/report/report_inputs.h"
 #include "pipeline/report/report_page.h"
+#include "stages/reconstruct/verdict/draw_verdict.h"
+#include "stages/reconstruct/verdict/verdict_json.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -29,6 +32,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kCheckWords = "what cairn check --details wrote";
 constexpr const char* kBuildWords = "the report that cairn compile wrote";
+constexpr const char* kReconstructionWords = "what the stage reconstruct wrote";
 constexpr const char* kDriveWords = "what cairn drive -o wrote";
 
 struct ReportArguments {
@@ -112,8 +116,33 @@ Result<std::optional<Json>> ReadCheck(const ReportArguments& arguments, const st
   return std::optional<Json>();
 }
 
+std::string ReconstructionPath(const std::string& build_dir) {
+  return build_dir + "/poses/reconstruction.json";
+}
+
+// How the images were joined, if the build folder has it and it is of this map.
+Result<std::optional<reconstruct::Verdict>> ReadReconstruction(const ReportArguments& arguments,
+                                                               const std::string& build_dir,
+                                                               const MapRows& rows) {
+  const std::string path = ReconstructionPath(build_dir);
+  std::error_code error;
+  if (!rows.frame.is_reconstructed || build_dir.empty() || !fs::exists(path, error))
+    return std::optional<reconstruct::Verdict>();
+  CAIRN_ASSIGN_OR_RETURN(const Json json, ReadJsonReport(path, kReconstructionWords));
+  if (!json.contains("verdict")) return std::optional<reconstruct::Verdict>();  // of an earlier version
+  Result<reconstruct::Verdict> verdict = reconstruct::ParseVerdict(json["verdict"]);
+  if (!verdict.ok()) {
+    return MakeError(ErrorCode::kCorrupt, "{}: {}: it is not {}; remove it, and compile again", path,
+                     verdict.error().message, kReconstructionWords);
+  }
+  if (IsReconstructionOf(*verdict, rows)) return std::optional(*std::move(verdict));
+  spdlog::warn("{}: is of another compilation than {}; it is not shown", path, arguments.map_path);
+  return std::optional<reconstruct::Verdict>();
+}
+
 std::string FloorPicture(const std::string& folder) { return folder + "/floor.svg"; }
 std::string AmbiguityPicture(const std::string& folder) { return folder + "/ambiguity.svg"; }
+std::string ReconstructionPicture(const std::string& folder) { return folder + "/reconstruction.svg"; }
 
 // Checks that the page and the pictures can be written, and that none of them is an input file, given
 // or found.
@@ -121,7 +150,8 @@ Status CheckPageAndPictures(const ReportArguments& arguments, const std::vector<
   CAIRN_RETURN_IF_ERROR(CheckCanBeReplaced(arguments.output_path));
   CAIRN_RETURN_IF_ERROR(CheckOutputIsNoInput(arguments.output_path, inputs));
   if (arguments.svg_dir.empty()) return Ok();
-  for (const std::string& picture : {FloorPicture(arguments.svg_dir), AmbiguityPicture(arguments.svg_dir)}) {
+  for (const std::string& picture : {FloorPicture(arguments.svg_dir), AmbiguityPicture(arguments.svg_dir),
+                                     ReconstructionPicture(arguments.svg_dir)}) {
     if (IsSameFile(picture, arguments.output_path))
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: is the name of the page and of a picture; choose another name", picture);
@@ -130,11 +160,16 @@ Status CheckPageAndPictures(const ReportArguments& arguments, const std::vector<
   return Ok();
 }
 
-Status WritePictures(const std::string& folder, const MapRows& rows) {
+Status WritePictures(const std::string& folder, const ReportInputs& inputs) {
+  const MapRows& rows = *inputs.rows;
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return MakeError(ErrorCode::kIo, "{}: cannot be created: {}", folder, error.message());
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(FloorPicture(folder), FloorSvg(rows)));
+  if (inputs.reconstruction != nullptr) {
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(ReconstructionPicture(folder),
+                                              reconstruct::DrawVerdict(*inputs.reconstruction, rows.name)));
+  }
   const Result<std::string> ambiguity = AmbiguitySvg(rows);
   return ambiguity.ok() ? WriteFileAtomically(AmbiguityPicture(folder), *ambiguity) : Ok();
 }
@@ -149,8 +184,9 @@ Status RunReport(const ReportArguments& arguments, const CommandEnvironment& env
   const std::string build_path = Beside(arguments, arguments.build_report_path, ".report.json");
   const std::string pareto_path = Beside(arguments, "", ".pareto.csv");
   CAIRN_RETURN_IF_ERROR(CheckPageAndPictures(
-      arguments, {arguments.map_path, arguments.compare_path, arguments.check_path, arguments.drive_path,
-                  build_path, pareto_path, build_dir + "/check.json", build_dir + "/classes.db"}));
+      arguments,
+      {arguments.map_path, arguments.compare_path, arguments.check_path, arguments.drive_path, build_path,
+       pareto_path, build_dir + "/check.json", build_dir + "/classes.db", ReconstructionPath(build_dir)}));
   std::error_code error;
   if (!arguments.build_dir.empty() && !fs::is_directory(build_dir, error))
     return MakeError(ErrorCode::kNotFound, "--build-dir {}: no such folder", build_dir);
@@ -168,6 +204,9 @@ Status RunReport(const ReportArguments& arguments, const CommandEnvironment& env
   }
   CAIRN_ASSIGN_OR_RETURN(const std::optional<Json> check, ReadCheck(arguments, build_dir, rows));
   if (check) inputs.check = &*check;
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<reconstruct::Verdict> reconstruction,
+                         ReadReconstruction(arguments, build_dir, rows));
+  if (reconstruction) inputs.reconstruction = &*reconstruction;
   if (!arguments.drive_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(drive, ReadJsonReport(arguments.drive_path, kDriveWords));
     if (!IsDrive(*drive)) return NotWhatWasExpected(arguments.drive_path, kDriveWords);
@@ -187,9 +226,9 @@ Status RunReport(const ReportArguments& arguments, const CommandEnvironment& env
   }
   inputs.advice = ReportAdvice(inputs);
   const Json data = ReportData(inputs);
-  const std::string page = arguments.print ? PrintedReportPage(inputs, data) : ReportPage(data);
+  const std::string page = arguments.print ? PrintedReportPage(inputs, data) : ReportPage(inputs, data);
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, page));
-  if (!arguments.svg_dir.empty()) CAIRN_RETURN_IF_ERROR(WritePictures(arguments.svg_dir, rows));
+  if (!arguments.svg_dir.empty()) CAIRN_RETURN_IF_ERROR(WritePictures(arguments.svg_dir, inputs));
   *environment.out << fmt::format("{}: {} bytes; open it in a browser\n", arguments.output_path, page.size());
   return Ok();
 }
@@ -213,7 +252,8 @@ Command ReportCommand() {
                 .Type("FILE.json");
             parser
                 .Add("--build-dir", arguments->build_dir,
-                     "Build folder, for reprojection errors [NAME.build beside the map, if it is there]")
+                     "Build folder, for reprojection errors and how the images were joined [NAME.build "
+                     "beside the map, if it is there]")
                 .Type("FOLDER");
             parser
                 .Add("--check", arguments->check_path,

@@ -10,6 +10,7 @@
 #include "core/geometry/floor_pose.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/station_losses.h"
+#include "pipeline/report/reconstruction_data.h"
 #include "pipeline/report/report_inputs.h"
 
 namespace cairn::pipeline {
@@ -417,6 +418,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
     json["held_out"] = HeldOutJson(*inputs.check, rows);
     json["held_out_is_self_test"] = !rows.self_test.empty() && IsCheckOf(*inputs.check, rows);
   }
+  if (inputs.reconstruction != nullptr) json["reconstruction"] = ReconstructionJson(*inputs.reconstruction);
   if (inputs.drive != nullptr) json["drive"] = DriveJson(*inputs.drive);
   if (inputs.compared != nullptr) json["changes"] = ChangesJson(inputs);
   return json;

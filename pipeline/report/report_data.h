@@ -10,6 +10,7 @@
 #include "core/blocks/map_rows.h"
 #include "pipeline/explain/advise.h"
 #include "pipeline/explain/pareto_points.h"
+#include "stages/reconstruct/verdict/verdict.h"
 
 namespace cairn::pipeline {
 
@@ -24,6 +25,7 @@ struct ReportInputs {
   const nlohmann::ordered_json* build_report = nullptr;      // NAME.report.json; may be null
   const nlohmann::ordered_json* check = nullptr;             // what check-map --details wrote; may be null
   const nlohmann::ordered_json* drive = nullptr;             // what drive -o wrote; may be null
+  const reconstruct::Verdict* reconstruction = nullptr;      // of its images; null: they had poses
   const MapRows* compared = nullptr;                         // the map to compare with; may be null
   int64_t compared_bytes = 0;
   std::string compared_name;        // its file

@@ -10,6 +10,7 @@
 #include "pipeline/explain/inspect_drops.h"
 #include "pipeline/report/ambiguity_svg.h"
 #include "pipeline/report/floor_svg.h"
+#include "pipeline/report/reconstruction_data.h"
 #include "report/chart_js.h"
 #include "report/chart_notice.h"
 #include "report/charts_js.h"
@@ -25,10 +26,12 @@
 #include "report/page_css.h"
 #include "report/page_html.h"
 #include "report/page_js.h"
+#include "report/reconstruction_js.h"
 #include "report/stages_js.h"
 #include "report/start_js.h"
 #include "report/summary_js.h"
 #include "stages/check_map/report.h"
+#include "stages/reconstruct/verdict/draw_verdict.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -60,11 +63,16 @@ std::string Notices() {
 std::string Script() {
   std::string script;
   for (const char* part :
-       {kPageJsText, kFloorJsText, kDrawJsText, kLayersJsText, kExplainJsText, kSummaryJsText, kStagesJsText,
-        kChartsJsText, kCompareJsText, kDriveJsText, kStartJsText}) {
+       {kPageJsText, kFloorJsText, kDrawJsText, kLayersJsText, kExplainJsText, kSummaryJsText,
+        kReconstructionJsText, kStagesJsText, kChartsJsText, kCompareJsText, kDriveJsText, kStartJsText}) {
     script += part;
   }
   return script;
+}
+
+std::string ReconstructionPicture(const ReportInputs& inputs) {
+  if (inputs.reconstruction == nullptr) return "";
+  return reconstruct::DrawVerdict(*inputs.reconstruction, inputs.rows->name);
 }
 
 // The held-out images that failed, a line each: name, place, reason.
@@ -86,11 +94,12 @@ std::string FailedImagesText(const nlohmann::ordered_json& data) {
 
 }  // namespace
 
-std::string ReportPage(const nlohmann::ordered_json& data) {
+std::string ReportPage(const ReportInputs& inputs, const nlohmann::ordered_json& data) {
   const std::vector<std::pair<std::string_view, std::string>> parts = {
       {"@TITLE@", EscapeXml(data["name"].get<std::string>())},
       {"@LEAFLET_CSS@", kLeafletCssText},
       {"@CSS@", kPageCssText},
+      {"@RECONSTRUCTION@", ReconstructionPicture(inputs)},
       {"@WRITER@", EscapeXml(data["writer"].get<std::string>())},
       {"@NOTICES@", EscapeXml(Notices())},
       {"@DATA@", JsonInPage(data)},
@@ -133,6 +142,10 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
   html += block("Self-test by region",
                 check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
   html += block("Held-out images not localized, or wrong", FailedImagesText(data));
+  if (inputs.reconstruction != nullptr) {
+    html += block("Reconstruction", ReconstructionText(*inputs.reconstruction));
+    html += "<figure>" + ReconstructionPicture(inputs) + "</figure>\n";
+  }
   html += block("What the stages dropped", DropsText(rows, kMaxStationLines));
   for (const auto& [stage, options] : rows.stage_options) html += block("Options of " + stage, options);
   return html + "</body></html>\n";

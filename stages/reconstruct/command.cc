@@ -10,6 +10,9 @@
 #include "core/files/folder.h"
 #include "core/files/write_error.h"
 #include "stages/reconstruct/reconstruct.h"
+#include "stages/reconstruct/verdict/draw_verdict.h"
+#include "stages/reconstruct/verdict/verdict_json.h"
+#include "stages/reconstruct/verdict/verdict_text.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -17,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kReportFile = "reconstruction.json";
+constexpr const char* kPictureFile = "reconstruction.svg";
 
 struct Arguments {
   std::string matches;
@@ -41,7 +45,15 @@ std::string ReportJson(const ReconstructResult& result) {
   report["rejects"] = nlohmann::ordered_json::array();
   for (const Reject& reject : result.rejects)
     report["rejects"].push_back({{"name", reject.name}, {"reason", reject.reason}});
+  report["verdict"] = VerdictJson(result.verdict);
   return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+// The name of the capture's folder.
+std::string TitleOf(const Capture& capture) {
+  std::error_code error;
+  const fs::path root = fs::weakly_canonical(capture.root, error);
+  return root.filename().string();
 }
 
 // Writes the result as a capture: the image lists, and a link to the images.
@@ -53,6 +65,8 @@ Status WritePosesFolder(const ReconstructResult& result, const Capture& capture,
   CAIRN_RETURN_IF_ERROR(
       WriteFileAtomically(folder + "/" + kCaptureFrameFile, CaptureFrameJson(result.frame)));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kReportFile, ReportJson(result)));
+  CAIRN_RETURN_IF_ERROR(
+      WriteFileAtomically(folder + "/" + kPictureFile, DrawVerdict(result.verdict, TitleOf(capture))));
   std::error_code error;
   const fs::path images = fs::canonical(capture.images_folder, error);
   if (!error) fs::create_directory_symlink(images, folder + "/images", error);
@@ -100,6 +114,7 @@ std::string ResultText(const ReconstructResult& result) {
                         result.frame.anchor->latitude_deg, result.frame.anchor->longitude_deg,
                         result.frame.anchor->altitude_m);
   }
+  for (const std::string& line : VerdictLines(result.verdict)) text += "reconstruct: " + line + "\n";
   return text;
 }
 
@@ -136,9 +151,11 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   const auto num_posed = static_cast<int64_t>(result.images.size() + result.queries.size());
   environment.report->in = {{"images", num_posed + static_cast<int64_t>(result.rejects.size())}};
   environment.report->out = {{"images", static_cast<int64_t>(result.images.size())},
-                             {"held out", static_cast<int64_t>(result.queries.size())}};
+                             {"held out", static_cast<int64_t>(result.queries.size())},
+                             {"loops", static_cast<int64_t>(result.verdict.loops.size())}};
   AddRejects("images", result.rejects, environment.report);
-  *environment.out << ResultText(result);
+  *environment.out << ResultText(result)
+                   << fmt::format("reconstruct: seen from above: {}/{}\n", arguments.output, kPictureFile);
   return Ok();
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "core/base/text.h"
 #include "core/files/write_error.h"
 #include "stages/reconstruct/find_frame.h"
 #include "stages/reconstruct/globally/map_globally.h"
@@ -182,8 +183,20 @@ void CollectRejects(const MapperInput& input, const std::vector<ColmapModel>& mo
   }
 }
 
-Status CheckRegistered(const MapperInput& input, const ReconstructOptions& options,
-                       ReconstructResult* result) {
+// Which images are joined with each other, the largest parts.
+std::string PartsText(const std::vector<ColmapModel>& models) {
+  std::string text;
+  for (size_t m = 0; m < std::min<size_t>(models.size(), 5); ++m) {
+    std::vector<std::string> names;
+    for (const ModelImage& image : models[m].images) names.push_back(image.name);
+    const std::vector<int> order = NaturalOrder(names);
+    text += fmt::format("\n  {} images, {} to {}", names.size(), names[order.front()], names[order.back()]);
+  }
+  return text;
+}
+
+Status CheckRegistered(const MapperInput& input, const std::vector<ColmapModel>& models,
+                       const ReconstructOptions& options, ReconstructResult* result) {
   const size_t num_images = input.images.size(), num_registered = num_images - result->rejects.size();
   if (num_registered == num_images) return Ok();
   const std::string text = fmt::format(
@@ -199,8 +212,8 @@ Status CheckRegistered(const MapperInput& input, const ReconstructOptions& optio
   return MakeError(ErrorCode::kNoData,
                    "{}, below min_registered_ratio = {:g}; take images that join the parts, or more features "
                    "per image (extract_features: max_num_features); a lower ratio accepts the largest part. "
-                   "The first missing images:{}",
-                   text, options.min_registered_ratio, reasons);
+                   "The parts:{}\nThe first missing images:{}",
+                   text, options.min_registered_ratio, PartsText(models), reasons);
 }
 
 void CollectImages(const ColmapModel& model, const Similarity& world_from_model, int hold_out_every,
@@ -215,6 +228,17 @@ void CollectImages(const ColmapModel& model, const Similarity& world_from_model,
     const bool is_held_out = hold_out_every > 0 && (i + 1) % static_cast<size_t>(hold_out_every) == 0;
     (is_held_out ? result->queries : result->images).push_back(std::move(images[i]));
   }
+}
+
+Verdict JudgeModels(const std::vector<ColmapModel>& models, const Similarity& world_from_model,
+                    const ReconstructResult& result) {
+  JudgedModels judged{.models = &models,
+                      .cam_from_world = {},
+                      .rejects = result.rejects,
+                      .is_metric = result.frame.unit == "metre"};
+  for (const ModelImage& image : models[0].images)
+    judged.cam_from_world.push_back(TransformPose(world_from_model, image.cam_from_world));
+  return Judge(judged, {});
 }
 
 Status CheckReconstructOptions(const ReconstructOptions& options) {
@@ -330,11 +354,12 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
   for (const ModelPoint& point : model.points)
     result.mean_error_px += point.error_px / static_cast<double>(model.points.size());
   CollectRejects(input, models, &result);
-  CAIRN_RETURN_IF_ERROR(CheckRegistered(input, options, &result));
+  CAIRN_RETURN_IF_ERROR(CheckRegistered(input, models, options, &result));
   ModelPoses poses;
   for (const ModelImage& image : model.images) poses.emplace(image.name, image.cam_from_world);
   CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(poses, capture, options, &result));
   CollectImages(model, world_from_model, options.hold_out_every, &result);
+  result.verdict = JudgeModels(models, world_from_model, result);
   return result;
 }
 

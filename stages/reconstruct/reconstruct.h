@@ -11,6 +11,7 @@
 #include "core/capture/capture_frame.h"
 #include "core/options/options.h"
 #include "stages/reconstruct/mapper.h"
+#include "stages/reconstruct/verdict/verdict.h"
 
 namespace cairn::reconstruct {
 
@@ -67,6 +68,7 @@ struct ReconstructResult {
   std::vector<int> model_sizes;  // images of each model, the kept one first
   int num_points = 0;            // of the model kept
   double mean_error_px = 0;      // its mean reprojection error
+  Verdict verdict;               // is it whole, and where is it weak?  Held-out images are in it
 };
 
 // Maps the images and puts the largest model into a frame.  `work_folder` is an empty folder, for COLMAP.

@@ -111,6 +111,59 @@ TEST_F(ReconstructLine, HeldOutImagesAreLocalized) {
   EXPECT_GE(json["localized_ratio"].get<double>(), 0.5) << run.out;
 }
 
+TEST_F(ReconstructLine, EndsWithAVerdictInWordsAndAsAPicture) {
+  ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
+  EXPECT_THAT(first_run_->out, HasSubstr("whole: "));
+  EXPECT_THAT(first_run_->out, HasSubstr("seen from above: " + Path("flat.build/poses/reconstruction.svg")));
+  const auto json = nlohmann::json::parse(ReadFile(Path("flat.build/poses/reconstruction.json")).value());
+  const auto verdict = json["verdict"];
+  EXPECT_EQ(verdict["is_metric"], true);
+  EXPECT_EQ(verdict["num_images"], kNumImages);
+  EXPECT_EQ(verdict["num_joined"].get<size_t>() + verdict["missing"].size(), size_t{kNumImages});
+  EXPECT_EQ(verdict["num_joined"].get<size_t>(),
+            json["num_images"].get<size_t>() + json["num_queries"].get<size_t>())
+      << "held-out images are joined, too";
+  EXPECT_NEAR(verdict["median_step"].get<double>(), 0.35, 0.05);
+  const std::string picture = ReadFile(Path("flat.build/poses/reconstruction.svg")).value();
+  EXPECT_THAT(picture, HasSubstr(" m</text>"));
+
+  // The report shows the same.
+  const std::string page = Path("flat.html"), json_path = Path("flat.build/poses/reconstruction.json");
+  const auto report = [&](const std::string& options = "") {
+    return RunShell("cairn report " + Path("flat.cairn") + " -o " + page + " " + options);
+  };
+  const ProgramRun run = report("--svg " + Path("pictures"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(ReadFile(Path("pictures/reconstruction.svg")).value(), picture);
+  EXPECT_THAT(ReadFile(page).value(), HasSubstr(picture));
+  EXPECT_THAT(ReadFile(page).value(), HasSubstr("\"reconstruction\":{\"text\":\""));
+  ASSERT_EQ(report("--print").exit_code, 0);
+  EXPECT_THAT(ReadFile(page).value(), HasSubstr("<h2>Reconstruction</h2>\n<pre>"));
+  EXPECT_THAT(ReadFile(page).value(), HasSubstr(picture));
+
+  // Not that of another compilation, nor one that cannot be read; and it is not written over.
+  const std::string text = ReadFile(json_path).value();
+  auto other = nlohmann::json::parse(text);
+  for (auto& name : other["verdict"]["images"]["name"]) name = "x" + name.get<std::string>();
+  std::ofstream(json_path) << other;
+  const ProgramRun of_other = report();
+  EXPECT_EQ(of_other.exit_code, 0) << of_other.err;
+  EXPECT_THAT(of_other.err, HasSubstr(json_path + ": is of another compilation than "));
+  EXPECT_THAT(ReadFile(page).value(), testing::Not(HasSubstr("\"reconstruction\":{")));
+  other["verdict"]["way"] = "long";
+  std::ofstream(json_path) << other;
+  const ProgramRun broken = report();
+  EXPECT_EQ(broken.exit_code, static_cast<int>(ErrorCode::kCorrupt));
+  EXPECT_THAT(broken.err, HasSubstr(json_path + ": 'way' is not a length"));
+  other.erase("verdict");  // of an earlier version
+  std::ofstream(json_path) << other;
+  EXPECT_EQ(report().exit_code, 0);
+  std::ofstream(json_path) << text;
+  const ProgramRun over = RunShell("cairn report " + Path("flat.cairn") + " -o " + json_path);
+  EXPECT_EQ(over.exit_code, 2) << over.err;
+  EXPECT_EQ(ReadFile(json_path).value(), text);
+}
+
 TEST_F(ReconstructLine, SecondRunDoesNothingAndChangedControlPointsRunTheReconstruction) {
   ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
   EXPECT_THAT(Compile().out, HasSubstr("up to date"));

@@ -176,6 +176,10 @@ TEST_P(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
   EXPECT_EQ(result->rejects[5].name, "lonely.jpg");
   EXPECT_THAT(result->rejects[5].reason, HasSubstr("no 15 verified matches with any registered image"));
   ASSERT_THAT(result->warnings, SizeIs(1));
+  EXPECT_EQ(result->verdict.num_images(), 15);
+  ASSERT_THAT(result->verdict.parts, SizeIs(1));
+  EXPECT_EQ(result->verdict.parts[0].first, "other00.jpg");
+  EXPECT_EQ(result->verdict.missing[0].reason, result->rejects[5].reason);
   EXPECT_THAT(result->warnings[0],
               HasSubstr("only 9 of 15 images were registered (60 %); models of 9, 5 images"));
 
@@ -184,7 +188,8 @@ TEST_P(ReconstructTest, LargestPartIsKeptAndTheRestIsListed) {
   EXPECT_EQ(too_few.error().code, ErrorCode::kNoData);
   EXPECT_THAT(
       too_few.error().message,
-      AllOf(HasSubstr("only 9 of 15"), HasSubstr("min_registered_ratio = 0.61"), HasSubstr("other00.jpg: ")));
+      AllOf(HasSubstr("only 9 of 15"), HasSubstr("min_registered_ratio = 0.61"), HasSubstr("other00.jpg: "),
+            HasSubstr("\n  9 images, image00.jpg to image08.jpg\n  5 images, other00.jpg to other04.jpg\n")));
 }
 
 TEST_P(ReconstructTest, BadOptionsAreRefused) {

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Opens reports in a real browser: report_test.py CAIRN GOLDEN_MAPS MAP SCREENSHOTS MAKE_MAP
+"""Opens reports in a real browser: report_test.py CAIRN GOLDEN_MAPS MAP SCREENSHOTS MAKE_MAP WALK
 
 Headless Chromium through its driver; no network.  MAP is a compiled map with a self-test, its build folder beside
-it.  Screenshots of what was looked at land in SCREENSHOTS; MAKE_MAP makes maps that no survey makes.
+it.  Screenshots of what was looked at land in SCREENSHOTS; MAKE_MAP makes maps that no survey makes; WALK is a
+map of images without poses, some of which are not joined.
 """
 import functools
 import json
@@ -24,7 +25,7 @@ from selenium.webdriver.common.keys import Keys
 
 from write_report import write_report
 
-CAIRN, GOLDEN, MAP, SCREENSHOTS, MAKE_MAP = sys.argv[1:6]
+CAIRN, GOLDEN, MAP, SCREENSHOTS, MAKE_MAP, WALK = sys.argv[1:7]
 BUILD = MAP.replace('.cairn', '.build')
 CHECK = BUILD + '/check.json'
 report = functools.partial(write_report, CAIRN)
@@ -255,6 +256,10 @@ class ReportTest(unittest.TestCase):
         self.assertGreater(self.browser.script('return map.getCenter().lng'), center)
         floor.send_keys('-')
 
+    def test_images_that_had_poses_were_not_joined(self):
+        for element in ['reconstruction', 'reconstruction-link']:
+            self.assertFalse(self.browser.driver.find_element(By.ID, element).is_displayed())
+
     def test_the_line_the_figures_and_the_advice_are_there(self):
         self.assertIn('group_classes drops', self.browser.text('#stages'))
         self.assertRegex(self.browser.text('#stages'), r'few observations')
@@ -334,6 +339,48 @@ class OtherPagesTest(unittest.TestCase):
             browser = self.look(report(self.folder.name, os.path.join(GOLDEN, name)), name + '.png')
             self.assertEqual(browser.problems(), [], name)
             self.assertIn('self-test', browser.text('#self-test-text').lower())
+
+    def test_how_the_images_were_joined_is_drawn_and_told(self):
+        verdict = json.loads(pathlib.Path(WALK.replace('.cairn', '.build') + '/poses/reconstruction.json').read_text())['verdict']
+        browser = self.look(report(self.folder.name, WALK), 'reconstruction.png')
+        self.assertEqual(verdict['num_images'], 112)
+        self.assertFalse(verdict['is_whole'])
+        self.assertIn(f"{verdict['num_joined']} of 112\nimages joined", browser.text('#cards'))
+        browser.driver.find_element(By.ID, 'reconstruction-link').click()
+        self.assertTrue(browser.driver.find_element(By.ID, 'reconstruction').is_displayed())
+        self.assertIn(f"Not whole: {verdict['num_joined']} of 112 images are joined", browser.text('#reconstruction-verdict'))
+        tables = browser.text('#reconstruction-text')
+        for title in ['Where it is weak', 'loop', 'images missing', verdict['missing'][0]['name']]:
+            self.assertIn(title, tables)
+        # Every joined image is named by what hovers over the picture, and no name is markup.
+        titles = browser.script('return [...document.querySelectorAll("#reconstruction svg title")].map(title => title.textContent)')
+        for name in verdict['images']['name']:
+            self.assertTrue(any(name in title for title in titles), name)
+        self.assertTrue(any('onerror=alert(1)>&"' in title for title in titles))
+        self.assertEqual(browser.script('return document.querySelectorAll("img").length'), 0)
+        self.assertGreater(sum(title.startswith('missing: ') for title in titles), 0)
+        self.assertGreater(browser.driver.find_element(By.CSS_SELECTOR, '#reconstruction svg').size['width'], 600)
+        # A long table is opened by its button.
+        shown = 'return [...document.querySelectorAll("#reconstruction-text tr")].filter(row => !row.hidden).length'
+        before = browser.script(shown)
+        buttons = [one for one in browser.driver.find_elements(By.CSS_SELECTOR, '#reconstruction-text button')]
+        self.assertGreater(len(buttons), 0)
+        for one in buttons:
+            browser.script('arguments[0].click()', one)
+        self.assertGreater(browser.script(shown), before)
+        self.assertEqual(len(browser.driver.find_elements(By.CSS_SELECTOR, '#reconstruction-text button')), 0)
+        # On the dark ground text is light and the ground dark, in the picture as around it.
+        colours = """const paint = css => getComputedStyle(document.querySelector(`#reconstruction svg ${css}`)).fill;
+            return [paint('rect'), paint('text'), getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color];"""
+        for _ in range(2):
+            ground, ink, page_ground, page_ink = browser.script(colours)
+            self.assertEqual((ground, ink), (page_ground, page_ink))
+            browser.driver.find_element(By.ID, 'theme').click()
+        browser.script('document.getElementById("reconstruction").scrollIntoView()')
+        browser.shot('reconstruction_picture.png')
+        self.assertEqual(browser.problems(), [])
+        phone = self.look(report(self.folder.name, WALK), 'reconstruction_phone.png', '400,850', phone=True)
+        self.assertLessEqual(phone.script('return document.documentElement.scrollWidth'), 401)
 
     def test_names_with_markup_stay_text(self):
         copy = os.path.join(self.folder.name, 'evil.cairn')
