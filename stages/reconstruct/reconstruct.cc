@@ -226,11 +226,6 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
       return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
     }
   }
-  if (options.scale_from == "auto" && !options.control_points.empty() && !options.distances.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "control_points and distances are both given, but only one can give the scale; choose "
-                     "one with scale_from, and leave the other out");
-  }
   if (options.hold_out_every == 1)
     return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
   return Ok();
@@ -266,9 +261,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .max = 1},
       {.name = "scale_from",
        .value = &o->scale_from,
-       .help = "where scale and axes come from; auto: control_points or distances where given, else the "
-               "capture's odometry.txt, else GPS, else none",
-       .choices = {"auto", "odometry", "gps", "control_points", "distances", "none"}},
+       .help =
+           "where scale and axes come from; auto: the first that is there of control_points, the capture's "
+           "odometry.txt, GPS and distances, or one after it that knows the scale three times as well",
+       .choices = {"auto", "control_points", "odometry", "gps", "distances", "none"}},
       {.name = "control_points",
        .value = &o->control_points,
        .help =
@@ -294,6 +290,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->distance_sigma_ratio,
        .help = "standard deviation of a known distance over its length",
        .min = 1e-6},
+      {.name = "odometry_sigma_ratio",
+       .value = &o->odometry_sigma_ratio,
+       .help = "standard deviation of what all of the odometry shares over its length: a wheel's radius",
+       .min = 1e-6},
       {.name = "up_sigma_deg",
        .value = &o->up_sigma_deg,
        .help = "standard deviation of the cameras' mean up against the vertical, degrees",
@@ -308,10 +308,11 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .help = "one in this many registered images is kept out of the map, as a query; 0: none",
        .min = 0},
   };
-  AddCondition({"scale_from", {"auto", "control_points"}}, {"control_points", "control_point_sigma_m"},
+  // What does not give the scale is compared with what does.
+  AddCondition({"scale_from", {"auto", "control_points", "odometry", "gps", "distances"}},
+               {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
+                "gps_altitude_sigma_m", "distances", "distance_sigma_ratio"},
                &table);
-  AddCondition({"scale_from", {"auto", "distances"}}, {"distances", "distance_sigma_ratio"}, &table);
-  AddCondition({"scale_from", {"auto", "gps"}}, {"gps_sigma_m", "gps_altitude_sigma_m"}, &table);
   AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
   return table;
 }
