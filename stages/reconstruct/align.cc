@@ -17,8 +17,6 @@ constexpr double kMinSpreadSigmas = 2;   // root mean square of the targets abou
 constexpr size_t kMaxHypotheses = 2000;  // from triples
 constexpr size_t kMaxHypothesisTargets = 64;
 constexpr double kMedianChiSquare = 2.366;  // of 3 degrees of freedom
-constexpr double kSigmaOfMedian =
-    1.2533;  // standard deviation of many normal values' median, over their mean's
 
 Eigen::Quaterniond LevelRotation(const Eigen::Vector3d& up) {
   return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
@@ -261,9 +259,13 @@ Eigen::Vector3d MeanUp(const std::vector<Pose>& cams_from_model) {
 }
 
 Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale) {
+  return LevelledFrame(cams_from_model, scale, MeanUp(cams_from_model));
+}
+
+Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale, const Eigen::Vector3d& up) {
   Similarity similarity;
   similarity.scale = scale;
-  const Eigen::Quaterniond level = LevelRotation(MeanUp(cams_from_model));
+  const Eigen::Quaterniond level = LevelRotation(up);
   const Eigen::Vector3d view = level * cams_from_model.front().ViewingDirection();
   const double yaw = view.head<2>().norm() > 1e-6 ? std::atan2(view.y(), view.x()) : 0;
   similarity.rotation = Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * level;

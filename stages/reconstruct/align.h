@@ -13,6 +13,8 @@ namespace cairn::reconstruct {
 
 // Standard deviation of a normal distribution over its median absolute deviation.
 inline constexpr double kSigmaOfMad = 1.4826;
+// Standard deviation of the median of many normal values over that of their mean.
+inline constexpr double kSigmaOfMedian = 1.2533;
 
 // A known position of a camera, with standard deviations per axis, metres.
 struct PositionTarget {
@@ -65,6 +67,8 @@ Eigen::Vector3d MeanUp(const std::vector<Pose>& cams_from_model);
 // A frame of this scale with the first camera at its origin, the cameras' up along +z and the first camera's
 // view along +x as far as it is level.  REQUIRES: not empty
 Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale);
+// The same with this direction, of length 1, along +z.
+Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale, const Eigen::Vector3d& up);
 
 // Median distance of a camera to the nearest other one; 0 with fewer than two cameras.  O(n^2).
 double MedianStep(const std::vector<Pose>& cams_from_model);

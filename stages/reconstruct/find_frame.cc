@@ -100,11 +100,13 @@ CaptureFrame FrameOf(const Answered& taken) {
 
 }  // namespace
 
-Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
+Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& capture,
                              const ReconstructOptions& options, ReconstructResult* result) {
+  ModelPoses model;
+  for (const ModelImage& image : reconstruction.images) model.emplace(image.name, image.cam_from_world);
   const std::string& from = options.scale_from;
   if (from == "none") return WithoutScale(model, options, result);
-  const ScaleQuestion question{model, capture, options};
+  const ScaleQuestion question{reconstruction, model, capture, options};
   std::vector<Answered> answered;
   std::optional<Error> refusal;  // of a source that the recipe names
   std::string nothing;
@@ -128,8 +130,8 @@ Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
   if (answered.empty()) {
     if (refusal) return *refusal;
     result->warnings.push_back(fmt::format(
-        "nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, control_points "
-        "or distances for metres",
+        "nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, control_points, "
+        "camera_height_m or distances for metres",
         nothing));
     return WithoutScale(model, options, result);
   }

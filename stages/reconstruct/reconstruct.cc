@@ -226,6 +226,12 @@ Status CheckReconstructOptions(const ReconstructOptions& options) {
       return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
     }
   }
+  if (options.scale_from == "camera_height" && options.camera_height_m == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "scale_from = camera_height, but no camera_height_m is given: how high the camera is over "
+        "the floor, metres");
+  }
   if (options.hold_out_every == 1)
     return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
   return Ok();
@@ -263,8 +269,9 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->scale_from,
        .help =
            "where scale and axes come from; auto: the first that is there of control_points, the capture's "
-           "odometry.txt, GPS and distances, or one after it that knows the scale three times as well",
-       .choices = {"auto", "control_points", "odometry", "gps", "distances", "none"}},
+           "odometry.txt, GPS, camera_height_m and distances, or one after it that knows the scale three "
+           "times as well",
+       .choices = {"auto", "control_points", "odometry", "gps", "camera_height", "distances", "none"}},
       {.name = "control_points",
        .value = &o->control_points,
        .help =
@@ -294,6 +301,14 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->odometry_sigma_ratio,
        .help = "standard deviation of what all of the odometry shares over its length: a wheel's radius",
        .min = 1e-6},
+      {.name = "camera_height_m",
+       .value = &o->camera_height_m,
+       .help = "how high the camera is over a flat floor, wherever it drives, metres; 0: not known",
+       .min = 0},
+      {.name = "camera_height_sigma_m",
+       .value = &o->camera_height_sigma_m,
+       .help = "standard deviation of camera_height_m, metres",
+       .min = 1e-6},
       {.name = "up_sigma_deg",
        .value = &o->up_sigma_deg,
        .help = "standard deviation of the cameras' mean up against the vertical, degrees",
@@ -309,9 +324,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .min = 0},
   };
   // What does not give the scale is compared with what does.
-  AddCondition({"scale_from", {"auto", "control_points", "odometry", "gps", "distances"}},
+  AddCondition({"scale_from", {"auto", "control_points", "odometry", "gps", "camera_height", "distances"}},
                {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
-                "gps_altitude_sigma_m", "distances", "distance_sigma_ratio"},
+                "gps_altitude_sigma_m", "camera_height_m", "camera_height_sigma_m", "distances",
+                "distance_sigma_ratio"},
                &table);
   AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
   return table;
@@ -332,9 +348,7 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
     result.mean_error_px += point.error_px / static_cast<double>(model.points.size());
   CollectRejects(input, models, &result);
   CAIRN_RETURN_IF_ERROR(CheckRegistered(input, options, &result));
-  ModelPoses poses;
-  for (const ModelImage& image : model.images) poses.emplace(image.name, image.cam_from_world);
-  CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(poses, capture, options, &result));
+  CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(model, capture, options, &result));
   CollectImages(model, world_from_model, options.hold_out_every, &result);
   return result;
 }

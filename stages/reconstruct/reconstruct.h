@@ -25,7 +25,8 @@ struct ReconstructOptions {
   // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
   // Where scale and axes come from: "control_points", "odometry" (the capture's odometry.txt), "gps" (EXIF),
-  // "distances", or "none"; "auto": the first of these that is there and says something (find_frame.h).
+  // "camera_height", "distances", or "none"; "auto": the first of these that is there and says something
+  // (find_frame.h).
   std::string scale_from = "auto";
   // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
@@ -38,6 +39,10 @@ struct ReconstructOptions {
   double control_point_sigma_m = 0.05;
   double distance_sigma_ratio = 0.02;
   double odometry_sigma_ratio = 0.01;
+  // How high the camera is over a flat floor that it sees, all the way (floor_plane.h), and the standard
+  // deviation of that; 0: not known.  REQUIRES: >= 0; > 0
+  double camera_height_m = 0;
+  double camera_height_sigma_m = 0.02;
   double up_sigma_deg = 5;
   // Where nothing gives a scale: median distance of an image to the nearest other, in the map's unit, so that
   // lengths in options of later stages are meaningful.  REQUIRES: > 0

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "stages/reconstruct/align.h"
+#include "stages/reconstruct/floor_plane.h"
 #include "stages/reconstruct/known_places.h"
 #include "stages/reconstruct/odometry.h"
 
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
 constexpr double kMaxResidualSigmas = 3;
+// A camera that is so much higher or lower over the floor, as a part of its height, is off.
+constexpr double kMaxHeightErrorRatio = 0.15;
 // Odometry whose pieces spread more is worth a warning.
 constexpr double kMaxOdometrySpread = 0.1;
 
@@ -146,6 +149,42 @@ Result<ScaleAnswer> AskOdometry(const ScaleQuestion& question) {
   return answer;
 }
 
+Result<ScaleAnswer> AskCameraHeight(const ScaleQuestion& question) {
+  const double height_m = question.options.camera_height_m;
+  std::map<ImageId, int> camera_of_image;
+  std::vector<Eigen::Vector3d> centers;
+  for (const ModelImage& image : question.reconstruction.images) {
+    camera_of_image.emplace(image.image_id, static_cast<int>(centers.size()));
+    centers.push_back(image.cam_from_world.Center());
+  }
+  std::vector<SeenPoint> points;
+  for (const ModelPoint& point : question.reconstruction.points) {
+    points.push_back({.position = point.position, .cameras = {}});
+    for (const auto& [image_id, keypoint] : point.track)
+      points.back().cameras.push_back(camera_of_image.at(image_id));
+  }
+  const std::vector<Pose> poses = PosesOf(question.model);
+  const Result<FloorPlane> floor = FindFloor(points, centers, MeanUp(poses));
+  if (!floor.ok()) {
+    return MakeError(
+        floor.error().code,
+        "{}: camera_height_m = {:g}: no floor is found that the camera is over: {}; take it out of "
+        "the recipe, or give odometry.txt or distances",
+        question.capture.root, height_m, floor.error().message);
+  }
+  const double scale = height_m / floor->height;
+  ScaleAnswer answer{
+      .told_by = fmt::format("the camera's height over {} points of the floor", floor->num_points),
+      .world_from_model = LevelledFrame(poses, scale, floor->up),
+      .sigma_ratio = std::hypot(floor->sigma_ratio, question.options.camera_height_sigma_m / height_m)};
+  for (size_t i = 0; i < floor->cameras.size(); ++i) {
+    const double residual_m = std::abs(scale * floor->heights[i] - height_m);
+    answer.residuals.push_back({question.reconstruction.images[floor->cameras[i]].name, residual_m,
+                                residual_m > kMaxHeightErrorRatio * height_m});
+  }
+  return answer;
+}
+
 }  // namespace
 
 std::vector<Pose> PosesOf(const ModelPoses& model) {
@@ -161,6 +200,8 @@ const std::vector<ScaleSource>& ScaleSources() {
       {"odometry", [](const ScaleQuestion& q) { return std::filesystem::exists(OdometryPath(q.capture)); },
        false, AskOdometry},
       {"gps", [](const ScaleQuestion&) { return true; }, false, AskGps},
+      {"camera_height", [](const ScaleQuestion& q) { return q.options.camera_height_m > 0; }, true,
+       AskCameraHeight},
       {"distances", [](const ScaleQuestion& q) { return !q.options.distances.empty(); }, true, AskDistances},
   };
   return sources;

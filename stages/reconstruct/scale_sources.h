@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/capture/capture.h"
+#include "core/colmap/colmap_model.h"
 #include "core/geometry/geodesy.h"
 #include "core/geometry/similarity.h"
 #include "stages/reconstruct/find_frame.h"
@@ -18,7 +19,8 @@ namespace cairn::reconstruct {
 
 // What may say how large a reconstruction is.
 struct ScaleQuestion {
-  const ModelPoses& model;
+  const ColmapModel& reconstruction;
+  const ModelPoses& model;  // its poses
   const Capture& capture;
   const ReconstructOptions& options;
 };

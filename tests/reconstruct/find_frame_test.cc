@@ -12,6 +12,7 @@
 namespace cairn::reconstruct {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -62,7 +63,14 @@ class FindFrameTest : public testing::Test {
   Result<Similarity> Find(const std::string& scale_from) {
     result_ = {};
     options_.scale_from = scale_from;
-    return FindFrame(model_, capture_, options_, &result_);
+    ColmapModel reconstruction;
+    for (const auto& [name, pose] : model_) {
+      const auto image_id = static_cast<ImageId>(reconstruction.images.size() + 1);
+      reconstruction.images.push_back(
+          {.image_id = image_id, .name = name, .camera_id = 1, .cam_from_world = pose, .keypoints = {}});
+    }
+    reconstruction.points = points_;
+    return FindFrame(reconstruction, capture_, options_, &result_);
   }
   std::vector<std::string> Sources() const {
     std::vector<std::string> names;
@@ -72,6 +80,7 @@ class FindFrameTest : public testing::Test {
   ReconstructOptions options_;
   Capture capture_;
   ModelPoses model_;
+  std::vector<ModelPoint> points_;
   ReconstructResult result_;
 };
 
@@ -103,7 +112,8 @@ TEST_F(FindFrameTest, OdometryThatDisagreesWithTheImagesIsReported) {
 TEST_F(FindFrameTest, WithoutOdometryNothingGivesAScale) {
   ASSERT_TRUE(Find("auto").ok());
   EXPECT_EQ(result_.frame.unit, "arbitrary");
-  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("give odometry.txt, control_points or distances")));
+  EXPECT_THAT(result_.warnings,
+              ElementsAre(HasSubstr("control_points, camera_height_m or distances for metres")));
   const auto asked = Find("odometry");
   ASSERT_FALSE(asked.ok());
   EXPECT_EQ(asked.error().code, ErrorCode::kNotFound);
@@ -202,6 +212,37 @@ TEST_F(FindFrameTest, WhatKnowsTheScaleFarWorseGivesWay) {
   EXPECT_EQ(result_.frame.source, "gps");
   ASSERT_TRUE(Find("gps").ok());
   EXPECT_EQ(result_.frame.source, "gps");
+}
+
+// The cameras look along z, and y is down: 0.2 units are 0.8 m.
+TEST_F(FindFrameTest, TheCamerasHeightOverTheFloorGivesTheScale) {
+  options_.camera_height_m = 0.9;
+  EXPECT_THAT(Find("auto").error().message, AllOf(HasSubstr("camera_height_m = 0.9: no floor is found"),
+                                                  HasSubstr("0 of 0 points lie below")));
+  for (int i = 0; i < 59; ++i) {
+    for (int row = 0; row < 5; ++row) {
+      ModelPoint point;
+      point.position = {0.025 * i, 0.2, 0.05 * row + 0.001 * (i * row % 7)};
+      for (const int image : {i + 1, i + 2}) point.track.emplace_back(static_cast<ImageId>(image), row);
+      points_.push_back(std::move(point));
+    }
+  }
+  const auto similarity = Find("auto");
+  ASSERT_TRUE(similarity.ok()) << similarity.error().message;
+  EXPECT_NEAR(similarity->scale, 4.5, 1e-9);
+  EXPECT_EQ(result_.frame.source, "camera_height");
+  EXPECT_NEAR(result_.frame.scale_sigma_ratio, std::hypot(0.005, 0.02 / 0.9), 1e-6);
+  EXPECT_EQ(result_.residuals.size(), 60u);
+  EXPECT_NEAR((*similarity * Eigen::Vector3d(0.7, 0.2, 0.1)).z(), -0.9, 1e-9);  // the floor is level
+  EXPECT_THAT(result_.scales[0].told_by, HasSubstr("over 295 points of the floor"));
+  // Trusted less than odometry, more than distances.
+  WriteDistances(0.1);
+  WriteOdometry(0.1, 0.1);
+  options_.camera_height_m = 0.8;
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_THAT(Sources(), ElementsAre("odometry", "camera_height", "distances"));
+  EXPECT_THAT(result_.warnings, IsEmpty());
+  EXPECT_NEAR(Find("camera_height")->scale, 4, 1e-9);
 }
 
 TEST_F(FindFrameTest, ControlPointsNeverGiveWay) {
