@@ -16,7 +16,7 @@ using ModelPoses = std::map<std::string, Pose>;
 
 // Where scale and axes of a model come from, and what they are: world_from_model.  All sources that are there
 // are asked (scale_sources.h), most trusted first:
-//   control_points, odometry, gps, camera_height, distances.
+//   control_points, odometry, gps, rig, camera_height, distances.
 // By scale_from = "auto" the first of them that says something is taken, unless a later one knows the scale
 // three times as well (as after pictures of a garden whose GPS errs by metres); control points never give
 // way. The scale's standard deviation is the taken one's.  Each two that contradict each other, by more than

@@ -30,7 +30,7 @@ constexpr double kMinOnFloorRatio = 0.05, kMaxBelowRatio = 0.2, kRivalRatio = 0.
 // A floor has so many times as many points as the space of its thickness above it, where walls have as many.
 constexpr double kMinStandsOut = 1.5;
 // The cameras' heights: largest spread, and how many in a row see the same floor.
-constexpr double kMaxSpreadRatio = 0.1, kMinSigmaRatio = 0.005, kNumNeighbours = 10;
+constexpr double kMaxSpreadRatio = 0.1, kMinSigmaRatio = 0.005, kNumOfOneFloor = 10;
 // Cameras whose places leave less than this of their way beside a plane moved over one.
 constexpr double kFlatRatio = 0.1, kLineRatio = 0.05;
 
@@ -211,7 +211,7 @@ class FloorFinder {
           "one height",
           100 * spread_ratio, 100 * kMaxSpreadRatio);
     }
-    const double num_apart = std::max(1.0, static_cast<double>(found.cameras.size()) / kNumNeighbours);
+    const double num_apart = std::max(1.0, static_cast<double>(found.cameras.size()) / kNumOfOneFloor);
     found.sigma_ratio = std::max(kMinSigmaRatio, kSigmaOfMedian * spread_ratio / std::sqrt(num_apart));
     return found;
   }

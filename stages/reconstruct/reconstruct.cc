@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <tuple>
 
 #include "core/files/write_error.h"
 #include "stages/reconstruct/find_frame.h"
@@ -220,10 +221,13 @@ void CollectImages(const ColmapModel& model, const Similarity& world_from_model,
 Status CheckReconstructOptions(const ReconstructOptions& options) {
   ReconstructOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  for (const auto& [scale_from, file] :
-       {std::pair("control_points", options.control_points), std::pair("distances", options.distances)}) {
-    if (options.scale_from == scale_from && file.empty()) {
-      return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
+  for (const auto& [scale_from, key, file] :
+       {std::tuple("control_points", "control_points", &options.control_points),
+        std::tuple("distances", "distances", &options.distances),
+        std::tuple("rig", "rig_baselines", &options.rig_baselines)}) {
+    if (options.scale_from == scale_from && file->empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "scale_from = {}, but no file {} is given", scale_from,
+                       key);
     }
   }
   if (options.scale_from == "camera_height" && options.camera_height_m == 0) {
@@ -269,9 +273,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->scale_from,
        .help =
            "where scale and axes come from; auto: the first that is there of control_points, the capture's "
-           "odometry.txt, GPS, camera_height_m and distances, or one after it that knows the scale three "
+           "odometry.txt, GPS, rig_baselines, camera_height_m and distances, or one after it that knows the "
+           "scale three "
            "times as well",
-       .choices = {"auto", "control_points", "odometry", "gps", "camera_height", "distances", "none"}},
+       .choices = {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances", "none"}},
       {.name = "control_points",
        .value = &o->control_points,
        .help =
@@ -281,6 +286,15 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->distances,
        .help = "file of known distances between cameras, IMAGE1 IMAGE2 METRES a line; absolute or relative "
                "to the capture"},
+      {.name = "rig_baselines",
+       .value = &o->rig_baselines,
+       .help =
+           "file of how far cameras of a rig are apart, FOLDER1 FOLDER2 METRES a line; their images of one "
+           "name below the two folders were taken at once; absolute or relative to the capture"},
+      {.name = "rig_sigma_ratio",
+       .value = &o->rig_sigma_ratio,
+       .help = "standard deviation of a stated baseline over its length",
+       .min = 1e-6},
       {.name = "gps_sigma_m",
        .value = &o->gps_sigma_m,
        .help = "standard deviation of GPS positions per level axis, metres",
@@ -324,11 +338,12 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .min = 0},
   };
   // What does not give the scale is compared with what does.
-  AddCondition({"scale_from", {"auto", "control_points", "odometry", "gps", "camera_height", "distances"}},
-               {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
-                "gps_altitude_sigma_m", "camera_height_m", "camera_height_sigma_m", "distances",
-                "distance_sigma_ratio"},
-               &table);
+  AddCondition(
+      {"scale_from", {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances"}},
+      {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
+       "gps_altitude_sigma_m", "rig_baselines", "rig_sigma_ratio", "camera_height_m", "camera_height_sigma_m",
+       "distances", "distance_sigma_ratio"},
+      &table);
   AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
   return table;
 }

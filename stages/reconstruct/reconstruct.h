@@ -25,12 +25,13 @@ struct ReconstructOptions {
   // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
   // Where scale and axes come from: "control_points", "odometry" (the capture's odometry.txt), "gps" (EXIF),
-  // "camera_height", "distances", or "none"; "auto": the first of these that is there and says something
-  // (find_frame.h).
+  // "rig", "camera_height", "distances", or "none"; "auto": the first of these that is there and says
+  // something (find_frame.h).
   std::string scale_from = "auto";
   // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
   std::string distances;
+  std::string rig_baselines;
   // Standard deviations: of a GPS position, level and in altitude; of a control point; of a known distance,
   // over its length; of all that odometry says, over its length (a wheel's radius, which no image shows); of
   // the cameras' mean up against the vertical, degrees.  REQUIRES: > 0
@@ -39,6 +40,8 @@ struct ReconstructOptions {
   double control_point_sigma_m = 0.05;
   double distance_sigma_ratio = 0.02;
   double odometry_sigma_ratio = 0.01;
+  // The same of a stated baseline of a rig, which all its pairs of images share.  REQUIRES: > 0
+  double rig_sigma_ratio = 0.01;
   // How high the camera is over a flat floor that it sees, all the way (floor_plane.h), and the standard
   // deviation of that; 0: not known.  REQUIRES: >= 0; > 0
   double camera_height_m = 0;

@@ -15,6 +15,8 @@ constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
 constexpr double kMaxResidualSigmas = 3;
 // A camera that is so much higher or lower over the floor, as a part of its height, is off.
 constexpr double kMaxHeightErrorRatio = 0.15;
+// Pairs of a rig in a row that err together.
+constexpr double kNumNeighbours = 10;
 // Odometry whose pieces spread more is worth a warning.
 constexpr double kMaxOdometrySpread = 0.1;
 
@@ -92,10 +94,10 @@ Result<ScaleAnswer> AskControlPoints(const ScaleQuestion& question) {
   return answer;
 }
 
-Result<ScaleAnswer> AskDistances(const ScaleQuestion& question) {
-  const std::string path = InputPath(question.capture, question.options.distances);
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<KnownDistance> distances,
-                         ReadKnownDistances(path, question.capture));
+// From known distances of images, each off by more than three times sigma_ratio if it contradicts the scale
+// found.
+Result<ScaleAnswer> ScaleByDistances(const ScaleQuestion& question, const std::string& path,
+                                     const std::vector<KnownDistance>& distances, double sigma_ratio) {
   ScaleAnswer answer{.told_by = path};
   std::vector<DistanceTarget> targets;
   std::vector<std::string> names;
@@ -109,7 +111,6 @@ Result<ScaleAnswer> AskDistances(const ScaleQuestion& question) {
     targets.push_back({CenterErrorM(pose1->second, pose2->second), known.distance_m});
     names.push_back(known.name1 + " " + known.name2);
   }
-  const double sigma_ratio = question.options.distance_sigma_ratio;
   const Result<DistanceScale> found = ScaleFromDistances(targets, sigma_ratio);
   if (!found.ok()) return MakeError(found.error().code, "{}: {}", path, found.error().message);
   for (size_t i = 0; i < targets.size(); ++i) {
@@ -119,6 +120,29 @@ Result<ScaleAnswer> AskDistances(const ScaleQuestion& question) {
   }
   answer.world_from_model = LevelledFrame(PosesOf(question.model), found->scale);
   answer.sigma_ratio = found->sigma_ratio;
+  return answer;
+}
+
+Result<ScaleAnswer> AskDistances(const ScaleQuestion& question) {
+  const std::string path = InputPath(question.capture, question.options.distances);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<KnownDistance> distances,
+                         ReadKnownDistances(path, question.capture));
+  return ScaleByDistances(question, path, distances, question.options.distance_sigma_ratio);
+}
+
+// The error of a stated baseline is the same in all pairs, and so are errors of the places of images that
+// follow each other.
+Result<ScaleAnswer> AskRig(const ScaleQuestion& question) {
+  const std::string path = InputPath(question.capture, question.options.rig_baselines);
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<KnownDistance> pairs, ReadRigBaselines(path, question.capture));
+  const double stated_ratio = question.options.rig_sigma_ratio;
+  CAIRN_ASSIGN_OR_RETURN(ScaleAnswer answer, ScaleByDistances(question, path, pairs, stated_ratio));
+  const auto num_pairs = static_cast<double>(answer.residuals.size());
+  answer.told_by = fmt::format("{} of {} pairs of images", path, num_pairs);
+  answer.sigma_ratio =
+      std::hypot(stated_ratio, answer.sigma_ratio * std::sqrt(std::min(num_pairs, kNumNeighbours)));
+  // Images that are missing are listed as rejects already.
+  answer.warnings.clear();
   return answer;
 }
 
@@ -200,6 +224,7 @@ const std::vector<ScaleSource>& ScaleSources() {
       {"odometry", [](const ScaleQuestion& q) { return std::filesystem::exists(OdometryPath(q.capture)); },
        false, AskOdometry},
       {"gps", [](const ScaleQuestion&) { return true; }, false, AskGps},
+      {"rig", [](const ScaleQuestion& q) { return !q.options.rig_baselines.empty(); }, true, AskRig},
       {"camera_height", [](const ScaleQuestion& q) { return q.options.camera_height_m > 0; }, true,
        AskCameraHeight},
       {"distances", [](const ScaleQuestion& q) { return !q.options.distances.empty(); }, true, AskDistances},
