@@ -207,7 +207,10 @@ TEST_F(FindFrameTest, WhatKnowsTheScaleFarWorseGivesWay) {
   EXPECT_EQ(result_.frame.source, "distances");
   EXPECT_FALSE(result_.frame.anchor);
   EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("the GPS of 60 images knows the scale to 6.0 % only")));
-  options_.distance_sigma_ratio = 0.04;  // less than three times as well
+  options_.distance_sigma_ratio = 0.027;  // over the root of two: 3.1 times as well
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_EQ(result_.frame.source, "distances");
+  options_.distance_sigma_ratio = 0.029;  // 2.9 times
   ASSERT_TRUE(Find("auto").ok());
   EXPECT_EQ(result_.frame.source, "gps");
   ASSERT_TRUE(Find("gps").ok());

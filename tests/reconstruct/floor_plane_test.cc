@@ -17,14 +17,14 @@ using testing::HasSubstr;
 
 constexpr double kHeight = 0.8;
 
-// A robot that drives a loop in a room of 6 x 5 x 2.5, whose camera looks ahead and sees what is within 3.
+// A robot that drives a loop in a room of 6 x 5 x 2.5, whose camera sees what is within `range`.
 //
 //   z |  walls all around                The world is turned by `turned`, as a reconstruction is.
 //     |     o  camera, 0.8 over the floor
 //     |_____________ x
 class Room {
  public:
-  explicit Room(uint64_t seed) : random_(seed) {
+  explicit Room(uint64_t seed, double range = 3) : random_(seed), range_(range) {
     for (int i = 0; i < 60; ++i) {
       const double angle = 2 * std::numbers::pi * i / 60;
       cameras_.emplace_back(3 + 1.5 * std::cos(angle), 2.5 + std::sin(angle),
@@ -72,11 +72,12 @@ class Room {
     SeenPoint point{.position = place + 0.005 * Eigen::Vector3d(random_.Normal(0, 1), random_.Normal(0, 1),
                                                                 random_.Normal(0, 1))};
     for (size_t camera = 0; camera < cameras_.size(); ++camera) {
-      if ((cameras_[camera] - place).norm() < 3) point.cameras.push_back(static_cast<int>(camera));
+      if ((cameras_[camera] - place).norm() < range_) point.cameras.push_back(static_cast<int>(camera));
     }
     if (!point.cameras.empty()) points_.push_back(std::move(point));
   }
   Random random_;
+  double range_;
   std::vector<Eigen::Vector3d> cameras_;
   std::vector<SeenPoint> points_;
 };
@@ -99,10 +100,11 @@ TEST(FindFloor, FindsTheCamerasHeightOverIt) {
 // The plane of a drive is level, though its camera is tilted by 20 degrees; of a drive straight ahead nobody
 // knows.
 TEST(FindFloor, TheDriveIsLevelWhereItTurns) {
-  Room room(2);
+  Room room(2, 4.5);  // what is far is above a camera that takes its tilt for level
   room.AddWalls(2000);
   room.AddLevel(300, 0);
   EXPECT_NEAR(room.Find(14)->height, kHeight, 0.01);
+  EXPECT_EQ(room.Find(14)->num_points, room.Find(0)->num_points);
   const auto tilted = room.Find(20);
   EXPECT_FALSE(tilted.ok());
 }
