@@ -36,10 +36,8 @@ std::string ReportJson(const ReconstructResult& result) {
   report["scale_sigma_ratio"] = result.frame.scale_sigma_ratio;
   report["scales"] = nlohmann::ordered_json::array();
   for (const ScaleFound& scale : result.scales) {
-    report["scales"].push_back({{"source", scale.source},
-                                {"told_by", scale.told_by},
-                                {"span_m", scale.span_m},
-                                {"sigma_ratio", scale.sigma_ratio}});
+    report["scales"].push_back(
+        {{"source", scale.source}, {"span_m", scale.span_m}, {"sigma_ratio", scale.sigma_ratio}});
   }
   report["residuals"] = nlohmann::ordered_json::array();
   for (const AlignmentResidual& residual : result.residuals) {
