@@ -1,5 +1,6 @@
 #include "core/capture/capture_frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -7,10 +8,30 @@
 #include "core/files/file.h"
 
 namespace cairn {
+namespace {
+
+constexpr double kMaxCoordinateM = 1e7;
+
+}  // namespace
 
 Status CheckCaptureFrame(const CaptureFrame& frame) {
   if (frame.unit != "metre" && frame.unit != "arbitrary") {
     return MakeError(ErrorCode::kInvalidArgument, "unit '{}': expected 'metre' or 'arbitrary'", frame.unit);
+  }
+  const bool is_scale_valid = frame.scale_sigma_ratio >= 0 && frame.scale_sigma_ratio < 1 &&
+                              frame.scale_centre.allFinite() &&
+                              frame.scale_centre.cwiseAbs().maxCoeff() < kMaxCoordinateM;
+  if (!is_scale_valid) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "scale known to {} of it about {}, {}, {}: expected a standard deviation in [0, 1) and a "
+        "place within {:g} m",
+        frame.scale_sigma_ratio, frame.scale_centre.x(), frame.scale_centre.y(), frame.scale_centre.z(),
+        kMaxCoordinateM);
+  }
+  if (frame.unit != "metre" && frame.scale_sigma_ratio > 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "a frame of arbitrary unit says how well its scale is known: expected the unit metre");
   }
   if (!frame.anchor) return Ok();
   const GeodeticPosition& a = *frame.anchor;
@@ -36,6 +57,10 @@ std::string CaptureFrameJson(const CaptureFrame& frame) {
     document["anchor"] = {{"latitude_deg", frame.anchor->latitude_deg},
                           {"longitude_deg", frame.anchor->longitude_deg},
                           {"altitude_m", frame.anchor->altitude_m}};
+  }
+  if (frame.scale_sigma_ratio > 0) {
+    document["scale_sigma_ratio"] = frame.scale_sigma_ratio;
+    document["scale_centre"] = {frame.scale_centre.x(), frame.scale_centre.y(), frame.scale_centre.z()};
   }
   return document.dump(2) + "\n";
 }
@@ -63,6 +88,19 @@ Result<CaptureFrame> ReadCaptureFrame(const std::string& path) {
     frame.anchor =
         GeodeticPosition{anchor["latitude_deg"].get<double>(), anchor["longitude_deg"].get<double>(),
                          anchor["altitude_m"].get<double>()};
+  }
+  if (document.contains("scale_sigma_ratio")) {
+    const nlohmann::json centre = document.value("scale_centre", nlohmann::json());
+    const bool is_place =
+        centre.is_array() && centre.size() == 3 &&
+        std::all_of(centre.begin(), centre.end(), [](const auto& x) { return x.is_number(); });
+    if (!has(document, "scale_sigma_ratio", true) || !is_place) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "{}: expected the number 'scale_sigma_ratio' with three numbers in 'scale_centre'",
+                       path);
+    }
+    frame.scale_sigma_ratio = document["scale_sigma_ratio"].get<double>();
+    for (int i = 0; i < 3; ++i) frame.scale_centre[i] = centre[static_cast<size_t>(i)].get<double>();
   }
   if (const Status status = CheckCaptureFrame(frame); !status.ok())
     return MakeError(ErrorCode::kCorrupt, "{}: {}", path, status.error().message);

@@ -133,6 +133,11 @@ Result<CaptureFrame> JoinFrames(const std::vector<CaptureSession>& sessions,
     }
     if (frames[i].source != joined.source) joined.source = "mixed";
     joined.is_reconstructed &= frames[i].is_reconstructed;
+    // The map is as exact as the worst of them.
+    if (frames[i].scale_sigma_ratio > joined.scale_sigma_ratio) {
+      joined.scale_sigma_ratio = frames[i].scale_sigma_ratio;
+      joined.scale_centre = frames[i].scale_centre;
+    }
     if (!frames[i].anchor) continue;
     if (anchored == nullptr) {
       anchored = &sessions[i];

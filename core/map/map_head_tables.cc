@@ -46,6 +46,11 @@ std::map<std::string, std::string> FrameTexts(const CaptureFrame& frame) {
     texts["anchor_longitude_deg"] = fmt::format("{}", frame.anchor->longitude_deg);
     texts["anchor_altitude_m"] = fmt::format("{}", frame.anchor->altitude_m);
   }
+  if (frame.scale_sigma_ratio > 0) {
+    texts["scale_sigma_ratio"] = fmt::format("{}", frame.scale_sigma_ratio);
+    texts["scale_centre"] =
+        fmt::format("{} {} {}", frame.scale_centre.x(), frame.scale_centre.y(), frame.scale_centre.z());
+  }
   return texts;
 }
 
@@ -83,6 +88,18 @@ Status ReadFrame(std::map<std::string, std::string> meta, const std::string& pat
         !ParseNumber(meta["anchor_altitude_m"], &frame->anchor->altitude_m)) {
       return Corrupt(path, "table meta: anchor '{}', '{}', '{}' is not three numbers",
                      meta["anchor_latitude_deg"], meta["anchor_longitude_deg"], meta["anchor_altitude_m"]);
+    }
+  }
+  if (meta.count("scale_sigma_ratio") > 0) {
+    const std::vector<std::string> centre = SplitWords(meta["scale_centre"]);
+    bool are_numbers =
+        ParseNumber(meta["scale_sigma_ratio"], &frame->scale_sigma_ratio) && centre.size() == 3;
+    for (size_t i = 0; are_numbers && i < 3; ++i)
+      are_numbers = ParseNumber(centre[i], &frame->scale_centre[static_cast<Eigen::Index>(i)]);
+    if (!are_numbers) {
+      return Corrupt(path,
+                     "table meta: scale_sigma_ratio '{}' with scale_centre '{}' is not one and three numbers",
+                     meta["scale_sigma_ratio"], meta["scale_centre"]);
     }
   }
   const Status status = CheckCaptureFrame(*frame);

@@ -57,7 +57,7 @@ std::string OptionText(const Recipe& recipe, const std::string& stage_name, cons
 // Files with known places of images, besides the capture's own.
 Result<std::vector<std::string>> KnownPlaces(const Recipe& recipe, const std::string& capture) {
   std::vector<std::string> files;
-  for (const char* name : {"control_points", "distances"}) {
+  for (const char* name : {"control_points", "distances", "rig_baselines"}) {
     const std::string file = OptionText(recipe, "reconstruct", name);
     if (file.empty()) continue;
     if (IsJoined(recipe)) {
@@ -244,7 +244,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("SIMULATED", "", {recipe.simulated ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(config.Set("RECONSTRUCTED", "", {IsReconstructed(recipe) ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(
-      config.Set("KNOWN_PLACES", "[reconstruct] control_points or distances", known_places));
+      config.Set("KNOWN_PLACES", "[reconstruct] control_points, distances or rig_baselines", known_places));
   CAIRN_RETURN_IF_ERROR(config.Set("QUERIES", "the list of queries", {queries}));
   CAIRN_RETURN_IF_ERROR(config.Set("LEFT_OUT", "", {LeavesOut(recipe) ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(config.Set("NAME", "the name", {recipe.name}));

@@ -160,6 +160,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"seed", rows.seed},
                                  {"unit", rows.frame.unit},
                                  {"frame_source", rows.frame.source},
+                                 {"scale_sigma_ratio", rows.frame.scale_sigma_ratio},
                                  {"bytes", num_bytes},
                                  {"num_landmarks", rows.landmarks.size()},
                                  {"landmarks", rows.landmark_choice},
@@ -190,6 +191,10 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
                                  {"num_view_regions", rows.views.parents.size()},
                                  {"num_view_links", rows.views.links.size()}};
   AddVisualMap(file.directory(), rows.visual_map, &json);
+  if (rows.frame.scale_sigma_ratio > 0) {
+    const Eigen::Vector3d& centre = rows.frame.scale_centre;
+    json["scale_centre_m"] = {centre.x(), centre.y(), centre.z()};
+  }
   if (rows.frame.anchor) {
     json["anchor"] = {{"latitude_deg", rows.frame.anchor->latitude_deg},
                       {"longitude_deg", rows.frame.anchor->longitude_deg},

@@ -31,6 +31,7 @@ constexpr double kLeastFromWallM = 0.2;
 constexpr int kMaxNames = 6;
 // Part of the poses within 10 cm and 5 degrees that is good enough.
 constexpr double kManyWithin = 0.8;
+constexpr double kPoorScaleRatio = 0.03;  // standard deviation of a scale that is worth a word
 
 std::vector<std::vector<StationIdx>> Neighbours(const MapRows& rows) {
   std::vector<std::vector<StationIdx>> neighbours(rows.stations.size());
@@ -287,6 +288,14 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
              "degrees of where they were taken. Causes are landmarks far away, few images around, or inexact "
              "poses of the survey; [group_classes] refine_poses = \"always\" improves poses.",
              100 * localized->second, TriedWord(rows), 100 * within->second / localized->second)});
+  }
+  if (rows.frame.scale_sigma_ratio > kPoorScaleRatio) {
+    advice->push_back(
+        {.text = fmt::format(
+             "The map's metres are known to {:.1f} % only ({}): what is 10 m away may be {:.2f} m "
+             "nearer or farther. odometry.txt in the capture, or more and longer known distances "
+             "([reconstruct] distances), give the scale better.",
+             100 * rows.frame.scale_sigma_ratio, rows.frame.source, 10 * rows.frame.scale_sigma_ratio)});
   }
   if (rows.self_test.empty()) {
     advice->push_back({.text = "No images tried the map: queries = \"queries.txt\" in the capture, or "

@@ -388,6 +388,8 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   Json json = {{"name", rows.name},
                {"writer", rows.writer},
                {"unit", rows.frame.unit == "metre" ? "m" : "units"},
+               {"scale_sigma_ratio", rows.frame.scale_sigma_ratio},
+               {"frame_source", rows.frame.source},
                {"sealed", rows.sealed},
                {"algorithm", rows.algorithm},
                {"k", rows.k},

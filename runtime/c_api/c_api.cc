@@ -133,6 +133,8 @@ int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* descript
     said.is_metric = open->head().frame.unit == "metre";
     CopyText(open->head().name, said.name);
     said.epoch = open->head().epoch;
+    said.scale_sigma_ratio = open->head().frame.scale_sigma_ratio;
+    for (int i = 0; i < 3; ++i) said.scale_centre_m[i] = open->head().frame.scale_centre[i];
     Return(said, description);
     return Ok();
   });

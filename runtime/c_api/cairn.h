@@ -115,9 +115,17 @@ typedef struct cairn_map_description {
   int32_t is_metric;      /* 0: nothing gave the survey its scale, and "metres" have an arbitrary length */
   char name[128];         /* as the recipe calls it, cut to fit, always with a NUL */
   uint64_t epoch;         /* counts the signed releases of a map of this name; 0: never counted */
+  /* How well the map's metres are known: standard deviation of its scale, as a part of it (0: poses were
+   * stated), and the place of the world frame that stays where it is when the scale errs.  The covariance of
+   * a fix at C contains that of scale_sigma_ratio (C - scale_centre_m), the same multiple of it in every fix.
+   */
+  double scale_sigma_ratio;
+  double scale_centre_m[3];
 } cairn_map_description;
-#define CAIRN_MAP_DESCRIPTION_INIT \
-  { sizeof(cairn_map_description), 0, 0, 0, 0, 0, {0}, 0 }
+#define CAIRN_MAP_DESCRIPTION_INIT                                 \
+  {                                                                \
+    sizeof(cairn_map_description), 0, 0, 0, 0, 0, {0}, 0, 0, { 0 } \
+  }
 
 /* Intrinsics: COLMAP's models by their numbers, with its parameters in its order (0 SIMPLE_PINHOLE: f, cx,
  * cy; 1 PINHOLE: fx, fy, cx, cy; 2 SIMPLE_RADIAL: f, cx, cy, k; 4 OPENCV: fx, fy, cx, cy, k1, k2, p1, p2;

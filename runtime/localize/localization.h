@@ -51,6 +51,10 @@ struct Localization {
   // Rotation (rad), translation (m); of the left perturbation of cam_from_world: the true pose is
   // (Exp(rotation), translation) * cam_from_world.
   Matrix6d covariance = Matrix6d::Identity();
+  // By how much one standard deviation of the map's scale moves the translation, metres: the outer product is
+  // part of the covariance.  The scale errs once: every fix of the map by the same multiple, so that it does
+  // not average out, and no difference of near fixes shows it.  Zero where poses were stated, or no metres.
+  Eigen::Vector3d scale_sigma_m = Eigen::Vector3d::Zero();
   RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
   Scope scope = Scope::kAll;
 

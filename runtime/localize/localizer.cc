@@ -215,6 +215,11 @@ Result<Localization> Localizer::Answer(const Query& query, const std::optional<P
     const Pose given_from_camera = map_->head().camera_from_given.Inverse();
     localization.cam_from_world = given_from_camera * localization.cam_from_world;
     localization.covariance = TransformCovariance(given_from_camera, localization.covariance);
+    // The camera's place C is scale_centre + (1 + e) (C - scale_centre), and its translation is -R C.
+    const Pose& found = localization.cam_from_world;
+    localization.scale_sigma_m = -(found.rotation * ScaleSigmaAt(map_->head().frame, found.Center()));
+    localization.covariance.bottomRightCorner<3, 3>() +=
+        localization.scale_sigma_m * localization.scale_sigma_m.transpose();
   }
   return localization;
 }

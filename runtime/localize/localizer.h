@@ -58,7 +58,8 @@ class Localizer {
   // `best`: what was found before.
   Result<Localization> LocalizeBetter(const Query& query, const std::optional<PosePrior>& prior,
                                       Localization best) const;
-  // The last step of every fix: look-alikes are excluded, and the pose is put into the given frame.
+  // The last step of every fix: look-alikes are excluded, the pose is put into the given frame, and the
+  // error of the map's scale is added to its covariance.
   Result<Localization> Answer(const Query& query, const std::optional<PosePrior>& prior,
                               Localization localization) const;
   Result<std::vector<Attempt>> MakeAttempts(const Query& query, const std::optional<PosePrior>& prior,

@@ -143,6 +143,10 @@ void BindMap(py::module_& module) {
       .def_property_readonly("num_regions", [](const PyMap& self) { return self.map->num_regions(); })
       .def_property_readonly("is_metric",
                              [](const PyMap& self) { return self.map->head().frame.unit == "metre"; })
+      .def_property_readonly("scale_sigma_ratio",
+                             [](const PyMap& self) { return self.map->head().frame.scale_sigma_ratio; })
+      .def_property_readonly(
+          "scale_centre", [](const PyMap& self) { return VectorArray(self.map->head().frame.scale_centre); })
       .def("__repr__", [](const PyMap& self) {
         return fmt::format("<cairn.Map '{}' of {}: {} landmarks>", self.map->head().name, self.path,
                            self.map->num_landmarks());

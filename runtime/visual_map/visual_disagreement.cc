@@ -32,13 +32,16 @@ FloorFix FloorFixOf(const Localization& localization, const Pose& floor_from_wor
     jacobian.col(i) << (moved.position - at.position) / kStep,
         RadFromDeg(TurnDeg(at.heading_deg, moved.heading_deg)) / kStep;
   }
-  return {at.position, at.heading_deg, jacobian * localization.covariance * jacobian.transpose()};
+  Matrix6d covariance = localization.covariance;
+  covariance.bottomRightCorner<3, 3>() -= localization.scale_sigma_m * localization.scale_sigma_m.transpose();
+  return {at.position, at.heading_deg, jacobian * covariance * jacobian.transpose()};
 }
 
 Disagreement Compare(const FloorFix& fix, const VisualPose& pose) {
   Eigen::Vector3d difference;
   difference << pose.position - fix.position, RadFromDeg(TurnDeg(fix.heading_deg, pose.heading_deg));
-  const Eigen::Matrix3d covariance = fix.covariance + pose.covariance;
+  Eigen::Matrix3d covariance = fix.covariance + pose.covariance;
+  covariance.topLeftCorner<2, 2>() -= pose.scale_sigma_m * pose.scale_sigma_m.transpose();
   return {difference.head<2>().norm(), DegFromRad(std::abs(difference[2])),
           std::sqrt(std::max(0.0, difference.dot(covariance.ldlt().solve(difference))))};
 }

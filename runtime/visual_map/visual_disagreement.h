@@ -12,7 +12,8 @@ namespace cairn {
 struct FloorFix {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();  // floor frame, metres
   double heading_deg = 0;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // x m, y m, heading rad
+  // x m, y m, heading rad; without the error of the map's scale, which estimates by one map share.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 // REQUIRES: localization.has_fix()
 FloorFix FloorFixOf(const Localization& localization, const Pose& floor_from_world);
@@ -21,8 +22,8 @@ FloorFix FloorFixOf(const Localization& localization, const Pose& floor_from_wor
 struct Disagreement {
   double distance_m = 0;
   double angle_deg = 0;
-  // Mahalanobis distance in (x, y, heading) under the sum of both covariances: beyond 4 they contradict
-  // each other.
+  // Mahalanobis distance in (x, y, heading) under the sum of both covariances, without the map's scale:
+  // beyond 4 they contradict each other.
   double mahalanobis = 0;
 };
 Disagreement Compare(const FloorFix& fix, const VisualPose& pose);

@@ -407,8 +407,15 @@ Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<Se
     CAIRN_RETURN_IF_ERROR(CheckVisualInput(map, seen, options));
     CAIRN_RETURN_IF_ERROR(CheckPrior(map, prior));
     CAIRN_ASSIGN_OR_RETURN(const auto loaded, map.With(LandmarksSeen(seen)));
-    return Estimator(*loaded, seen, options, prior).Run();
+    VisualPose pose = Estimator(*loaded, seen, options, prior).Run();
+    AddScaleError(map, &pose);
+    return pose;
   });
+}
+
+void AddScaleError(const VisualMap& map, VisualPose* pose) {
+  pose->scale_sigma_m = map.ScaleSigmaAt(pose->position);
+  pose->covariance.topLeftCorner<2, 2>() += pose->scale_sigma_m * pose->scale_sigma_m.transpose();
 }
 
 Result<LatticePosterior> PosteriorOnLattice(const VisualMap& map, const std::vector<SeenLandmark>& seen,

@@ -84,6 +84,8 @@ struct VisualPose {
   // x m, y m, heading rad: of the maximum, widened by the posterior elsewhere (with a flag: by the
   // whole survey).
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  // As Localization's, on the floor: its outer product is part of the covariance.
+  Eigen::Vector2d scale_sigma_m = Eigen::Vector2d::Zero();
   // Of the whole posterior.
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   double entropy = 0;  // nats, over places and "elsewhere"
@@ -106,6 +108,9 @@ double SharedGrowth(double spread_ratio);
 Result<VisualPose> EstimateVisualPose(const VisualMap& map, const std::vector<SeenLandmark>& seen,
                                       const VisualEstimateOptions& options = {},
                                       const std::vector<double>& prior = {});
+
+// Adds the error of the map's scale at the pose's position to its covariance.
+void AddScaleError(const VisualMap& map, VisualPose* pose);
 
 // p(x | z) over the survey's places as the source has it [Sala06 §VI-C]:
 //   p(x | z) ~ p(z | x) p(x)   with p(x) uniform over the places, and nothing beside them:

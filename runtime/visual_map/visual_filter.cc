@@ -197,6 +197,7 @@ Result<VisualPose> VisualFilter::See(const std::vector<SeenLandmark>& seen) {
   if (pose.flag != VisualFlag::kNone) {
     pose.position = pose.mean;
     pose.covariance.topLeftCorner<2, 2>() = spread;
+    AddScaleError(*map_, &pose);
   }
   return pose;
 }

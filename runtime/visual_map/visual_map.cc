@@ -80,6 +80,8 @@ Result<VisualSurvey> SurveyOf(const Map& map, CameraId camera_id) {
   survey.places = DistinctPlaces(stations);
   const Pose given_from_camera = map.head().camera_from_given.Inverse();
   const Pose& floor_from_world = map.head().floor_from_world;
+  survey.scale_sigma_ratio = map.head().frame.scale_sigma_ratio;
+  survey.scale_centre = (floor_from_world * map.head().frame.scale_centre).head<2>();
   for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kImages); ++ordinal) {
     CAIRN_ASSIGN_OR_RETURN(const auto block, map.Images(ordinal));
     for (const MapImage& image : block->images) {

@@ -49,6 +49,9 @@ struct VisualSurvey {
   std::vector<Eigen::Vector2d> images;  // where each image of the map was taken
   std::vector<double> heights_m;        // and how high; empty: all at the same height
   int width_px = 0, height_px = 0;      // of the images
+  // As CaptureFrame has them (core/capture/capture_frame.h); the centre in the floor frame.
+  double scale_sigma_ratio = 0;
+  Eigen::Vector2d scale_centre = Eigen::Vector2d::Zero();
 };
 
 // Stations closer together than a centimetre are one place.
@@ -105,6 +108,10 @@ class VisualMap {
   int image_width_px() const { return survey_->width_px; }
   int image_height_px() const { return survey_->height_px; }
   Eigen::Vector2d middle_px() const { return {0.5 * survey_->width_px, 0.5 * survey_->height_px}; }
+  // How far a place on the floor moves where the map's scale is one standard deviation too small, metres.
+  Eigen::Vector2d ScaleSigmaAt(const Eigen::Vector2d& position) const {
+    return survey_->scale_sigma_ratio * (position - survey_->scale_centre);
+  }
   // Variance of a model's prediction at a place: that of left-out sights, growing with the distance from
   // its sights.
   Eigen::Vector3d Variance(const Model& model, const Eigen::Vector2d& position) const;

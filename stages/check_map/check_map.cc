@@ -63,6 +63,10 @@ HeldOutResult TryImage(const std::shared_ptr<const Map>& map, const HeldOutImage
     const auto truth_variance = [](double given, double of_survey) {
       return std::pow(given < 0 ? of_survey : given, 2);
     };
+    if (options.truth_has_map_scale) {
+      covariance.bottomRightCorner<3, 3>() -=
+          result.localization.scale_sigma_m * result.localization.scale_sigma_m.transpose();
+    }
     covariance.diagonal().head<3>().array() +=
         truth_variance(RadFromDeg(options.truth_sigma_deg), RadFromDeg(map->head().stated_pose_sigma_deg));
     covariance.diagonal().tail<3>().array() +=
@@ -218,6 +222,11 @@ OptionTable DescribeOptions(CheckMapOptions* o) {
                    .help = "the same of the true rotations, degrees per axis; below 0: that of the survey's "
                            "stated poses",
                    .min = -1});
+  table.push_back({.name = "truth_has_map_scale",
+                   .value = &o->truth_has_map_scale,
+                   .help = "the true poses have the map's own scale, as those of a reconstruction do; false: "
+                           "they are in metres of their own, and the normalised error counts how well the "
+                           "map's scale is known"});
   table.push_back({.name = "plan_must_fit",
                    .value = &o->plan_must_fit,
                    .help = "gate: where the map has a floor plan, its walls must fit the landmarks"});

@@ -51,6 +51,9 @@ struct CheckMapOptions {
   // covariance; below 0: as the survey's stated poses were found to err, for truth of the same source.
   double truth_sigma_m = -1;
   double truth_sigma_deg = -1;
+  // Whether the true poses have the map's own scale, as those that the reconstruction found do: then the
+  // error of its scale is no part of a fix's.
+  bool truth_has_map_scale = true;
   LocalizerOptions localizer;
 };
 OptionTable DescribeOptions(CheckMapOptions* options);

@@ -16,6 +16,7 @@ constexpr double kMaxSigmas = 3;         // beyond this a target is off
 constexpr double kMinSpreadSigmas = 2;   // root mean square of the targets about their centre
 constexpr size_t kMaxHypotheses = 2000;  // from triples
 constexpr size_t kMaxHypothesisTargets = 64;
+constexpr double kMedianChiSquare = 2.366;  // of 3 degrees of freedom
 
 Eigen::Quaterniond LevelRotation(const Eigen::Vector3d& up) {
   return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
@@ -170,6 +171,30 @@ Similarity Refine(const std::vector<PositionTarget>& targets, const Eigen::Vecto
   return refined;
 }
 
+// Fills scale_sigma_ratio and centre.
+void FillScaleSigma(const std::vector<PositionTarget>& targets, Alignment* alignment) {
+  const Similarity& similarity = alignment->world_from_model;
+  std::vector<double> squares;
+  for (const PositionTarget& target : targets) squares.push_back(SquaredSigmas(target, similarity));
+  const double noise = std::max(1.0, Median(squares) / kMedianChiSquare);
+  std::vector<const PositionTarget*> used;
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero(), weights = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < targets.size(); ++i) {
+    if (squares[i] > kMaxSigmas * kMaxSigmas * noise) continue;
+    used.push_back(&targets[i]);
+    const Eigen::Vector3d weight = targets[i].sigma_m.cwiseAbs2().cwiseInverse();
+    weighted += weight.cwiseProduct(similarity * targets[i].model);
+    weights += weight;
+  }
+  alignment->centre = weighted.cwiseQuotient(weights);
+  double information = 0;
+  for (const PositionTarget* target : used) {
+    information +=
+        (similarity * target->model - alignment->centre).cwiseQuotient(target->sigma_m).squaredNorm();
+  }
+  alignment->scale_sigma_ratio = std::sqrt(noise / information);
+}
+
 Status CheckSpread(const std::vector<PositionTarget>& targets) {
   if (targets.size() < 3) {
     return MakeError(ErrorCode::kNoData, "{} images with a known position, expected at least 3",
@@ -207,17 +232,24 @@ Result<Alignment> AlignToPositions(const std::vector<PositionTarget>& targets,
     alignment.residuals_m.push_back((target.world - alignment.world_from_model * target.model).norm());
     alignment.is_off.push_back(SquaredSigmas(target, alignment.world_from_model) > kMaxSigmas * kMaxSigmas);
   }
+  FillScaleSigma(targets, &alignment);
   return alignment;
 }
 
-Result<double> ScaleFromDistances(const std::vector<DistanceTarget>& targets) {
+Result<DistanceScale> ScaleFromDistances(const std::vector<DistanceTarget>& targets,
+                                         double distance_sigma_ratio) {
   std::vector<double> ratios;
   for (const DistanceTarget& target : targets) {
     if (target.model > 0 && target.world_m > 0) ratios.push_back(target.world_m / target.model);
   }
   if (ratios.empty())
     return MakeError(ErrorCode::kNoData, "no known distance between two images that were registered");
-  return Median(ratios);
+  const double scale = Median(ratios);
+  std::vector<double> deviations;
+  for (const double ratio : ratios) deviations.push_back(std::abs(ratio / scale - 1));
+  const double of_one = std::max(distance_sigma_ratio, kSigmaOfMad * Median(deviations));
+  const double of_median = ratios.size() > 2 ? kSigmaOfMedian : 1;  // of two it is the mean
+  return DistanceScale{scale, of_median * of_one / std::sqrt(static_cast<double>(ratios.size()))};
 }
 
 Eigen::Vector3d MeanUp(const std::vector<Pose>& cams_from_model) {
@@ -227,9 +259,13 @@ Eigen::Vector3d MeanUp(const std::vector<Pose>& cams_from_model) {
 }
 
 Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale) {
+  return LevelledFrame(cams_from_model, scale, MeanUp(cams_from_model));
+}
+
+Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale, const Eigen::Vector3d& up) {
   Similarity similarity;
   similarity.scale = scale;
-  const Eigen::Quaterniond level = LevelRotation(MeanUp(cams_from_model));
+  const Eigen::Quaterniond level = LevelRotation(up);
   const Eigen::Vector3d view = level * cams_from_model.front().ViewingDirection();
   const double yaw = view.head<2>().norm() > 1e-6 ? std::atan2(view.y(), view.x()) : 0;
   similarity.rotation = Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * level;

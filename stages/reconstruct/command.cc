@@ -36,7 +36,13 @@ std::string ReportJson(const ReconstructResult& result) {
                                    {"model_sizes", result.model_sizes},
                                    {"num_points", result.num_points},
                                    {"mean_error_px", result.mean_error_px}};
-  if (result.scale_sigma_ratio > 0) report["scale_sigma_ratio"] = result.scale_sigma_ratio;
+  report["scale_from"] = result.frame.source;
+  report["scale_sigma_ratio"] = result.frame.scale_sigma_ratio;
+  report["scales"] = nlohmann::ordered_json::array();
+  for (const ScaleFound& scale : result.scales) {
+    report["scales"].push_back(
+        {{"source", scale.source}, {"span_m", scale.span_m}, {"sigma_ratio", scale.sigma_ratio}});
+  }
   report["residuals"] = nlohmann::ordered_json::array();
   for (const AlignmentResidual& residual : result.residuals) {
     report["residuals"].push_back(
@@ -104,10 +110,12 @@ std::string ResultText(const ReconstructResult& result) {
   if (result.frame.unit == "arbitrary") {
     text += "reconstruct: no scale: the unit is arbitrary\n";
   } else {
-    const std::string sigma =
-        result.scale_sigma_ratio > 0 ? fmt::format(" (+- {:.1f} %)", 100 * result.scale_sigma_ratio) : "";
-    text +=
-        fmt::format("reconstruct: scale from {}{}, {}\n", result.frame.source, sigma, ResidualText(result));
+    text += fmt::format("reconstruct: scale from {} (+- {:.1f} %), {}\n", result.frame.source,
+                        100 * result.frame.scale_sigma_ratio, ResidualText(result));
+    for (const ScaleFound& scale : result.scales) {
+      text += fmt::format("reconstruct: images' places span {:.4g} m (+- {:.1f} %) by {}\n", scale.span_m,
+                          100 * scale.sigma_ratio, scale.told_by);
+    }
   }
   if (result.frame.anchor) {
     text += fmt::format("reconstruct: east, north, up at {:.7f}, {:.7f}, {:.2f} m\n",

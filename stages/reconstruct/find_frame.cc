@@ -1,157 +1,34 @@
 #include "stages/reconstruct/find_frame.h"
 
+#include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Geometry>
 
 #include "stages/reconstruct/align.h"
-#include "stages/reconstruct/known_places.h"
-#include "stages/reconstruct/odometry.h"
+#include "stages/reconstruct/scale_sources.h"
 
 namespace cairn::reconstruct {
 namespace {
 
-constexpr double kNoAltitudeSigmaM = 1e5;  // of an altitude that is not known
-constexpr double kMaxResidualSigmas = 3;
-// Odometry whose pieces spread more, and a scale by GPS that is this far off (logarithm), are worth a
-// warning.
-constexpr double kMaxOdometrySpread = 0.1, kMaxScaleDisagreement = 0.1;
+// Two sources contradict each other from so many standard deviations of their difference on, and one gives
+// way to another that knows the scale so many times as well.
+constexpr double kContradictingSigmas = 3, kMuchBetter = 3;
+// A source that knows the scale less well than this says nothing of it.
+constexpr double kMaxSigmaRatio = 0.5;
 
-std::vector<Pose> PosesOf(const ModelPoses& model) {
-  std::vector<Pose> poses;
-  for (const auto& [name, pose] : model) poses.push_back(pose);
-  return poses;
-}
+struct Answered {
+  const ScaleSource* source = nullptr;
+  ScaleAnswer answer;
+  double span_m = 0;
+};
 
-std::string InputPath(const Capture& capture, const std::string& path) {
-  return (std::filesystem::path(capture.root) / path).lexically_normal().string();
-}
-
-// Aligns to the images' known positions; appends to the residuals.
-Result<Similarity> AlignImages(const ModelPoses& model, const std::map<std::string, PositionTarget>& known,
-                               const ReconstructOptions& options, ReconstructResult* result) {
-  std::vector<std::string> names;
-  std::vector<PositionTarget> targets;
-  for (const auto& [name, target] : known) {
-    const auto pose = model.find(name);
-    if (pose == model.end()) continue;
-    names.push_back(name);
-    targets.push_back(target);
-    targets.back().model = pose->second.Center();
-  }
-  CAIRN_ASSIGN_OR_RETURN(const Alignment alignment,
-                         AlignToPositions(targets, MeanUp(PosesOf(model)), options.up_sigma_deg));
-  for (size_t i = 0; i < names.size(); ++i)
-    result->residuals.push_back({names[i], alignment.residuals_m[i], alignment.is_off[i]});
-  return alignment.world_from_model;
-}
-
-Result<Similarity> AlignToGps(const ModelPoses& model, const Capture& capture,
-                              const ReconstructOptions& options, ReconstructResult* result) {
-  const std::map<std::string, ExifTags> tags = ReadGpsTags(capture);
-  if (tags.empty()) return MakeError(ErrorCode::kNoData, "no image has a GPS position in its EXIF block");
-  const GeodeticPosition anchor = MedianPosition(tags);
-  std::map<std::string, PositionTarget> known;
-  for (const auto& [name, exif] : tags) {
-    const double altitude_sigma_m = exif.has_altitude ? options.gps_altitude_sigma_m : kNoAltitudeSigmaM;
-    GeodeticPosition position = *exif.gps;
-    if (!exif.has_altitude) position.altitude_m = anchor.altitude_m;
-    known[name] = {.world = EnuFromGeodetic(anchor, position),
-                   .sigma_m = {options.gps_sigma_m, options.gps_sigma_m, altitude_sigma_m}};
-  }
-  CAIRN_ASSIGN_OR_RETURN(const Similarity similarity, AlignImages(model, known, options, result));
-  result->frame.source = "gps";
-  result->frame.anchor = anchor;
-  return similarity;
-}
-
-Result<Similarity> AlignToControlPoints(const ModelPoses& model, const Capture& capture,
-                                        const ReconstructOptions& options, ReconstructResult* result) {
-  const std::string path = InputPath(capture, options.control_points);
-  CAIRN_ASSIGN_OR_RETURN(const auto points, ReadControlPoints(path, capture));
-  std::map<std::string, PositionTarget> known;
-  for (const auto& [name, point] : points) {
-    known[name] = {.world = point, .sigma_m = Eigen::Vector3d::Constant(options.control_point_sigma_m)};
-    if (model.count(name) == 0)
-      result->warnings.push_back(fmt::format("{}: image {} was not registered", path, name));
-  }
-  result->frame.source = "control_points";
-  Result<Similarity> similarity = AlignImages(model, known, options, result);
-  if (similarity.ok()) return similarity;
-  return MakeError(similarity.error().code, "{}: of the registered images: {}", path,
-                   similarity.error().message);
-}
-
-Result<Similarity> ScaleByDistances(const ModelPoses& model, const Capture& capture,
-                                    const ReconstructOptions& options, ReconstructResult* result) {
-  const std::string path = InputPath(capture, options.distances);
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<KnownDistance> distances, ReadKnownDistances(path, capture));
-  std::vector<DistanceTarget> targets;
-  std::vector<std::string> names;
-  for (const KnownDistance& known : distances) {
-    const auto pose1 = model.find(known.name1), pose2 = model.find(known.name2);
-    if (pose1 == model.end() || pose2 == model.end()) {
-      result->warnings.push_back(fmt::format("{}: image {} was not registered", path,
-                                             pose1 == model.end() ? known.name1 : known.name2));
-      continue;
-    }
-    targets.push_back({CenterErrorM(pose1->second, pose2->second), known.distance_m});
-    names.push_back(known.name1 + " " + known.name2);
-  }
-  const Result<double> scale = ScaleFromDistances(targets);
-  if (!scale.ok()) return MakeError(scale.error().code, "{}: {}", path, scale.error().message);
-  for (size_t i = 0; i < targets.size(); ++i) {
-    const double residual_m = std::abs(*scale * targets[i].model - targets[i].world_m);
-    const double sigma_m = options.distance_sigma_ratio * targets[i].world_m;
-    result->residuals.push_back({names[i], residual_m, residual_m > kMaxResidualSigmas * sigma_m});
-  }
-  result->frame.source = "distances";
-  return LevelledFrame(PosesOf(model), *scale);
-}
-
-Result<Similarity> AlignByOdometry(const ModelPoses& model, const Capture& capture,
-                                   ReconstructResult* result) {
-  const std::string path = capture.root + "/" + kOdometryFile;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<OdometryPose> odometry, ReadOdometry(path, capture));
-  const Result<OdometryAlignment> alignment = AlignToOdometry(odometry, model);
-  if (!alignment.ok()) return MakeError(alignment.error().code, "{}: {}", path, alignment.error().message);
-  const double scale = alignment->world_from_model.scale;
-  size_t num_off = 0;
-  for (const OdometryWindow& window : alignment->windows) {
-    result->residuals.push_back({window.first + " " + window.last,
-                                 std::abs(scale * window.model - window.odometry_m), window.is_off});
-    num_off += window.is_off ? 1 : 0;
-  }
-  if (alignment->spread_ratio > kMaxOdometrySpread || 4 * num_off > alignment->windows.size()) {
-    result->warnings.push_back(
-        fmt::format("{}: on pieces of the way the odometry and the images disagree by {:.0f} %, on {} "
-                    "of {} by far more: wheels that slip, another unit, or images in the wrong places; the "
-                    "scale is as doubtful",
-                    path, 100 * alignment->spread_ratio, num_off, alignment->windows.size()));
-  }
-  result->frame.source = "odometry";
-  result->scale_sigma_ratio = alignment->scale_sigma_ratio;
-  return alignment->world_from_model;
-}
-
-// Whether GPS, where images have it, says another scale than the one found.
-void CompareWithGps(const ModelPoses& model, const Capture& capture, const ReconstructOptions& options,
-                    double scale, ReconstructResult* result) {
-  ReconstructResult by_gps;
-  const Result<Similarity> similarity = AlignToGps(model, capture, options, &by_gps);
-  if (!similarity.ok()) return;
-  const double ratio = similarity->scale / scale;
-  if (std::abs(std::log(ratio)) < kMaxScaleDisagreement) {
-    result->warnings.push_back(
-        fmt::format("{}: the images' GPS agrees with the odometry's scale to {:.1f} %; scale_from = \"gps\" "
-                    "makes the map's "
-                    "frame east, north, up",
-                    capture.root, 100 * std::abs(ratio - 1)));
-    return;
-  }
-  result->warnings.push_back(
-      fmt::format("{}: by the images' GPS everything is {:.2f} times as large as by the odometry, which is "
-                  "taken; scale_from = \"gps\" takes the other",
-                  capture.root, ratio));
+double SpanOf(const ModelPoses& model) {
+  Eigen::AlignedBox3d box;
+  for (const auto& [name, pose] : model) box.extend(pose.Center());
+  return box.diagonal().norm();
 }
 
 Similarity WithoutScale(const ModelPoses& model, const ReconstructOptions& options,
@@ -163,41 +40,117 @@ Similarity WithoutScale(const ModelPoses& model, const ReconstructOptions& optio
   return LevelledFrame(poses, step > 0 ? options.unscaled_step / step : 1);
 }
 
+Result<ScaleAnswer> Ask(const ScaleSource& source, const ScaleQuestion& question) {
+  Result<ScaleAnswer> answer = source.ask(question);
+  if (!answer.ok() || answer->sigma_ratio < kMaxSigmaRatio) return answer;
+  return MakeError(ErrorCode::kNoData, "{}: it knows the scale to {:.0f} % only, which is no scale",
+                   answer->told_by, 100 * answer->sigma_ratio);
+}
+
+// The one to take by scale_from = "auto".  REQUIRES: not empty
+size_t MostTrusted(const Capture& capture, const std::vector<Answered>& answered,
+                   std::vector<std::string>* warnings) {
+  size_t taken = 0;
+  if (answered[0].source->name == std::string("control_points")) return taken;
+  for (size_t i = 1; i < answered.size(); ++i) {
+    if (kMuchBetter * answered[i].answer.sigma_ratio < answered[taken].answer.sigma_ratio) taken = i;
+  }
+  if (taken > 0) {
+    const ScaleAnswer &first = answered[0].answer, &better = answered[taken].answer;
+    warnings->push_back(
+        fmt::format("{}: {} knows the scale to {:.1f} % only, {} to {:.1f} %: this is taken; scale_from = "
+                    "\"{}\" takes the "
+                    "first, and its frame",
+                    capture.root, first.told_by, 100 * first.sigma_ratio, better.told_by,
+                    100 * better.sigma_ratio, answered[0].source->name));
+  }
+  return taken;
+}
+
+// Warns of each two that contradict each other.
+void ComparePairs(const Capture& capture, const std::vector<Answered>& answered, size_t taken,
+                  std::vector<std::string>* warnings) {
+  for (size_t i = 0; i < answered.size(); ++i) {
+    for (size_t j = i + 1; j < answered.size(); ++j) {
+      const Answered &a = answered[i], &b = answered[j];
+      const double sigmas =
+          std::abs(std::log(b.answer.world_from_model.scale / a.answer.world_from_model.scale)) /
+          std::hypot(a.answer.sigma_ratio, b.answer.sigma_ratio);
+      if (sigmas <= kContradictingSigmas) continue;
+      warnings->push_back(
+          fmt::format("{}: two sources contradict each other on the scale by {:.0f} standard deviations: the "
+                      "images' places "
+                      "span {:.4g} m (+- {:.1f} %) by {}, {:.4g} m (+- {:.1f} %) by {}; the scale is that of "
+                      "{}.  Check the "
+                      "units and the files; scale_from = \"{}\" or \"{}\" chooses one",
+                      capture.root, sigmas, a.span_m, 100 * a.answer.sigma_ratio, a.answer.told_by, b.span_m,
+                      100 * b.answer.sigma_ratio, b.answer.told_by, answered[taken].answer.told_by,
+                      a.source->name, b.source->name));
+    }
+  }
+}
+
+// Six digits, and millimetres, are more than is known.
+CaptureFrame FrameOf(const Answered& taken) {
+  CaptureFrame frame{.anchor = taken.answer.anchor, .source = taken.source->name};
+  frame.scale_sigma_ratio = std::max(1e-6, std::round(1e6 * taken.answer.sigma_ratio) / 1e6);
+  for (int i = 0; i < 3; ++i) frame.scale_centre[i] = std::round(1e3 * taken.answer.centre[i]) / 1e3;
+  return frame;
+}
+
 }  // namespace
 
-Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
+Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& capture,
                              const ReconstructOptions& options, ReconstructResult* result) {
+  ModelPoses model;
+  for (const ModelImage& image : reconstruction.images) model.emplace(image.name, image.cam_from_world);
   const std::string& from = options.scale_from;
-  if (from == "control_points" || (from == "auto" && !options.control_points.empty()))
-    return AlignToControlPoints(model, capture, options, result);
-  if (from == "distances" || (from == "auto" && !options.distances.empty()))
-    return ScaleByDistances(model, capture, options, result);
   if (from == "none") return WithoutScale(model, options, result);
-  const bool has_odometry = std::filesystem::exists(capture.root + "/" + kOdometryFile);
-  if (from == "odometry" || (from == "auto" && has_odometry)) {
-    const Result<Similarity> by_odometry = AlignByOdometry(model, capture, result);
-    if (by_odometry.ok()) {
-      CompareWithGps(model, capture, options, by_odometry->scale, result);
-      return by_odometry;
+  const ScaleQuestion question{reconstruction, model, capture, options};
+  std::vector<Answered> answered;
+  std::optional<Error> refusal;  // of a source that the recipe names
+  std::string nothing;
+  for (const ScaleSource& source : ScaleSources()) {
+    const bool is_asked_for = from == source.name;
+    if (!is_asked_for && !source.is_there(question)) continue;
+    Result<ScaleAnswer> answer = Ask(source, question);
+    if (answer.ok()) {
+      const double span_m = answer->world_from_model.scale * SpanOf(model);
+      answered.push_back({&source, *std::move(answer), span_m});
+      continue;
     }
+    const Error& error = answer.error();
+    if (is_asked_for) return MakeError(error.code, "scale_from = {}: {}", source.name, error.message);
     // What cannot be read is an error; what says nothing leaves the question to others.
-    if (from == "odometry") {
-      return MakeError(by_odometry.error().code, "scale_from = odometry: {}", by_odometry.error().message);
-    }
-    if (by_odometry.error().code != ErrorCode::kNoData) return by_odometry;
-    result->warnings.push_back(by_odometry.error().message);
+    if (error.code != ErrorCode::kNoData) return error;
+    if (source.is_named && !refusal) refusal = error;
+    nothing += (nothing.empty() ? "" : "; ") + error.message;
+    if (source.name != std::string("gps")) result->warnings.push_back(error.message);
   }
-  Result<Similarity> similarity = AlignToGps(model, capture, options, result);
-  if (similarity.ok()) return similarity;
-  if (from == "gps") {
-    return MakeError(similarity.error().code, "{}: scale_from = gps: {}", capture.root,
-                     similarity.error().message);
+  if (answered.empty()) {
+    if (refusal) return *refusal;
+    result->warnings.push_back(fmt::format(
+        "nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, control_points, "
+        "camera_height_m or distances for metres",
+        nothing));
+    return WithoutScale(model, options, result);
   }
-  result->warnings.push_back(fmt::format(
-      "{}: nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, control_points or "
-      "distances for metres",
-      capture.root, similarity.error().message));
-  return WithoutScale(model, options, result);
+  size_t taken = 0;
+  if (from == "auto") {
+    taken = MostTrusted(capture, answered, &result->warnings);
+  } else {
+    while (answered[taken].source->name != from) ++taken;
+  }
+  ComparePairs(capture, answered, taken, &result->warnings);
+  for (const Answered& one : answered) {
+    result->warnings.insert(result->warnings.end(), one.answer.warnings.begin(), one.answer.warnings.end());
+    result->scales.push_back({one.source->name, one.answer.told_by, one.span_m, one.answer.sigma_ratio});
+  }
+  const bool is_reconstructed = result->frame.is_reconstructed;
+  result->frame = FrameOf(answered[taken]);
+  result->frame.is_reconstructed = is_reconstructed;
+  result->residuals = std::move(answered[taken].answer.residuals);
+  return answered[taken].answer.world_from_model;
 }
 
 }  // namespace cairn::reconstruct

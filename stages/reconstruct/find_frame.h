@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/capture/capture.h"
+#include "core/colmap/colmap_model.h"
 #include "core/geometry/similarity.h"
 #include "stages/reconstruct/reconstruct.h"
 
@@ -13,11 +14,16 @@ namespace cairn::reconstruct {
 // The poses of a model, cam_from_model by image name.
 using ModelPoses = std::map<std::string, Pose>;
 
-// Where scale and axes of a model come from, and what they are (options.scale_from): world_from_model.  Fills
-// frame, residuals, scale_sigma_ratio and warnings of the result; where two sources know the scale, it says
-// whether they agree.  Errors: NoData (what is asked for is not there, or does not determine it); those of
-// the files.
-Result<Similarity> FindFrame(const ModelPoses& model, const Capture& capture,
+// Where scale and axes of a model come from, and what they are: world_from_model.  All sources that are there
+// are asked (scale_sources.h), most trusted first:
+//   control_points, odometry, gps, rig, camera_height, distances.
+// By scale_from = "auto" the first of them that says something is taken, unless a later one knows the scale
+// three times as well (as after pictures of a garden whose GPS errs by metres); control points never give
+// way. The scale's standard deviation is the taken one's.  Each two that contradict each other, by more than
+// three standard deviations, are a warning.  Fills frame, residuals, scales and warnings of the result.
+// Errors: NoData (what is asked for is not there, or does not determine it); those of the files, of sources
+// that are not taken too.
+Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& capture,
                              const ReconstructOptions& options, ReconstructResult* result);
 
 }  // namespace cairn::reconstruct

@@ -78,6 +78,38 @@ Result<std::vector<KnownDistance>> ReadKnownDistances(const std::string& path, c
   return distances;
 }
 
+Result<std::vector<KnownDistance>> ReadRigBaselines(const std::string& path, const Capture& capture) {
+  const std::set<std::string> names = NamesOf(capture);
+  std::vector<KnownDistance> distances;
+  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& words) -> Status {
+    double distance_m = 0;
+    if (words.size() != 3 || !ParseNumber(words[2], &distance_m) || !std::isfinite(distance_m) ||
+        distance_m <= 0 || words[0] == words[1]) {
+      return MakeError(ErrorCode::kCorrupt,
+                       "expected FOLDER1 FOLDER2 METRES, two folders and more than 0 metres");
+    }
+    const std::string first = words[0] + "/", second = words[1] + "/";
+    for (const std::string& folder : {first, second}) {
+      const auto image = names.lower_bound(folder);
+      if (image == names.end() || !image->starts_with(folder))
+        return MakeError(ErrorCode::kCorrupt, "the capture has no image below '{}'", folder);
+    }
+    const size_t num_before = distances.size();
+    for (auto image = names.lower_bound(first); image != names.end() && image->starts_with(first); ++image) {
+      const std::string other = second + image->substr(first.size());
+      if (names.contains(other)) distances.push_back({*image, other, distance_m});
+    }
+    if (distances.size() > num_before) return Ok();
+    return MakeError(
+        ErrorCode::kCorrupt,
+        "no image below '{}' has the name of one below '{}': images that were taken at once must have "
+        "the same name in both",
+        first, second);
+  }));
+  if (distances.empty()) return MakeError(ErrorCode::kNoData, "{}: no line FOLDER1 FOLDER2 METRES", path);
+  return distances;
+}
+
 Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::string& path,
                                                                  const Capture& capture) {
   const std::set<std::string> names = NamesOf(capture);

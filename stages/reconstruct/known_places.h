@@ -28,6 +28,11 @@ struct KnownDistance {
 // not positive).
 Result<std::vector<KnownDistance>> ReadKnownDistances(const std::string& path, const Capture& capture);
 
+// "FOLDER1 FOLDER2 METRES" a line: how far two cameras of a rig are apart.  Their images of the same name
+// below the two folders were taken at once.  The distances of all such pairs, in the order of names.  Errors
+// as above; Corrupt too for a folder without an image and for two without images of the same name.
+Result<std::vector<KnownDistance>> ReadRigBaselines(const std::string& path, const Capture& capture);
+
 // "IMAGE X Y Z" a line, metres: the position of the camera of an image in a frame of the user's choice, z up
 // (the form of COLMAP's model_aligner).  Errors as above; an image listed twice is Corrupt.
 Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::string& path,

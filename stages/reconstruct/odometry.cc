@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/quantiles.h"
+#include "stages/reconstruct/align.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -15,7 +16,6 @@ constexpr double kMinStepsOfWindow = 5;
 // A window that ends nearer to its beginning than this part of its way says little of the scale.
 constexpr double kMinChordRatio = 0.3;
 constexpr double kSigmasOff = 3, kMinSpreadRatio = 0.005;
-constexpr double kSigmaOfMad = 1.4826;  // of a normal distribution
 
 // An image that is in the odometry and in the model.
 struct Place {
@@ -124,8 +124,9 @@ Result<OdometryAlignment> AlignToOdometry(const std::vector<OdometryPose>& odome
   Similarity& similarity = alignment.world_from_model;
   similarity.scale = FitScale(&alignment);
   similarity.rotation = FitRotation(places);
+  alignment.first = places.front().InOdometry();
   similarity.translation =
-      places.front().InOdometry() - similarity.scale * (similarity.rotation * places.front().InModel());
+      alignment.first - similarity.scale * (similarity.rotation * places.front().InModel());
   return alignment;
 }
 

@@ -24,6 +24,8 @@ struct OdometryWindow {
 
 struct OdometryAlignment {
   Similarity world_from_model;
+  Eigen::Vector3d first =
+      Eigen::Vector3d::Zero();   // where the first image is: it stays there, whatever the scale
   double scale_sigma_ratio = 0;  // standard deviation of the scale, as a part of it
   double spread_ratio = 0;       // of single windows about it
   std::vector<OdometryWindow> windows;

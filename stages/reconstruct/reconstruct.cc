@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <tuple>
 
 #include "core/base/text.h"
 #include "core/files/write_error.h"
@@ -244,16 +245,20 @@ Verdict JudgeModels(const std::vector<ColmapModel>& models, const Similarity& wo
 Status CheckReconstructOptions(const ReconstructOptions& options) {
   ReconstructOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  for (const auto& [scale_from, file] :
-       {std::pair("control_points", options.control_points), std::pair("distances", options.distances)}) {
-    if (options.scale_from == scale_from && file.empty()) {
-      return MakeError(ErrorCode::kInvalidArgument, "scale_from = {0}, but no file {0} is given", scale_from);
+  for (const auto& [scale_from, key, file] :
+       {std::tuple("control_points", "control_points", &options.control_points),
+        std::tuple("distances", "distances", &options.distances),
+        std::tuple("rig", "rig_baselines", &options.rig_baselines)}) {
+    if (options.scale_from == scale_from && file->empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "scale_from = {}, but no file {} is given", scale_from,
+                       key);
     }
   }
-  if (options.scale_from == "auto" && !options.control_points.empty() && !options.distances.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "control_points and distances are both given, but only one can give the scale; choose "
-                     "one with scale_from, and leave the other out");
+  if (options.scale_from == "camera_height" && options.camera_height_m == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "scale_from = camera_height, but no camera_height_m is given: how high the camera is over "
+        "the floor, metres");
   }
   if (options.hold_out_every == 1)
     return MakeError(ErrorCode::kInvalidArgument, "hold_out_every = 1 leaves nothing to compile");
@@ -290,9 +295,12 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .max = 1},
       {.name = "scale_from",
        .value = &o->scale_from,
-       .help = "where scale and axes come from; auto: control_points or distances where given, else the "
-               "capture's odometry.txt, else GPS, else none",
-       .choices = {"auto", "odometry", "gps", "control_points", "distances", "none"}},
+       .help =
+           "where scale and axes come from; auto: the first that is there of control_points, the capture's "
+           "odometry.txt, GPS, rig_baselines, camera_height_m and distances, or one after it that knows the "
+           "scale three "
+           "times as well",
+       .choices = {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances", "none"}},
       {.name = "control_points",
        .value = &o->control_points,
        .help =
@@ -302,6 +310,15 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->distances,
        .help = "file of known distances between cameras, IMAGE1 IMAGE2 METRES a line; absolute or relative "
                "to the capture"},
+      {.name = "rig_baselines",
+       .value = &o->rig_baselines,
+       .help =
+           "file of how far cameras of a rig are apart, FOLDER1 FOLDER2 METRES a line; their images of one "
+           "name below the two folders were taken at once; absolute or relative to the capture"},
+      {.name = "rig_sigma_ratio",
+       .value = &o->rig_sigma_ratio,
+       .help = "standard deviation of a stated baseline over its length",
+       .min = 1e-6},
       {.name = "gps_sigma_m",
        .value = &o->gps_sigma_m,
        .help = "standard deviation of GPS positions per level axis, metres",
@@ -318,6 +335,18 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->distance_sigma_ratio,
        .help = "standard deviation of a known distance over its length",
        .min = 1e-6},
+      {.name = "odometry_sigma_ratio",
+       .value = &o->odometry_sigma_ratio,
+       .help = "standard deviation of what all of the odometry shares over its length: a wheel's radius",
+       .min = 1e-6},
+      {.name = "camera_height_m",
+       .value = &o->camera_height_m,
+       .help = "how high the camera is over a flat floor, wherever it drives, metres; 0: not known",
+       .min = 0},
+      {.name = "camera_height_sigma_m",
+       .value = &o->camera_height_sigma_m,
+       .help = "standard deviation of camera_height_m, metres",
+       .min = 1e-6},
       {.name = "up_sigma_deg",
        .value = &o->up_sigma_deg,
        .help = "standard deviation of the cameras' mean up against the vertical, degrees",
@@ -332,10 +361,13 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .help = "one in this many registered images is kept out of the map, as a query; 0: none",
        .min = 0},
   };
-  AddCondition({"scale_from", {"auto", "control_points"}}, {"control_points", "control_point_sigma_m"},
-               &table);
-  AddCondition({"scale_from", {"auto", "distances"}}, {"distances", "distance_sigma_ratio"}, &table);
-  AddCondition({"scale_from", {"auto", "gps"}}, {"gps_sigma_m", "gps_altitude_sigma_m"}, &table);
+  // What does not give the scale is compared with what does.
+  AddCondition(
+      {"scale_from", {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances"}},
+      {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
+       "gps_altitude_sigma_m", "rig_baselines", "rig_sigma_ratio", "camera_height_m", "camera_height_sigma_m",
+       "distances", "distance_sigma_ratio"},
+      &table);
   AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
   return table;
 }
@@ -355,9 +387,7 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
     result.mean_error_px += point.error_px / static_cast<double>(model.points.size());
   CollectRejects(input, models, &result);
   CAIRN_RETURN_IF_ERROR(CheckRegistered(input, models, options, &result));
-  ModelPoses poses;
-  for (const ModelImage& image : model.images) poses.emplace(image.name, image.cam_from_world);
-  CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(poses, capture, options, &result));
+  CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(model, capture, options, &result));
   CollectImages(model, world_from_model, options.hold_out_every, &result);
   result.verdict = JudgeModels(models, world_from_model, result);
   return result;

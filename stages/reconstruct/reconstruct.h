@@ -25,20 +25,28 @@ struct ReconstructOptions {
   // Smallest part of the capture's images that the largest model must have; with fewer there is no
   // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
-  // Where scale and axes come from: "odometry" (the capture's odometry.txt), "gps" (EXIF), "control_points",
-  // "distances", or "none"; "auto": the control points if their file is given, else the distances if theirs
-  // is, else odometry if it is there, else GPS where at least three images have it and are far enough apart,
-  // else none.
+  // Where scale and axes come from: "control_points", "odometry" (the capture's odometry.txt), "gps" (EXIF),
+  // "rig", "camera_height", "distances", or "none"; "auto": the first of these that is there and says
+  // something (find_frame.h).
   std::string scale_from = "auto";
   // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
   std::string distances;
+  std::string rig_baselines;
   // Standard deviations: of a GPS position, level and in altitude; of a control point; of a known distance,
-  // over its length; of the cameras' mean up against the vertical, degrees.  REQUIRES: > 0
+  // over its length; of all that odometry says, over its length (a wheel's radius, which no image shows); of
+  // the cameras' mean up against the vertical, degrees.  REQUIRES: > 0
   double gps_sigma_m = 5;
   double gps_altitude_sigma_m = 10;
   double control_point_sigma_m = 0.05;
   double distance_sigma_ratio = 0.02;
+  double odometry_sigma_ratio = 0.01;
+  // The same of a stated baseline of a rig, which all its pairs of images share.  REQUIRES: > 0
+  double rig_sigma_ratio = 0.01;
+  // How high the camera is over a flat floor that it sees, all the way (floor_plane.h), and the standard
+  // deviation of that; 0: not known.  REQUIRES: >= 0; > 0
+  double camera_height_m = 0;
+  double camera_height_sigma_m = 0.02;
   double up_sigma_deg = 5;
   // Where nothing gives a scale: median distance of an image to the nearest other, in the map's unit, so that
   // lengths in options of later stages are meaningful.  REQUIRES: > 0
@@ -56,14 +64,22 @@ struct AlignmentResidual {
   bool is_off = false;  // by more than three standard deviations: it had little weight
 };
 
+// What one source says of the scale.
+struct ScaleFound {
+  std::string source;      // as scale_from has it
+  std::string told_by;     // in words: a file, the GPS of so many images
+  double span_m = 0;       // how far the cameras' places reach, by it: the diagonal of their box
+  double sigma_ratio = 0;  // its standard deviation, as a part of it
+};
+
 struct ReconstructResult {
   std::map<CameraId, Camera> cameras;  // as the mapper refined them
   std::vector<CaptureImage> images;    // ascending by name; poses in `frame`
   std::vector<CaptureImage> queries;   // held out, likewise
   CaptureFrame frame;
   std::vector<AlignmentResidual> residuals;
-  double scale_sigma_ratio = 0;  // standard deviation of the scale, as a part of it; 0: not known
-  std::vector<Reject> rejects;   // images that are in neither list, and why
+  std::vector<ScaleFound> scales;  // all that know one, most trusted first; frame.source names the one taken
+  std::vector<Reject> rejects;     // images that are in neither list, and why
   std::vector<std::string> warnings;
   std::vector<int> model_sizes;  // images of each model, the kept one first
   int num_points = 0;            // of the model kept

@@ -97,6 +97,9 @@ TEST_F(ReconstructLine, ImagesWithoutPosesBecomeAMapInTheFrameOfTheControlPoints
   const auto json = nlohmann::json::parse(inspect.out);
   EXPECT_EQ(json["unit"], "metre");
   EXPECT_EQ(json["frame_source"], "control_points");
+  EXPECT_GT(json["scale_sigma_ratio"].get<double>(), 0.001);  // four points, 5 cm each
+  EXPECT_LT(json["scale_sigma_ratio"].get<double>(), 0.1);
+  ASSERT_EQ(json["scale_centre_m"].size(), 3u);
   EXPECT_GT(json["num_landmarks"].get<int>(), 100);
   EXPECT_EQ(json["num_images"].get<size_t>(), poses->images.size()) << "held-out images are not in the map";
   EXPECT_TRUE(json["stage_options"].contains("reconstruct"));

@@ -48,6 +48,7 @@ const std::map<std::string, std::vector<std::string>> kGiven = {
     {"extract_features.masks", {"\"../masks\""}},
     {"reconstruct.control_points", {"\"../control_points.txt\""}},
     {"reconstruct.distances", {"\"../distances.txt\""}},
+    {"reconstruct.rig_baselines", {"\"../rig.txt\""}},
     {"reconstruct.hold_out_every", {"4"}},
     {"filter_visibility.up", {"\"0,0,1\""}},
     {"build_vocabulary.tree_from", {"\"words.db\""}},

@@ -226,6 +226,10 @@ TEST_F(CApi, ShorterStructsOfEarlierReleasesAreEnough) {
   ASSERT_EQ(cairn_map_describe(open, &description), CAIRN_OK) << cairn_last_error();
   EXPECT_STREQ(description.name, "poster");
   EXPECT_EQ(description.epoch, UINT64_MAX);  // nor written
+  description.size = sizeof(description);
+  ASSERT_EQ(cairn_map_describe(open, &description), CAIRN_OK) << cairn_last_error();
+  EXPECT_EQ(description.scale_sigma_ratio, 0);  // its poses were stated
+  EXPECT_EQ(description.scale_centre_m[2], 0);
   description.size = offsetof(cairn_map_description, epoch) - 1;
   EXPECT_EQ(cairn_map_describe(open, &description), CAIRN_INVALID_ARGUMENT);
   EXPECT_EQ(cairn_map_close(open), CAIRN_OK);

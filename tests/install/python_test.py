@@ -414,6 +414,8 @@ class Facts(Poster):
         self.assertEqual(self.map.num_images, 3)
         self.assertGreater(self.map.num_landmarks, 50)
         self.assertTrue(self.map.is_metric)
+        self.assertEqual(self.map.scale_sigma_ratio, 0)
+        self.assertEqual(self.map.scale_centre.tolist(), [0, 0, 0])
         camera = self.map.camera_for_size(320, 240)
         self.assertEqual(repr(camera), "cairn.Camera('SIMPLE_PINHOLE', 320, 240, [280, 160, 120])")
         self.assertEqual(eval(repr(camera)).params, [280, 160, 120])

@@ -109,11 +109,54 @@ TEST(TransformPose, KeepsWhatTheCameraSees) {
   EXPECT_LT((cam_from_world.Center() - kTruth * cam_from_model.Center()).norm(), 1e-9);
 }
 
+// Many times the same place with other errors: the scales found spread as the standard deviation says.
+TEST(AlignToPositions, SaysHowWellItKnowsTheScale) {
+  Random random(6);
+  for (const double announced : {1.0, 0.5}) {  // of the errors' standard deviation
+    double sum = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      std::vector<Eigen::Vector3d> places;
+      for (int i = 0; i < 30; ++i)
+        places.emplace_back(random.Uniform(0, 60), random.Uniform(0, 40), random.Uniform(0, 2));
+      std::vector<PositionTarget> targets = TargetsAt(places, 2 * announced);
+      for (PositionTarget& target : targets) {
+        target.sigma_m.z() = 6 * announced;
+        target.world += Eigen::Vector3d(random.Normal(0, 2), random.Normal(0, 2), random.Normal(0, 6));
+      }
+      const auto alignment = AlignToPositions(targets, TrueUp(), 5);
+      ASSERT_TRUE(alignment.ok());
+      sum += std::pow(
+          std::log(alignment->world_from_model.scale / kTruth.scale) / alignment->scale_sigma_ratio, 2);
+    }
+    EXPECT_GT(std::sqrt(sum / 300), 0.8) << announced;
+    // The loss hardly counts targets that err more than was said, and is as much less exact.
+    EXPECT_LT(std::sqrt(sum / 300), announced < 1 ? 1.6 : 1.25);
+  }
+}
+
+TEST(AlignToPositions, TheScaleErrsAboutTheMiddleOfWhatIsKnown) {
+  std::vector<PositionTarget> targets = TargetsAt({{0, 0, 0}, {10, 0, 0}, {0, 10, 0}, {10, 10, 0}}, 0.1);
+  const auto even = AlignToPositions(targets, TrueUp(), 5);
+  EXPECT_LT((even->centre - Eigen::Vector3d(5, 5, 0)).norm(), 1e-3);
+  EXPECT_NEAR(even->scale_sigma_ratio, 0.1 / std::sqrt(200), 1e-5);
+  targets[0].sigma_m.x() = 1e5;  // says nothing of x
+  const auto uneven = AlignToPositions(targets, TrueUp(), 5);
+  EXPECT_LT((uneven->centre - Eigen::Vector3d(20.0 / 3, 5, 0)).norm(), 1e-3);
+}
+
 TEST(ScaleFromDistances, IsTheMedianRatio) {
-  EXPECT_DOUBLE_EQ(*ScaleFromDistances({{1, 2}, {2, 4.2}, {0.5, 9}}), 2.1);
-  EXPECT_DOUBLE_EQ(*ScaleFromDistances({{1, 2}, {1, 3}}), 2.5);
-  EXPECT_FALSE(ScaleFromDistances({}).ok());
-  EXPECT_FALSE(ScaleFromDistances({{0, 2}}).ok());
+  EXPECT_DOUBLE_EQ(ScaleFromDistances({{1, 2}, {2, 4.2}, {0.5, 9}}, 0.02)->scale, 2.1);
+  EXPECT_DOUBLE_EQ(ScaleFromDistances({{1, 2}, {1, 3}}, 0.02)->scale, 2.5);
+  EXPECT_FALSE(ScaleFromDistances({}, 0.02).ok());
+  EXPECT_FALSE(ScaleFromDistances({{0, 2}}, 0.02).ok());
+}
+
+TEST(ScaleFromDistances, IsKnownAsWellAsTheyAreOrAsTheyAgree) {
+  EXPECT_DOUBLE_EQ(ScaleFromDistances({{1, 2}}, 0.02)->sigma_ratio, 0.02);
+  EXPECT_NEAR(ScaleFromDistances({{1, 2}, {1, 2}}, 0.02)->sigma_ratio, 0.02 / std::sqrt(2), 1e-12);
+  EXPECT_NEAR(ScaleFromDistances({{1, 2}, {1, 2}, {1, 2}, {1, 2}}, 0.02)->sigma_ratio, 1.2533 * 0.01, 1e-12);
+  // 2 and 3: 20 % off each, by the median absolute deviation 30 %.
+  EXPECT_NEAR(ScaleFromDistances({{1, 2}, {1, 3}}, 0.02)->sigma_ratio, 1.4826 * 0.2 / std::sqrt(2), 1e-12);
 }
 
 TEST(LevelledFrame, FirstCameraIsTheOriginAndLooksAlongX) {

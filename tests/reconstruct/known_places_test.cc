@@ -44,6 +44,34 @@ TEST_F(KnownPlacesTest, WrongDistancesNameTheLine) {
   EXPECT_EQ(ReadKnownDistances("/no/such/file", capture_).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(KnownPlacesTest, CamerasOfARigAreAsFarApartInAllPairsOfOneName) {
+  for (const char* name : {"left/1.jpg", "left/2.jpg", "left/in/3.jpg", "leftover/1.jpg", "right/1.jpg",
+                           "right/in/3.jpg", "right/4.jpg", "top/9.jpg"})
+    capture_.images.push_back({name, 1, std::nullopt});
+  const auto pairs = ReadRigBaselines(Write("# m\nleft right 0.12\nright leftover 0.3\n"), capture_);
+  ASSERT_TRUE(pairs.ok()) << pairs.error().message;
+  ASSERT_EQ(pairs->size(), 3u);
+  EXPECT_EQ((*pairs)[0].name1, "left/1.jpg");
+  EXPECT_EQ((*pairs)[0].name2, "right/1.jpg");
+  EXPECT_EQ((*pairs)[1].name2, "right/in/3.jpg");
+  EXPECT_EQ((*pairs)[1].distance_m, 0.12);
+  EXPECT_EQ((*pairs)[2].distance_m, 0.3);
+  for (const auto& [line, message] :
+       {std::pair("left right", "expected FOLDER1 FOLDER2 METRES"),
+        std::pair("left right 0", "expected FOLDER1 FOLDER2 METRES"),
+        std::pair("left right x", "expected FOLDER1 FOLDER2 METRES"),
+        std::pair("left left 1", "expected FOLDER1 FOLDER2 METRES"),
+        std::pair("left lef 1", "no image below 'lef/'"),
+        std::pair("left top 1", "no image below 'left/' has the name of one")}) {
+    const auto wrong = ReadRigBaselines(Write(line), capture_);
+    ASSERT_FALSE(wrong.ok()) << line;
+    EXPECT_EQ(wrong.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(wrong.error().message, HasSubstr("known_places.txt:1: "));
+    EXPECT_THAT(wrong.error().message, HasSubstr(message));
+  }
+  EXPECT_EQ(ReadRigBaselines(Write("# nothing\n"), capture_).error().code, ErrorCode::kNoData);
+}
+
 TEST_F(KnownPlacesTest, ReadsControlPoints) {
   const auto points = ReadControlPoints(Write("a.jpg 1 2 3\nb c.jpg -1.5 0 2e-1\n"), capture_);
   ASSERT_TRUE(points.ok()) << points.error().message;

@@ -197,7 +197,9 @@ TEST_P(ReconstructTest, BadOptionsAreRefused) {
   for (const ReconstructOptions& options :
        {ReconstructOptions{.min_registered_ratio = 2}, ReconstructOptions{.scale_from = "stars"},
         ReconstructOptions{.scale_from = "distances"}, ReconstructOptions{.scale_from = "control_points"},
-        ReconstructOptions{.gps_sigma_m = 0}, ReconstructOptions{.hold_out_every = 1}}) {
+        ReconstructOptions{.scale_from = "rig"}, ReconstructOptions{.scale_from = "camera_height"},
+        ReconstructOptions{.camera_height_m = -1}, ReconstructOptions{.gps_sigma_m = 0},
+        ReconstructOptions{.hold_out_every = 1}}) {
     const auto result = Run(survey, options);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::kInvalidArgument) << result.error().message;

@@ -29,6 +29,9 @@ if (data.promise) {
   const P = data.promise;
   card(`${count(P.num_kept)} of ${count(P.num_nodes)}`, ['places and headings keep the ', defined('promise', `${percent(P.probability, 0)} of the images taken there find ${P.min_matches} landmarks at least and are localized within ${lengthText(P.max_error_m)}, ${degrees(P.max_error_deg)}`)], {bad: P.num_kept < P.num_nodes});
 }
+if (data.scale_sigma_ratio > 0) {
+  card(`\u00B1 ${percent(data.scale_sigma_ratio)}`, ['of all lengths: the ', defined('scale', `how long a metre of the map is, by ${data.frame_source.replaceAll('_', ' ')}: one standard deviation; a part of every covariance, and the same error in all of them`)]);
+}
 if (tested) {
   card(`${tested.localized} of ${tested.held_out}`, [term('held-out', `${tried} images`), ' localized, ', tested.wrong ? `${tested.wrong} of them wrong` : 'none wrong'], {bad: tested.wrong > 0 || tested.localized < data.poor_localized_ratio * tested.held_out});
   if (tested.median_m !== undefined && tested.median_deg !== undefined) {

@@ -56,6 +56,16 @@ class Map:
     @property
     def is_metric(self) -> bool:
         """False: nothing gave the survey its scale, and "metres" have an arbitrary length."""
+    @property
+    def scale_sigma_ratio(self) -> float:
+        """Standard deviation of the map's scale, as a part of it; 0: its poses were stated.
+
+        The covariance of a fix contains that of scale_sigma_ratio * (center - scale_centre), the same multiple of it
+        in every fix.
+        """
+    @property
+    def scale_centre(self) -> NDArray[np.float64]:
+        """The place of the world frame that stays where it is when the scale errs: (3,)."""
 
 @final
 class Prior:

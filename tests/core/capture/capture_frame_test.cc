@@ -20,7 +20,9 @@ TEST(CaptureFrame, RoundTrip) {
   const CaptureFrame frame{.unit = "metre",
                            .anchor = GeodeticPosition{-33.8567844, 151.2152967, -1.25},
                            .source = "gps",
-                           .is_reconstructed = true};
+                           .is_reconstructed = true,
+                           .scale_sigma_ratio = 0.0125,
+                           .scale_centre = {1.5, -2, 1.0 / 3}};
   const auto read = ReadText(CaptureFrameJson(frame));
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->unit, "metre");
@@ -30,7 +32,17 @@ TEST(CaptureFrame, RoundTrip) {
   EXPECT_EQ(read->anchor->latitude_deg, -33.8567844);
   EXPECT_EQ(read->anchor->longitude_deg, 151.2152967);
   EXPECT_EQ(read->anchor->altitude_m, -1.25);
-  EXPECT_FALSE(ReadText(CaptureFrameJson({.unit = "arbitrary", .source = "none"}))->anchor);
+  EXPECT_EQ(read->scale_sigma_ratio, 0.0125);
+  EXPECT_EQ(read->scale_centre, Eigen::Vector3d(1.5, -2, 1.0 / 3));
+  const auto none = ReadText(CaptureFrameJson({.unit = "arbitrary", .source = "none"}));
+  EXPECT_FALSE(none->anchor);
+  EXPECT_EQ(none->scale_sigma_ratio, 0);
+}
+
+TEST(CaptureFrame, AnErrorOfTheScaleGrowsFromItsCentre) {
+  const CaptureFrame frame{.scale_sigma_ratio = 0.02, .scale_centre = {1, 2, 3}};
+  EXPECT_EQ(ScaleSigmaAt(frame, {1, 2, 3}), Eigen::Vector3d::Zero());
+  EXPECT_TRUE(ScaleSigmaAt(frame, {11, 2, -2}).isApprox(Eigen::Vector3d(0.2, 0, -0.1)));
 }
 
 TEST(CaptureFrame, WrongFilesAreNamed) {
@@ -44,6 +56,21 @@ TEST(CaptureFrame, WrongFilesAreNamed) {
        "expected a latitude"},
       {R"({"unit": "arbitrary", "source": "gps", "anchor": {"latitude_deg": 1, "longitude_deg": 0, "altitude_m": 0}})",
        "expected the unit metre"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": "0.1", "scale_centre": [0, 0, 0]})",
+       "expected the number 'scale_sigma_ratio'"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": 0.1})", "three numbers in 'scale_centre'"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": 0.1, "scale_centre": [0, 0]})",
+       "three numbers in 'scale_centre'"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": 0.1, "scale_centre": [0, 0, "0"]})",
+       "three numbers in 'scale_centre'"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": 1, "scale_centre": [0, 0, 0]})",
+       "in [0, 1)"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": -0.1, "scale_centre": [0, 0, 0]})",
+       "in [0, 1)"},
+      {R"({"unit": "metre", "source": "gps", "scale_sigma_ratio": 0.1, "scale_centre": [0, 2e7, 0]})",
+       "a place within 1e+07 m"},
+      {R"({"unit": "arbitrary", "source": "none", "scale_sigma_ratio": 0.1, "scale_centre": [0, 0, 0]})",
+       "how well its scale is known"},
   };
   for (const auto& [text, message] : cases) {
     const auto frame = ReadText(text);

@@ -194,7 +194,12 @@ TEST_F(JoinCapturesTest, FramesMustAgree) {
     Write(name + "/frame.json", CaptureFrameJson(f));
   };
   const GeodeticPosition here = {.latitude_deg = 50, .longitude_deg = 8, .altitude_m = 100};
-  frame("day2", {.anchor = here, .source = "gps", .is_reconstructed = true});
+  frame("day1", {.scale_sigma_ratio = 0.001, .scale_centre = {1, 0, 0}});
+  frame("day2", {.anchor = here,
+                 .source = "gps",
+                 .is_reconstructed = true,
+                 .scale_sigma_ratio = 0.01,
+                 .scale_centre = {2, 0, 0}});
   ASSERT_TRUE(Join({Session("day1"), Session("day2")}).ok());
   const auto joined = ReadCaptureFrame(Path("joined/frame.json"));
   ASSERT_TRUE(joined.ok());
@@ -202,6 +207,8 @@ TEST_F(JoinCapturesTest, FramesMustAgree) {
   EXPECT_FALSE(joined->is_reconstructed);
   ASSERT_TRUE(joined->anchor);
   EXPECT_EQ(joined->anchor->longitude_deg, 8);
+  EXPECT_EQ(joined->scale_sigma_ratio, 0.01);  // the worst one's
+  EXPECT_EQ(joined->scale_centre.x(), 2);
 
   GeodeticPosition there = here;
   there.longitude_deg = 8.001;

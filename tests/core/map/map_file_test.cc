@@ -43,6 +43,8 @@ MapRows ExampleRows() {
   rows.frame.anchor = GeodeticPosition{55.7, 13.2, 40.5};
   rows.frame.source = "gps";
   rows.frame.is_reconstructed = true;
+  rows.frame.scale_sigma_ratio = 0.0123456789;
+  rows.frame.scale_centre = {1.0 / 3, -2, 1e-9};
   return rows;
 }
 
@@ -82,6 +84,8 @@ TEST(MapFile, RoundTripKeepsEverything) {
   EXPECT_EQ(read->frame.anchor->altitude_m, 40.5);
   EXPECT_EQ(read->frame.source, "gps");
   EXPECT_TRUE(read->frame.is_reconstructed);
+  EXPECT_EQ(read->frame.scale_sigma_ratio, 0.0123456789);
+  EXPECT_EQ(read->frame.scale_centre, Eigen::Vector3d(1.0 / 3, -2, 1e-9));
   EXPECT_EQ(read->cameras[0].params, written.cameras[0].params);
   EXPECT_EQ(read->station_edges, written.station_edges);
   EXPECT_EQ(read->stations[1].heading_deg, written.stations[1].heading_deg);

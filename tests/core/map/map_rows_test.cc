@@ -132,6 +132,9 @@ TEST(MapRows, HeadsThatMakeNoSenseAreRefused) {
   EXPECT_THAT(Refusal([](MapRows& r) { r.sessions = {"a/b"}; }), HasSubstr("the name is not valid"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.frame.unit = "foot"; }), HasSubstr("unit 'foot'"));
   EXPECT_THAT(Refusal([](MapRows& r) { r.frame.anchor = GeodeticPosition{91, 0, 0}; }), HasSubstr("anchor"));
+  for (const double ratio : {-0.1, 1.0, kNan})
+    EXPECT_THAT(Refusal([&](MapRows& r) { r.frame.scale_sigma_ratio = ratio; }), HasSubstr("scale known to"));
+  EXPECT_THAT(Refusal([](MapRows& r) { r.frame.scale_centre.y() = kNan; }), HasSubstr("scale known to"));
   for (const Change& change : std::vector<Change>{
            [](MapRows& r) { r.name = "a\nb"; }, [](MapRows& r) { r.writer = "a\nb"; },
            [](MapRows& r) { r.instruction_set = "a\nb"; }, [](MapRows& r) { r.landmark_choice = "a\nb"; },

@@ -206,6 +206,18 @@ TEST(Advise, SaysThatPosesAreOffThoughImagesAreLocalized) {
   EXPECT_THAT(Advise(rows), IsEmpty());
 }
 
+TEST(Advise, SaysThatTheScaleIsPoorlyKnown) {
+  MapRows rows = FiveStations();
+  for (MapStation& station : rows.stations) station.is_covered = true;
+  rows.self_test = {{"localized_ratio", 1.0}, {"within_10cm_5deg_ratio", 0.9}};
+  rows.frame.source = "gps";
+  rows.frame.scale_sigma_ratio = 0.03;
+  EXPECT_THAT(Advise(rows), IsEmpty());
+  rows.frame.scale_sigma_ratio = 0.04;
+  EXPECT_THAT(AdviceText(Advise(rows)),
+              HasSubstr("metres are known to 4.0 % only (gps): what is 10 m away may be 0.40 m nearer"));
+}
+
 // Bytes, part localized and within 10 cm of a map of 100 kB that localizes 0.9 of the images.
 std::string SizesText(const std::vector<ParetoPoint>& sizes) {
   MapRows rows;

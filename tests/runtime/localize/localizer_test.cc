@@ -135,6 +135,51 @@ TEST(Localizer, KeypointsThatErrTogetherWidenTheCovariance) {
   EXPECT_NEAR(unmeasured.covariance(0, 0) / without.covariance(0, 0), 1.8, 1e-3);
 }
 
+// The room is a little larger or smaller than its map says: the errors of fixes grow from scale_centre, and
+// their normalised squares still are 6 in the mean, for each size and over all that are likely.
+TEST(Localizer, TheErrorOfTheMapsScaleIsInTheCovariance) {
+  constexpr double kScaleSigma = 0.02;
+  MapRows rows = Room().rows;
+  rows.frame.scale_sigma_ratio = kScaleSigma;
+  rows.frame.scale_centre = {-1, 2, 0.5};
+  rows.camera_from_given = {Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY())),
+                            {0.1, 0, 0.2}};
+  Localizer with(*Map::FromRows(rows), IndependentErrors());
+  rows.frame.scale_sigma_ratio = 0;
+  Localizer without(*Map::FromRows(rows), IndependentErrors());
+  const Pose given_from_camera = rows.camera_from_given.Inverse();
+  Random random(9);
+  int num_fixes = 0;
+  double sum_one_sigma = 0, sum_likely = 0, sum_ignored = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Pose cam_from_map = RandomPose(random);
+    const Features features = RenderFeatures(Room(), cam_from_map, {.num_swapped_ratio = 0.2}, 100 + i);
+    const auto found = *with.LocalizeFeatures(features, Room().camera);
+    if (!found.has_fix()) continue;
+    ++num_fixes;
+    const auto plain = *without.LocalizeFeatures(features, Room().camera);
+    EXPECT_EQ(plain.scale_sigma_m, Eigen::Vector3d::Zero());
+    EXPECT_EQ(found.covariance.topRows(3), plain.covariance.topRows(3));
+    EXPECT_NEAR(found.scale_sigma_m.norm(),
+                kScaleSigma * (found.cam_from_world.Center() - rows.frame.scale_centre).norm(), 1e-9);
+    const auto nees = [&](double scale_error, const Matrix6d& covariance) {
+      Pose truth = given_from_camera * cam_from_map;
+      const Eigen::Vector3d centre =
+          rows.frame.scale_centre + (1 + scale_error) * (truth.Center() - rows.frame.scale_centre);
+      truth.translation = -(truth.rotation * centre);
+      const Vector6d error = PerturbationBetween(found.cam_from_world, truth);
+      return error.dot(covariance.inverse() * error);
+    };
+    sum_one_sigma += nees(kScaleSigma, found.covariance);
+    sum_likely += nees(random.Normal(0, kScaleSigma), found.covariance);
+    sum_ignored += nees(kScaleSigma, plain.covariance);
+  }
+  ASSERT_GT(num_fixes, 290);
+  EXPECT_NEAR(sum_one_sigma / num_fixes, 6, 0.8);
+  EXPECT_NEAR(sum_likely / num_fixes, 6, 0.8);
+  EXPECT_GT(sum_ignored / num_fixes, 60);
+}
+
 TEST(Localizer, AStatedCameraIsTheOneThatTheSurveyFound) {
   MapRows rows = Room().rows;
   Camera stated = Room().camera;

@@ -126,6 +126,24 @@ TEST(Compare, PutsAFixInSpaceOnTheFloor) {
   EXPECT_NEAR(fix.covariance(2, 2), 0, 1e-5);
 }
 
+// What both share, as estimates by one map, does not excuse a contradiction.
+TEST(Compare, LeavesTheErrorOfTheMapsScaleOut) {
+  Localization localization;
+  localization.reason = NoFix::kNone;
+  localization.cam_from_world = VisualRoom::PoseAt({2, 1}, 0);
+  localization.covariance = 0.01 * Matrix6d::Identity();
+  VisualPose pose;
+  pose.position = {2.3, 1};
+  pose.covariance = Eigen::Vector3d(0.08, 0.01, 1).asDiagonal();
+  const double before = Compare(FloorFixOf(localization, {}), pose).mahalanobis;
+  localization.scale_sigma_m = {0.5, 0.1, 0.3};
+  localization.covariance.bottomRightCorner<3, 3>() +=
+      localization.scale_sigma_m * localization.scale_sigma_m.transpose();
+  pose.scale_sigma_m = {0.3, 0.4};
+  pose.covariance.topLeftCorner<2, 2>() += pose.scale_sigma_m * pose.scale_sigma_m.transpose();
+  EXPECT_NEAR(Compare(FloorFixOf(localization, {}), pose).mahalanobis, before, 1e-6);
+}
+
 TEST(Compare, CountsDistancesInStandardDeviations) {
   FloorFix fix{{2, 1}, 359, Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal()};
   VisualPose pose;

@@ -6,6 +6,7 @@
 #include "runtime/localize/measurement.h"
 #include "runtime/map/map.h"
 #include "runtime/visual_map/visual_estimate.h"
+#include "runtime/visual_map/visual_filter.h"
 #include "runtime/visual_map/visual_search.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
@@ -207,6 +208,32 @@ TEST(EstimateVisualPose, SharedErrorsGrowWithTheSquareOfHowCloseLandmarksLie) {
   EXPECT_GE(std::sqrt(spot->covariance(0, 0)), growth * 0.02);
   EXPECT_GE(std::sqrt(spot->covariance(2, 2)), growth * 0.01);
   EXPECT_LT(std::sqrt(all->covariance(0, 0)), 0.03);
+}
+
+TEST(EstimateVisualPose, TheErrorOfTheMapsScaleIsInTheCovariance) {
+  MapRows rows = Clean().room.rows;
+  // The floor frame is the world's, turned by a quarter and 5 m away.
+  rows.floor_from_world = {
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())), {5, 0, 0}};
+  const auto estimate = [&](double scale_sigma_ratio) {
+    rows.frame.scale_sigma_ratio = scale_sigma_ratio;
+    rows.frame.scale_centre = {0, 3, 9};
+    const auto visual = VisualMap::Open(*Map::FromRows(rows));
+    EXPECT_TRUE(visual.ok()) << visual.error().message;
+    return *EstimateVisualPose(**visual, Clean().room.SeenLandmarks(VisualRoom::PoseAt({2.3, 2.1}, 0)));
+  };
+  const VisualPose without = estimate(0), with = estimate(0.1);
+  EXPECT_EQ(without.scale_sigma_m, Eigen::Vector2d::Zero());
+  const Eigen::Vector2d moved =
+      0.1 * (with.position - Eigen::Vector2d(2, 0));  // (0, 3) on the floor: 5 - 3, 0
+  EXPECT_TRUE(with.scale_sigma_m.isApprox(moved)) << with.scale_sigma_m;
+  const Eigen::Matrix2d added = (with.covariance - without.covariance).topLeftCorner(2, 2);
+  EXPECT_TRUE(added.isApprox(moved * moved.transpose(), 1e-6));
+  // A filter's belief, where an image shows nothing.
+  VisualFilter filter(*VisualMap::Open(*Map::FromRows(rows)));
+  const VisualPose blind = *filter.See({});
+  ASSERT_NE(blind.flag, VisualFlag::kNone);
+  EXPECT_TRUE(blind.scale_sigma_m.isApprox(0.1 * (blind.position - Eigen::Vector2d(2, 0))));
 }
 
 TEST(EstimateVisualPose, SurveysUnsureOfTheirOwnImagesNeedMoreAgreeingLandmarks) {
