@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -9,6 +10,7 @@
 #include "core/base/parallel.h"
 #include "core/camera/panorama.h"
 #include "stages/group_classes/adjust/left_out.h"
+#include "stages/group_classes/adjust/parts.h"
 #include "stages/group_classes/tracks/sub_survey.h"
 
 namespace cairn::group_classes {
@@ -28,6 +30,9 @@ constexpr double kFarOffGain = 0.3;
 // Noise and cameras' models need no adjustment to the last digit.
 constexpr double kLearningTolerance = 1e-3;
 constexpr int kMinNumCameraImages = 5;
+// What was straightened in parts is nearly right: damped as at a bad start, the bends that are left would
+// take several steps more.
+constexpr double kTrustInStraightened = 1e7;
 
 // Observations of a point that are adjusted, at most: k of them cost k^2, and say little more.
 constexpr size_t kMaxNumObservations = 16;
@@ -134,6 +139,12 @@ class SurveyAdjuster {
     }
     posed_.camera_from_given = offset;
     if (findings.pose_gain == 0) return;
+    const std::vector<int> rounds = NumPartsOfRounds(posed_.num_images(), options_.num_images_at_once);
+    for (const int num_parts : rounds) AdjustParts(num_parts, first);
+    if (!rounds.empty()) {
+      bundle_options_.initial_trust_region_radius = kTrustInStraightened;
+      bundle_options_.points_follow = true;
+    }
     Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
     Adjust(nullptr);
     if (!progress_.Cancelled()) {  // again, with all that agrees now, and to the end
@@ -144,7 +155,50 @@ class SurveyAdjuster {
     KeepFrame();
   }
 
+  // Adjusts poses alone by what was learnt, from those that are known, where they were freed from drift.
+  PosesOfPart AdjustPoses(const SurveyFindings& findings, std::vector<Pose> drifted,
+                          const TriangulateOptions& first) {
+    is_learning_ = false;
+    findings_ = findings;
+    problem_.noise = findings.noise;
+    problem_.is_offset_free = false;
+    problem_.camera_from_given = posed_.camera_from_given;
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      problem_.images[i].cam_from_world = posed_.poses[i];
+      problem_.images[i].drifted = drifted[i];
+    }
+    Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
+    Adjust(nullptr);
+    for (int i = 0; i < posed_.num_images(); ++i) drifted[i] = problem_.images[i].drifted;
+    return {posed_.poses, std::move(drifted)};
+  }
+
  private:
+  // One round of parts (parts.h).
+  void AdjustParts(int num_parts, const TriangulateOptions& first) {
+    const std::vector<int> begins = BeginsOfParts(posed_.num_images(), num_parts);
+    std::vector<std::vector<Track>> tracks = SplitTracks(tracks_, begins);
+    std::vector<Pose> drifted;
+    for (const BundleProblem::Image& image : problem_.images) drifted.push_back(image.drifted);
+    std::vector<PosesOfPart> parts(num_parts);
+    ParallelFor(num_parts, num_threads_, [&](int64_t p) {
+      if (progress_.Cancelled()) return;
+      std::vector<int> images(begins[p + 1] - begins[p]);
+      std::iota(images.begin(), images.end(), begins[p]);
+      SubSurvey sub = {SelectImages(posed_, images), std::move(tracks[p])};
+      parts[p] =
+          SurveyAdjuster(matched_, sub.tracks, triangulate_, options_, 1, progress_, &sub.posed)
+              .AdjustPoses(findings_, {drifted.begin() + begins[p], drifted.begin() + begins[p + 1]}, first);
+    });
+    if (progress_.Cancelled()) return;
+    PosesOfPart whole = JoinParts(parts, drifted);
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      problem_.images[i].cam_from_world = whole.poses[i];
+      problem_.images[i].drifted = whole.drifted[i];
+    }
+    posed_.poses = std::move(whole.poses);
+  }
+
   void MakeImages() {
     for (int i = 0; i < posed_.num_images(); ++i) {
       BundleProblem::Image image;
@@ -298,7 +352,8 @@ class SurveyAdjuster {
       }
     }
     if (changed) MakeRays(matched_, num_threads_, &posed_);
-    if (is_learning_) findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
+    if (!is_learning_) return;  // tracks are selected anew
+    findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
     Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
   }
 

@@ -16,6 +16,9 @@
 namespace cairn::group_classes {
 namespace {
 
+// Points follow steps for as long as that lowers the cost by more than this part.
+constexpr double kFollowTolerance = 1e-6;
+
 // A camera's pose against the one that the drifted stated pose and the offset give: rotation, centre.
 struct OwnErrorCost {
   double sigma_rad, sigma_m;
@@ -103,6 +106,14 @@ class CeresBundle {
     options.linear_solver_ordering = ordering_;
     options.max_num_iterations = options_.max_num_iterations;
     options.function_tolerance = options_.function_tolerance;
+    options.initial_trust_region_radius = options_.initial_trust_region_radius;
+    if (options_.points_follow) {
+      options.use_inner_iterations = true;
+      options.inner_iteration_tolerance = kFollowTolerance;
+      options.inner_iteration_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+      for (Eigen::Vector3d& point : bundle_.points)
+        options.inner_iteration_ordering->AddElementToGroup(point.data(), 0);
+    }
     const ceres::Solver::Summary summary = SolveOnOneThread(options, &problem_);
     spdlog::debug(
         "group_classes: {} images, {} points, {} keypoints adjusted in {} steps: cost {:.6g} -> {:.6g}",

@@ -79,6 +79,11 @@ struct BundleOptions {
   int max_num_iterations = 30;
   // It has converged when a step lowers the cost by less than this part.  REQUIRES: > 0
   double function_tolerance = 1e-4;
+  // How far the first step is trusted (Levenberg-Marquardt): the less, the more it is damped.  REQUIRES: > 0
+  double initial_trust_region_radius = 1e4;
+  // Each point is placed anew by the poses of a step before the step is judged: otherwise a few points that
+  // are weakly determined make it fail for all.
+  bool points_follow = false;
 };
 
 // Reprojection error of an observation, px.
