@@ -30,6 +30,8 @@ constexpr double kFarOffGain = 0.3;
 // Noise and cameras' models need no adjustment to the last digit.
 constexpr double kLearningTolerance = 1e-3;
 constexpr int kMinNumCameraImages = 5;
+// Steps of a large survey that are made before they are kept in a file: some minutes.
+constexpr int kNumStepsAtOnce = 4;
 // What was straightened in parts is nearly right: damped as at a bad start, the bends that are left would
 // take several steps more.
 constexpr double kTrustInStraightened = 1e7;
@@ -51,13 +53,15 @@ class SurveyAdjuster {
  public:
   SurveyAdjuster(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                  const TriangulateOptions& triangulate, const AdjustSurveyOptions& options, int num_threads,
-                 const Progress& progress, PosedImages* posed)
+                 Progress& progress, SolvedFile* solved, PosedImages* posed)
       : matched_(matched),
         tracks_(tracks),
         triangulate_(triangulate),
         options_(options),
         bundle_options_{.max_num_iterations = options.max_num_iterations,
-                        .function_tolerance = kLearningTolerance},
+                        .function_tolerance = kLearningTolerance,
+                        .solved = solved,
+                        .cancel = &progress},
         num_threads_(num_threads),
         progress_(progress),
         posed_(*posed) {
@@ -68,6 +72,7 @@ class SurveyAdjuster {
 
   // Learns the noise, the cameras, whether there is an offset, and whether the poses need be moved at all.
   SurveyFindings Learn(const std::vector<Triangulation>& triangulations) {
+    progress_.Begin("learn noise and cameras", 2 * int64_t{options_.num_rounds}, "rounds at most");
     Select(triangulations);
     Adjust(nullptr);
     LearnNoise();
@@ -108,6 +113,7 @@ class SurveyAdjuster {
         findings_.camera_from_given = Pose();
       }
     }
+    progress_.End();
     return findings_;
   }
 
@@ -144,7 +150,11 @@ class SurveyAdjuster {
     if (!rounds.empty()) {
       bundle_options_.initial_trust_region_radius = kTrustInStraightened;
       bundle_options_.points_follow = true;
+      bundle_options_.num_steps_at_once = kNumStepsAtOnce;
     }
+    if (progress_.Cancelled()) return;
+    progress_.Begin("adjust all poses", 2 * int64_t{options_.max_num_iterations}, "steps at most");
+    bundle_options_.steps = &progress_;
     Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
     Adjust(nullptr);
     if (!progress_.Cancelled()) {  // again, with all that agrees now, and to the end
@@ -152,6 +162,7 @@ class SurveyAdjuster {
       Select(TriangulateTracks(tracks_, posed_, triangulate_, num_threads_));
       Adjust(nullptr);
     }
+    progress_.End();
     KeepFrame();
   }
 
@@ -181,15 +192,19 @@ class SurveyAdjuster {
     std::vector<Pose> drifted;
     for (const BundleProblem::Image& image : problem_.images) drifted.push_back(image.drifted);
     std::vector<PosesOfPart> parts(num_parts);
+    progress_.Begin("straighten poses", num_parts, "parts");
     ParallelFor(num_parts, num_threads_, [&](int64_t p) {
       if (progress_.Cancelled()) return;
       std::vector<int> images(begins[p + 1] - begins[p]);
       std::iota(images.begin(), images.end(), begins[p]);
       SubSurvey sub = {SelectImages(posed_, images), std::move(tracks[p])};
       parts[p] =
-          SurveyAdjuster(matched_, sub.tracks, triangulate_, options_, 1, progress_, &sub.posed)
+          SurveyAdjuster(matched_, sub.tracks, triangulate_, options_, 1, progress_, bundle_options_.solved,
+                         &sub.posed)
               .AdjustPoses(findings_, {drifted.begin() + begins[p], drifted.begin() + begins[p + 1]}, first);
+      progress_.Advance();
     });
+    progress_.End();
     if (progress_.Cancelled()) return;
     PosesOfPart whole = JoinParts(parts, drifted);
     for (int i = 0; i < posed_.num_images(); ++i) {
@@ -360,6 +375,7 @@ class SurveyAdjuster {
   void LearnNoise() {
     for (int round = 0; round < options_.num_rounds && !progress_.Cancelled(); ++round) {
       Adjust(&evidence_);
+      progress_.Advance();
       double change = 0;
       const auto learn = [&](const NoiseEvidence& evidence, double least, double* sigma) {
         const double few = std::max(kMinDetermined, kMinDeterminedRatio * evidence.num_residuals);
@@ -463,7 +479,7 @@ class SurveyAdjuster {
   const AdjustSurveyOptions& options_;
   BundleOptions bundle_options_;
   int num_threads_;
-  const Progress& progress_;
+  Progress& progress_;
   PosedImages& posed_;
   std::vector<std::vector<CameraVariant>> candidates_;  // per camera
   std::vector<int> variants_;                           // per camera: the one taken
@@ -483,21 +499,24 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
   SubSurvey sub = Restrict(posed, tracks, ImagesToLearnFrom(posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, triangulate, num_threads);
-  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, NoProgress(), &sub.posed)
+  NoProgress progress;
+  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, nullptr, &sub.posed)
       .Measure(triangulations);
 }
 
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
-                            PosedImages* posed) {
+                            const AdjustSurveyOptions& options, int num_threads, Progress& progress,
+                            SolvedFile* solved, PosedImages* posed) {
   SubSurvey sub = Restrict(*posed, tracks, ImagesToLearnFrom(*posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, first, num_threads);
   const SurveyFindings findings =
-      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, &sub.posed)
+      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, solved, &sub.posed)
           .Learn(triangulations);
-  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, progress, posed).Apply(findings, first);
+  if (progress.Cancelled()) return findings;
+  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, progress, solved, posed)
+      .Apply(findings, first);
   return findings;
 }
 

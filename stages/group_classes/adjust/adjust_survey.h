@@ -75,12 +75,13 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 //   - a large survey is straightened in parts first (parts.h), so that its size adds no steps to the
 //     adjustment of the whole.
 // The world frame stays that of the stated poses, in the mean.  Changes poses, cameras, rays and
-// camera_from_given of `posed`.  `first`: how tracks are triangulated by poses and cameras as stated.  Stops
-// early, with no meaning, when progress is cancelled.  Pure; same result for any number of threads.  O(images
+// camera_from_given of `posed`.  `solved`: where what was solved is kept (solved_file.h); may be null.
+// `first`: how tracks are triangulated by poses and cameras as stated.  Stops early, with no meaning, when
+// progress is cancelled.  Pure; same result for any number of threads.  O(images
 // * keypoints adjusted) but for the sparse factorisation of the poses.
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
-                            PosedImages* posed);
+                            const AdjustSurveyOptions& options, int num_threads, Progress& progress,
+                            SolvedFile* solved, PosedImages* posed);
 
 }  // namespace cairn::group_classes
