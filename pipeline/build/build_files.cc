@@ -26,9 +26,9 @@ bool IsBuildFileName(const std::string& name) {
   static const std::regex kStageFile = [] {
     std::string stems = "images|(film|bag)-[-A-Za-z0-9_.]+";
     for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
-    return std::regex(
-        "(" + stems +
-        ")([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.report\\.json)*");
+    return std::regex("(" + stems +
+                      ")([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.solved|"
+                      "\\.report\\.json)*");
   }();
   static const std::set<std::string> kOthers = {"config.mk", "recipe", "check.json", "error.json", "lock"};
   const std::string stem = WithoutTemporaryMark(name);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/line/memory.h"
+#include "stages/group_classes/adjust/solved_file.h"
 #include "stages/group_classes/group_classes.h"
 
 namespace cairn::group_classes {
@@ -78,10 +79,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   if (capture.frame && capture.frame->is_reconstructed) {
     for (const auto& [camera_id, camera] : capture.cameras) matched.cameras[camera_id] = camera;
   }
-  CAIRN_ASSIGN_OR_RETURN(
-      const GroupClassesResult result,
-      GroupClasses(matched, capture, arguments.options, environment.num_threads, *environment.progress));
+  SolvedFile solved(SolvedPath(arguments.output));
+  CAIRN_ASSIGN_OR_RETURN(const GroupClassesResult result,
+                         GroupClasses(matched, capture, arguments.options, environment.num_threads,
+                                      *environment.progress, &solved));
   CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
+  solved.Remove();
   const Classes& classes = result.classes;
   environment.report->in = {{"images", static_cast<int64_t>(classes.images.size())},
                             {"tracks", result.num_tracks}};

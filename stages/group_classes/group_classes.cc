@@ -156,7 +156,7 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
 
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
-                                        Progress& progress) {
+                                        Progress& progress, SolvedFile* solved) {
   PosedImages posed = CollectPosedImages(matched, capture, num_threads);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
@@ -168,24 +168,26 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   const std::vector<Track> tracks = BuildTracks(matched, posed, &result.num_conflicts);
   result.num_tracks = static_cast<int64_t>(tracks.size());
 
-  progress.Begin("group classes", 4, "steps");
+  progress.Begin("triangulate tracks", 1, "rounds");
   TriangulateOptions first = options.triangulation;
   first.max_reprojection_error_px =
       std::max(options.initial_reprojection_error_px, first.max_reprojection_error_px);
   std::vector<Triangulation> triangulations = TriangulateTracks(tracks, posed, first, num_threads);
   result.initial_rms_px = RmsErrorPx(triangulations);
   progress.Advance();
+  progress.End();
   const bool is_reconstructed = capture.frame && capture.frame->is_reconstructed;
   result.poses_refined =
       options.refine_poses == "always" || (options.refine_poses == "auto" && !is_reconstructed);
   if (result.poses_refined) {
     result.findings = AdjustSurvey(matched, tracks, first, options.triangulation, options.adjustment,
-                                   num_threads, progress, &posed);
+                                   num_threads, progress, solved, &posed);
   } else {
     result.findings.keypoints =
         MeasureSurvey(matched, tracks, options.triangulation, options.adjustment, num_threads, posed);
   }
-  progress.Advance();
+  if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while adjusting poses");
+  progress.Begin("group classes", 2, "steps");
   triangulations = TriangulateTracks(tracks, posed, options.triangulation, num_threads);
   progress.Advance();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while grouping classes");

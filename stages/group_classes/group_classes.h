@@ -53,11 +53,12 @@ struct GroupClassesResult {
   SurveyFindings findings;  // where they were
 };
 
-// Pure; same result for any thread count.  Classes are ascending by their first observation.  Errors:
+// Pure; same result for any thread count, and for any file of what was `solved` before
+// (adjust/solved_file.h), which may be null.  Classes are ascending by their first observation.  Errors:
 // InvalidArgument (options), NoData (no posed image, or no class left: says what dropped the
 // most), Cancelled.
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
-                                        Progress& progress);
+                                        Progress& progress, SolvedFile* solved = nullptr);
 
 }  // namespace cairn::group_classes

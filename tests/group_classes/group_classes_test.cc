@@ -214,6 +214,28 @@ TEST(GroupClasses, DriftIsFoundAndStraightened) {
   EXPECT_LT(MeanErrorDeg(survey, result.classes, false), 0.2 * MeanErrorDeg(survey, result.classes, true));
 }
 
+TEST(GroupClasses, DriftIsStraightenedInPartsToo) {
+  const Survey survey = MakeSurvey({.walk_m = 0.01, .walk_deg = 0.4});
+  GroupClassesOptions options;
+  options.adjustment.num_images_at_once = 20;  // of 24
+  const Classes in_parts = Group(survey, options).classes, at_once = Group(survey).classes;
+  EXPECT_LT(MeanErrorDeg(survey, in_parts, false), 0.2 * MeanErrorDeg(survey, in_parts, true));
+  // Both end at the same optimum, not at the same bits.
+  double largest_m = 0;
+  for (size_t i = 0; i < at_once.images.size(); ++i) {
+    largest_m = std::max(largest_m,
+                         CenterErrorM(in_parts.images[i].cam_from_world, at_once.images[i].cam_from_world));
+  }
+  EXPECT_LT(largest_m, 2e-3);
+  EXPECT_GT(largest_m, 0);
+  // One thread or three.
+  const Classes again = Group(survey, options, 1).classes, thrice = Group(survey, options, 3).classes;
+  for (size_t i = 0; i < again.images.size(); ++i) {
+    EXPECT_EQ(again.images[i].cam_from_world.translation, in_parts.images[i].cam_from_world.translation);
+    EXPECT_EQ(thrice.images[i].cam_from_world.translation, in_parts.images[i].cam_from_world.translation);
+  }
+}
+
 TEST(GroupClasses, LensThatNobodyStatedIsFound) {
   const Survey survey = MakeSurvey({.k1 = -0.12});
   GroupClassesOptions options;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -9,6 +10,7 @@
 #include "core/base/parallel.h"
 #include "core/camera/panorama.h"
 #include "stages/group_classes/adjust/left_out.h"
+#include "stages/group_classes/adjust/parts.h"
 #include "stages/group_classes/tracks/sub_survey.h"
 
 namespace cairn::group_classes {
@@ -28,6 +30,11 @@ constexpr double kFarOffGain = 0.3;
 // Noise and cameras' models need no adjustment to the last digit.
 constexpr double kLearningTolerance = 1e-3;
 constexpr int kMinNumCameraImages = 5;
+// Steps of a large survey that are made before they are kept in a file: some minutes.
+constexpr int kNumStepsAtOnce = 4;
+// What was straightened in parts is nearly right: damped as at a bad start, the bends that are left would
+// take several steps more.
+constexpr double kTrustInStraightened = 1e7;
 
 // Observations of a point that are adjusted, at most: k of them cost k^2, and say little more.
 constexpr size_t kMaxNumObservations = 16;
@@ -46,13 +53,15 @@ class SurveyAdjuster {
  public:
   SurveyAdjuster(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                  const TriangulateOptions& triangulate, const AdjustSurveyOptions& options, int num_threads,
-                 const Progress& progress, PosedImages* posed)
+                 Progress& progress, SolvedFile* solved, PosedImages* posed)
       : matched_(matched),
         tracks_(tracks),
         triangulate_(triangulate),
         options_(options),
         bundle_options_{.max_num_iterations = options.max_num_iterations,
-                        .function_tolerance = kLearningTolerance},
+                        .function_tolerance = kLearningTolerance,
+                        .solved = solved,
+                        .cancel = &progress},
         num_threads_(num_threads),
         progress_(progress),
         posed_(*posed) {
@@ -63,6 +72,7 @@ class SurveyAdjuster {
 
   // Learns the noise, the cameras, whether there is an offset, and whether the poses need be moved at all.
   SurveyFindings Learn(const std::vector<Triangulation>& triangulations) {
+    progress_.Begin("learn noise and cameras", 2 * int64_t{options_.num_rounds}, "rounds at most");
     Select(triangulations);
     Adjust(nullptr);
     LearnNoise();
@@ -103,6 +113,7 @@ class SurveyAdjuster {
         findings_.camera_from_given = Pose();
       }
     }
+    progress_.End();
     return findings_;
   }
 
@@ -134,6 +145,16 @@ class SurveyAdjuster {
     }
     posed_.camera_from_given = offset;
     if (findings.pose_gain == 0) return;
+    const std::vector<int> rounds = NumPartsOfRounds(posed_.num_images(), options_.num_images_at_once);
+    for (const int num_parts : rounds) AdjustParts(num_parts, first);
+    if (!rounds.empty()) {
+      bundle_options_.initial_trust_region_radius = kTrustInStraightened;
+      bundle_options_.points_follow = true;
+      bundle_options_.num_steps_at_once = kNumStepsAtOnce;
+    }
+    if (progress_.Cancelled()) return;
+    progress_.Begin("adjust all poses", 2 * int64_t{options_.max_num_iterations}, "steps at most");
+    bundle_options_.steps = &progress_;
     Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
     Adjust(nullptr);
     if (!progress_.Cancelled()) {  // again, with all that agrees now, and to the end
@@ -141,10 +162,58 @@ class SurveyAdjuster {
       Select(TriangulateTracks(tracks_, posed_, triangulate_, num_threads_));
       Adjust(nullptr);
     }
+    progress_.End();
     KeepFrame();
   }
 
+  // Adjusts poses alone by what was learnt, from those that are known, where they were freed from drift.
+  PosesOfPart AdjustPoses(const SurveyFindings& findings, std::vector<Pose> drifted,
+                          const TriangulateOptions& first) {
+    is_learning_ = false;
+    findings_ = findings;
+    problem_.noise = findings.noise;
+    problem_.is_offset_free = false;
+    problem_.camera_from_given = posed_.camera_from_given;
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      problem_.images[i].cam_from_world = posed_.poses[i];
+      problem_.images[i].drifted = drifted[i];
+    }
+    Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
+    Adjust(nullptr);
+    for (int i = 0; i < posed_.num_images(); ++i) drifted[i] = problem_.images[i].drifted;
+    return {posed_.poses, std::move(drifted)};
+  }
+
  private:
+  // One round of parts (parts.h).
+  void AdjustParts(int num_parts, const TriangulateOptions& first) {
+    const std::vector<int> begins = BeginsOfParts(posed_.num_images(), num_parts);
+    std::vector<std::vector<Track>> tracks = SplitTracks(tracks_, begins);
+    std::vector<Pose> drifted;
+    for (const BundleProblem::Image& image : problem_.images) drifted.push_back(image.drifted);
+    std::vector<PosesOfPart> parts(num_parts);
+    progress_.Begin("straighten poses", num_parts, "parts");
+    ParallelFor(num_parts, num_threads_, [&](int64_t p) {
+      if (progress_.Cancelled()) return;
+      std::vector<int> images(begins[p + 1] - begins[p]);
+      std::iota(images.begin(), images.end(), begins[p]);
+      SubSurvey sub = {SelectImages(posed_, images), std::move(tracks[p])};
+      parts[p] =
+          SurveyAdjuster(matched_, sub.tracks, triangulate_, options_, 1, progress_, bundle_options_.solved,
+                         &sub.posed)
+              .AdjustPoses(findings_, {drifted.begin() + begins[p], drifted.begin() + begins[p + 1]}, first);
+      progress_.Advance();
+    });
+    progress_.End();
+    if (progress_.Cancelled()) return;
+    PosesOfPart whole = JoinParts(parts, drifted);
+    for (int i = 0; i < posed_.num_images(); ++i) {
+      problem_.images[i].cam_from_world = whole.poses[i];
+      problem_.images[i].drifted = whole.drifted[i];
+    }
+    posed_.poses = std::move(whole.poses);
+  }
+
   void MakeImages() {
     for (int i = 0; i < posed_.num_images(); ++i) {
       BundleProblem::Image image;
@@ -298,13 +367,15 @@ class SurveyAdjuster {
       }
     }
     if (changed) MakeRays(matched_, num_threads_, &posed_);
-    if (is_learning_) findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
+    if (!is_learning_) return;  // tracks are selected anew
+    findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
     Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
   }
 
   void LearnNoise() {
     for (int round = 0; round < options_.num_rounds && !progress_.Cancelled(); ++round) {
       Adjust(&evidence_);
+      progress_.Advance();
       double change = 0;
       const auto learn = [&](const NoiseEvidence& evidence, double least, double* sigma) {
         const double few = std::max(kMinDetermined, kMinDeterminedRatio * evidence.num_residuals);
@@ -408,7 +479,7 @@ class SurveyAdjuster {
   const AdjustSurveyOptions& options_;
   BundleOptions bundle_options_;
   int num_threads_;
-  const Progress& progress_;
+  Progress& progress_;
   PosedImages& posed_;
   std::vector<std::vector<CameraVariant>> candidates_;  // per camera
   std::vector<int> variants_;                           // per camera: the one taken
@@ -428,21 +499,24 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
   SubSurvey sub = Restrict(posed, tracks, ImagesToLearnFrom(posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, triangulate, num_threads);
-  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, NoProgress(), &sub.posed)
+  NoProgress progress;
+  return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, nullptr, &sub.posed)
       .Measure(triangulations);
 }
 
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
-                            PosedImages* posed) {
+                            const AdjustSurveyOptions& options, int num_threads, Progress& progress,
+                            SolvedFile* solved, PosedImages* posed) {
   SubSurvey sub = Restrict(*posed, tracks, ImagesToLearnFrom(*posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
       TriangulateTracks(sub.tracks, sub.posed, first, num_threads);
   const SurveyFindings findings =
-      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, &sub.posed)
+      SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, solved, &sub.posed)
           .Learn(triangulations);
-  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, progress, posed).Apply(findings, first);
+  if (progress.Cancelled()) return findings;
+  SurveyAdjuster(matched, tracks, triangulate, options, num_threads, progress, solved, posed)
+      .Apply(findings, first);
   return findings;
 }
 

@@ -29,6 +29,9 @@ struct AdjustSurveyOptions {
   int num_rounds = 4;
   // Most iterations of a round's solver.  REQUIRES: >= 1
   int max_num_iterations = 30;
+  // Poses of a survey of more images are straightened in parts (parts.h) before all are adjusted together.
+  // REQUIRES: >= 10
+  int num_images_at_once = 600;
 };
 OptionTable DescribeOptions(AdjustSurveyOptions* options);
 
@@ -68,14 +71,17 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 //   - the camera's model is chosen by the errors of keypoints that were left out (camera_models.h): a larger
 //     model must make their variance smaller by more than half the part that an image's keypoints share,
 //     and than chance; what they share is no camera's;
-//   - an offset that is not significant is none.
+//   - an offset that is not significant is none;
+//   - a large survey is straightened in parts first (parts.h), so that its size adds no steps to the
+//     adjustment of the whole.
 // The world frame stays that of the stated poses, in the mean.  Changes poses, cameras, rays and
-// camera_from_given of `posed`.  `first`: how tracks are triangulated by poses and cameras as stated.  Stops
-// early, with no meaning, when progress is cancelled.  Pure; same result for any number of threads.  O(images
+// camera_from_given of `posed`.  `solved`: where what was solved is kept (solved_file.h); may be null.
+// `first`: how tracks are triangulated by poses and cameras as stated.  Stops early, with no meaning, when
+// progress is cancelled.  Pure; same result for any number of threads.  O(images
 // * keypoints adjusted) but for the sparse factorisation of the poses.
 SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Track>& tracks,
                             const TriangulateOptions& first, const TriangulateOptions& triangulate,
-                            const AdjustSurveyOptions& options, int num_threads, const Progress& progress,
-                            PosedImages* posed);
+                            const AdjustSurveyOptions& options, int num_threads, Progress& progress,
+                            SolvedFile* solved, PosedImages* posed);
 
 }  // namespace cairn::group_classes

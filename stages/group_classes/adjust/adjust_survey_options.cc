@@ -39,6 +39,10 @@ OptionTable DescribeOptions(AdjustSurveyOptions* o) {
        .value = &o->max_num_iterations,
        .help = "most iterations of a round's solver",
        .min = 1},
+      {.name = "num_images_at_once",
+       .value = &o->num_images_at_once,
+       .help = "poses of a survey of more images are straightened in parts before all are adjusted together",
+       .min = 10},
   };
   table.insert(table.end(), others.begin(), others.end());
   AddCondition({"refine_cameras", {"true"}},

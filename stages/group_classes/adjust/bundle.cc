@@ -11,10 +11,15 @@
 #include <Eigen/Sparse>
 
 #include "core/structure/bundle_blocks.h"
+#include "stages/group_classes/adjust/bundle_solution.h"
 #include "stages/group_classes/adjust/evidence.h"
+#include "stages/group_classes/adjust/solved_file.h"
 
 namespace cairn::group_classes {
 namespace {
+
+// Points follow steps for as long as that lowers the cost by more than this part.
+constexpr double kFollowTolerance = 1e-6;
 
 // A camera's pose against the one that the drifted stated pose and the offset give: rotation, centre.
 struct OwnErrorCost {
@@ -77,6 +82,20 @@ class CameraPrior : public ceres::CostFunction {
   const CameraBlock& camera_;
 };
 
+// Between two steps.
+class StepCallback : public ceres::IterationCallback {
+ public:
+  explicit StepCallback(const BundleOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    if (options_.steps != nullptr && step.iteration > 0) options_.steps->Advance();
+    const bool is_cancelled = options_.cancel != nullptr && options_.cancel->Cancelled();
+    return is_cancelled ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const BundleOptions& options_;
+};
+
 // The whole problem in Ceres, over copies of the poses.
 class CeresBundle {
  public:
@@ -98,11 +117,21 @@ class CeresBundle {
     }
   }
 
-  bool Solve() {
+  BundleOutcome Solve() {
     ceres::Solver::Options options;
     options.linear_solver_ordering = ordering_;
     options.max_num_iterations = options_.max_num_iterations;
     options.function_tolerance = options_.function_tolerance;
+    options.initial_trust_region_radius = options_.initial_trust_region_radius;
+    if (options_.points_follow) {
+      options.use_inner_iterations = true;
+      options.inner_iteration_tolerance = kFollowTolerance;
+      options.inner_iteration_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+      for (Eigen::Vector3d& point : bundle_.points)
+        options.inner_iteration_ordering->AddElementToGroup(point.data(), 0);
+    }
+    StepCallback callback(options_);
+    options.callbacks.push_back(&callback);
     const ceres::Solver::Summary summary = SolveOnOneThread(options, &problem_);
     spdlog::debug(
         "group_classes: {} images, {} points, {} keypoints adjusted in {} steps: cost {:.6g} -> {:.6g}",
@@ -118,7 +147,14 @@ class CeresBundle {
     bundle_.camera_from_given = LoadPose(Offset());
     for (size_t c = 0; c < bundle_.cameras.size(); ++c)
       std::copy_n(Delta(c), bundle_.cameras[c].delta.size(), bundle_.cameras[c].delta.begin());
-    return summary.termination_type == ceres::CONVERGENCE;
+    BundleOutcome outcome;
+    outcome.has_converged = summary.termination_type == ceres::CONVERGENCE;
+    outcome.was_stopped = summary.termination_type == ceres::USER_FAILURE;
+    if (!summary.iterations.empty()) {
+      outcome.num_steps = static_cast<int>(summary.iterations.size()) - 1;
+      outcome.trust_region_radius = summary.iterations.back().trust_region_radius;
+    }
+    return outcome;
   }
 
   BundleEvidence FindEvidence() {
@@ -277,6 +313,25 @@ class CeresBundle {
   std::vector<bool> is_walk_block_;  // per block of a stated pose
 };
 
+BundleOutcome AdjustOnce(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence) {
+  ContentHash hash;
+  if (options.solved != nullptr) {
+    hash = HashBundle(options, *problem, evidence != nullptr);
+    if (const auto solution = options.solved->Find(hash)) {
+      if (const auto outcome = ReadSolution(*solution, problem, evidence)) {
+        if (options.steps != nullptr) options.steps->Advance(outcome->num_steps);
+        return *outcome;
+      }
+    }
+  }
+  CeresBundle bundle(options, problem);
+  const BundleOutcome outcome = bundle.Solve();
+  if (outcome.was_stopped) return outcome;
+  if (evidence != nullptr) *evidence = bundle.FindEvidence();
+  if (options.solved != nullptr) options.solved->Add(hash, WriteSolution(*problem, outcome, evidence));
+  return outcome;
+}
+
 }  // namespace
 
 Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Observation& observation) {
@@ -291,10 +346,17 @@ Eigen::Vector2d ResidualOf(const BundleProblem& problem, const BundleProblem::Ob
 }
 
 bool AdjustBundle(const BundleOptions& options, BundleProblem* problem, BundleEvidence* evidence) {
-  CeresBundle bundle(options, problem);
-  const bool converged = bundle.Solve();
-  if (evidence != nullptr) *evidence = bundle.FindEvidence();
-  return converged;
+  BundleOptions piece = options;
+  for (int num_left = options.max_num_iterations;;) {
+    if (options.num_steps_at_once > 0)
+      piece.max_num_iterations = std::min(num_left, options.num_steps_at_once);
+    const BundleOutcome outcome = AdjustOnce(piece, problem, evidence);
+    num_left -= outcome.num_steps;
+    const bool has_ended = outcome.has_converged || outcome.was_stopped ||
+                           outcome.num_steps < piece.max_num_iterations || num_left <= 0;
+    if (has_ended) return outcome.has_converged;
+    piece.initial_trust_region_radius = outcome.trust_region_radius;
+  }
 }
 
 }  // namespace cairn::group_classes

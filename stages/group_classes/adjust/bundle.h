@@ -4,12 +4,15 @@
 
 #include <Eigen/Core>
 
+#include "core/base/progress.h"
 #include "core/camera/camera.h"
 #include "core/camera/pixel_ray.h"
 #include "core/geometry/pose.h"
 #include "core/structure/camera_sensitivity.h"
 
 namespace cairn::group_classes {
+
+class SolvedFile;
 
 // Standard deviations of a survey's stated poses, per axis of the camera.  Each pose has an error of its own;
 // and what a tracker drifts from one image to the next adds up: a random walk.
@@ -79,6 +82,20 @@ struct BundleOptions {
   int max_num_iterations = 30;
   // It has converged when a step lowers the cost by less than this part.  REQUIRES: > 0
   double function_tolerance = 1e-4;
+  // How far the first step is trusted (Levenberg-Marquardt): the less, the more it is damped.  REQUIRES: > 0
+  double initial_trust_region_radius = 1e4;
+  // Each point is placed anew by the poses of a step before the step is judged: otherwise a few points that
+  // are weakly determined make it fail for all.
+  bool points_follow = false;
+  // A long solution is made in pieces of so many steps, each with the trust that the one before ended with;
+  // those that are kept in a file need not be made again.  0: in one piece.  REQUIRES: >= 0
+  int num_steps_at_once = 0;
+  // Where solutions are kept, and taken from; null: nowhere.
+  SolvedFile* solved = nullptr;
+  // Stops between two steps when it is cancelled, with no meaning; null: never.
+  const Progress* cancel = nullptr;
+  // Advanced by each step; null: nothing is.
+  Progress* steps = nullptr;
 };
 
 // Reprojection error of an observation, px.

@@ -10,18 +10,24 @@ constexpr size_t kMinNumLearnt = 24;
 
 }  // namespace
 
-SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images) {
-  SubSurvey sub;
-  sub.posed.cameras = all.cameras;
-  std::vector<int> new_idx(all.num_images(), -1);
+PosedImages SelectImages(const PosedImages& all, const std::vector<int>& images) {
+  PosedImages selected;
+  selected.cameras = all.cameras;
+  selected.camera_from_given = all.camera_from_given;
   for (const int i : images) {
-    new_idx[i] = sub.posed.num_images();
-    sub.posed.feature_idx.push_back(all.feature_idx[i]);
-    sub.posed.camera_idx.push_back(all.camera_idx[i]);
-    sub.posed.stated.push_back(all.stated[i]);
-    sub.posed.poses.push_back(all.poses[i]);
-    sub.posed.rays.push_back(all.rays[i]);
+    selected.feature_idx.push_back(all.feature_idx[i]);
+    selected.camera_idx.push_back(all.camera_idx[i]);
+    selected.stated.push_back(all.stated[i]);
+    selected.poses.push_back(all.poses[i]);
+    selected.rays.push_back(all.rays[i]);
   }
+  return selected;
+}
+
+SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images) {
+  SubSurvey sub = {SelectImages(all, images), {}};
+  std::vector<int> new_idx(all.num_images(), -1);
+  for (size_t i = 0; i < images.size(); ++i) new_idx[images[i]] = static_cast<int>(i);
   for (const Track& track : tracks) {
     Track kept;
     for (const TrackElement& element : track) {

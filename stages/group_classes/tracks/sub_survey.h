@@ -12,6 +12,9 @@ struct SubSurvey {
   std::vector<Track> tracks;
 };
 
+// `images`: indices into all.stated, ascending.  The offset is kept.
+PosedImages SelectImages(const PosedImages& all, const std::vector<int>& images);
+
 // `images`: indices into all.stated, ascending.
 SubSurvey Restrict(const PosedImages& all, const std::vector<Track>& tracks, const std::vector<int>& images);
 
