@@ -28,7 +28,7 @@ ColmapModel Round(const std::vector<std::string>& names) {
   std::vector<Eigen::Vector3d> places;
   for (int i = 0; i < num; ++i)
     places.emplace_back(10 * std::cos(6.0 * i / num), 10 * std::sin(6.0 * i / num), 1);
-  std::vector<Sight> sights = SightsOfNext(num, 200);
+  std::vector<ModelSight> sights = SightsOfNext(num, 200);
   sights.push_back({{0, num - 1}, 60});
   return ModelOfSights(names, places, sights);
 }
@@ -100,7 +100,7 @@ TEST(DrawVerdict, ALongDriveStaysSmall) {
 TEST(DrawVerdict, ManyImagesInNoOrderStaySmall) {
   const int num = 2000;
   std::vector<Eigen::Vector3d> places;
-  std::vector<Sight> sights;
+  std::vector<ModelSight> sights;
   for (int i = 0; i < num; ++i) {
     places.emplace_back(i * 7 % 45, i * 13 % 44, 0);
     if (i > 0) sights.push_back({{i, i * 7 % i}, 60});

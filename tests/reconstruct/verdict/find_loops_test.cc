@@ -15,9 +15,9 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 // A drive of so many images, a metre apart along its way, of which each next one sees 100 points.
-Loops LoopsOf(int num_images, std::vector<Sight> more, const FindLoopsOptions& options = {},
+Loops LoopsOf(int num_images, std::vector<ModelSight> more, const FindLoopsOptions& options = {},
               std::vector<double> way = {}, const TiedImages& tied = {}) {
-  std::vector<Sight> sights = SightsOfNext(num_images, 100);
+  std::vector<ModelSight> sights = SightsOfNext(num_images, 100);
   sights.insert(sights.end(), more.begin(), more.end());
   const ColmapModel model = ModelOfSights(NumberedNames(num_images), PlacesInARow(num_images), sights);
   if (way.empty()) {
@@ -76,7 +76,7 @@ TEST(FindLoops, TurningOnTheSpotIsNone) {
 // A second lap sees what the first one saw, image by image: that is one loop, and its best pair stands for
 // it.
 TEST(FindLoops, PairsAlongASecondLapAreOneLoop) {
-  std::vector<Sight> again;
+  std::vector<ModelSight> again;
   for (int i = 0; i < 5; ++i) again.push_back({{i, i + 30}, i == 3 ? 90 : 70});
   const Loops loops = LoopsOf(40, again);
   EXPECT_THAT(loops.pairs, SizeIs(5));

@@ -11,7 +11,7 @@
 namespace cairn::reconstruct {
 
 // Points that these images see, and no other.
-struct Sight {
+struct ModelSight {
   std::vector<int> images;
   int num_points = 0;
 };
@@ -19,7 +19,7 @@ struct Sight {
 // A model of images that stand at places, none of them turned, and see points.
 inline ColmapModel ModelOfSights(const std::vector<std::string>& names,
                                  const std::vector<Eigen::Vector3d>& places,
-                                 const std::vector<Sight>& sights) {
+                                 const std::vector<ModelSight>& sights) {
   ColmapModel model;
   for (size_t i = 0; i < names.size(); ++i) {
     ModelImage& image = model.images.emplace_back();
@@ -27,7 +27,7 @@ inline ColmapModel ModelOfSights(const std::vector<std::string>& names,
     image.name = names[i];
     image.cam_from_world.translation = -places[i];
   }
-  for (const Sight& sight : sights) {
+  for (const ModelSight& sight : sights) {
     for (int p = 0; p < sight.num_points; ++p) {
       ModelPoint& point = model.points.emplace_back();
       point.point_id = model.points.size();
@@ -58,8 +58,8 @@ inline std::vector<Eigen::Vector3d> PlacesInARow(int num) {
 }
 
 // Each image and the next.
-inline std::vector<Sight> SightsOfNext(int num, int num_points) {
-  std::vector<Sight> sights;
+inline std::vector<ModelSight> SightsOfNext(int num, int num_points) {
+  std::vector<ModelSight> sights;
   for (int i = 0; i + 1 < num; ++i) sights.push_back({{i, i + 1}, num_points});
   return sights;
 }

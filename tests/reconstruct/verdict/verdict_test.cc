@@ -18,8 +18,8 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 
-ColmapModel Drive(int num_images, std::vector<Sight> more = {}) {
-  std::vector<Sight> sights = SightsOfNext(num_images, 100);
+ColmapModel Drive(int num_images, std::vector<ModelSight> more = {}) {
+  std::vector<ModelSight> sights = SightsOfNext(num_images, 100);
   sights.insert(sights.end(), more.begin(), more.end());
   return ModelOfSights(NumberedNames(num_images), PlacesInARow(num_images), sights);
 }
@@ -103,7 +103,7 @@ TEST(Judge, StepsFarLongerThanTheMedianAreNamed) {
 
 // What joins 4 and 5 is what 3 and 5 see, too: 4 is weak, the drive is not.
 TEST(Judge, ABlurredImageIsWeakButDoesNotPartTheDrive) {
-  std::vector<Sight> sights;
+  std::vector<ModelSight> sights;
   for (int i = 0; i + 1 < 10; ++i) {
     const bool is_blurred = i == 3 || i == 4;
     sights.push_back({{i, i + 1}, is_blurred ? 20 : 100});
@@ -118,7 +118,7 @@ TEST(Judge, ABlurredImageIsWeakButDoesNotPartTheDrive) {
 }
 
 TEST(Judge, LinksOfFewPointsAreWeakTheWeakestFirst) {
-  std::vector<Sight> sights = SightsOfNext(12, 100);
+  std::vector<ModelSight> sights = SightsOfNext(12, 100);
   sights[2].num_points = 49;
   sights[6].num_points = 12;
   sights[8].num_points = 50;
@@ -151,7 +151,7 @@ TEST(Judge, ImagesInNoOrderAreJoinedByTheLinksOfMostPoints) {
 // Of the 61 points that an image has in common with the next but one, the next must see 0.4 times as many.
 TEST(Judge, ADriveIsWhereTheNextImageSeesMuchOfTheSame) {
   for (const int num_next : {24, 25}) {
-    std::vector<Sight> sights = SightsOfNext(12, num_next);
+    std::vector<ModelSight> sights = SightsOfNext(12, num_next);
     for (int i = 0; i + 2 < 12; ++i) sights.push_back({{i, i + 2}, 61});
     const Verdict verdict = JudgeModels({ModelOfSights(NumberedNames(12), PlacesInARow(12), sights)});
     EXPECT_EQ(verdict.is_drive, num_next == 25);
@@ -162,8 +162,8 @@ TEST(Judge, FoldersAreWalksOfTheirOwnThatCommonPointsJoin) {
   std::vector<std::string> names = NumberedNames(6, "monday/");
   const std::vector<std::string> tuesday = NumberedNames(6, "tuesday/");
   names.insert(names.end(), tuesday.begin(), tuesday.end());
-  std::vector<Sight> sights;
-  for (const Sight& sight : SightsOfNext(12, 100)) {
+  std::vector<ModelSight> sights;
+  for (const ModelSight& sight : SightsOfNext(12, 100)) {
     if (sight.images[0] != 5) sights.push_back(sight);
   }
   sights.push_back({{2, 8}, 40});
@@ -190,9 +190,9 @@ TEST(Judge, AnotherFoldersImagesHoldWhatTheySeeAgain) {
   std::vector<std::string> names = NumberedNames(24, "monday/");
   const std::vector<std::string> tuesday = NumberedNames(3, "tuesday/");
   names.insert(names.end(), tuesday.begin(), tuesday.end());
-  std::vector<Sight> sights = SightsOfNext(24, 100);
-  for (const Sight& more :
-       {Sight{{24, 25}, 100}, Sight{{25, 26}, 100}, Sight{{0, 24}, 50}, Sight{{11, 26}, 50}})
+  std::vector<ModelSight> sights = SightsOfNext(24, 100);
+  for (const ModelSight& more : {ModelSight{{24, 25}, 100}, ModelSight{{25, 26}, 100},
+                                 ModelSight{{0, 24}, 50}, ModelSight{{11, 26}, 50}})
     sights.push_back(more);
   const Verdict verdict = JudgeModels({ModelOfSights(names, PlacesInARow(27), sights)});
   ASSERT_THAT(verdict.open_stretches, SizeIs(1));
