@@ -80,11 +80,18 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
     for (const auto& [camera_id, camera] : capture.cameras) matched.cameras[camera_id] = camera;
   }
   SolvedFile solved(SolvedPath(arguments.output));
-  CAIRN_ASSIGN_OR_RETURN(const GroupClassesResult result,
-                         GroupClasses(matched, capture, arguments.options, environment.num_threads,
-                                      *environment.progress, &solved));
-  CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
-  solved.Remove();
+  const auto group_and_write = [&]() -> Result<GroupClassesResult> {
+    CAIRN_ASSIGN_OR_RETURN(GroupClassesResult result,
+                           GroupClasses(matched, capture, arguments.options, environment.num_threads,
+                                        *environment.progress, &solved));
+    CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
+    return result;
+  };
+  const Result<GroupClassesResult> grouped = group_and_write();
+  // A run that was stopped goes on; one that failed leaves nothing behind, least of all on a full disk.
+  if (grouped.ok() || grouped.error().code != ErrorCode::kCancelled) solved.Remove();
+  if (!grouped.ok()) return grouped.error();
+  const GroupClassesResult& result = *grouped;
   const Classes& classes = result.classes;
   environment.report->in = {{"images", static_cast<int64_t>(classes.images.size())},
                             {"tracks", result.num_tracks}};

@@ -109,7 +109,11 @@ void SolvedFile::Write(const std::string& bytes) {
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t written = write(file_->descriptor(), bytes.data() + done, bytes.size() - done);
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return GiveUp("cannot be written", errno);
+    if (written <= 0) {
+      const int error_number = errno;
+      unlink(path_.c_str());  // its room is needed elsewhere
+      return GiveUp("cannot be written", error_number);
+    }
     done += static_cast<size_t>(written);
   }
   if (fdatasync(file_->descriptor()) != 0 && errno != EINVAL) GiveUp("cannot be synced", errno);

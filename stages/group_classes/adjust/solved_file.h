@@ -21,7 +21,7 @@ namespace cairn::group_classes {
 //   hash 16 bytes | size u64 | solution | hash of these three, 16 bytes | the next one ...
 //
 // Solutions are appended when they are there, so that after a kill the last one may be cut off.  A disk that
-// is full, or a folder that cannot be written, is a warning: the run goes on without the file.
+// is full, or a folder that cannot be written, is a warning: the run goes on without the file, which goes.
 class SolvedFile {
  public:
   // Opens the file, or makes it.  Where another process has it, or it cannot be made, nothing is kept.
@@ -30,7 +30,7 @@ class SolvedFile {
   std::optional<std::string> Find(const ContentHash& problem) const;
   // From any thread.
   void Add(const ContentHash& problem, const std::string& solution);
-  // The output is there: the file goes.
+  // The output is there, or will never be: the file goes.
   void Remove();
 
  private:
