@@ -9,6 +9,16 @@ ContentHash HashContents(std::string_view bytes) {
   return {hash.high64, hash.low64};
 }
 
+void WriteHash(const ContentHash& hash, BlobWriter* blob) {
+  blob->UInt64(hash.high);
+  blob->UInt64(hash.low);
+}
+
+ContentHash ReadHash(BlobReader* reader) {
+  const uint64_t high = reader->UInt64();
+  return {high, reader->UInt64()};
+}
+
 ContentHasher& ContentHasher::Text(std::string_view text) {
   bytes_.UInt64(text.size());
   bytes_.Bytes(text);

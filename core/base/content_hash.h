@@ -17,6 +17,10 @@ struct ContentHash {
 };
 ContentHash HashContents(std::string_view bytes);
 
+// A hash as 16 bytes of a blob.
+void WriteHash(const ContentHash& hash, BlobWriter* blob);
+ContentHash ReadHash(BlobReader* reader);
+
 // The hash of several things in turn.
 class ContentHasher {
  public:

@@ -38,4 +38,9 @@ inline double Median(std::vector<double> values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
+// Standard deviation of a normal distribution over its median absolute deviation.
+inline constexpr double kSigmaOfMad = 1.4826;
+// Standard deviation of the median of many normal values over that of their mean.
+inline constexpr double kSigmaOfMedian = 1.2533;
+
 }  // namespace cairn

@@ -22,16 +22,6 @@ constexpr size_t kMinBytes = kMagic.size() + kIdentityBytes + sizeof(uint64_t) +
 // Databases that are open at the same time.
 constexpr int kMaxNumOpen = 64;
 
-void WriteHash(const ContentHash& hash, BlobWriter* blob) {
-  blob->UInt64(hash.high);
-  blob->UInt64(hash.low);
-}
-
-ContentHash ReadHash(BlobReader* reader) {
-  const uint64_t high = reader->UInt64();
-  return {high, reader->UInt64()};
-}
-
 }  // namespace
 
 std::string ReusePath(const std::string& output_path) { return output_path + ".reuse"; }

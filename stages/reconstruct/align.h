@@ -11,11 +11,6 @@
 
 namespace cairn::reconstruct {
 
-// Standard deviation of a normal distribution over its median absolute deviation.
-inline constexpr double kSigmaOfMad = 1.4826;
-// Standard deviation of the median of many normal values over that of their mean.
-inline constexpr double kSigmaOfMedian = 1.2533;
-
 // A known position of a camera, with standard deviations per axis, metres.
 struct PositionTarget {
   Eigen::Vector3d model = Eigen::Vector3d::Zero();  // the camera's centre in the reconstruction

@@ -43,9 +43,8 @@ std::string UnevenSteps(const ColmapModel& model) {
   if (at < 0) return "";
   return fmt::format(
       "from {} to {} the steps from image to image are {:.1f} times as {} as elsewhere: if the camera did "
-      "not move "
-      "so unevenly, the map is bent there; odometry.txt, or images with a view of both sides of a turn, mend "
-      "that",
+      "not move so unevenly, the map is bent there; odometry.txt, or images with a view of both sides of a "
+      "turn, mend that",
       names[order[at]], names[order[at + kNumSteps]], most, is_short ? "short" : "long");
 }
 

@@ -19,16 +19,6 @@ namespace {
 
 constexpr std::string_view kMagic("cairn solved 1\n\0", 16);
 
-void WriteHash(const ContentHash& hash, BlobWriter* blob) {
-  blob->UInt64(hash.high);
-  blob->UInt64(hash.low);
-}
-
-ContentHash ReadHash(BlobReader* reader) {
-  const uint64_t high = reader->UInt64();
-  return {high, reader->UInt64()};
-}
-
 // A problem's hash, the solution with its size.
 std::string RecordOf(const ContentHash& problem, std::string_view solution) {
   BlobWriter blob;

@@ -18,8 +18,6 @@ constexpr size_t kNumCompared = 5;
 constexpr double kLeastRatioSigma =
     0.02;                            // of a ratio's logarithm: the pairs' directions are not exact, either
 constexpr double kUnknownSigma = 3;  // of the logarithm of a length of which nothing is known
-// Of a median, per standard deviation of normal values; and that per median absolute deviation.
-constexpr double kSigmaOfMedian = 1.2533, kSigmaPerDeviation = 1.4826;
 
 const std::vector<PairDepth>& DepthsFrom(const PairDepths& pair, int image) {
   return image == pair.image1 ? pair.from1 : pair.from2;
@@ -39,7 +37,7 @@ std::optional<std::pair<double, double>> LogRatio(const std::vector<PairDepth>& 
   const double median = Median(differences);
   const auto num = static_cast<double>(differences.size());
   for (double& difference : differences) difference = std::abs(difference - median);
-  const double sigma = kSigmaPerDeviation * Median(differences) * kSigmaOfMedian / std::sqrt(num);
+  const double sigma = kSigmaOfMad * Median(differences) * kSigmaOfMedian / std::sqrt(num);
   return std::pair(median, std::hypot(sigma, kLeastRatioSigma));
 }
 
