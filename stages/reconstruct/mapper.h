@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/colmap/colmap_model.h"
-#include "stages/reconstruct/globally/mapper_input.h"
+#include "stages/reconstruct/view_graph/mapper_input.h"
 
 namespace cairn::reconstruct {
 

@@ -7,9 +7,9 @@
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/similarity.h"
-#include "stages/reconstruct/globally/image_motion.h"
-#include "stages/reconstruct/globally/mapper_input.h"
 #include "stages/reconstruct/known_places.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
+#include "stages/reconstruct/view_graph/mapper_input.h"
 
 namespace cairn::reconstruct {
 

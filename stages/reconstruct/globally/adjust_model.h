@@ -8,7 +8,7 @@
 
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
-#include "stages/reconstruct/globally/image_motion.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
 
 namespace cairn::reconstruct {
 

@@ -5,8 +5,8 @@
 #include <map>
 
 #include "core/base/parallel.h"
-#include "stages/reconstruct/globally/differences.h"
 #include "stages/reconstruct/globally/pair_lengths.h"
+#include "stages/reconstruct/view_graph/differences.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -50,16 +50,16 @@ std::map<std::pair<int, int>, KnownLength> KnownLengths(const std::vector<ImageM
 
 }  // namespace
 
-ImageWays WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
-                 const std::vector<ImageMotion>& motions, const std::vector<std::pair<int, int>>& steps,
-                 const BearingOf& bearing_of, double sigma_rad, int num_threads) {
-  ImageWays result;
-  const double median_way_m = MedianWayM(motions);
-  if (median_way_m > 0) result.unit = median_way_m;
+std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
+                        const std::vector<ImageMotion>& motions,
+                        const std::vector<std::pair<int, int>>& steps, const BearingOf& bearing_of,
+                        double sigma_rad, int num_threads) {
+  // A typical step.
+  const double median_way_m = MedianWayM(motions), unit = median_way_m > 0 ? median_way_m : 1;
   std::vector<PairDepths> depths(pairs.size());
   ParallelFor(std::ssize(pairs), num_threads,
               [&](int64_t p) { depths[p] = DepthsOfMatches(pairs[p], bearing_of, sigma_rad); });
-  const auto known_by_images = KnownLengths(motions, steps, result.unit);
+  const auto known_by_images = KnownLengths(motions, steps, unit);
   std::vector<KnownLength> known;
   for (size_t p = 0; p < pairs.size(); ++p) {
     const auto found = known_by_images.find(std::minmax(pairs[p].image1, pairs[p].image2));
@@ -67,21 +67,20 @@ ImageWays WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::ve
     known.push_back(found->second);
     known.back().pair = static_cast<int>(p);
   }
+  std::vector<Way> ways;
   const std::vector<double> lengths = PairLengths(static_cast<int>(rotations.size()), depths, known);
   for (size_t p = 0; p < pairs.size(); ++p) {
     const Eigen::Vector3d direction =
         rotations[pairs[p].image1].conjugate() * pairs[p].cam2_from_cam1.Center().normalized();
-    result.ways.push_back(
-        {pairs[p].image1, pairs[p].image2, result.unit * lengths[p] * direction,
-         result.unit * (lengths[p] > 0 ? kLeastSigma + kSigmaRatio * lengths[p] : kShortSigma)});
+    ways.push_back({pairs[p].image1, pairs[p].image2, unit * lengths[p] * direction,
+                    unit * (lengths[p] > 0 ? kLeastSigma + kSigmaRatio * lengths[p] : kShortSigma)});
   }
   for (const ImageMotion& motion : motions) {
-    result.ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way(),
-                           kLeastSigma * result.unit + kSigmaRatio * motion.Way().norm()});
+    ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way(),
+                    kLeastSigma * unit + kSigmaRatio * motion.Way().norm()});
   }
-  for (const auto& [from, to] : steps)
-    result.ways.push_back({from, to, Eigen::Vector3d::Zero(), kStepSigma * result.unit});
-  return result;
+  for (const auto& [from, to] : steps) ways.push_back({from, to, Eigen::Vector3d::Zero(), kStepSigma * unit});
+  return ways;
 }
 
 std::vector<Eigen::Vector3d> CentersAlong(int num_images, const std::vector<Way>& ways) {

@@ -9,8 +9,8 @@
 #include <Eigen/Geometry>
 
 #include "core/base/ids.h"
-#include "stages/reconstruct/globally/image_motion.h"
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
 
@@ -21,20 +21,17 @@ struct Way {
   double sigma = 1;  // per axis
 };
 
-struct ImageWays {
-  std::vector<Way> ways;  // of pairs, motions and steps
-  double unit = 1;        // a typical step: of the motions, in metres, or of the pairs
-};
-
 // Where a keypoint is seen, a unit vector in its camera's frame; none outside of what the lens shows.
 using BearingOf = std::function<std::optional<Eigen::Vector3d>(int image, KeypointIdx keypoint)>;
 
-// Ways by pairs, whose lengths are averaged, and by motions; of pairs that know no length, and of `steps`
-// (images of which one follows the other), that they are short.  `sigma_rad`: of bearings.  Same result for
+// Ways by pairs, whose lengths are averaged, and by motions, in metres if there are any; of pairs that know
+// no length, and of `steps` (images of which one follows the other), that they are short.  `sigma_rad`: of
+// bearings.  Same result for
 // any number of threads.
-ImageWays WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
-                 const std::vector<ImageMotion>& motions, const std::vector<std::pair<int, int>>& steps,
-                 const BearingOf& bearing_of, double sigma_rad, int num_threads);
+std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
+                        const std::vector<ImageMotion>& motions,
+                        const std::vector<std::pair<int, int>>& steps, const BearingOf& bearing_of,
+                        double sigma_rad, int num_threads);
 
 // The images' centres that explain the ways best, robustly; the first at zero.  REQUIRES: the ways join all
 // images

@@ -11,10 +11,11 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/text.h"
-#include "stages/reconstruct/globally/average_rotations.h"
-#include "stages/reconstruct/globally/backbone.h"
 #include "stages/reconstruct/globally/part_mapper.h"
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
+#include "stages/reconstruct/view_graph/backbone.h"
+#include "stages/reconstruct/view_graph/triangles.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -34,6 +35,7 @@ ViewPair WithoutMatches(const ViewPair& pair) {
           .alternatives = pair.alternatives,
           .matches = {},
           .strength = pair.strength,
+          .closed = pair.closed,
           .weight = pair.weight};
 }
 
@@ -100,14 +102,27 @@ std::vector<Part> PartsOf(Part whole) {
   return parts;
 }
 
+// Leaves out the pairs between images of different lists, if there are such; returns whether.
+bool CutApart(const std::vector<std::vector<int>>& lists, Part* part) {
+  if (!lists.empty() && lists[0].size() == part->images.size()) return false;
+  std::vector<int> list_of(part->images.size(), -1);
+  for (size_t k = 0; k < lists.size(); ++k) {
+    for (const int i : lists[k]) list_of[i] = static_cast<int>(k);
+  }
+  std::erase_if(part->pairs, [&](const ViewPair& pair) {
+    return list_of[pair.image1] < 0 || list_of[pair.image1] != list_of[pair.image2];
+  });
+  return true;
+}
+
 // The backbone of a part and its rotations, without the pairs that contradict them.
 struct Untangled {
   std::vector<int> backbone;
   std::vector<Eigen::Quaterniond> rotations;
 };
 
-// Nothing where the part falls apart without the pairs that contradict its rotations, which are taken out of
-// it.
+// Nothing where no backbone joins the part, or where it falls apart without the pairs that contradict its
+// rotations: these pairs are taken out of it.
 std::optional<Untangled> Untangle(bool is_drive, Part* part) {
   const int num_images = static_cast<int>(part->images.size());
   const AverageRotationsOptions options;
@@ -118,6 +133,7 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
     for (const int p : untangled.backbone) pairs.push_back(WithoutMatches(part->pairs[p]));
     const size_t num_seen = pairs.size();
     for (ViewPair& motion : PairsOf(part->motions)) pairs.push_back(std::move(motion));
+    if (CutApart(ConnectedParts(num_images, pairs), part)) return std::nullopt;
     // Chooses the rotations nearest to these, and says which contradict them all the same.
     const auto contradicting = [&](const std::vector<Eigen::Quaterniond>& rotations, double max_error_deg) {
       std::vector<bool> is_wrong(part->pairs.size(), false);
@@ -173,6 +189,11 @@ Result<std::optional<GlobalMap>> MapBy(const MapperInput& input, std::vector<Ima
     Part part = std::move(open.front());
     open.pop_front();
     const bool is_drive = IsDrive(static_cast<int>(part.images.size()), part.pairs, part.motions);
+    if (!is_drive) {  // the order of a drive tells more
+      const std::vector<double> closed =
+          CloseTriangles(static_cast<int>(part.images.size()), part.pairs, {}, num_threads);
+      for (size_t p = 0; p < part.pairs.size(); ++p) part.pairs[p].closed = closed[p];
+    }
     SetWeights(is_drive, &part.pairs);
     const auto untangled = Untangle(is_drive, &part);
     if (!untangled) {

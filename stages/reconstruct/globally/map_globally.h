@@ -6,9 +6,9 @@
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/colmap/colmap_model.h"
-#include "stages/reconstruct/globally/image_motion.h"
-#include "stages/reconstruct/globally/mapper_input.h"
 #include "stages/reconstruct/globally/part_mapper.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
+#include "stages/reconstruct/view_graph/mapper_input.h"
 
 namespace cairn::reconstruct {
 
@@ -24,12 +24,12 @@ struct GlobalMap {
 
 // Poses of all images at once instead of one after the other [Pan, Barath, Pollefeys & Schönberger, "Global
 // structure-from-motion revisited" (GLOMAP), ECCV 2024]: focal lengths that are guesses from the pairs,
-// relative poses, rotations averaged, wrong pairs cut, lengths of ways averaged, tracks, places of cameras
-// and points, then bundle adjustments, each with tracks triangulated anew; all anew where the first of these
-// find another focal length.  `motions` are measurements in all
-// of that: they join what no match joins, and give the scale.  Every part that pairs or motions join becomes
-// a model. Returns them, most images first (ties: more points), in frames and scales of their own.  The same
-// for any number of threads. Errors: NoData (no pair of images has a relative pose); Cancelled.
+// relative poses, wrong pairs cut, rotations averaged, lengths of ways averaged, places that these lead to,
+// then bundle adjustments, each with tracks triangulated anew; all anew where the first of these find another
+// focal length.  `motions` are measurements in all of that: they join what no match joins, and give the
+// scale.  Every part that pairs or motions join becomes a model.  Returns them, most images first (ties: more
+// points), in frames and scales of their own.  The same for any number of threads.
+// Errors: NoData (no pair of images has a relative pose); Cancelled.
 Result<GlobalMap> MapGlobally(const MapperInput& input, const std::vector<ImageMotion>& motions,
                               const MapGloballyOptions& options, int num_threads, Progress& progress);
 

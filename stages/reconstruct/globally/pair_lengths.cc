@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/quantiles.h"
-#include "stages/reconstruct/globally/differences.h"
+#include "stages/reconstruct/view_graph/differences.h"
 
 namespace cairn::reconstruct {
 namespace {

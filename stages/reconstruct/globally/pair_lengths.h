@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "core/base/ids.h"
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
 

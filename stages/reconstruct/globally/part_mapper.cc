@@ -13,14 +13,12 @@
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
 #include "core/structure/camera_sensitivity.h"
-#include "stages/reconstruct/globally/average_rotations.h"
-#include "stages/reconstruct/globally/image_ways.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
 
 namespace cairn::reconstruct {
 namespace {
 
 constexpr int kMinTrackLength = 3;
-constexpr int kNumKeypointsPositioned = 80;
 constexpr double kMinAngleDeg = 1;
 constexpr int kMinNumSeen = 15;  // points of an image that stays
 constexpr double kGuessedFocalSigma = 0.3, kStatedFocalSigma = 0.03, kDistortionSigma = 0.1;
@@ -48,7 +46,7 @@ constexpr int kLastStartingRound = 1;
 constexpr double kMinPartAccepted = 0.01;
 // Keypoints that decide in the last round: of an image, and of all.
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
-constexpr int kMaxNumObservations = 200000;
+constexpr int kMaxNumObservations = 800000;
 
 }  // namespace
 
@@ -98,8 +96,8 @@ double PartMapper::FocalChange() const {
 std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations,
                                            double max_focal_change_ratio, Progress& progress) {
   KeepRotations(rotations);
-  MakeTracks();
   Position(rotations);
+  MakeTracks();
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
     progress.Advance(static_cast<int64_t>(images_.size()));
@@ -217,35 +215,14 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   const auto bearing_of = [&](int image, KeypointIdx keypoint) {
     return BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
   };
-  const ImageWays by_pairs = WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of,
-                                    1 / CameraOf(0).MeanFocal(), num_threads_);
-  const std::vector<Eigen::Vector3d> start = CentersAlong(static_cast<int>(images_.size()), by_pairs.ways);
-  std::vector<Way> ways;
-  for (const auto& [from, to] : steps_) ways.push_back({from, to, start[to] - start[from]});
-  KeepSteps(ways);
-  for (const ImageMotion& motion : problem_.motions)
-    ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way()});
-  std::vector<std::vector<int>> all(tracks_.size());
-  for (size_t t = 0; t < tracks_.size(); ++t) {
-    all[t].resize(tracks_[t].size());
-    std::iota(all[t].begin(), all[t].end(), 0);
-  }
-  std::vector<Sight> sights;
-  const std::vector<Chosen> chosen = ChooseTracks(kNumKeypointsPositioned, all);
-  for (size_t k = 0; k < chosen.size(); ++k) {
-    for (const int e : chosen[k].elements) {
-      const TrackElement& element = tracks_[chosen[k].track][e];
-      const auto bearing = bearing_of(element.image_idx, element.keypoint_idx);
-      if (!bearing) continue;
-      sights.push_back(
-          {element.image_idx, static_cast<int>(k), rotations[element.image_idx].conjugate() * *bearing});
-    }
-  }
-  const Positions positions =
-      PositionImages(start, static_cast<int>(chosen.size()), sights, ways, by_pairs.unit, {});
+  const std::vector<Way> ways = WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of,
+                                       1 / CameraOf(0).MeanFocal(), num_threads_);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(static_cast<int>(images_.size()), ways);
+  std::vector<Way> steps;
+  for (const auto& [from, to] : steps_) steps.push_back({from, to, centers[to] - centers[from]});
+  KeepSteps(steps);
   for (size_t i = 0; i < images_.size(); ++i)
-    problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
-  spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());
+    problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * centers[i])});
 }
 
 void PartMapper::TriangulateAll(double max_error_px) {

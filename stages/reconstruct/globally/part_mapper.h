@@ -12,9 +12,9 @@
 #include "core/structure/triangulate.h"
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
-#include "stages/reconstruct/globally/image_motion.h"
-#include "stages/reconstruct/globally/position_images.h"
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/globally/image_ways.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
 
@@ -25,9 +25,9 @@ struct MapGloballyOptions {
   bool refine_distortion = true;
 };
 
-// Maps images that pairs join, from their rotations: places by the pairs of the backbone, then rounds, each
-// of which takes in the pairs that agree with the map so far, makes tracks of their matches, triangulates,
-// and adjusts the longest.
+// Maps images that pairs join, from their rotations: places by the ways of the backbone's pairs, then rounds,
+// each of which takes in the pairs that agree with the map so far, makes tracks of their matches,
+// triangulates, and adjusts the longest.
 class PartMapper {
  public:
   // `images`: indices into the input's, of a drive in its order; `pairs` and `motions`: of indices into

@@ -93,7 +93,7 @@ BearingOf BearingsOf(const Drive& drive) {
   };
 }
 
-ImageWays Find(const Drive& drive, const std::vector<ImageMotion>& motions = {}, int num_threads = 2) {
+std::vector<Way> Find(const Drive& drive, const std::vector<ImageMotion>& motions = {}, int num_threads = 2) {
   return WaysBy(drive.Rotations(), drive.pairs, motions, drive.steps, BearingsOf(drive), kNoiseRad,
                 num_threads);
 }
@@ -175,9 +175,8 @@ TEST(PairLengths, APairThatSharesTooLittleHasNone) {
 
 TEST(ImageWays, TellHowMuchLongerStepsAreBehindATurnOnTheSpot) {
   const Drive drive = MakeDrive();
-  const ImageWays found = Find(drive);
-  EXPECT_EQ(found.unit, 1);
-  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, found.ways);
+  const std::vector<Way> found = Find(drive);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, found);
   const double scale = LengthOf(centers, 0, 12) / 1.2;
   EXPECT_NEAR(LengthOf(centers, 17, 29) / scale, 3.6, 0.1);
   EXPECT_LT(LengthOf(centers, 12, 17) / scale, 0.01);
@@ -189,9 +188,8 @@ TEST(ImageWays, MotionsGiveTheUnitAlsoWhereTheyAreMissing) {
   std::vector<ImageMotion> motions;
   for (int i = 1; i < 8; ++i)
     motions.push_back({i - 1, i, drive.cams_from_world[i] * drive.cams_from_world[i - 1].Inverse()});
-  const ImageWays found = Find(drive, motions);
-  EXPECT_NEAR(found.unit, 0.1, 1e-9);
-  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, found.ways);
+  const std::vector<Way> found = Find(drive, motions);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, found);
   // A ratio over a turn is known to some per cent, and 3.6 m follow.
   for (int i = 0; i < 30; ++i) EXPECT_LT((centers[i] - drive.Center(i)).norm(), i < 18 ? 0.05 : 0.2) << i;
 }
@@ -203,7 +201,7 @@ TEST(ImageWays, MotionsJoinWhatNoPairDoes) {
   std::vector<ImageMotion> motions = {
       {19, 20, drive.cams_from_world[20] * drive.cams_from_world[19].Inverse()},
       {21, 20, drive.cams_from_world[20] * drive.cams_from_world[21].Inverse()}};
-  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, Find(drive, motions).ways);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, Find(drive, motions));
   EXPECT_NEAR(LengthOf(centers, 19, 20), 0.3, 0.03);
   EXPECT_NEAR(LengthOf(centers, 21, 29), 2.4, 0.1);
 }
@@ -213,16 +211,16 @@ TEST(ImageWays, APairThatIsWrongHasLittleSay) {
   for (ViewPair& pair : drive.pairs) {
     if (pair.image1 == 5 && pair.image2 == 9) pair.cam2_from_cam1.translation = Eigen::Vector3d::UnitX();
   }
-  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, Find(drive).ways);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(30, Find(drive));
   const double scale = LengthOf(centers, 0, 12) / 1.2;
   for (int i = 0; i < 30; ++i) EXPECT_LT((centers[i] / scale - drive.Center(i)).norm(), 0.1) << i;
 }
 
 TEST(ImageWays, SameForAnyNumberOfThreads) {
   const Drive drive = MakeDrive();
-  const ImageWays one = Find(drive, {}, 1), seven = Find(drive, {}, 7);
-  ASSERT_EQ(one.ways.size(), seven.ways.size());
-  for (size_t k = 0; k < one.ways.size(); ++k) EXPECT_EQ(one.ways[k].way, seven.ways[k].way);
+  const std::vector<Way> one = Find(drive, {}, 1), seven = Find(drive, {}, 7);
+  ASSERT_EQ(one.size(), seven.size());
+  for (size_t k = 0; k < one.size(); ++k) EXPECT_EQ(one[k].way, seven[k].way);
 }
 
 }  // namespace

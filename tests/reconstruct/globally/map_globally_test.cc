@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "stages/reconstruct/globally/part_mapper.h"
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
 namespace cairn::reconstruct {
@@ -181,7 +181,7 @@ TEST(MapGlobally, SameModelForAnyNumberOfThreads) {
 }
 
 // Four images of one place match four of another, as they would where both bear the same poster.
-TEST(MapGlobally, LookAlikesDoNotBendTheMap) {
+SyntheticSurvey MakeLookAlikes() {
   SyntheticSurvey survey = MakeSyntheticSurvey(30, 6);
   for (int i = 0; i < 4; ++i) {
     for (int j = 25; j < 29; ++j) {
@@ -202,10 +202,68 @@ TEST(MapGlobally, LookAlikesDoNotBendTheMap) {
       survey.input.geometries.push_back(geometry);
     }
   }
+  return survey;
+}
+
+TEST(MapGlobally, LookAlikesDoNotBendTheMap) {
+  const SyntheticSurvey survey = MakeLookAlikes();
   const auto models = Map(survey);
   ASSERT_TRUE(models.ok());
   EXPECT_GE(models->front().images.size(), 26u);
   EXPECT_LT(LargestErrorM(models->front(), survey), 0.1);
+}
+
+// Pairs that nothing bears out, each of another relative pose, as strong as a third of what neighbours share.
+TEST(MapGlobally, InNoOrderPairsThatNoTriangleBearsOutDoNotBendTheMap) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(30, 6);
+  const size_t num_right = survey.input.geometries.size();
+  for (int i = 0; i < 30; ++i) {
+    for (int j = i + 6 + i % 3; j < 30; j += 4) {
+      TwoViewGeometry geometry = survey.input.geometries[(17 * i + 5 * j) % num_right];
+      const ImageId from = geometry.image_id1, to = geometry.image_id2;
+      geometry.image_id1 = static_cast<ImageId>(i + 1);
+      geometry.image_id2 = static_cast<ImageId>(j + 1);
+      const size_t first1 = survey.input.keypoints[i].size(), first2 = survey.input.keypoints[j].size();
+      std::vector<Match> matches;
+      for (const Match& match : geometry.inliers) {
+        if (match.idx1 % 2 == 0) continue;
+        matches.push_back({static_cast<KeypointIdx>(first1 + matches.size()),
+                           static_cast<KeypointIdx>(first2 + matches.size())});
+        survey.input.keypoints[i].push_back(survey.input.keypoints[from - 1][match.idx1]);
+        survey.input.keypoints[j].push_back(survey.input.keypoints[to - 1][match.idx2]);
+      }
+      geometry.inliers = matches;
+      survey.input.geometries.push_back(geometry);
+    }
+  }
+  for (size_t i = 0; i < 30; ++i) survey.input.images[i].name = fmt::format("image{:02}.jpg", 7 * i % 30);
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  EXPECT_EQ(models->front().images.size(), 30u);
+  EXPECT_LT(LargestErrorM(models->front(), survey), 0.1);
+}
+
+// Two surveys, joined by one pair of hardly a match: two models, not one with half of it anywhere.
+TEST(MapGlobally, PartsThatNextToNothingJoinsAreModelsOfTheirOwn) {
+  SyntheticSurvey survey = MakeSyntheticSurvey(12, 1, "a");
+  AppendSurvey(MakeSyntheticSurvey(14, 2, "b", 100), &survey);
+  TwoViewGeometry weak{.image_id1 = 5, .image_id2 = 102, .config = TwoViewConfig::kUncalibrated};
+  // What image 4 of the one sees is what image 2 of the other does, of sixteen of its keypoints.
+  for (const Match& match : survey.input.geometries[4].inliers) {
+    const auto first = static_cast<KeypointIdx>(survey.input.keypoints[4].size()),
+               second = static_cast<KeypointIdx>(survey.input.keypoints[14].size());
+    if (weak.inliers.size() == 16) break;
+    survey.input.keypoints[4].push_back(survey.input.keypoints[0][match.idx1]);
+    survey.input.keypoints[14].push_back(survey.input.keypoints[5][match.idx2]);
+    weak.inliers.push_back({first, second});
+  }
+  survey.input.geometries.push_back(weak);
+  for (size_t i = 0; i < 26; ++i) survey.input.images[i].name = fmt::format("image{:02}.jpg", 7 * i % 26);
+  const auto models = Map(survey);
+  ASSERT_TRUE(models.ok());
+  ASSERT_EQ(models->size(), 2u);
+  EXPECT_EQ(models->at(0).images.size(), 14u);
+  EXPECT_EQ(models->at(1).images.size(), 12u);
 }
 
 TEST(MapGlobally, NothingToJoinIsAnError) {

@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
 

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/view_pairs.h"
+#include "stages/reconstruct/view_graph/view_pairs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/average_rotations.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "stages/reconstruct/globally/average_rotations.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
 
 #include <algorithm>
 #include <cmath>
 #include <queue>
 
 #include "core/structure/disjoint_sets.h"
-#include "stages/reconstruct/globally/differences.h"
+#include "stages/reconstruct/view_graph/differences.h"
 
 namespace cairn::reconstruct {
 namespace {

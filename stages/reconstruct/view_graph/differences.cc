@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/differences.h"
+#include "stages/reconstruct/view_graph/differences.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 namespace cairn::reconstruct {
 namespace {
 
-constexpr int kNumAbsoluteIterations = 10, kNumRobustIterations = 10;
+constexpr int kNumByAbsolute = 10, kNumBySquares = 10;
 // In standard deviations: errors below are not told apart, and those beyond count little.
 constexpr double kLeastError = 0.1, kRobustScale = 3;
 
@@ -45,14 +45,14 @@ Eigen::MatrixXd SolveDifferencesRobustly(int num_nodes, const std::vector<Link>&
   std::vector<double> precisions, weights(links.size());
   for (const Link& link : links) precisions.push_back(1 / (link.sigma * link.sigma));
   Eigen::MatrixXd values = SolveDifferences(num_nodes, links, differences, precisions);
-  for (int iteration = 0; iteration < kNumAbsoluteIterations + kNumRobustIterations; ++iteration) {
+  for (int iteration = 0; iteration < kNumByAbsolute + kNumBySquares; ++iteration) {
     for (size_t k = 0; k < links.size(); ++k) {
       const auto [from, to, sigma] = links[k];
       const auto row = static_cast<Eigen::Index>(k);
       const double error = (values.row(to) - values.row(from) - differences.row(row)).norm() / sigma;
-      weights[k] = precisions[k] * (iteration < kNumAbsoluteIterations
-                                        ? 1 / std::max(error, kLeastError)
-                                        : std::pow(1 + std::pow(error / kRobustScale, 2), -2));
+      weights[k] =
+          precisions[k] * (iteration < kNumByAbsolute ? 1 / std::max(error, kLeastError)
+                                                      : std::pow(1 + std::pow(error / kRobustScale, 2), -2));
     }
     values = SolveDifferences(num_nodes, links, differences, weights);
   }

@@ -5,7 +5,7 @@
 
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
-#include "stages/reconstruct/globally/mapper_input.h"
+#include "stages/reconstruct/view_graph/mapper_input.h"
 
 namespace cairn::reconstruct {
 
@@ -19,6 +19,8 @@ struct ViewPair {
   // How much of what the images show both do: matches over the keypoints that have any, of the image with
   // more.
   double strength = 0;
+  // How well other pairs bear it out (triangles.h); 1 where that was not asked.
+  double closed = 1;
   double weight = 0;  // beside pairs that contradict it
 };
 

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/image_motion.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

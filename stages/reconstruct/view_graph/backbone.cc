@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/backbone.h"
+#include "stages/reconstruct/view_graph/backbone.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,9 +8,9 @@
 namespace cairn::reconstruct {
 namespace {
 
-// Strength from which a pair belongs to the backbone, and the ladder down which parts of it are
-// joined.
-constexpr double kMinStrength = 0.25, kLadderFactor = 0.8, kLeastStrength = 0.01;
+// Trust from which a pair belongs to the backbone, of a drive and of images in no order, and the ladder down
+// which parts of it are joined.
+constexpr double kMinTrustOfDrive = 0.25, kMinTrust = 0.1, kLadderFactor = 0.8, kLeastTrust = 0.005;
 // Of a drive: those at most this many images on or back.
 constexpr int kMaxOrderDistance = 10;
 // A drive: of this part of its neighbours the pair is at least this strong.
@@ -40,26 +40,28 @@ void SetWeights(bool is_drive, std::vector<ViewPair>* pairs) {
     const int distance = std::min(std::abs(pair.image1 - pair.image2), kMaxOrderDistance);
     const double certainty = std::min(1.0, static_cast<double>(pair.matches.size()) / kNumCertainMatches);
     const double unambiguity = pair.alternatives.empty() ? 1 : kWeightOfAmbiguous;
-    pair.weight = pair.strength * certainty * unambiguity / (is_drive ? distance : 1);
+    pair.weight = pair.strength * pair.closed * certainty * unambiguity / (is_drive ? distance : 1);
   }
 }
 
 std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs,
                           const std::vector<ImageMotion>& motions, bool is_drive) {
+  const double min_trust = is_drive ? kMinTrustOfDrive : kMinTrust;
+  const auto trust = [](const ViewPair& pair) { return pair.strength * pair.closed; };
   std::vector<bool> is_taken(pairs.size(), false);
   DisjointSets components(num_images);
   for (const ImageMotion& motion : motions) components.Join(motion.image1, motion.image2);
   for (size_t p = 0; p < pairs.size(); ++p) {
     const int distance = std::abs(pairs[p].image1 - pairs[p].image2);
-    is_taken[p] = pairs[p].strength >= kMinStrength && (!is_drive || distance <= kMaxOrderDistance);
+    is_taken[p] = trust(pairs[p]) >= min_trust && (!is_drive || distance <= kMaxOrderDistance);
     if (is_drive && distance == 1) is_taken[p] = true;
     if (is_taken[p]) components.Join(pairs[p].image1, pairs[p].image2);
   }
   // What joins parts, the strongest first, all of one step of the ladder together.
-  for (double least = kMinStrength; least >= kLeastStrength; least *= kLadderFactor) {
+  for (double least = min_trust; least >= kLeastTrust; least *= kLadderFactor) {
     std::vector<size_t> joining;
     for (size_t p = 0; p < pairs.size(); ++p) {
-      if (pairs[p].strength >= least && components.Find(pairs[p].image1) != components.Find(pairs[p].image2))
+      if (trust(pairs[p]) >= least && components.Find(pairs[p].image1) != components.Find(pairs[p].image2))
         joining.push_back(p);
     }
     for (const size_t p : joining) {

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/image_motion.h"
+#include "stages/reconstruct/view_graph/image_motion.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "core/base/quantiles.h"
-#include "stages/reconstruct/globally/average_rotations.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
 
 namespace cairn::reconstruct {
 namespace {

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/differences.h"
+#include "stages/reconstruct/view_graph/differences.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/mapper_input.h"
+#include "stages/reconstruct/view_graph/mapper_input.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/globally/backbone.h"
+#include "stages/reconstruct/view_graph/backbone.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -50,18 +50,28 @@ TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
 }
 
 TEST(Backbone, WithoutAnOrderItIsTheStrongPairs) {
-  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.25), Pair(0, 2, 0.24), Pair(2, 3, 0.7)};
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.1), Pair(0, 2, 0.099), Pair(2, 3, 0.7)};
   EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 3));
+}
+
+TEST(Backbone, WithoutAnOrderPairsThatOthersDoNotBearOutAreWeak) {
+  std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(1, 2, 0.5), Pair(0, 2, 0.9), Pair(2, 3, 0.7)};
+  pairs[2].closed = 0.1;
+  EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 3));
+  SetWeights(false, &pairs);
+  EXPECT_DOUBLE_EQ(pairs[1].weight, 0.5);
+  EXPECT_DOUBLE_EQ(pairs[2].weight, 0.09);
 }
 
 TEST(Backbone, PartsAreJoinedByTheStrongestOfTheWeakPairs) {
   // Two parts; the strongest pairs between them come, with those of nearly its strength, and the weak ones do
   // not.
-  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9),   Pair(2, 3, 0.9),  Pair(0, 2, 0.155),
-                                       Pair(1, 3, 0.145), Pair(1, 2, 0.05), Pair(0, 3, 0.12)};
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9),   Pair(2, 3, 0.9),  Pair(0, 2, 0.062),
+                                       Pair(1, 3, 0.054), Pair(1, 2, 0.02), Pair(0, 3, 0.049)};
   EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 2, 3));
-  // As weak as it need be.
-  EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.012)}, {}, false), ElementsAre(0, 1));
+  // Weak as it may be, within reason.
+  EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.006)}, {}, false), ElementsAre(0, 1));
+  EXPECT_THAT(Backbone(3, {Pair(0, 1, 0.9), Pair(1, 2, 0.004)}, {}, false), ElementsAre(0));
 }
 
 TEST(Backbone, OfADriveItIsWhatIsNearInItsOrder) {
@@ -91,7 +101,7 @@ TEST(IsDrive, WhereOdometrySaysHowTheNextImageWasReached) {
 }
 
 TEST(Backbone, WhatMotionsJoinNeedsNoWeakPair) {
-  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(2, 3, 0.9), Pair(0, 3, 0.1)};
+  const std::vector<ViewPair> pairs = {Pair(0, 1, 0.9), Pair(2, 3, 0.9), Pair(0, 3, 0.05)};
   EXPECT_THAT(Backbone(4, pairs, {}, false), ElementsAre(0, 1, 2));
   EXPECT_THAT(Backbone(4, pairs, {{1, 2, {}}}, false), ElementsAre(0, 1));
 }
