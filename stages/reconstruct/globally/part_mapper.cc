@@ -79,7 +79,10 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
   for (const int image : images_) problem_.camera_idx.push_back(index.at(input.images[image].camera_id));
 }
 
-int PartMapper::NumRounds() { return static_cast<int>(std::size(kRounds)); }
+int64_t PartMapper::NumSteps() {
+  return PositionImagesOptions().max_num_iterations +
+         static_cast<int64_t>(std::size(kRounds)) * AdjustModelOptions().max_num_iterations;
+}
 
 std::map<CameraId, Camera> PartMapper::Cameras() const {
   std::map<CameraId, Camera> cameras;
@@ -99,15 +102,17 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
                                            double max_focal_change_ratio, Progress& progress) {
   KeepRotations(rotations);
   MakeTracks();
-  Position(rotations);
+  Position(rotations, progress);
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
-    progress.Advance(static_cast<int64_t>(images_.size()));
     TriangulateAll(round.max_error_px);
     if (round.accepted_rad > 0) {
       const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
       const int num_changed = AcceptPairs(round.accepted_rad);
-      if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) continue;
+      if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) {
+        progress.Advance(AdjustModelOptions().max_num_iterations);
+        continue;
+      }
       if (num_changed > 0) {
         MakeTracks();
         TriangulateAll(round.max_error_px);
@@ -117,7 +122,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
     if (num_keypoints == 0)
       num_keypoints = std::clamp(kMaxNumObservations / static_cast<int>(images_.size()), kMinNumKeypoints,
                                  kMaxNumKeypoints);
-    Adjust(num_keypoints, round.adjust_cameras);
+    Adjust(num_keypoints, round.adjust_cameras, progress);
     if (&round == &kRounds[kLastStartingRound] && FocalChange() > max_focal_change_ratio) return std::nullopt;
   }
   TriangulateAll(std::end(kRounds)[-1].max_error_px);
@@ -209,7 +214,7 @@ void PartMapper::KeepSteps(const std::vector<Way>& steps) {
   }
 }
 
-void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
+void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations, Progress& progress) {
   std::vector<ViewPair> pairs;
   for (size_t p = 0; p < pairs_.size(); ++p) {
     if (is_accepted_[p]) pairs.push_back(pairs_[p]);
@@ -241,8 +246,8 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
           {element.image_idx, static_cast<int>(k), rotations[element.image_idx].conjugate() * *bearing});
     }
   }
-  const Positions positions =
-      PositionImages(start, static_cast<int>(chosen.size()), sights, ways, by_pairs.unit, {});
+  const Positions positions = PositionImages(start, static_cast<int>(chosen.size()), sights, ways,
+                                             by_pairs.unit, {.progress = &progress});
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * positions.centers[i])});
   spdlog::debug("reconstruct: {} images positioned by {} tracks", images_.size(), chosen.size());
@@ -310,7 +315,7 @@ int PartMapper::AcceptPairs(double max_error_rad) {
   return num_changed;
 }
 
-void PartMapper::Adjust(int num_keypoints, bool adjust_cameras) {
+void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progress) {
   std::vector<std::vector<int>> elements;
   for (const Triangulation& triangulation : triangulations_) elements.push_back(triangulation.inliers);
   problem_.points.clear();
@@ -323,7 +328,7 @@ void PartMapper::Adjust(int num_keypoints, bool adjust_cameras) {
     }
     problem_.points.push_back(triangulations_[chosen.track].position);
   }
-  AdjustModel({.adjust_cameras = adjust_cameras}, &problem_);
+  AdjustModel({.adjust_cameras = adjust_cameras, .progress = &progress}, &problem_);
   spdlog::debug("reconstruct: {} points and {} observations adjusted", problem_.points.size(),
                 problem_.observations.size());
 }

@@ -110,7 +110,7 @@ Positions PositionImages(const std::vector<Eigen::Vector3d>& start, int num_poin
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = 1e-5;
-  SolveOnOneThread(solver, &problem);
+  SolveOnOneThread(solver, &problem, options.progress);
   Positions positions;
   for (size_t i = 0; i < num_images; ++i) positions.centers.emplace_back(center_of(i));
   for (int k = 0; k < num_points; ++k) positions.points.emplace_back(point_of(k));

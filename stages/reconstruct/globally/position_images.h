@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "core/base/progress.h"
 #include "stages/reconstruct/globally/image_ways.h"
 
 namespace cairn::reconstruct {
@@ -25,6 +26,8 @@ struct PositionImagesOptions {
   double loss_scale = 0.1;
   // Weight beside one sight of a way that is wrong by a unit.
   double way_weight = 1;
+  // Advanced by max_num_iterations, little by little; positioning ends when it is cancelled.
+  Progress* progress = nullptr;
 };
 
 // Places of images and points, from those of images: points are put some units away from the images that see
