@@ -112,6 +112,7 @@ class Learner {
       return std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image);
     };
     const auto rest = std::stable_partition(lookers.images.begin(), lookers.images.end(), sees);
+    lookers.seen_from.reserve(static_cast<size_t>(rest - lookers.images.begin()));
     for (auto image = lookers.images.begin(); image != rest; ++image)
       lookers.seen_from.push_back(DirectionTo(i, views_[*image].center));
     return lookers;
@@ -196,7 +197,7 @@ class Learner {
     std::erase_if(candidates, [&](int32_t image) {
       return !std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image) && !LooksAt(image, i);
     });
-    return candidates;
+    return {candidates.begin(), candidates.end()};  // without the room of all candidates
   }
 
   bool LooksAt(int32_t image, size_t i) const {

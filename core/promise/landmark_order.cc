@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -10,7 +11,7 @@
 namespace cairn {
 namespace {
 
-// Up to so many, sights are computed once and kept: 64 bytes each.
+// Up to so many, sights are computed once and kept: 56 bytes each.
 constexpr size_t kMaxKeptSights = 1 << 24;
 // Far from underflow: a factor is 1e-12 at least.
 constexpr double kLeastProduct = 1e-200;
@@ -82,26 +83,30 @@ class LandmarkOrder::Impl {
     heap_.pop_back();
   }
 
-  // A sight, and how much it adds to a view that has nothing yet.
+  // A sight, and how much it adds to a view that has nothing yet.  There are many: no byte of padding.
   struct Sight {
     int32_t view;
     float first_gain;
-    double shrinkage;  // of exp(-m_v / e)
-    bool has_root;
-    Eigen::Matrix<float, 2, 6> root;
+    Eigen::Matrix<float, 2, 6, Eigen::DontAlign> root;  // NaN: none
+    bool has_root() const { return !std::isnan(root(0, 0)); }
   };
+  static_assert(sizeof(Sight) == 56);
+
+  // Of exp(-m_v / e), by a match more.
+  double Shrinkage(const ExpectedMatch& match) const { return std::exp(-match.probability / enough_); }
 
   std::vector<Sight> SightsOf(size_t i) const {
     std::vector<Sight> sights;
     sights.reserve(matches_.of_class[i].size());
     for (const ExpectedMatch& match : matches_.of_class[i]) {
-      Sight sight{.view = match.view};
-      sight.shrinkage = std::exp(-match.probability / enough_);
-      sight.first_gain = static_cast<float>(enough_ * (1 - sight.shrinkage));
+      Sight sight{.view = match.view, .first_gain = static_cast<float>(enough_ * (1 - Shrinkage(match)))};
       const View& view = views_[match.view];
       const auto root = sights_.Root(i, view.cam_from_world, view.focal, match.probability);
-      sight.has_root = root.has_value();
-      if (root) sight.root = root->cast<float>();
+      if (root) {
+        sight.root = root->cast<float>();
+      } else {
+        sight.root(0, 0) = std::numeric_limits<float>::quiet_NaN();
+      }
       sights.push_back(sight);
     }
     return sights;
@@ -122,7 +127,7 @@ class LandmarkOrder::Impl {
     WithSights(n, [&](const std::vector<Sight>& sights) {
       for (const Sight& sight : sights) {
         gain += sight.first_gain * lack_[sight.view];
-        if (!sight.has_root) continue;
+        if (!sight.has_root()) continue;
         ratio *= information_.PlaceRatio(sight.view, sight.root.cast<double>());
         if (ratio < kLeastProduct) {
           gain -= std::log(ratio);
@@ -134,11 +139,11 @@ class LandmarkOrder::Impl {
   }
 
   void Take(size_t n) {
+    for (const ExpectedMatch& match : matches_.of_class[pool_[n]]) lack_[match.view] *= Shrinkage(match);
     std::vector<SightInformation> seen;
     WithSights(n, [&](const std::vector<Sight>& sights) {
       for (const Sight& sight : sights) {
-        lack_[sight.view] *= sight.shrinkage;
-        if (sight.has_root) seen.push_back({static_cast<size_t>(sight.view), sight.root.cast<double>()});
+        if (sight.has_root()) seen.push_back({static_cast<size_t>(sight.view), sight.root.cast<double>()});
       }
     });
     information_.Add(seen);

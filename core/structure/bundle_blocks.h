@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 #include <Eigen/Core>
 
+#include "core/base/progress.h"
 #include "core/camera/pixel_ray.h"
 #include "core/geometry/pose.h"
 #include "core/structure/camera_sensitivity.h"
@@ -63,6 +64,9 @@ struct MotionCost {
 };
 
 // Sparse Schur on one thread: bit-stable.  Sets what the options say of solver and threads.
-ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem);
+// `progress`, if there is one, is advanced by max_num_iterations: by 1 for each, and at the end by what is
+// left. The solver ends when it is cancelled; progress changes nothing else.
+ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem,
+                                        Progress* progress = nullptr);
 
 }  // namespace cairn

@@ -307,11 +307,13 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
     CAIRN_ASSIGN_OR_RETURN(fitted.trial, attempt(num_kept, bits));
     break;
   }
+  // The maps that were tried make room for what the whole survey takes.
+  const std::vector<PromiseTrial> fared = Trials(*std::move(trials)).fared();
   const PromiseMaker maker(classes, num_threads);
   const std::vector<size_t> first =
       num_kept < classes.classes.size() ? maker.Order(Pool(fitted.keep)).First(num_kept) : Pool(fitted.keep);
-  fitted.keep = maker.Complete(first, trials->fared(), options.promise);
-  fitted.promises = maker.Promise(fitted.keep, trials->fared(), options.promise);
+  fitted.keep = maker.Complete(first, fared, options.promise);
+  fitted.promises = maker.Promise(fitted.keep, fared, options.promise);
   progress.Advance();
   progress.End();
   return fitted;

@@ -209,7 +209,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
-  SolveOnOneThread(solver, &ceres_problem);
+  SolveOnOneThread(solver, &ceres_problem, options.progress);
   for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
     problem->cam_from_world[i] = LoadPose(pose_of(i));
   for (size_t c = 0; c < problem->cameras.size(); ++c) {

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/base/progress.h"
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
@@ -68,6 +69,8 @@ struct AdjustModelOptions {
   double function_tolerance = 1e-4;
   // Whether the cameras' free parameters change, too.
   bool adjust_cameras = true;
+  // Advanced by max_num_iterations, little by little; an adjustment ends when it is cancelled.
+  Progress* progress = nullptr;
 };
 
 // Minimises the reprojection errors over poses, points and cameras, as group_classes does where poses are

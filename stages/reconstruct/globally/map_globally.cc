@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "core/base/text.h"
@@ -166,6 +167,8 @@ std::optional<Untangled> Untangle(bool is_drive, Part* part) {
   }
 }
 
+Error Stopped() { return MakeError(ErrorCode::kCancelled, "stopped while reconstructing"); }
+
 // The map by these cameras; nothing where they turn out to be others by more than this ratio of their focal
 // lengths, to which they are set.
 Result<std::optional<GlobalMap>> MapBy(const MapperInput& input, std::vector<ImageMotion> motions,
@@ -173,8 +176,8 @@ Result<std::optional<GlobalMap>> MapBy(const MapperInput& input, std::vector<Ima
                                        int num_threads, std::map<CameraId, Camera>* cameras,
                                        Progress& progress) {
   const int num_images = static_cast<int>(input.images.size());
-  progress.Begin("reconstruct", int64_t{num_images} * PartMapper::NumRounds(), "images in rounds");
-  std::vector<ViewPair> pairs = EstimateViewPairs(input, *cameras, {}, num_threads);
+  std::vector<ViewPair> pairs = EstimateViewPairs(input, *cameras, {}, num_threads, progress);
+  if (progress.Cancelled()) return Stopped();
   const size_t num_pairs = pairs.size();
   GlobalMap map;
   map.why_no_odometry = LeaveOutContradicted(pairs, &motions);
@@ -200,17 +203,20 @@ Result<std::optional<GlobalMap>> MapBy(const MapperInput& input, std::vector<Ima
       add_parts(std::move(part));
       continue;
     }
+    const size_t num_in_part = part.images.size();
     PartMapper mapper(input, *cameras, options, num_threads, std::move(part.images), std::move(part.pairs),
                       std::move(part.motions), untangled->backbone, is_drive);
+    progress.Begin(fmt::format("{} of {} images joined, finding their places", num_in_part, num_images),
+                   PartMapper::NumSteps(), "steps");
     std::optional<ColmapModel> model = mapper.Map(untangled->rotations, max_focal_change_ratio, progress);
-    if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reconstructing");
+    if (progress.Cancelled()) return Stopped();
+    progress.End();
     if (!model) {
       for (const auto& [camera_id, camera] : mapper.Cameras()) cameras->insert_or_assign(camera_id, camera);
       return std::optional<GlobalMap>();
     }
     if (!model->images.empty()) models.emplace_back(std::move(*model), is_drive);
   }
-  progress.End();
   if (models.empty()) {
     return MakeError(
         ErrorCode::kNoData,

@@ -77,7 +77,9 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
   for (const int image : images_) problem_.camera_idx.push_back(index.at(input.images[image].camera_id));
 }
 
-int PartMapper::NumRounds() { return static_cast<int>(std::size(kRounds)); }
+int64_t PartMapper::NumSteps() {
+  return static_cast<int64_t>(std::size(kRounds)) * AdjustModelOptions().max_num_iterations;
+}
 
 std::map<CameraId, Camera> PartMapper::Cameras() const {
   std::map<CameraId, Camera> cameras;
@@ -100,12 +102,14 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
   MakeTracks();
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
-    progress.Advance(static_cast<int64_t>(images_.size()));
     TriangulateAll(round.max_error_px);
     if (round.accepted_rad > 0) {
       const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
       const int num_changed = AcceptPairs(round.accepted_rad);
-      if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) continue;
+      if (is_again && num_changed < kMinPartAccepted * static_cast<double>(pairs_.size())) {
+        progress.Advance(AdjustModelOptions().max_num_iterations);
+        continue;
+      }
       if (num_changed > 0) {
         MakeTracks();
         TriangulateAll(round.max_error_px);
@@ -115,7 +119,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
     if (num_keypoints == 0)
       num_keypoints = std::clamp(kMaxNumObservations / static_cast<int>(images_.size()), kMinNumKeypoints,
                                  kMaxNumKeypoints);
-    Adjust(num_keypoints, round.adjust_cameras);
+    Adjust(num_keypoints, round.adjust_cameras, progress);
     if (&round == &kRounds[kLastStartingRound] && FocalChange() > max_focal_change_ratio) return std::nullopt;
   }
   TriangulateAll(std::end(kRounds)[-1].max_error_px);
@@ -287,7 +291,7 @@ int PartMapper::AcceptPairs(double max_error_rad) {
   return num_changed;
 }
 
-void PartMapper::Adjust(int num_keypoints, bool adjust_cameras) {
+void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progress) {
   std::vector<std::vector<int>> elements;
   for (const Triangulation& triangulation : triangulations_) elements.push_back(triangulation.inliers);
   problem_.points.clear();
@@ -300,7 +304,7 @@ void PartMapper::Adjust(int num_keypoints, bool adjust_cameras) {
     }
     problem_.points.push_back(triangulations_[chosen.track].position);
   }
-  AdjustModel({.adjust_cameras = adjust_cameras}, &problem_);
+  AdjustModel({.adjust_cameras = adjust_cameras, .progress = &progress}, &problem_);
   spdlog::debug("reconstruct: {} points and {} observations adjusted", problem_.points.size(),
                 problem_.observations.size());
 }

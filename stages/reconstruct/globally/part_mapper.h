@@ -37,8 +37,8 @@ class PartMapper {
              std::vector<ViewPair> pairs, std::vector<ImageMotion> motions, const std::vector<int>& backbone,
              bool is_drive);
 
-  // Rounds of adjustment, for progress: each advances it by as many items as the part has images.
-  static int NumRounds();
+  // By how much Map advances progress: the iterations of its solvers.
+  static int64_t NumSteps();
 
   // Images that see too few points are not in the model.  Nothing where a focal length is found off by more
   // than this ratio before pairs are taken in: then relative poses and rotations are, too, and Cameras() says
@@ -67,7 +67,7 @@ class PartMapper {
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
-  void Adjust(int num_keypoints, bool adjust_cameras);
+  void Adjust(int num_keypoints, bool adjust_cameras, Progress& progress);
   ColmapModel MakeModel() const;
 
   const MapperInput& input_;

@@ -240,7 +240,8 @@ std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input) {
 }
 
 std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
-                                        const ViewPairOptions& options, int num_threads) {
+                                        const ViewPairOptions& options, int num_threads, Progress& progress) {
+  progress.Begin("relative poses", static_cast<int64_t>(input.geometries.size()), "pairs");
   const std::map<ImageId, int> index = IndexOf(input);
   std::vector<std::vector<Eigen::Vector3d>> bearings(input.images.size());
   ParallelFor(static_cast<int64_t>(input.images.size()), num_threads, [&](int64_t i) {
@@ -252,6 +253,8 @@ std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map
   });
   std::vector<std::optional<ViewPair>> estimated(input.geometries.size());
   ParallelFor(static_cast<int64_t>(input.geometries.size()), num_threads, [&](int64_t g) {
+    if (progress.Cancelled()) return;
+    progress.Advance();
     const TwoViewGeometry& geometry = input.geometries[g];
     const int image1 = index.at(geometry.image_id1), image2 = index.at(geometry.image_id2);
     estimated[g] = EstimateViewPair(geometry, cameras.at(input.images[image1].camera_id),
@@ -266,6 +269,7 @@ std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map
     if (pair) pairs.push_back(std::move(*pair));
   }
   SetStrengths(input, &pairs);
+  progress.End();
   return pairs;
 }
 

@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "core/base/progress.h"
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
 #include "stages/reconstruct/view_graph/mapper_input.h"
@@ -44,9 +45,9 @@ struct ViewPairOptions {
 
 // The relative pose of each verified pair by these cameras: from its essential or fundamental matrix, or by
 // five points where it has none, refined; of points on a plane also the others, the one of the smallest turn
-// first.  Pairs that keep too few matches are left out; in the
-// order of the pairs.  Same result for any number of threads.
+// first.  Pairs that keep too few matches are left out; in the order of the pairs.  Same result for any
+// number of threads; what was done so far when progress is cancelled.
 std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map<CameraId, Camera>& cameras,
-                                        const ViewPairOptions& options, int num_threads);
+                                        const ViewPairOptions& options, int num_threads, Progress& progress);
 
 }  // namespace cairn::reconstruct

@@ -1,5 +1,12 @@
 #include "stages/reconstruct/globally/map_globally.h"
 
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
@@ -90,9 +97,9 @@ TEST(PartMapper, SaysByWhatCameraToBeginAnew) {
     images[i] = i;
     rotations.push_back(survey.cams_from_world[i].rotation);
   }
-  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, cameras, {}, 2);
-  for (size_t p = 0; p < pairs.size(); ++p) backbone.push_back(static_cast<int>(p));
   NoProgress progress;
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, cameras, {}, 2, progress);
+  for (size_t p = 0; p < pairs.size(); ++p) backbone.push_back(static_cast<int>(p));
   const MapGloballyOptions options;
   PartMapper mapper(survey.input, cameras, options, 2, images, pairs, {}, backbone, true);
   EXPECT_FALSE(mapper.Map(rotations, 0.01, progress).has_value());
@@ -101,6 +108,65 @@ TEST(PartMapper, SaysByWhatCameraToBeginAnew) {
   const auto model = patient.Map(rotations, 0.2, progress);
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(model->images.size(), 20u);
+}
+
+// What a user sees meanwhile, and Ctrl-C.
+class KeptProgress : public Progress {
+ public:
+  explicit KeptProgress(int64_t num_until_cancelled = -1) : num_left_(num_until_cancelled) {}
+  void Begin(std::string_view task, int64_t total, std::string_view unit) override {
+    tasks.push_back(fmt::format("{}: {}", task, unit));
+    totals.push_back(total);
+    done.push_back(0);
+    num_calls.push_back(0);
+  }
+  void Advance(int64_t num_items) override {
+    const std::lock_guard lock(mutex_);
+    done.back() += num_items;
+    ++num_calls.back();
+    if (num_left_ > 0) --num_left_;
+  }
+  void End() override { ++num_ended; }
+  bool Cancelled() const override {
+    const std::lock_guard lock(mutex_);
+    return num_left_ == 0;
+  }
+
+  std::vector<std::string> tasks;
+  std::vector<int64_t> totals, done, num_calls;
+  int num_ended = 0;
+
+ private:
+  mutable std::mutex mutex_;
+  int64_t num_left_;  // -1: never
+};
+
+TEST(MapGlobally, TellsHowManyImagesAreJoinedAndEveryStepOfTheSolvers) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  KeptProgress progress;
+  ASSERT_TRUE(MapGlobally(survey.input, {}, {}, 2, progress).ok());
+  ASSERT_GE(progress.tasks.size(), 2u);
+  EXPECT_EQ(progress.tasks[0], "relative poses: pairs");
+  EXPECT_EQ(progress.totals[0], static_cast<int64_t>(survey.input.geometries.size()));
+  EXPECT_EQ(progress.tasks.back(), "20 of 20 images joined, finding their places: steps");
+  EXPECT_EQ(progress.done.back(), progress.totals.back());
+  EXPECT_EQ(progress.done[0], progress.totals[0]);
+  EXPECT_GT(progress.num_calls.back(), 10);  // more than one a round
+}
+
+TEST(MapGlobally, StopsWithinAStep) {
+  const SyntheticSurvey survey = MakeSyntheticSurvey(20, 1);
+  const auto num_pairs = static_cast<int64_t>(survey.input.geometries.size());
+  for (const int64_t num_until_cancelled : {int64_t{1}, num_pairs, num_pairs + 1, num_pairs + 5}) {
+    KeptProgress progress(num_until_cancelled);
+    const auto map = MapGlobally(survey.input, {}, {}, 1, progress);
+    ASSERT_FALSE(map.ok());
+    EXPECT_EQ(map.error().code, ErrorCode::kCancelled);
+    // No iteration more: what is left of the solver's is a call of its own.
+    int64_t num_calls = 0;
+    for (const int64_t num : progress.num_calls) num_calls += num;
+    EXPECT_LE(num_calls, num_until_cancelled + 1);
+  }
 }
 
 // One that is stated as such, and wrong, is begun anew with until it is found.

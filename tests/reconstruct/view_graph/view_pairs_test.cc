@@ -82,8 +82,9 @@ std::map<CameraId, Camera> TrueCameras(const SyntheticSurvey& survey) {
 }
 
 TEST(EstimateViewPairs, RelativePosesAreThoseOfTheCameras) {
+  NoProgress progress;
   const SyntheticSurvey survey = MakeSyntheticSurvey(12, 4);
-  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2);
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2, progress);
   ASSERT_EQ(pairs.size(), survey.input.geometries.size());
   for (const ViewPair& pair : pairs) {
     const Pose truth = survey.cams_from_world[pair.image2] * survey.cams_from_world[pair.image1].Inverse();
@@ -93,31 +94,33 @@ TEST(EstimateViewPairs, RelativePosesAreThoseOfTheCameras) {
     EXPECT_GT(pair.strength, 0);
     EXPECT_LE(pair.strength, 1);
   }
-  const std::vector<ViewPair> alone = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1);
+  const std::vector<ViewPair> alone = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1, progress);
   for (size_t p = 0; p < pairs.size(); ++p)
     EXPECT_EQ(pairs[p].cam2_from_cam1.translation, alone[p].cam2_from_cam1.translation);
 }
 
 TEST(EstimateViewPairs, MatchesThatTheGeometryDoesNotExplainAreLeftOut) {
+  NoProgress progress;
   SyntheticSurvey survey = MakeSyntheticSurvey(4, 4);
   TwoViewGeometry& geometry = survey.input.geometries[0];
   const size_t num_before = geometry.inliers.size();
   for (size_t m = 0; m + 1 < geometry.inliers.size(); m += 10)
     std::swap(geometry.inliers[m].idx2, geometry.inliers[m + 1].idx2);
-  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2);
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2, progress);
   EXPECT_LT(pairs[0].matches.size(), num_before * 9 / 10);
   EXPECT_GT(pairs[0].matches.size(), num_before * 7 / 10);
   // A pair with too few is none.
   geometry.inliers.resize(14);
-  EXPECT_EQ(EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2).size(), pairs.size() - 1);
+  EXPECT_EQ(EstimateViewPairs(survey.input, TrueCameras(survey), {}, 2, progress).size(), pairs.size() - 1);
 }
 
 // A fundamental matrix from points on a plane may be any: five points decide.
 TEST(EstimateViewPairs, AWrongFundamentalMatrixDoesNoHarm) {
+  NoProgress progress;
   SyntheticSurvey survey = MakeSyntheticSurvey(3, 4);
   for (TwoViewGeometry& geometry : survey.input.geometries)
     geometry.F << 0, -1e-6, 3e-4, 2e-6, 0, -1e-3, -4e-4, 8e-4, 0.1;
-  for (const ViewPair& pair : EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1)) {
+  for (const ViewPair& pair : EstimateViewPairs(survey.input, TrueCameras(survey), {}, 1, progress)) {
     const Pose truth = survey.cams_from_world[pair.image2] * survey.cams_from_world[pair.image1].Inverse();
     EXPECT_LT(DegFromRad(pair.cam2_from_cam1.rotation.angularDistance(truth.rotation)), 0.5);
   }
@@ -125,6 +128,7 @@ TEST(EstimateViewPairs, AWrongFundamentalMatrixDoesNoHarm) {
 
 // A wall seen from two places: two relative poses explain it, and neighbours tell which is right.
 TEST(EstimateViewPairs, OfAPlaneBothRelativePosesAreKept) {
+  NoProgress progress;
   Random random(12);
   Camera camera;
   camera.camera_id = 1;
@@ -157,7 +161,7 @@ TEST(EstimateViewPairs, OfAPlaneBothRelativePosesAreKept) {
   geometry.H = K * (truth.rotation.toRotationMatrix() + truth.translation * Eigen::RowVector3d(0, 0, 1) / 3) *
                K.inverse();
   input.geometries.push_back(geometry);
-  std::vector<ViewPair> pairs = EstimateViewPairs(input, input.cameras, {}, 1);
+  std::vector<ViewPair> pairs = EstimateViewPairs(input, input.cameras, {}, 1, progress);
   ASSERT_EQ(pairs.size(), 1u);
   ViewPair& pair = pairs[0];
   ASSERT_EQ(pair.alternatives.size(), 1u);
