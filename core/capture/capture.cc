@@ -127,26 +127,49 @@ class FlatFolderCameras {
     return Ok();
   }
 
+  // Where focal lengths come from.
+  void Finish() {
+    for (const auto& [source, range] : focal_ranges_) {
+      const std::string lengths = range.least_px == range.most_px
+                                      ? fmt::format("f = {:.1f} px", range.least_px)
+                                      : fmt::format("f = {:.1f} to {:.1f} px", range.least_px, range.most_px);
+      capture_.notes.push_back(fmt::format("{}: {} of {} images from {}; the map refines them", capture_.root,
+                                           lengths, range.num_images, FocalSourceText(source)));
+    }
+  }
+
  private:
   // One camera for each session, image size and focal length in EXIF.
   void AddGuessed(const std::string& name, int session, const cv::Mat& image) {
-    const double focal_mm = ReadExif(capture_.images_folder + "/" + name).focal_length_35mm_mm;
-    const CameraId camera_id =
-        NewCamera(guessed_ids_, std::tuple(session, image.cols, image.rows, focal_mm), [&] {
+    const ExifTags tags = ReadExif(capture_.images_folder + "/" + name);
+    const std::optional<ExifFocal> focal = FocalOf(tags, std::max(image.cols, image.rows));
+    const CameraId camera_id = NewCamera(
+        guessed_ids_, std::tuple(session, image.cols, image.rows, focal ? focal->focal_px : 0), [&] {
           Camera camera = GuessCamera(0, image.cols, image.rows);
-          if (focal_mm > 0) {
-            // 36 mm: width of the film
-            camera.params[0] = focal_mm / 36.0 * std::max(image.cols, image.rows);
+          if (focal) {
+            camera.params[0] = focal->focal_px;
             camera.has_focal_prior = true;
           } else {
             capture_.warnings.push_back(
-                fmt::format("{}: no cameras.txt and no focal length in EXIF: f = 1.2 max(w, h) = {:g} px "
+                fmt::format("{}: no cameras.txt and {}: f = 1.2 max(w, h) = {:g} px "
                             "assumed for {} x {} images",
-                            capture_.root, camera.params[0], camera.width, camera.height));
+                            capture_.root, WhyNoFocal(tags), camera.params[0], camera.width, camera.height));
           }
           return camera;
         });
+    if (focal) {
+      FocalRange& range = focal_ranges_[focal->source];
+      range.least_px = range.num_images == 0 ? focal->focal_px : std::min(range.least_px, focal->focal_px);
+      range.most_px = std::max(range.most_px, focal->focal_px);
+      ++range.num_images;
+    }
     capture_.images.push_back({name, camera_id, std::nullopt});
+  }
+
+  static std::string WhyNoFocal(const ExifTags& tags) {
+    if (tags.focal_length_mm <= 0) return "no focal length in EXIF";
+    return fmt::format("a focal length in EXIF of {:g} mm{}, but nothing that says how large the sensor is",
+                       tags.focal_length_mm, tags.camera.empty() ? "" : " (" + tags.camera + ")");
   }
 
   // The id of the camera that `key` names; `make` returns the camera where it is new.
@@ -162,8 +185,14 @@ class FlatFolderCameras {
     return entry->second;
   }
 
+  struct FocalRange {
+    double least_px = 0, most_px = 0;
+    int64_t num_images = 0;
+  };
+
   KnownCameras known_;
   Capture& capture_;
+  std::map<FocalSource, FocalRange> focal_ranges_;
   std::map<std::pair<int, CameraId>, CameraId> known_ids_;
   std::map<std::tuple<int, int, int, double>, CameraId> guessed_ids_;
 };
@@ -213,6 +242,7 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
     }
     CAIRN_RETURN_IF_ERROR(cameras.Add(name, SessionOfImage(sessions, name), *image));
   }
+  cameras.Finish();
   return Ok();
 }
 

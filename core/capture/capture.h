@@ -34,6 +34,7 @@ struct Capture {
   std::vector<CaptureImage> queries;  // held out, never compiled; ascending by name
   std::vector<Reject> rejects;        // named in images.txt, but missing or with an invalid pose
   std::vector<std::string> warnings;  // e.g. image files that neither list names
+  std::vector<std::string> notes;     // what was found and is no fault: where focal lengths come from
   bool has_poses = false;
   std::optional<CaptureFrame> frame;  // of frame.json, if there is one
 

@@ -39,6 +39,12 @@ constexpr double kAboutAsSharp = 0.9;
 // would count as blurred.
 constexpr size_t kNumRecent = 11;
 
+// Corners that moved less than this, pixels, stand still, ...
+constexpr double kStillPx = 0.5;
+// ... and are painted onto the picture where they are this part of all, while the others moved by this part
+// of the longer side: a camera that moves so far sees nothing that stands, but right ahead.
+constexpr double kMinStillRatio = 0.2, kMinMovedRatio = 0.05;
+
 cv::Mat MakeSmall(const cv::Mat& grey, int max_side_px) {
   const double scale = static_cast<double>(max_side_px) / std::max(grey.cols, grey.rows);
   if (scale >= 1) return grey.clone();
@@ -98,6 +104,27 @@ cv::Point2f MedianShift(const std::vector<cv::Point2f>& before, const std::vecto
   }
   if (x.empty()) return {};
   return {static_cast<float>(Median(x)), static_cast<float>(Median(y))};
+}
+
+// Takes out the corners that stand still while the others move far; how many.
+size_t RemoveStill(double longer_side, std::vector<cv::Point2f>* before, std::vector<cv::Point2f>* after) {
+  std::vector<cv::Point2f> moving_before, moving_after;
+  std::vector<double> lengths;
+  for (size_t i = 0; i < before->size(); ++i) {
+    const double length = cv::norm((*after)[i] - (*before)[i]);
+    if (length < kStillPx) continue;
+    moving_before.push_back((*before)[i]);
+    moving_after.push_back((*after)[i]);
+    lengths.push_back(length);
+  }
+  const size_t num_still = before->size() - lengths.size();
+  if (lengths.size() < kMinNumCorners ||
+      static_cast<double>(num_still) < kMinStillRatio * static_cast<double>(before->size()) ||
+      Median(lengths) < kMinMovedRatio * longer_side)
+    return 0;
+  *before = std::move(moving_before);
+  *after = std::move(moving_after);
+  return num_still;
 }
 
 }  // namespace
@@ -191,7 +218,10 @@ double KeyframeChooser::Look(const cv::Mat& small, double* way) {
     found_after.push_back(after[i]);
     is_found[idx[i]] = true;
   }
-  const double found_ratio = static_cast<double>(found_before.size()) / static_cast<double>(corners_.size());
+  const size_t num_still = RemoveStill(std::max(small.cols, small.rows), &found_before, &found_after);
+  has_still_part_ = has_still_part_ || num_still > 0;
+  const double found_ratio =
+      static_cast<double>(found_before.size()) / static_cast<double>(corners_.size() - num_still);
   if (found_ratio < kLostRatio) return found_ratio;
   const cv::Point2f moved = MedianShift(found_before, found_after);
   for (size_t i = 0; i < corners_.size(); ++i) guesses_[i] = is_found[i] ? places[i] : corners_[i] + moved;
@@ -247,6 +277,8 @@ void KeyframeChooser::Consider(const Frame& frame) {
 void KeyframeChooser::Commit(std::vector<int64_t>* keyframes) {
   keyframes->push_back(candidate_->index);
   ++stats_.num_keyframes;
+  stats_.num_with_still_part += has_still_part_;
+  has_still_part_ = false;
   const Frame keyframe = *std::exchange(candidate_, std::nullopt);
   SetReference(keyframe);
   reference_is_keyframe_ = true;

@@ -40,10 +40,11 @@ struct KeyframeOptions {
 struct KeyframeStats {
   int64_t num_frames = 0;
   int64_t num_keyframes = 0;
-  int64_t num_repeated = 0;   // the same picture as the frame before
-  int64_t num_blank = 0;      // black, or of one colour: never keyframes
-  int64_t num_blurred = 0;    // less sharp than min_sharpness_ratio of what is usual around them
-  std::vector<int64_t> cuts;  // frames in which nothing of the film before is found
+  int64_t num_repeated = 0;         // the same picture as the frame before
+  int64_t num_blank = 0;            // black, or of one colour: never keyframes
+  int64_t num_blurred = 0;          // less sharp than min_sharpness_ratio of what is usual around them
+  int64_t num_with_still_part = 0;  // keyframes before which a part of the picture stood while the rest moved
+  std::vector<int64_t> cuts;        // frames in which nothing of the film before is found
 };
 
 // Chooses the keyframes of a film: few, sharp, and none loses sight of the one before.  Corners of the last
@@ -51,7 +52,8 @@ struct KeyframeStats {
 // that they do not drift while the camera stands).  How far the camera is on the way to the next keyframe is
 // the largest of
 //   parallax / parallax_ratio,  shift / shift_ratio,  (1 - share found) / (1 - min_overlap_ratio):
-// 0 while it stands, 1 when a keyframe is due.  Among the frames from first_candidate on the sharpest becomes
+// 0 while it stands, 1 when a keyframe is due.  Corners that stand while the others move far are of a logo or
+// a frame in the picture, and do not count.  Among the frames from first_candidate on the sharpest becomes
 // it (variance of the Laplacian).  Blank frames are passed over, and blurred ones where corners are lost.  In
 // a frame that shows nothing of the keyframe a new part of the film begins, whose first keyframe is the
 // sharpest before the camera has moved far.  Of frames that are far apart each is a keyframe.
@@ -97,6 +99,7 @@ class KeyframeChooser {
   // The last keyframe; at the beginning of a part its first frame, which need not become one.
   std::vector<cv::Mat> reference_;  // its pyramid; empty: no part has begun
   bool reference_is_keyframe_ = false;
+  bool has_still_part_ = false;       // in a frame since the reference
   std::vector<cv::Point2f> corners_;  // of the reference
   std::vector<cv::Point2f> guesses_;  // where they were last
   std::optional<Frame> candidate_;

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr const char* kWhatIsCompiled =
     "compile takes a recipe (docs/recipe.md), a film, a ROS bag or the folder of a capture";
 
+// Links to folders are not followed below it.
 bool HoldsImages(const std::string& folder) {
   std::error_code error;
   fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
@@ -35,7 +36,8 @@ Status CheckIsCapture(const std::string& folder) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: the build folder of a map, not a capture; {}", folder,
                      kWhatIsCompiled);
   }
-  if (HoldsImages(folder)) return Ok();
+  // images/ may be a link to a folder.
+  if (HoldsImages(folder) || HoldsImages(folder + "/images")) return Ok();
   std::string hint = "are the images in another folder?";
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() == ".toml")

@@ -43,6 +43,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(const ReuseOptions reuse, arguments.reuse.Apply(arguments.output));
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
   for (const std::string& warning : capture.warnings) spdlog::warn("{}", warning);
+  for (const std::string& note : capture.notes) spdlog::info("{}", note);
   if (!arguments.no_space_check) {
     CAIRN_RETURN_IF_ERROR(CheckDiskSpace(fmt::format("the features of {} images", capture.images.size()),
                                          fs::absolute(arguments.output).parent_path(),

@@ -13,6 +13,7 @@
 #include "stages/reconstruct/known_places.h"
 #include "stages/reconstruct/odometry.h"
 #include "stages/reconstruct/uneven_steps.h"
+#include "stages/reconstruct/zoomed_lens.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -377,8 +378,15 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
                                       int num_threads, Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
   ReconstructResult result;
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<ColmapModel> models,
-                         MapImages(input, capture, options, work_folder, num_threads, progress, &result));
+  const Result<std::vector<ColmapModel>> mapped =
+      MapImages(input, capture, options, work_folder, num_threads, progress, &result);
+  const std::string zoomed = ZoomedLens(input);
+  if (!mapped.ok()) {
+    if (mapped.error().code != ErrorCode::kNoData || zoomed.empty()) return mapped.error();
+    return MakeError(ErrorCode::kNoData, "{}; {}", mapped.error().message, zoomed);
+  }
+  if (!zoomed.empty()) result.warnings.push_back(fmt::format("{}: {}", capture.root, zoomed));
+  const std::vector<ColmapModel>& models = *mapped;
   const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;
   for (const ColmapModel& m : models) result.model_sizes.push_back(static_cast<int>(m.images.size()));

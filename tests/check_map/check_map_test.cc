@@ -10,6 +10,7 @@
 namespace cairn::check_map {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 const std::shared_ptr<const Map>& RoomMap() {
@@ -63,6 +64,26 @@ TEST(CheckMap, ReportIsReadableByPeopleAndPrograms) {
   EXPECT_THAT(ReportJson(printed, true), HasSubstr("quote\\\".png"));
   EXPECT_THAT(ReportJson(printed, true), HasSubstr("mean_total_ms"));
   EXPECT_THAT(ReportJson(printed, false), Not(HasSubstr("_ms\"")));
+}
+
+TEST(CheckMap, TruthInAnotherFrameIsToldAndGivesNoPrecision) {
+  auto report = Check({BlankImage("blank.png")});
+  const MapRows rows = MakeSyntheticRoom(1).rows;
+  const CheckMapOptions options;
+  const PrintedReport printed{&rows, 1000000, &*report, nullptr, &options};
+  const auto text = [&](double precision, double error_m, double left_m) {
+    report->figures["precision_ratio"] = precision;
+    report->figures["num_gross_errors"] = 93;
+    report->figures["median_error_m"] = error_m;
+    report->figures["similarity_p90_error_m"] = left_m;
+    return ReportText(printed);
+  };
+  EXPECT_THAT(text(0, 4, 0.3),
+              AllOf(HasSubstr("in another frame than the map"), Not(HasSubstr("wrong fixes"))));
+  EXPECT_THAT(text(0, 4, 0.5), HasSubstr("0.0 % (93 wrong fixes)"));  // bent: a similarity does not mend it
+  EXPECT_THAT(text(0.6, 4, 0.3), HasSubstr("60.0 % (93 wrong fixes)"));
+  report->figures.erase("similarity_p90_error_m");
+  EXPECT_THAT(ReportText(printed), HasSubstr("93 wrong fixes"));
 }
 
 }  // namespace

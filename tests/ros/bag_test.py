@@ -5,8 +5,6 @@ bag_test.py CAIRN
 The robot carries the camera 0.2 m ahead of its base, 1 m up.  Its wheels measure each step with an error of 2 %.
 """
 import pathlib
-import sqlite3
-import struct
 import subprocess
 import sys
 import tempfile
@@ -19,6 +17,8 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage
 from tf2_msgs.msg import TFMessage
+
+from ros2_bags import write_db3, write_mcap
 
 CAIRN = sys.argv[1]
 SECONDS_PER_IMAGE = 0.25
@@ -111,49 +111,6 @@ def rotation_fields(field, q):
     field.x, field.y, field.z, field.w = q
 
 
-class Cdr:
-    """ROS 2's bytes of a message of ROS 1 with the same fields."""
-
-    def __init__(self):
-        self.body = bytearray()
-
-    def put(self, form, *values):
-        for value in values:
-            size = struct.calcsize(form)
-            self.body += bytes(-len(self.body) % size) + struct.pack("<" + form, value)
-        return self
-
-    def text(self, text):
-        self.put("I", len(text) + 1).body.extend(text.encode() + b"\0")
-        return self
-
-    def header(self, header):
-        return self.put("i", header.stamp.secs).put("I", header.stamp.nsecs).text(header.frame_id)
-
-    def pose(self, position, turn):
-        return self.put("d", position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
-
-    @staticmethod
-    def of(message):
-        cdr = Cdr()
-        if isinstance(message, TFMessage):
-            cdr.put("I", len(message.transforms))
-            for link in message.transforms:
-                cdr.header(link.header).text(link.child_frame_id)
-                cdr.pose(link.transform.translation, link.transform.rotation)
-        elif isinstance(message, CompressedImage):
-            cdr.header(message.header).text(message.format).put("I", len(message.data)).body.extend(message.data)
-        elif isinstance(message, CameraInfo):
-            cdr.header(message.header).put("I", message.height, message.width).text(message.distortion_model)
-            cdr.put("I", len(message.D)).put("d", *message.D, *message.K, *message.R, *message.P)
-            cdr.put("I", 0, 0, 0, 0, 0, 0).put("B", 0)
-        else:
-            cdr.header(message.header).text(message.child_frame_id)
-            cdr.pose(message.pose.pose.position, message.pose.pose.orientation)
-            cdr.put("d", *message.pose.covariance, *[0] * 6, *message.twist.covariance)
-        return b"\0\1\0\0" + bytes(cdr.body)
-
-
 def write_ros1(path, messages, compression):
     with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=100_000) as bag:
         for topic, message, time in messages:
@@ -161,20 +118,8 @@ def write_ros1(path, messages, compression):
 
 
 def write_ros2(path, messages):
-    database = sqlite3.connect(path)
-    database.executescript(
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);")
-    numbers = {}
-    for topic, message, time in messages:
-        if topic not in numbers:
-            numbers[topic] = len(numbers) + 1
-            database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')",
-                             (numbers[topic], topic, message._type.replace("/", "/msg/")))
-        database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)",
-                         (numbers[topic], stamp(time).to_nsec(), Cdr.of(message)))
-    database.commit()
-    database.close()
+    timed = [(topic, message, stamp(time).to_nsec()) for topic, message, time in messages]
+    (write_db3 if path.suffix == ".db3" else write_mcap)(path, timed)
 
 
 def read_odometry(capture):
@@ -231,10 +176,12 @@ class ABagOfADrive(unittest.TestCase):
             captures.append(self.root / f"capture_{compression}")
             run = cairn("import", path, "-o", captures[-1], "--keyframes", "all")
             self.assertNotIn("warning", run.stderr)
-        path = self.root / "drive.db3"
-        write_ros2(path, self.messages)
-        captures.append(self.root / "capture_ros2")
-        cairn("import", path, "-o", captures[-1], "--keyframes", "all")
+        for form in ("db3", "mcap"):
+            path = self.root / f"drive.{form}"
+            write_ros2(path, self.messages)
+            captures.append(self.root / f"capture_{form}")
+            run = cairn("import", path, "-o", captures[-1], "--keyframes", "all")
+            self.assertNotIn("warning", run.stderr)
         for capture in captures:
             images, _ = self.check(capture)
             self.assertEqual(images, self.stamps)

@@ -1,8 +1,12 @@
 #include "pipeline/exchange/bags/choose_topics.h"
 
 #include <algorithm>
+#include <bit>
 #include <functional>
+#include <limits>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 #include "core/base/printable.h"
 #include "pipeline/exchange/bags/image_pixels.h"
@@ -19,6 +23,28 @@ bool IsImageTopic(const BagTopic& topic) {
   return topic.type == kImageType || topic.type == kCompressedImageType;
 }
 
+// Stamps are wild where they are off by more than this, ns, and by this many times what is usual.
+constexpr int64_t kWildNs = 10'000'000'000, kWildFactor = 10;
+// Every so many compressed images one is decoded for its size, and more at the beginning.
+constexpr int64_t kImagesPerSize = 50;
+
+int64_t MedianOf(std::vector<int64_t> values) {
+  const auto middle = values.begin() + static_cast<int64_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Differences of times as they stand in damaged messages, too.
+int64_t Minus(int64_t a, int64_t b) {
+  int64_t difference = 0;
+  if (!__builtin_sub_overflow(a, b, &difference)) return difference;
+  return a < b ? std::numeric_limits<int64_t>::min() : std::numeric_limits<int64_t>::max();
+}
+uint64_t Distance(int64_t a, int64_t b) {
+  return a < b ? static_cast<uint64_t>(b) - static_cast<uint64_t>(a)
+               : static_cast<uint64_t>(a) - static_cast<uint64_t>(b);
+}
+
 class ContentsVisitor : public BagVisitor {
  public:
   bool Wants(const BagTopic& topic, int64_t record_time_ns) override {
@@ -27,9 +53,8 @@ class ContentsVisitor : public BagVisitor {
     const bool is_new = contents.num_messages++ == 0;
     contents.first_time_ns = is_new ? record_time_ns : std::min(contents.first_time_ns, record_time_ns);
     contents.last_time_ns = is_new ? record_time_ns : std::max(contents.last_time_ns, record_time_ns);
-    const bool is_first = !contents.header;
-    return topic.type == kCameraInfoType || IsTransformTopic(topic) ||
-           (is_first && (IsImageTopic(topic) || topic.type == kOdometryType));
+    return topic.type == kCameraInfoType || IsTransformTopic(topic) || IsImageTopic(topic) ||
+           topic.type == kOdometryType;
   }
 
   // What cannot be read is counted where it is imported; here it is no topic's first message.
@@ -41,29 +66,48 @@ class ContentsVisitor : public BagVisitor {
     if (message.topic.type == kCameraInfoType) status = TakeCameraInfo(message, &contents);
     if (message.topic.type == kOdometryType) status = TakeOdometry(message, &contents);
     if (IsTransformTopic(message.topic)) status = TakeTransforms(message);
+    if (status.ok() && (IsImageTopic(message.topic) || message.topic.type == kOdometryType)) {
+      if (const Result<MessageHeader> header = DecodeHeader(message); header.ok())
+        contents.clock.Add(header->stamp_ns, message.record_time_ns);
+    }
     if (!status.ok() && contents.problem.empty()) contents.problem = status.error().message;
     return Ok();
   }
 
-  BagContents contents_;
+  BagContents Finish() {
+    for (auto& [name, contents] : contents_.topics) {
+      contents.clock.Finish();
+      int64_t most = 0;
+      for (const auto& [size, count] : sizes_[name]) {
+        if (count <= most) continue;
+        most = count;
+        std::tie(contents.width, contents.height) = size;
+      }
+    }
+    return std::move(contents_);
+  }
 
  private:
-  static Status TakeImage(const BagMessage& message, TopicContents* contents) {
+  Status TakeImage(const BagMessage& message, TopicContents* contents) {
     CAIRN_ASSIGN_OR_RETURN(const ImageMessage image, DecodeImage(message));
+    const bool is_whole = image.bytes.size() >= static_cast<uint64_t>(image.step) * image.height;
+    if (is_whole && IsPictureEncoding(image.encoding))
+      ++sizes_[message.topic.name][{image.width, image.height}];
+    if (contents->header) return Ok();
     contents->header = image.header;
     contents->encoding = image.encoding;
-    contents->width = image.width;
-    contents->height = image.height;
     return Ok();
   }
-  static Status TakeCompressedImage(const BagMessage& message, TopicContents* contents) {
+  Status TakeCompressedImage(const BagMessage& message, TopicContents* contents) {
     CAIRN_ASSIGN_OR_RETURN(const CompressedImageMessage image, DecodeCompressedImage(message));
+    const auto index = static_cast<uint64_t>(contents->num_messages - 1);
+    if (std::has_single_bit(index) || index % kImagesPerSize == 0) {
+      if (const Result<BagPicture> picture = PictureOf(image); picture.ok())
+        ++sizes_[message.topic.name][{picture->grey.cols, picture->grey.rows}];
+    }
+    if (contents->header) return Ok();
     contents->header = image.header;
     contents->encoding = image.format;
-    if (const Result<BagPicture> picture = PictureOf(image); picture.ok()) {
-      contents->width = picture->grey.cols;
-      contents->height = picture->grey.rows;
-    }
     return Ok();
   }
   static Status TakeCameraInfo(const BagMessage& message, TopicContents* contents) {
@@ -78,6 +122,7 @@ class ContentsVisitor : public BagVisitor {
   }
   static Status TakeOdometry(const BagMessage& message, TopicContents* contents) {
     CAIRN_ASSIGN_OR_RETURN(const OdometryMessage odometry, DecodeOdometry(message));
+    if (contents->header) return Ok();
     contents->header = odometry.header;
     contents->child_frame_id = odometry.child_frame_id;
     return Ok();
@@ -89,6 +134,9 @@ class ContentsVisitor : public BagVisitor {
       contents_.frames.AddLink(transform.header.frame_id, transform.child_frame_id);
     return Ok();
   }
+
+  BagContents contents_;
+  std::map<std::string, std::map<std::pair<int64_t, int64_t>, int64_t>> sizes_;  // of a topic's images
 };
 
 // Depth and disparity are images, but no pictures.
@@ -183,14 +231,42 @@ Result<std::optional<TopicContents>> Choose(const BagContents& contents, const s
 
 }  // namespace
 
+void TopicClock::Add(int64_t stamp_ns, int64_t record_time_ns) {
+  if (stamp_ns != 0) aheads_ns_.push_back(Minus(stamp_ns, record_time_ns));
+}
+
+void TopicClock::Finish() {
+  if (aheads_ns_.empty()) return;
+  ahead_ns_ = MedianOf(aheads_ns_);
+  std::vector<int64_t> distances;
+  for (const int64_t ahead_ns : aheads_ns_) {
+    distances.push_back(static_cast<int64_t>(std::min<uint64_t>(
+        Distance(ahead_ns, ahead_ns_), static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))));
+  }
+  spread_ns_ = MedianOf(std::move(distances));
+}
+
+bool TopicClock::IsWild(int64_t stamp_ns, int64_t record_time_ns) const {
+  if (stamp_ns == 0) return false;
+  const uint64_t off_ns = Distance(Minus(stamp_ns, record_time_ns), ahead_ns_);
+  return off_ns > kWildNs && off_ns / kWildFactor > static_cast<uint64_t>(spread_ns_);
+}
+
+int64_t TopicClock::TimeOf(int64_t stamp_ns, int64_t record_time_ns) const {
+  if (stamp_ns != 0 && !IsWild(stamp_ns, record_time_ns)) return stamp_ns;
+  return std::max<int64_t>(Minus(record_time_ns, -ahead_ns_), 0);
+}
+
 bool IsTransformTopic(const BagTopic& topic) {
   return topic.type == "tf2_msgs/TFMessage" || topic.type == "tf/tfMessage";
 }
 
 Result<BagContents> LookThrough(Bag& bag) {
   ContentsVisitor visitor;
-  CAIRN_ASSIGN_OR_RETURN(visitor.contents_.damage, bag.Read(visitor));
-  return std::move(visitor.contents_);
+  CAIRN_ASSIGN_OR_RETURN(std::vector<std::string> damage, bag.Read(visitor));
+  BagContents contents = visitor.Finish();
+  contents.damage = std::move(damage);
+  return contents;
 }
 
 Result<TopicContents> ChooseImages(const BagContents& contents, const std::string& bag_path,

@@ -1,11 +1,13 @@
 #include "pipeline/exchange/bags/import_bag.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "core/base/quantiles.h"
 #include "core/capture/capture.h"
 #include "core/capture/keyframes.h"
 #include "core/colmap/cameras_text.h"
@@ -27,6 +29,14 @@ constexpr double kSteepSine = 0.9;
 // Odometry jumps where it goes farther than this, metres, and faster, metres a second, than robots in
 // buildings do: it was reset, or corrected by a map.
 constexpr double kJumpM = 0.5, kJumpMPerS = 10;
+// Nothing that is mapped goes faster than this all the time, metres a second: such odometry is in another
+// unit.
+constexpr double kOtherUnitMPerS = 50;
+// Stamps of two topics are of one clock where, seen from the times at which they were recorded, they differ
+// by less than this: no driver and no network takes so long.
+constexpr double kTwoClocksS = 5;
+// Times of recording say when something happened where they follow stamps as closely as this, seconds.
+constexpr double kSteadyS = 0.2;
 
 struct TimeSpan {
   int64_t first_ns = 0, last_ns = 0;
@@ -55,6 +65,8 @@ struct BagPlan {
   std::optional<FrameChain> chain;        // between the odometry's child frame and the images' frame
   std::optional<Camera> camera;
   bool camera_is_asked_for = false;
+  // Added to the stamps of odometry, which are of another clock than those of the images; 0: of the same.
+  int64_t odometry_shift_ns = 0;
 };
 
 // Names of one length: their order is that of time.
@@ -70,6 +82,7 @@ class ImportVisitor : public BagVisitor {
         options_(options),
         folder_(std::move(folder)),
         progress_(progress),
+        size_(static_cast<int>(plan.images.width), static_cast<int>(plan.images.height)),
         motion_(plan.chain.value_or(FrameChain())) {}
 
   bool Wants(const BagTopic& topic, int64_t /*record_time_ns*/) override {
@@ -95,6 +108,7 @@ class ImportVisitor : public BagVisitor {
 
   const std::vector<WrittenImage>& written() const { return written_; }
   cv::Size size() const { return size_; }
+  bool has_read_an_image() const { return !image_times_.is_empty; }
   std::vector<std::string> Warnings() const;
   // odometry.txt's lines.  What stands in the way is said in `warnings`.
   std::string OdometryLines(int64_t* num_lines, std::vector<std::string>* warnings) const;
@@ -133,8 +147,9 @@ class ImportVisitor : public BagVisitor {
   Trajectory odometry_;
   TimeSpan odometry_times_;
   std::optional<std::pair<int64_t, Eigen::Vector3d>> last_place_;  // of odometry, with its time
-  PassedOver damaged_images_, resized_images_, late_images_, unstamped_images_, damaged_odometry_,
-      damaged_transforms_, jumps_;
+  std::vector<double> speeds_m_per_s_;                             // of odometry, between two messages
+  PassedOver damaged_images_, resized_images_, late_images_, unstamped_images_, wild_images_, wild_odometry_,
+      damaged_odometry_, damaged_transforms_, jumps_;
 };
 
 Result<ImportVisitor::HeldImage> ImportVisitor::DecodeMessage(const BagMessage& message) {
@@ -148,10 +163,11 @@ Result<ImportVisitor::HeldImage> ImportVisitor::DecodeMessage(const BagMessage& 
     CAIRN_ASSIGN_OR_RETURN(image.picture, PictureOf(compressed));
     image.time_ns = compressed.header.stamp_ns;
   }
-  if (image.time_ns == 0) {
-    image.time_ns = std::max<int64_t>(message.record_time_ns, 0);
-    unstamped_images_.Add("");
-  }
+  const TopicClock& clock = plan_.images.clock;
+  if (image.time_ns == 0) unstamped_images_.Add("");
+  if (clock.IsWild(image.time_ns, message.record_time_ns))
+    wild_images_.Add(fmt::format("{:.3f} s", 1e-9 * static_cast<double>(image.time_ns)));
+  image.time_ns = clock.TimeOf(image.time_ns, message.record_time_ns);
   return image;
 }
 
@@ -208,7 +224,11 @@ Status ImportVisitor::WriteImage(const HeldImage& image) {
 void ImportVisitor::TakeOdometry(const BagMessage& message) {
   const Result<OdometryMessage> odometry = DecodeOdometry(message);
   if (!odometry.ok()) return damaged_odometry_.Add(odometry.error().message);
-  const int64_t time_ns = TimeOf(odometry->header, message);
+  const int64_t stamp_ns = odometry->header.stamp_ns;
+  const TopicClock& clock = plan_.odometry->clock;
+  if (clock.IsWild(stamp_ns, message.record_time_ns))
+    wild_odometry_.Add(fmt::format("{:.3f} s", 1e-9 * static_cast<double>(stamp_ns)));
+  const int64_t time_ns = clock.TimeOf(stamp_ns, message.record_time_ns) + plan_.odometry_shift_ns;
   LookForJump(time_ns, odometry->odom_from_child.translation);
   odometry_.Add(time_ns, odometry->odom_from_child);
   odometry_times_.Add(time_ns);
@@ -218,6 +238,7 @@ void ImportVisitor::LookForJump(int64_t time_ns, const Eigen::Vector3d& place) {
   if (last_place_) {
     const double length_m = (place - last_place_->second).norm();
     const double seconds = 1e-9 * static_cast<double>(std::abs(time_ns - last_place_->first));
+    if (length_m > 0 && seconds > 0) speeds_m_per_s_.push_back(length_m / seconds);
     if (length_m > kJumpM && length_m > kJumpMPerS * seconds)
       jumps_.Add(fmt::format("by {:.2f} m in {:.3f} s at {:.3f} s", length_m, seconds, 1e-9 * time_ns));
   }
@@ -245,7 +266,7 @@ std::vector<std::string> ImportVisitor::Warnings() const {
   say(damaged_images_, fmt::format("{} images of {} are left out, as they cannot be read; the first: {}",
                                    damaged_images_.count, topic, damaged_images_.first));
   say(resized_images_,
-      fmt::format("{} images of {} are left out: they are of another size ({}) than the first ({} x {})",
+      fmt::format("{} images of {} are left out: they are of another size ({}) than most ({} x {})",
                   resized_images_.count, topic, resized_images_.first, size_.width, size_.height));
   say(late_images_,
       fmt::format("{} images of {} are left out, whose stamps are not after those before them; the first: {}",
@@ -253,6 +274,16 @@ std::vector<std::string> ImportVisitor::Warnings() const {
   say(unstamped_images_,
       fmt::format("{} images of {} have no stamp; they have the times at which they were recorded",
                   unstamped_images_.count, topic));
+  say(wild_images_,
+      fmt::format(
+          "{} images of {} have stamps far from when they were recorded, unlike the others (the first: "
+          "{}); they have the times at which they were recorded",
+          wild_images_.count, topic, wild_images_.first));
+  say(wild_odometry_,
+      fmt::format(
+          "{} messages of odometry have stamps far from when they were recorded, unlike the others (the "
+          "first: {}); they have the times at which they were recorded",
+          wild_odometry_.count, wild_odometry_.first));
   say(damaged_odometry_, fmt::format("{} messages of odometry are left out; the first: {}",
                                      damaged_odometry_.count, damaged_odometry_.first));
   say(jumps_,
@@ -273,6 +304,16 @@ std::string ImportVisitor::OdometryLines(int64_t* num_lines, std::vector<std::st
             : fmt::format("{}: odometry is left out, as its stamps ({}) and those of the images ({}) are of "
                           "two clocks; let both drivers stamp with the same one",
                           plan_.path, odometry_times_.Text(), image_times_.Text()));
+    return {};
+  }
+  if (const double m_per_s = speeds_m_per_s_.empty() ? 0 : Median(speeds_m_per_s_);
+      m_per_s > kOtherUnitMPerS) {
+    warnings->push_back(fmt::format(
+        "{}: odometry is left out, as it goes at {:.0f} m/s where it moves, on the median: it is not in "
+        "metres "
+        "(of millimetres a thousandth is {:.2f} m/s), or its stamps are wrong; record it in metres, as "
+        "nav_msgs/Odometry says, or give distances ([reconstruct] distances)",
+        plan_.path, m_per_s, 1e-3 * m_per_s));
     return {};
   }
   std::string lines;
@@ -358,6 +399,24 @@ void ChooseChain(const BagContents& contents, const BagOptions& options, BagPlan
   plan->odometry.reset();
 }
 
+// Where images and odometry are stamped by two clocks, they are brought together by when they were recorded.
+void CompareClocks(BagPlan* plan, std::vector<std::string>* warnings) {
+  if (!plan->odometry) return;
+  const TopicClock &images = plan->images.clock, &odometry = plan->odometry->clock;
+  const double apart_s =
+      1e-9 * (static_cast<double>(images.ahead_ns()) - static_cast<double>(odometry.ahead_ns()));
+  const double spread_s = 1e-9 * static_cast<double>(std::max(images.spread_ns(), odometry.spread_ns()));
+  const bool were_at_once = plan->images.first_time_ns <= plan->odometry->last_time_ns &&
+                            plan->odometry->first_time_ns <= plan->images.last_time_ns;
+  if (std::abs(apart_s) < kTwoClocksS || spread_s > kSteadyS || !were_at_once) return;
+  plan->odometry_shift_ns = images.ahead_ns() - odometry.ahead_ns();
+  warnings->push_back(fmt::format(
+      "{}: the stamps of {} and of {} are of two clocks, {:.3f} s apart; odometry is taken by when "
+      "both were recorded, which is right to some hundredths of a second; let both drivers stamp "
+      "with the same clock",
+      plan->path, plan->images.topic.name, plan->odometry->topic.name, apart_s));
+}
+
 // The camera is only of use where it is that of the images.
 Status CheckCameraSize(const cv::Size& size, BagPlan* plan, std::vector<std::string>* warnings) {
   if (!plan->camera || (plan->camera->width == size.width && plan->camera->height == size.height))
@@ -374,7 +433,7 @@ Status CheckCameraSize(const cv::Size& size, BagPlan* plan, std::vector<std::str
 
 Status NoImages(const BagPlan& plan, const ImportVisitor& visitor) {
   const std::vector<std::string> warnings = visitor.Warnings();
-  if (visitor.size().empty()) {
+  if (!visitor.has_read_an_image()) {
     return MakeError(ErrorCode::kNoData, "{}: none of the {} images of {} can be read{}", plan.path,
                      plan.images.num_messages, plan.images.topic.name,
                      warnings.empty() ? "" : "; " + warnings.front());
@@ -397,6 +456,7 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
   CAIRN_ASSIGN_OR_RETURN(plan.odometry, ChooseOdometry(contents, path, options.odometry));
   CAIRN_RETURN_IF_ERROR(ChooseCamera(contents, options, &plan, &report.warnings));
   ChooseChain(contents, options, &plan, &report.warnings);
+  CompareClocks(&plan, &report.warnings);
 
   progress.Begin("import", plan.images.num_messages, "images");
   const Status status =

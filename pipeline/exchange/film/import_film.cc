@@ -232,6 +232,13 @@ class FilmImporter {
                       "too fast; parts that share no view with the rest are left out of the map",
                       path_, TimesText(cuts_s_)));
     }
+    if (2 * report_.frames.num_with_still_part > report_.frames.num_keyframes) {
+      warnings.push_back(fmt::format(
+          "{}: a part of the picture stands still while the rest moves (a logo, a border, the frame of "
+          "a screen that was filmed): images are matched by it although they show different places; "
+          "crop it away, for example with ffmpeg -vf crop",
+          path_));
+    }
     if (reader.is_interlaced()) {
       warnings.push_back(
           fmt::format("{}: interlaced: moving edges are combed; deinterlace it for a better map, "

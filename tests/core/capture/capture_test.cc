@@ -246,6 +246,36 @@ TEST_F(CaptureWithoutPoses, FocalLengthOfExifIsThatOfTheLongerSide) {
     EXPECT_EQ(camera.params[0], 18 / 36.0 * 120) << image.name;
     EXPECT_TRUE(camera.has_focal_prior);
   }
+  EXPECT_THAT(capture->notes,
+              testing::ElementsAre(HasSubstr("f = 60.0 px of 2 images from 35 mm equivalents")));
+}
+
+TEST_F(CaptureWithoutPoses, FocalLengthsOfLensAndSensorAreSaidAndWithoutASensorAsked) {
+  fs::remove(root_ + "/cameras.txt");
+  std::vector<uint8_t> jpeg;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(100, 75, CV_8U, cv::Scalar(128)), jpeg));
+  const auto write = [&](const std::string& name, const LensBlock& lens) {
+    const std::string exif = ExifJpegOfLens(lens);
+    Write("images/" + name, exif.substr(0, exif.size() - 2) + std::string(jpeg.begin() + 2, jpeg.end()));
+  };
+  write("near.jpg", {});
+  write("far.jpg", {.focal_mm = {144, 10}});
+  write("unknown.jpg", {.per_unit = {0, 1}});
+  const auto capture = ReadCapture(root_);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  for (const CaptureImage& image : capture->images) {
+    if (!image.name.ends_with(".jpg")) continue;
+    const Camera& camera = capture->cameras.at(image.camera_id);
+    const double focal_px = image.name == "near.jpg" ? 72 : image.name == "far.jpg" ? 144 : 120;
+    EXPECT_NEAR(camera.params[0], focal_px, 1e-9) << image.name;
+    EXPECT_EQ(camera.has_focal_prior, image.name != "unknown.jpg");
+  }
+  EXPECT_THAT(
+      capture->notes,
+      testing::ElementsAre(HasSubstr("f = 72.0 to 144.0 px of 2 images from the lens and the sensor's")));
+  EXPECT_THAT(capture->warnings, testing::Contains(HasSubstr(
+                                     "no cameras.txt and a focal length in EXIF of 7.2 mm, but nothing that "
+                                     "says how large the sensor is: f = 1.2 max(w, h) = 120 px")));
 }
 
 // What a list of one image per line cannot hold is rejected where it stands, and nothing after it.

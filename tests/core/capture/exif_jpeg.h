@@ -47,6 +47,25 @@ inline std::string ExifJpegOfFocalLength(uint32_t focal_mm) {
                     LittleEndian32(1) + LittleEndian32(focal_mm) + LittleEndian32(0));
 }
 
+// What a camera without a 35 mm equivalent says of its lens and its sensor.
+struct LensBlock {
+  std::pair<uint32_t, uint32_t> focal_mm = {72, 10};
+  std::pair<uint32_t, uint32_t> per_unit = {10160, 1};  // FocalPlaneXResolution
+  uint32_t unit = 2;                                    // inches
+  uint32_t width_px = 3000, height_px = 4000;           // 0: not said
+};
+inline std::string ExifJpegOfLens(const LensBlock& lens) {
+  constexpr uint32_t kNumEntries = 5, kLensIfd = 26, kValues = kLensIfd + 2 + 12 * kNumEntries + 4;
+  const auto entry = [](uint32_t tag, uint32_t format, uint32_t value) {
+    return LittleEndian16(tag) + LittleEndian16(format) + LittleEndian32(1) + LittleEndian32(value);
+  };
+  return ExifJpegOf(TiffLeadingTo(0x8769) + LittleEndian16(kNumEntries) + entry(0x920a, 5, kValues) +
+                    entry(0xa002, 4, lens.width_px) + entry(0xa003, 3, lens.height_px) +
+                    entry(0xa20e, 5, kValues + 8) + entry(0xa210, 3, lens.unit) + LittleEndian32(0) +
+                    LittleEndian32(lens.focal_mm.first) + LittleEndian32(lens.focal_mm.second) +
+                    LittleEndian32(lens.per_unit.first) + LittleEndian32(lens.per_unit.second));
+}
+
 // A GPS block alone.
 inline std::string ExifJpeg(const GpsBlock& gps) {
   constexpr int kNumEntries = 6;

@@ -57,6 +57,50 @@ TEST(ReadExif, PositionWithoutAValidAltitudeSaysSo) {
   EXPECT_EQ(tags.gps->altitude_m, 0);
 }
 
+// 4000 pixels, 400 a millimetre, are 10 mm: 7.2 mm see what 0.72 of the longer side sees.
+TEST(FocalOf, TheLensAndTheSensorsPixelsSayIt) {
+  const auto focal_px = [](const LensBlock& lens, double side_px) {
+    const std::optional<ExifFocal> focal = FocalOf(ReadBytes(ExifJpegOfLens(lens)), side_px);
+    EXPECT_TRUE(!focal || focal->source == FocalSource::kSensorPixels);
+    return focal ? focal->focal_px : 0;
+  };
+  EXPECT_NEAR(focal_px({}, 4000), 2880, 1e-9);
+  EXPECT_NEAR(focal_px({}, 1000), 720, 1e-9);  // made smaller since
+  EXPECT_NEAR(focal_px({.per_unit = {4000, 1}, .unit = 3}, 4000), 2880, 1e-9);
+  EXPECT_NEAR(focal_px({.per_unit = {400, 1}, .unit = 4}, 4000), 2880, 1e-9);
+  EXPECT_NEAR(focal_px({.per_unit = {4, 10}, .unit = 5}, 4000), 2880, 1e-9);
+  EXPECT_NEAR(focal_px({.unit = 0}, 4000), 2880, 1e-9);
+  // Without the size that the picture had it is that of the image.
+  EXPECT_NEAR(focal_px({.width_px = 0, .height_px = 0}, 2000), 2880, 1e-9);
+}
+
+TEST(FocalOf, WhatNoCameraHasIsNone) {
+  const auto has_focal = [](const LensBlock& lens) {
+    return FocalOf(ReadBytes(ExifJpegOfLens(lens)), 4000).has_value();
+  };
+  EXPECT_TRUE(has_focal({}));
+  EXPECT_FALSE(has_focal({.focal_mm = {0, 1}}));
+  EXPECT_FALSE(has_focal({.focal_mm = {72, 0}}));
+  EXPECT_FALSE(has_focal({.per_unit = {0, 1}}));
+  EXPECT_FALSE(has_focal({.per_unit = {10160, 0}}));
+  EXPECT_FALSE(has_focal({.per_unit = {300, 1}}));                         // of a scanner: 340 mm
+  EXPECT_FALSE(has_focal({.focal_mm = {1, 1}, .per_unit = {150000, 1}}));  // 0.7 mm
+  EXPECT_FALSE(has_focal({.focal_mm = {4, 10}}));                          // sees 171 degrees
+  EXPECT_FALSE(has_focal({.focal_mm = {600, 1}}));                         // sees 0.95 degrees
+}
+
+// Whole millimetres of a film that a camera has worked out are worth more than a sensor's size that may be of
+// other pixels than the image's.
+TEST(FocalOf, TheFilmEquivalentGoesBefore) {
+  ExifTags tags = ReadBytes(ExifJpegOfLens({}));
+  tags.focal_length_35mm_mm = 27;
+  const std::optional<ExifFocal> focal = FocalOf(tags, 4000);
+  ASSERT_TRUE(focal);
+  EXPECT_EQ(focal->focal_px, 3000);
+  EXPECT_EQ(focal->source, FocalSource::kFilmEquivalent);
+  EXPECT_FALSE(FocalOf({}, 4000));
+}
+
 TEST(ReadExif, FilesWithoutOrWithADamagedBlockHaveNoTags) {
   EXPECT_FALSE(ReadExif(testing::TempDir() + "/no such file.jpg").gps);
   EXPECT_FALSE(ReadBytes("").gps);

@@ -67,6 +67,24 @@ TEST(Keyframes, AreAsFarApartAsTheOptionsSay) {
   EXPECT_NEAR(static_cast<double>(num_of_half), 2.0 * keyframes.size(), 0.3 * keyframes.size());
 }
 
+// A third of the picture is a frame around a screen: most corners stand on it, and the walk counts as before.
+TEST(Keyframes, WhatIsPaintedOntoThePictureDoesNotCount) {
+  const cv::Mat border = DrawnWall(9)(cv::Rect(cv::Point(0, 0), kFrame));
+  const cv::Rect screen(80, 40, 190, 160);
+  std::vector<cv::Mat> frames;
+  for (const cv::Mat& frame : Walk(200, 4)) {
+    frames.push_back(border.clone());
+    frame(screen).copyTo(frames.back()(screen));
+  }
+  KeyframeStats stats;
+  const size_t num_keyframes = Choose(frames, &stats).size();
+  const size_t num_of_whole = Choose(Walk(200, 4)).size();
+  EXPECT_GE(num_keyframes, num_of_whole * 3 / 4);
+  EXPECT_GE(stats.num_with_still_part, num_keyframes * 3 / 4);
+  Choose(Walk(200, 4), &stats);
+  EXPECT_EQ(stats.num_with_still_part, 0);
+}
+
 // A frame of twice the size moves twice as many pixels.
 TEST(Keyframes, AreTheSameAtAnyResolution) {
   std::vector<cv::Mat> large;

@@ -60,6 +60,17 @@ TEST_F(RecipeSourceTest, AFolderIsCompiledByTheRecipeThatIsWrittenForIt) {
   EXPECT_FALSE(FindRecipe("survey/hall_A", "")->was_written);
 }
 
+TEST_F(RecipeSourceTest, ACaptureWhoseImagesAreALinkToAFolderIsOne) {
+  fs::create_directories("disk/pictures/monday");
+  Write("disk/pictures/monday/a.png", "");
+  fs::create_directories("survey/hall_B");
+  fs::create_directory_symlink(folder_ / "disk/pictures", "survey/hall_B/images");
+  EXPECT_EQ(Message("survey/hall_B"), "no error");
+  fs::create_directories("survey/hall_C");
+  fs::create_directory_symlink("nowhere", "survey/hall_C/images");
+  EXPECT_THAT(Message("survey/hall_C"), HasSubstr("a folder without an image"));
+}
+
 TEST_F(RecipeSourceTest, TheRecipeLiesBesideTheMap) {
   fs::create_directories("maps");
   const RecipeSource source = FindRecipe("survey/hall_A", "maps/east.cairn").value();

@@ -543,6 +543,87 @@ TEST_F(ImportedBag, TwoClocksAreNoticed) {
               Contains(AllOf(HasSubstr("two clocks"), HasSubstr("5.000 to 6.000 s"), HasSubstr("1000.000"))));
 }
 
+// The camera's computer is seven hours ahead of the wheels', which recorded both.
+TEST_F(ImportedBag, TwoClocksAreBroughtTogetherByWhenMessagesWereRecorded) {
+  const auto import = [&](double ahead_s, double recorded_late_s) {
+    std::vector<Recorded> messages = {StaticFrames()};
+    for (int i = 0; i < 8; ++i) {
+      messages.push_back(OdometryMessageAt(100 + i, Turned(0, 2 * i, 0, 0)));
+      Recorded image = GreyMessage(100.5 + i + ahead_s);
+      image.time_ns = std::llround((100.5 + i) * 1e9 + recorded_late_s * i * 1e9);
+      messages.push_back(image);
+    }
+    ASSERT_TRUE(Import(messages, {.choice = FrameChoice::kAll, .max_time_gap_s = 0.6}).ok());
+  };
+  import(25200, 0);
+  EXPECT_THAT(warnings_,
+              Contains(AllOf(HasSubstr("two clocks, 25200.000 s apart"), HasSubstr("same clock"))));
+  const std::vector<OdometryLine> odometry = ReadOdometry();
+  ASSERT_EQ(odometry.size(), 7u);  // none is after the last image
+  EXPECT_EQ(odometry[2].name, "0000025302.500000000.png");
+  EXPECT_NEAR(odometry[2].world_from_camera.translation.x(), 5.3, 1e-6);
+  // What a driver or a network may take is no other clock ...
+  import(-4, 0);
+  EXPECT_THAT(warnings_, Not(Contains(HasSubstr("two clocks"))));
+  // ... and times of recording that run another way than stamps say nothing.
+  import(25200, 0.5);
+  EXPECT_THAT(warnings_, Contains(HasSubstr("odometry is left out, as its stamps")));
+  EXPECT_FALSE(Has("odometry.txt"));
+}
+
+// A driver whose second message says 2106, and whose fourth says nothing.
+TEST_F(ImportedBag, StampsThatNoClockGaveAreThoseOfTheRecording) {
+  std::vector<Recorded> messages = {StaticFrames()};
+  for (int i = 0; i < 9; ++i) {
+    const double time_s = 1000 + i;
+    const double stamp_s = i == 1 ? 4.2e9 : i == 3 ? 0 : time_s - 7;  // a clock that is 7 s behind
+    messages.push_back({"/i", kImage, std::llround(time_s * 1e9), ImageBytes(Grey(stamp_s))});
+    Recorded odometry = OdometryMessageAt(i == 5 ? 2 : time_s - 7, Turned(0, 0.1 * i, 0, 0));
+    odometry.time_ns = std::llround(time_s * 1e9);
+    messages.push_back(odometry);
+  }
+  ASSERT_TRUE(Import(messages).ok());
+  std::vector<std::string> names;
+  for (int i = 0; i < 9; ++i) names.push_back(fmt::format("{:010}.000000000.png", 993 + i));
+  EXPECT_EQ(Names(), names);
+  EXPECT_THAT(warnings_,
+              Contains(HasSubstr("1 images of /i have stamps far from when they were recorded, unlike "
+                                 "the others (the first: 4200000000.000 s)")));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 images of /i have no stamp")));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 messages of odometry have stamps far from when")));
+  const std::vector<OdometryLine> odometry = ReadOdometry();
+  ASSERT_EQ(odometry.size(), 9u);
+  for (int i = 0; i < 9; ++i)
+    EXPECT_NEAR(odometry[i].world_from_camera.translation.x(), 0.3 + 0.1 * i, 1e-6) << i;
+}
+
+// A bag that a program made of files, all in the same instant: stamps are all that there is.
+TEST_F(ImportedBag, TimesOfRecordingThatSayNothingLeaveStampsAlone) {
+  std::vector<Recorded> messages;
+  for (int i = 0; i < 40; ++i) messages.push_back({"/i", kImage, 5, ImageBytes(Grey(100 + i))});
+  ASSERT_TRUE(Import(messages).ok());
+  EXPECT_EQ(Names().size(), 40u);
+  EXPECT_EQ(Names().back(), "0000000139.000000000.png");
+  EXPECT_THAT(warnings_, Not(Contains(HasSubstr("stamps"))));
+}
+
+TEST_F(ImportedBag, OdometryInMillimetresIsNotTakenForMetres) {
+  const auto import = [&](double unit) {
+    std::vector<Recorded> messages = {StaticFrames()};
+    for (int i = 0; i < 10; ++i) {
+      messages.push_back(OdometryMessageAt(10 + 0.1 * i, Turned(0, unit * 0.05 * std::max(0, i - 4), 0, 0)));
+      messages.push_back(GreyMessage(10 + 0.1 * i));
+    }
+    ASSERT_TRUE(Import(messages).ok());
+  };
+  import(1000);  // half a metre a second, after a rest
+  EXPECT_FALSE(Has("odometry.txt"));
+  EXPECT_THAT(warnings_, Contains(AllOf(HasSubstr("odometry is left out, as it goes at 500 m/s"),
+                                        HasSubstr("not in metres"), HasSubstr("0.50 m/s"))));
+  import(60);  // 30 m/s: a car
+  EXPECT_TRUE(Has("odometry.txt"));
+}
+
 TEST_F(ImportedBag, OdometryThatIsNoPoseIsLeftOut) {
   Pose nan = Turned(0, std::numeric_limits<double>::quiet_NaN(), 0, 0);
   Pose zero;
@@ -592,9 +673,32 @@ TEST_F(ImportedBag, ImagesOfAnotherSizeOrAnEarlierTimeAreLeftOut) {
   EXPECT_THAT(Names(), ElementsAre("0000000002.000000000.png", "0000000004.000000000.png"));
   EXPECT_THAT(warnings_,
               Contains(HasSubstr("1 images of /camera/image_raw are left out: they are of another size "
-                                 "(4 x 2 pixels) than the first (8 x 6)")));
+                                 "(4 x 2 pixels) than most (8 x 6)")));
   EXPECT_THAT(warnings_,
               Contains(HasSubstr("2 images of /camera/image_raw are left out, whose stamps are not after")));
+}
+
+// As from a camera whose driver sets the size a moment after it began.
+TEST_F(ImportedBag, AFirstImageOfAnotherSizeIsTheOneThatIsLeftOut) {
+  ASSERT_TRUE(Import({{"/camera/image_raw", kImage, kSecond, ImageBytes(Grey(1, 100, 4, 2))},
+                      {"/camera/camera_info", kInfo, 0, CameraInfoBytes({})},
+                      GreyMessage(2),
+                      GreyMessage(3)})
+                  .ok());
+  EXPECT_THAT(Names(), ElementsAre("0000000002.000000000.png", "0000000003.000000000.png"));
+  EXPECT_THAT(warnings_,
+              ElementsAre(HasSubstr("1 images of /camera/image_raw are left out: they are of another "
+                                    "size (4 x 2 pixels) than most (8 x 6)")));
+  EXPECT_TRUE(Has("cameras.txt"));
+  const auto jpeg = [](int time_s, int width) {
+    std::vector<uchar> bytes;
+    cv::imencode(".jpg", cv::Mat(6, width, CV_8UC1, cv::Scalar(100)), bytes);
+    return Recorded{"/i/compressed", kCompressed, time_s * kSecond,
+                    CompressedImageBytes(time_s * kSecond, "jpeg",
+                                         {reinterpret_cast<char*>(bytes.data()), bytes.size()})};
+  };
+  ASSERT_TRUE(Import({jpeg(1, 16), jpeg(2, 8), jpeg(3, 8)}).ok());
+  EXPECT_THAT(Names(), ElementsAre("0000000002.000000000.jpg", "0000000003.000000000.jpg"));
 }
 
 TEST_F(ImportedBag, ImagesThatCannotBeReadAreLeftOut) {

@@ -138,6 +138,20 @@ TEST_F(ImportFilmTest, ACameraThatIsGivenIsOfTheUprightPicture) {
   EXPECT_THAT(ImportError("walk.mp4", {.camera = "HOLE,1"}).message, HasSubstr("HOLE"));
 }
 
+TEST_F(ImportFilmTest, TheFrameOfAScreenThatWasFilmedIsTold) {
+  std::vector<cv::Mat> frames = DrawnWalk(90, 4);
+  const cv::Mat border = frames.front().clone();
+  const cv::Rect screen(80, 40, 190, 160);
+  for (cv::Mat& frame : frames) {
+    const cv::Mat picture = frame(screen).clone();
+    frame = border.clone();
+    picture.copyTo(frame(screen));
+  }
+  EncodeFilm(Path("screen.mp4"), frames);
+  EXPECT_THAT(Import("screen.mp4").value().warnings,
+              ElementsAre(AllOf(HasSubstr("a part of the picture stands still"), HasSubstr("crop"))));
+}
+
 TEST_F(ImportFilmTest, ACutIsToldAndBeginsANewPart) {
   EncodeFilm(Path("cut.mp4"), Joined(DrawnWalk(45, 4, 1), DrawnWalk(45, 4, 2)));
   const FilmReport report = Import("cut.mp4").value();
