@@ -1,5 +1,6 @@
 #include "stages/reconstruct/scale_sources.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -19,6 +20,9 @@ constexpr double kMaxHeightErrorRatio = 0.15;
 constexpr double kNumNeighbours = 10;
 // Odometry whose pieces spread more is worth a warning.
 constexpr double kMaxOdometrySpread = 0.1;
+// So is odometry by which the cameras' mean up is farther from the vertical than this: a camera that looks at
+// the ceiling is at 90.
+constexpr double kMaxTiltDeg = 120;
 
 std::string InputPath(const Capture& capture, const std::string& path) {
   return (std::filesystem::path(capture.root) / path).lexically_normal().string();
@@ -157,6 +161,14 @@ Result<ScaleAnswer> AskOdometry(const ScaleQuestion& question) {
       .sigma_ratio = std::hypot(alignment->scale_sigma_ratio, question.options.odometry_sigma_ratio),
       .centre = alignment->first};
   size_t num_off = 0;
+  const Eigen::Vector3d up = alignment->world_from_model.rotation * MeanUp(PosesOf(question.model));
+  if (const double tilt_deg = DegFromRad(std::acos(std::clamp(up.normalized().z(), -1.0, 1.0)));
+      tilt_deg > kMaxTiltDeg) {
+    answer.warnings.push_back(fmt::format(
+        "{}: by it the cameras stand upside down ({:.0f} degrees), and so does the map: its z points "
+        "down; write world from camera with z up, unless the camera hangs so",
+        path, tilt_deg));
+  }
   for (const OdometryWindow& window : alignment->windows) {
     const double found_m = answer.world_from_model.scale * window.model;
     answer.residuals.push_back(

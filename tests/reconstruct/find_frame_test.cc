@@ -29,11 +29,12 @@ class FindFrameTest : public testing::Test {
       model_[capture_.images.back().name] = {Eigen::Quaterniond::Identity(), {-0.025 * i, 0, 0}};
     }
   }
-  void WriteOdometry(double step_m, double step_of_half_m) {
+  void WriteOdometry(double step_m, double step_of_half_m,
+                     const std::string& world_from_cam_xyzw = "0 0 0 1") {
     std::string text;
     double x = 0;
     for (int i = 0; i < 60; ++i) {
-      text += fmt::format("{:02}.jpg {} 0 0 0 0 0 1\n", i, x);
+      text += fmt::format("{:02}.jpg {} 0 0 {}\n", i, x, world_from_cam_xyzw);
       x += i % 20 < 10 ? step_m : step_of_half_m;
     }
     ASSERT_TRUE(WriteFileAtomically(capture_.root + "/odometry.txt", text).ok());
@@ -107,6 +108,15 @@ TEST_F(FindFrameTest, OdometryThatDisagreesWithTheImagesIsReported) {
   WriteOdometry(0.1, 0.2);
   ASSERT_TRUE(Find("auto").ok());
   EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("the odometry and the images disagree by")));
+}
+
+TEST_F(FindFrameTest, OdometryWhoseZPointsDownIsReported) {
+  WriteOdometry(0.1, 0.1, "0.7071067812 0 0 0.7071067812");  // the image's down is +z
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("upside down (180 degrees)")));
+  WriteOdometry(0.1, 0.1, "-0.7071067812 0 0 0.7071067812");
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_THAT(result_.warnings, IsEmpty());
 }
 
 TEST_F(FindFrameTest, WithoutOdometryNothingGivesAScale) {

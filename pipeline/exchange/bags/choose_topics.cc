@@ -254,7 +254,10 @@ bool TopicClock::IsWild(int64_t stamp_ns, int64_t record_time_ns) const {
 
 int64_t TopicClock::TimeOf(int64_t stamp_ns, int64_t record_time_ns) const {
   if (stamp_ns != 0 && !IsWild(stamp_ns, record_time_ns)) return stamp_ns;
-  return std::max<int64_t>(Minus(record_time_ns, -ahead_ns_), 0);
+  int64_t time_ns = 0;
+  if (__builtin_add_overflow(record_time_ns, ahead_ns_, &time_ns))
+    return std::max<int64_t>(record_time_ns, 0);
+  return std::max<int64_t>(time_ns, 0);
 }
 
 bool IsTransformTopic(const BagTopic& topic) {
