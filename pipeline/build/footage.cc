@@ -35,8 +35,8 @@ Result<std::string> PlaceText(const std::string& text, const char* what) {
   if (!numbers || numbers->size() != 7) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "'{}': expected seven numbers [x, y, z, qx, qy, qz, qw]: where {}, metres, and its quaternion",
-        text, what);
+        "'{}': expected seven numbers [x, y, z, qx, qy, qz, qw]: where {}, metres, and its quaternion", text,
+        what);
   }
   if (const Result<Pose> pose = CameraOnRobot(*numbers); !pose.ok()) return pose.error();
   return fmt::format("{}", fmt::join(*numbers, ","));
@@ -117,12 +117,15 @@ const std::vector<FootageKey>& FootageKeys() {
        "z, qx, qy, qz, qw], metres and quaternion. Default: as `/tf` and `/tf_static` state.",
        false, &FootageOptions::camera_on_robot},
       {"imu", "text",
-       "Of a bag: the topic of the IMU, or \"none\". Default: the only one that measures turns and accelerations, "
+       "Of a bag: the topic of the IMU, or \"none\". Default: the only one that measures turns and "
+       "accelerations, "
        "if there is one.",
        false, &FootageOptions::imu},
       {"imu_on_camera", "list",
-       "Of a bag: the IMU's frame in the camera's optical frame (x right, y down, z ahead), as [x, y, z, qx, qy, qz, "
-       "qw], metres and quaternion. Default: as `/tf` and `/tf_static` state; where they do not, it is found from "
+       "Of a bag: the IMU's frame in the camera's optical frame (x right, y down, z ahead), as [x, y, z, qx, "
+       "qy, qz, "
+       "qw], metres and quaternion. Default: as `/tf` and `/tf_static` state; where they do not, it is found "
+       "from "
        "turns.",
        false, &FootageOptions::imu_on_camera},
       {"max_time_gap_s", "number",

@@ -97,7 +97,8 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
   }
   if (!arguments.imu_on_camera.empty()) {
     const Result<Pose> pose = CameraOnRobot(arguments.imu_on_camera);
-    if (!pose.ok()) return MakeError(ErrorCode::kInvalidArgument, "--imu-on-camera: {}", pose.error().message);
+    if (!pose.ok())
+      return MakeError(ErrorCode::kInvalidArgument, "--imu-on-camera: {}", pose.error().message);
     options.camera_from_imu = *pose;
   }
   CAIRN_ASSIGN_OR_RETURN(const BagReport report,
@@ -124,10 +125,11 @@ Status RunImport(const ImportArguments& arguments, const CommandEnvironment& env
   if (IsForBags(arguments)) return RunBagImport(arguments, environment);
   if (!arguments.topic.empty() || !arguments.odometry.empty() || !arguments.camera_on_robot.empty() ||
       !arguments.imu.empty() || !arguments.imu_on_camera.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--topic, --odometry, --camera-on-robot, --imu and --imu-on-camera are for bags, and {} is none; "
-                     "leave them out",
-                     arguments.source);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--topic, --odometry, --camera-on-robot, --imu and --imu-on-camera are for bags, and {} is none; "
+        "leave them out",
+        arguments.source);
   }
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(arguments.source, error);
@@ -189,12 +191,12 @@ void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
       .Values(7)
       .SeparatedByCommas()
       .Type("X,Y,Z,QX,QY,QZ,QW");
-  parser
-      .Add("--imu", arguments->imu, "bag: topic of the IMU; none: without [the only one, if there is one]")
+  parser.Add("--imu", arguments->imu, "bag: topic of the IMU; none: without [the only one, if there is one]")
       .Type("TOPIC");
   parser
       .Add("--imu-on-camera", arguments->imu_on_camera,
-           "bag: the IMU's frame in the camera's optical frame, metres and quaternion [as /tf and /tf_static state, "
+           "bag: the IMU's frame in the camera's optical frame, metres and quaternion [as /tf and /tf_static "
+           "state, "
            "else found from turns]")
       .Values(7)
       .SeparatedByCommas()

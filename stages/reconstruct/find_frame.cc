@@ -131,10 +131,11 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
   }
   if (answered.empty()) {
     if (refusal) return *refusal;
-    result->warnings.push_back(fmt::format(
-        "nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, imu.csv, control_points, "
-        "camera_height_m or distances for metres",
-        nothing));
+    result->warnings.push_back(
+        fmt::format("nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, imu.csv, "
+                    "control_points, "
+                    "camera_height_m or distances for metres",
+                    nothing));
     return WithoutScale(model, vertical, options, result);
   }
   size_t taken = 0;

@@ -21,9 +21,9 @@ using ModelPoses = std::map<std::string, Pose>;
 // three times as well (as after pictures of a garden whose GPS errs by metres); control points never give
 // way. The scale's standard deviation is the taken one's.  Each two that contradict each other, by more than
 // three standard deviations, are a warning.  An IMU says where up is, too, for all that do not know it better
-// (all but odometry and camera_height), and where nothing gives a scale.  Fills frame, residuals, scales and warnings of the result.
-// Errors: NoData (what is asked for is not there, or does not determine it); those of the files, of sources
-// that are not taken too.
+// (all but odometry and camera_height), and where nothing gives a scale.  Fills frame, residuals, scales and
+// warnings of the result. Errors: NoData (what is asked for is not there, or does not determine it); those of
+// the files, of sources that are not taken too.
 Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& capture,
                              const ReconstructOptions& options, ReconstructResult* result);
 

@@ -19,7 +19,8 @@ constexpr double kMaxHeightErrorRatio = 0.15;
 constexpr double kNumNeighbours = 10;
 // Odometry whose pieces spread more is worth a warning.
 constexpr double kMaxOdometrySpread = 0.1;
-// An IMU that knows the scale less well than this was hardly accelerated: then its errors are no longer normal.
+// An IMU that knows the scale less well than this was hardly accelerated: then its errors are no longer
+// normal.
 constexpr double kMaxImuSigmaRatio = 0.2;
 
 std::string InputPath(const Capture& capture, const std::string& path) {
@@ -185,12 +186,12 @@ Result<ScaleAnswer> AskImu(const ScaleQuestion& question) {
   if (!question.imu->ok()) return question.imu->error();
   const InertialScale& imu = **question.imu;
   if (!(imu.sigma_ratio <= kMaxImuSigmaRatio)) {
-    return MakeError(ErrorCode::kNoData,
-                     "{}: the motion does not show the scale{}: only a camera that speeds up, brakes, or swings to "
-                     "the sides shows it; what it says of up is taken",
-                     imu.told_by,
-                     std::isfinite(imu.sigma_ratio) ? fmt::format(" to better than {:.0f} %", 100 * imu.sigma_ratio)
-                                                    : "");
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: the motion does not show the scale{}: only a camera that speeds up, brakes, or swings to "
+        "the sides shows it; what it says of up is taken",
+        imu.told_by,
+        std::isfinite(imu.sigma_ratio) ? fmt::format(" to better than {:.0f} %", 100 * imu.sigma_ratio) : "");
   }
   ScaleAnswer answer{.told_by = imu.told_by,
                      .world_from_model = LevelledFrame(PosesOf(question.model), imu.scale, imu.up),
@@ -253,9 +254,9 @@ Vertical VerticalOf(const ScaleQuestion& question) {
 std::optional<Result<InertialScale>> AskImuOnce(const Capture& capture, const ModelPoses& model,
                                                 const ReconstructOptions& options) {
   if (!HasImu(capture)) return std::nullopt;
-  return ScaleByImu(capture, model,
-                    {.noise = {.gyro_rad_s_rthz = options.imu_gyro_noise,
-                               .accel_m_s2_rthz = options.imu_accel_noise}});
+  return ScaleByImu(
+      capture, model,
+      {.noise = {.gyro_rad_s_rthz = options.imu_gyro_noise, .accel_m_s2_rthz = options.imu_accel_noise}});
 }
 
 const std::vector<ScaleSource>& ScaleSources() {

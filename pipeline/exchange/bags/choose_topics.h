@@ -50,9 +50,9 @@ Result<TopicContents> ChooseImages(const BagContents& contents, const std::strin
 Result<std::optional<TopicContents>> ChooseOdometry(const BagContents& contents, const std::string& bag_path,
                                                     const std::string& asked);
 
-// The topic of an IMU that is asked for, or the only one that measures both turns and accelerations; none if there
-// is none, if "none" is asked for, or if there are several, which `warnings` say.  Errors: as ChooseImages, of what
-// is asked for.
+// The topic of an IMU that is asked for, or the only one that measures both turns and accelerations; none if
+// there is none, if "none" is asked for, or if there are several, which `warnings` say.  Errors: as
+// ChooseImages, of what is asked for.
 Result<std::optional<TopicContents>> ChooseImu(const BagContents& contents, const std::string& bag_path,
                                                const std::string& asked, std::vector<std::string>* warnings);
 

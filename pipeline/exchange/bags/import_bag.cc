@@ -247,8 +247,8 @@ void ImportVisitor::TakeImu(const BagMessage& message) {
   if (!imu_times_.is_empty && time_ns <= imu_times_.last_ns) return late_imu_.Add(TimeName(time_ns, ""));
   imu_times_.Add(time_ns);
   const Eigen::Vector3d &turn = imu->turn_rad_s, &accel = imu->accel_m_s2;
-  imu_lines_ += fmt::format("{},{},{},{},{},{},{}\n", time_ns, turn.x(), turn.y(), turn.z(), accel.x(), accel.y(),
-                            accel.z());
+  imu_lines_ += fmt::format("{},{},{},{},{},{},{}\n", time_ns, turn.x(), turn.y(), turn.z(), accel.x(),
+                            accel.y(), accel.z());
   ++num_imu_samples_;
 }
 
@@ -291,9 +291,10 @@ std::vector<std::string> ImportVisitor::Warnings() const {
                   jumps_.count, jumps_.first));
   say(damaged_imu_, fmt::format("{} messages of the IMU are left out; the first: {}", damaged_imu_.count,
                                 damaged_imu_.first));
-  say(late_imu_, fmt::format("{} messages of the IMU are left out, whose stamps are not after those before them; "
-                             "the first: {}",
-                             late_imu_.count, late_imu_.first));
+  say(late_imu_,
+      fmt::format("{} messages of the IMU are left out, whose stamps are not after those before them; "
+                  "the first: {}",
+                  late_imu_.count, late_imu_.first));
   say(damaged_transforms_, fmt::format("{} transforms are left out; the first: {}", damaged_transforms_.count,
                                        damaged_transforms_.first));
   return warnings;
@@ -349,9 +350,10 @@ std::string ImportVisitor::ImuLines(int64_t* num_lines, std::vector<std::string>
     warnings->push_back(
         imu_times_.is_empty
             ? fmt::format("{}: nothing valid on {}", plan_.path, plan_.imu->topic.name)
-            : fmt::format("{}: the IMU is left out, as its stamps ({}) and those of the images ({}) are of two "
-                          "clocks; let both drivers stamp with the same one",
-                          plan_.path, imu_times_.Text(), image_times_.Text()));
+            : fmt::format(
+                  "{}: the IMU is left out, as its stamps ({}) and those of the images ({}) are of two "
+                  "clocks; let both drivers stamp with the same one",
+                  plan_.path, imu_times_.Text(), image_times_.Text()));
     return {};
   }
   std::optional<Pose> place = options_.camera_from_imu;
@@ -363,12 +365,14 @@ std::string ImportVisitor::ImuLines(int64_t* num_lines, std::vector<std::string>
   if (place) {
     const Eigen::Vector3d& t = place->translation;
     const Eigen::Quaterniond& q = place->rotation;
-    head += fmt::format("#imu_on_camera,{},{},{},{},{},{},{}\n", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    head +=
+        fmt::format("#imu_on_camera,{},{},{},{},{},{},{}\n", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   } else {
-    warnings->push_back(fmt::format(
-        "{}: /tf does not say where the IMU ('{}') is on the camera ('{}'): how it is turned is found from turns "
-        "about two axes at least; --imu-on-camera states it",
-        plan_.path, plan_.imu->header->frame_id, plan_.images.header->frame_id));
+    warnings->push_back(
+        fmt::format("{}: /tf does not say where the IMU ('{}') is on the camera ('{}'): how it is turned is "
+                    "found from turns "
+                    "about two axes at least; --imu-on-camera states it",
+                    plan_.path, plan_.imu->header->frame_id, plan_.images.header->frame_id));
   }
   *num_lines = num_imu_samples_;
   return head + imu_lines_;

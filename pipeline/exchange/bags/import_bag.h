@@ -47,12 +47,12 @@ struct BagReport {
 //
 //   world_from_camera = world_from_base (odometry) * base_from_camera (/tf_static, /tf)
 //
-// And imu.csv where it has an IMU (stages/reconstruct/inertial/imu_file.h), with the line that says where it is on
-// the camera where tf, at the first image's stamp, or the options know it.
+// And imu.csv where it has an IMU (stages/reconstruct/inertial/imu_file.h), with the line that says where it
+// is on the camera where tf, at the first image's stamp, or the options know it.
 //
 // The bag is read twice; memory: a chunk of the bag, three images, the odometry and the IMU.
-// Errors: those of OpenBag, ChooseImages, ChooseOdometry and ChooseImu; InvalidArgument (the camera; or it is of another
-// size than the images), NoData (no image can be read, or the camera never moves), Io, Cancelled.
+// Errors: those of OpenBag, ChooseImages, ChooseOdometry and ChooseImu; InvalidArgument (the camera; or it is
+// of another size than the images), NoData (no image can be read, or the camera never moves), Io, Cancelled.
 Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, const std::string& output,
                             Progress& progress);
 

@@ -63,12 +63,12 @@ struct OdometryMessage {
 Result<OdometryMessage> DecodeOdometry(const BagMessage& message);
 
 struct ImuMessage {
-  MessageHeader header;                                 // frame_id: the IMU's
+  MessageHeader header;                                  // frame_id: the IMU's
   Eigen::Vector3d turn_rad_s = Eigen::Vector3d::Zero();  // angular velocity
   Eigen::Vector3d accel_m_s2 = Eigen::Vector3d::Zero();  // linear acceleration, with gravity
 };
-// Errors: also Corrupt for values that are not finite, and where a covariance that begins with -1 says that there
-// is no angular velocity or no acceleration.
+// Errors: also Corrupt for values that are not finite, and where a covariance that begins with -1 says that
+// there is no angular velocity or no acceleration.
 Result<ImuMessage> DecodeImu(const BagMessage& message);
 
 struct TransformMessage {

@@ -41,9 +41,10 @@ Result<ImuSample> ParseSample(const std::vector<std::string>& fields) {
   for (size_t i = 0; is_valid && i < v.size(); ++i)
     is_valid = ParseNumber(fields[i + 1], &v[i]) && std::isfinite(v[i]);
   if (!is_valid) {
-    return MakeError(ErrorCode::kCorrupt,
-                     "expected TIME_NS,WX,WY,WZ,AX,AY,AZ: an integer, nanoseconds, and six finite numbers, rad/s "
-                     "and m/s^2");
+    return MakeError(
+        ErrorCode::kCorrupt,
+        "expected TIME_NS,WX,WY,WZ,AX,AY,AZ: an integer, nanoseconds, and six finite numbers, rad/s "
+        "and m/s^2");
   }
   sample.gyro = {v[0], v[1], v[2]};
   sample.accel = {v[3], v[4], v[5]};
@@ -64,8 +65,9 @@ Status ReadLine(std::string_view line, bool may_be_header, ImuRecording* imu) {
   if (line.empty() || line.front() == '#' || (may_be_header && IsHeader(line))) return Ok();
   CAIRN_ASSIGN_OR_RETURN(const ImuSample sample, ParseSample(SplitFields(line, ',')));
   if (!imu->samples.empty() && sample.time_ns <= imu->samples.back().time_ns) {
-    return MakeError(ErrorCode::kCorrupt, "the time {} is not after {}, the one before: sort the lines by time",
-                     sample.time_ns, imu->samples.back().time_ns);
+    return MakeError(ErrorCode::kCorrupt,
+                     "the time {} is not after {}, the one before: sort the lines by time", sample.time_ns,
+                     imu->samples.back().time_ns);
   }
   imu->samples.push_back(sample);
   return Ok();
@@ -83,8 +85,8 @@ Status CheckRate(const std::string& path, ImuRecording* imu) {
   const double rate_hz = 1 / imu->typical_step_s;
   if (rate_hz < kMinRateHz || rate_hz > kMaxRateHz) {
     return MakeError(ErrorCode::kNoData,
-                     "{}: {:.4g} samples a second; {:g} to {:g} are of use.  Times are nanoseconds", path, rate_hz,
-                     kMinRateHz, kMaxRateHz);
+                     "{}: {:.4g} samples a second; {:g} to {:g} are of use.  Times are nanoseconds", path,
+                     rate_hz, kMinRateHz, kMaxRateHz);
   }
   if (seconds(0, num - 1) < kMinDurationS) {
     return MakeError(ErrorCode::kNoData, "{}: {:.3f} s are too short to say anything", path,
@@ -101,10 +103,11 @@ Status CheckUnits(const std::string& path, const ImuRecording& imu) {
   }
   const double turn = Quantile(turns, 0.95), acceleration = Median(accelerations);
   if (turn > kMaxTurnRadPerS) {
-    return MakeError(ErrorCode::kNoData,
-                     "{}: it turns by {:.0f} rad/s, which no gyro measures: in degrees a second? Columns 2 to 4 "
-                     "are rad/s",
-                     path, turn);
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: it turns by {:.0f} rad/s, which no gyro measures: in degrees a second? Columns 2 to 4 "
+        "are rad/s",
+        path, turn);
   }
   if (acceleration >= kMinGravity && acceleration <= kMaxGravity) return Ok();
   const char* guess = "";
@@ -112,10 +115,11 @@ Status CheckUnits(const std::string& path, const ImuRecording& imu) {
   if (acceleration >= kGravityInMilliG[0] && acceleration <= kGravityInMilliG[1]) guess = ": in mg?";
   if (acceleration < kGravityInG[0] || (acceleration > kGravityInG[1] && acceleration < kNoGravity))
     guess = ": with gravity taken out? What the accelerometer measures is wanted, gravity and all.";
-  return MakeError(ErrorCode::kNoData,
-                   "{}: the accelerations are {:.3g} m/s^2 on the median, not gravity's 9.81{} Columns 5 to 7 are "
-                   "m/s^2",
-                   path, acceleration, *guess != '\0' ? guess : ".");
+  return MakeError(
+      ErrorCode::kNoData,
+      "{}: the accelerations are {:.3g} m/s^2 on the median, not gravity's 9.81{} Columns 5 to 7 are "
+      "m/s^2",
+      path, acceleration, *guess != '\0' ? guess : ".");
 }
 
 }  // namespace

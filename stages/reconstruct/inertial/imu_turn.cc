@@ -21,8 +21,7 @@ Eigen::Quaterniond BestRotation(const Eigen::Matrix3d& camera_times_imu) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(camera_times_imu, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();
   if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs.z() = -1;
-  return Eigen::Quaterniond(
-      Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
+  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
 }
 
 }  // namespace
@@ -34,8 +33,8 @@ ImuTurn FitImuTurn(const std::vector<TurnPair>& pairs, const std::optional<Eigen
   for (int round = 0; round < kNumRounds; ++round) {
     Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
     for (size_t k = 0; k < pairs.size(); ++k) {
-      moments += weights[k] * pairs[k].of_camera *
-                 (pairs[k].of_imu - found.gyro_bias * pairs[k].dt_s).transpose();
+      moments +=
+          weights[k] * pairs[k].of_camera * (pairs[k].of_imu - found.gyro_bias * pairs[k].dt_s).transpose();
     }
     if (!stated) found.cam_from_imu = BestRotation(moments);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -34,7 +34,7 @@ constexpr double kBiasSpanS = 30;
 constexpr double kHuberSigmas = 4;
 constexpr double kUnknownTurnSigmaRad = 0.5;
 constexpr int kMaxNumRounds = 15, kMaxNumIterations = 20;
-constexpr double kConverged = 0.02;  // of a standard deviation, from round to round
+constexpr double kConverged = 0.02;   // of a standard deviation, from round to round
 constexpr double kScaleCounts = 0.5;  // a change of the scale by a standard deviation, beside those of these
 constexpr int kNumProbes = 16;
 // Where the images' errors alone would give this part of the information on the scale, there is none.
@@ -51,7 +51,7 @@ enum Group { kImu, kTurns, kShifts, kNumGroups, kStated = kNumGroups };
 
 // What stays the same for all steps.
 struct Frame {
-  double scale = 1;  // of the start
+  double scale = 1;                                    // of the start
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // columns: two level ones, down
   Quaterniond cam_from_imu = Quaterniond::Identity();
 };
@@ -73,7 +73,8 @@ struct StepCost {
   template <typename T>
   State<T> StateOf(const TimedImage& image, const T* block, const T* common, const Vector3d& gyro) const {
     using V = Eigen::Matrix<T, 3, 1>;
-    const Eigen::Map<const V> turn(block + kImageTurn), shift(block + kImageShift), speed(block + kImageSpeed);
+    const Eigen::Map<const V> turn(block + kImageTurn), shift(block + kImageShift),
+        speed(block + kImageSpeed);
     const Eigen::Map<const V> place(common + kPlace), mounted(common + kTurn);
     const Eigen::Quaternion<T> model_from_cam =
         image.cam_from_model.rotation.conjugate().cast<T>() * QuaternionOf<T>(V(turn));
@@ -97,8 +98,8 @@ struct StepCost {
     change.template tail<3>() -= imu.accel_bias.cast<T>();
     const Eigen::Matrix<T, 9, 1> by_bias = imu.by_bias.cast<T>() * change;
     const T dt(imu.dt_s);
-    const V gravity = T(kGravityMS2) *
-                      (frame.axes.cast<T>() * V(common[kDown], common[kDown + 1], T(1)).normalized());
+    const V gravity =
+        T(kGravityMS2) * (frame.axes.cast<T>() * V(common[kDown], common[kDown + 1], T(1)).normalized());
     const Eigen::Quaternion<T> imu_from_model = a.model_from_imu.conjugate();
     Eigen::Matrix<T, 9, 1> r;
     const Eigen::Quaternion<T> said = imu.dR.cast<T>() * QuaternionOf<T>(V(by_bias.template head<3>()));
@@ -169,7 +170,8 @@ struct Linearized {
 class InertialProblem {
  public:
   // Begins at so many times the start's scale.
-  InertialProblem(const InertialStart& start, double times, bool is_turn_stated, const InertialOptions& options)
+  InertialProblem(const InertialStart& start, double times, bool is_turn_stated,
+                  const InertialOptions& options)
       : start_(start), is_turn_stated_(is_turn_stated), options_(options) {
     frame_.scale = times * start.scale;
     frame_.cam_from_imu = start.turn.cam_from_imu;
@@ -179,7 +181,8 @@ class InertialProblem {
     frame_.axes.col(1) = down.cross(frame_.axes.col(0));
     std::vector<double> steps;
     for (const InertialStep& step : start.steps) {
-      steps.push_back(CenterErrorM(start.images[step.from].cam_from_model, start.images[step.to].cam_from_model));
+      steps.push_back(
+          CenterErrorM(start.images[step.from].cam_from_model, start.images[step.to].cam_from_model));
     }
     step_ = std::max(1e-12, Quantile(steps, 0.75));
     sigmas_.shift = kFirstShiftOfStep * step_;
@@ -187,8 +190,8 @@ class InertialProblem {
   }
 
   void Solve();
-  // Whether all that images and IMU disagree by is taken for the IMU's noise.  No image is so exact: the scale went
-  // to where the images' errors are small in metres, which is zero.
+  // Whether all that images and IMU disagree by is taken for the IMU's noise.  No image is so exact: the
+  // scale went to where the images' errors are small in metres, which is zero.
   bool HasCollapsed() const { return sigmas_.shift <= kLeastShiftOfStep * step_; }
   InertialAlignment Answer() const;
 
@@ -226,7 +229,8 @@ void InertialProblem::LayOut() {
   for (const InertialStep& step : start_.steps) {
     const double time_s =
         1e-9 * static_cast<double>(start_.images[step.from].time_ns - start_.images.front().time_ns);
-    if (span_begins_s_.empty() || time_s >= span_begins_s_.back() + kBiasSpanS) span_begins_s_.push_back(time_s);
+    if (span_begins_s_.empty() || time_s >= span_begins_s_.back() + kBiasSpanS)
+      span_begins_s_.push_back(time_s);
     span_of_step_.push_back(span_begins_s_.size() - 1);
   }
   first_image_ = kCommon + kBias * span_begins_s_.size();
@@ -245,7 +249,8 @@ void InertialProblem::LayOut() {
 }
 
 void InertialProblem::AddStated(ceres::Problem* problem) {
-  const double place_sigma_m = is_turn_stated_ ? options_.stated_place_sigma_m : options_.unknown_place_sigma_m;
+  const double place_sigma_m =
+      is_turn_stated_ ? options_.stated_place_sigma_m : options_.unknown_place_sigma_m;
   const double turn_sigma_rad =
       is_turn_stated_ ? RadFromDeg(options_.stated_turn_sigma_deg) : kUnknownTurnSigmaRad;
   StatedCost<kCommon> common{};
@@ -262,30 +267,30 @@ void InertialProblem::AddStated(ceres::Problem* problem) {
                                  nullptr, Common()),
        kStated, 0, kCommon});
   StatedCost<kBias> bias{};
-  for (int i = 0; i < kBias; ++i) bias.sigma[i] = i < 3 ? options_.gyro_bias_sigma : options_.accel_bias_sigma;
+  for (int i = 0; i < kBias; ++i)
+    bias.sigma[i] = i < 3 ? options_.gyro_bias_sigma : options_.accel_bias_sigma;
   residual_blocks_.push_back(
       {problem->AddResidualBlock(
-           new ceres::AutoDiffCostFunction<StatedCost<kBias>, kBias, kBias>(new StatedCost<kBias>(bias)), nullptr,
-           blocks_[1]),
+           new ceres::AutoDiffCostFunction<StatedCost<kBias>, kBias, kBias>(new StatedCost<kBias>(bias)),
+           nullptr, blocks_[1]),
        kStated, 0, kBias});
   for (size_t span = 1; span < span_begins_s_.size(); ++span) {
     const double root = std::sqrt(span_begins_s_[span] - span_begins_s_[span - 1]);
     WalkCost walk{};
     for (int i = 0; i < kBias; ++i)
       walk.sigma[i] = root * (i < 3 ? options_.gyro_bias_walk : options_.accel_bias_walk);
-    residual_blocks_.push_back({problem->AddResidualBlock(
-                                    new ceres::AutoDiffCostFunction<WalkCost, kBias, kBias, kBias>(
-                                        new WalkCost(walk)),
-                                    nullptr, blocks_[span], blocks_[span + 1]),
-                                kStated, 0, kBias});
+    residual_blocks_.push_back(
+        {problem->AddResidualBlock(
+             new ceres::AutoDiffCostFunction<WalkCost, kBias, kBias, kBias>(new WalkCost(walk)), nullptr,
+             blocks_[span], blocks_[span + 1]),
+         kStated, 0, kBias});
   }
 }
 
 void InertialProblem::Build(ceres::Problem* problem) {
   residual_blocks_.clear();
-  for (double* block : blocks_) problem->AddParameterBlock(block, block == Common() ? kCommon
-                                                           : block < ImageOf(0)     ? kBias
-                                                                                    : kImage);
+  for (double* block : blocks_)
+    problem->AddParameterBlock(block, block == Common() ? kCommon : block < ImageOf(0) ? kBias : kImage);
   for (size_t k = 0; k < start_.steps.size(); ++k) {
     const InertialStep& step = start_.steps[k];
     Matrix9d covariance = step.imu.covariance * (sigmas_.imu_ratio * sigmas_.imu_ratio);
@@ -321,7 +326,8 @@ Linearized InertialProblem::Linearize(ceres::Problem* problem) const {
   Linearized at;
   at.residuals = Eigen::Map<const Eigen::VectorXd>(residuals.data(), std::ssize(residuals));
   at.jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
-      crs.num_rows, crs.num_cols, std::ssize(crs.values), crs.rows.data(), crs.cols.data(), crs.values.data());
+      crs.num_rows, crs.num_cols, std::ssize(crs.values), crs.rows.data(), crs.cols.data(),
+      crs.values.data());
   int row = 0;
   for (const BlockOfResiduals& block : residual_blocks_) {
     at.first_row.push_back(row);
@@ -333,7 +339,8 @@ Linearized InertialProblem::Linearize(ceres::Problem* problem) const {
 using Factors = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
 // Information about the logarithm of the scale that errors of the images' places alone would seem to give,
-// were the camera not accelerated at all: of shifts of one standard deviation, by random signs [Hutchinson90].
+// were the camera not accelerated at all: of shifts of one standard deviation, by random signs
+// [Hutchinson90].
 double InertialProblem::InformationOfNoise(const Linearized& at) const {
   const auto num = at.jacobian.cols();
   const Eigen::SparseMatrix<double> columns = at.jacobian;
@@ -345,7 +352,8 @@ double InertialProblem::InformationOfNoise(const Linearized& at) const {
     Eigen::VectorXd shifts = Eigen::VectorXd::Zero(num);
     for (size_t i = 0; i < start_.images.size(); ++i) {
       for (size_t k = 0; k < 3; ++k)
-        shifts[first_image_ + kImage * i + kImageShift + k] = (random.Bits() & 1) != 0 ? sigmas_.shift : -sigmas_.shift;
+        shifts[first_image_ + kImage * i + kImageShift + k] =
+            (random.Bits() & 1) != 0 ? sigmas_.shift : -sigmas_.shift;
     }
     Eigen::VectorXd seen = at.jacobian * shifts;
     for (size_t k = 0; k < residual_blocks_.size(); ++k) {
@@ -357,8 +365,8 @@ double InertialProblem::InformationOfNoise(const Linearized& at) const {
   return information;
 }
 
-// [Foerstner79]: sigma^2 grows by the group's squared residuals over its redundancy, its number less the part of
-// the unknowns that it determines, tr(J_g H^-1 J_g^T), estimated by random signs [Hutchinson90].
+// [Foerstner79]: sigma^2 grows by the group's squared residuals over its redundancy, its number less the part
+// of the unknowns that it determines, tr(J_g H^-1 J_g^T), estimated by random signs [Hutchinson90].
 void InertialProblem::Rescale(const Linearized& at) {
   const Eigen::SparseMatrix<double> normal = at.jacobian.transpose() * at.jacobian;
   const Factors factors(normal);
@@ -419,7 +427,8 @@ void InertialProblem::Solve() {
     if (round == 0 || (change_ > kConverged && round + 1 < kMaxNumRounds)) continue;
     const double information = 1 / of_scale[kLogScale], of_noise = InformationOfNoise(at);
     // Of a regression in which both sides err, the part that is not noise counts.
-    sigma_ = of_noise > kMaxNoiseRatio * information ? INFINITY : std::sqrt(information) / (information - of_noise);
+    sigma_ = of_noise > kMaxNoiseRatio * information ? INFINITY
+                                                     : std::sqrt(information) / (information - of_noise);
     up_sigma_rad_ = std::sqrt(column(kDown)[kDown] + column(kDown + 1)[kDown + 1]);
     const Eigen::VectorXd influence = at.jacobian * of_scale;
     std::array<double, kNumParts> parts{};
@@ -431,9 +440,8 @@ void InertialProblem::Solve() {
     }
     double sum_squares = 0;
     for (const double part : parts) sum_squares += part * part;
-    parts_sigma_ = start_.images.size() < kMinImagesOfParts
-                       ? 0
-                       : std::sqrt(sum_squares * kNumParts / (kNumParts - 1));
+    parts_sigma_ =
+        start_.images.size() < kMinImagesOfParts ? 0 : std::sqrt(sum_squares * kNumParts / (kNumParts - 1));
     break;
   }
 }

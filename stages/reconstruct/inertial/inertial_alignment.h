@@ -50,12 +50,12 @@ struct InertialAlignment {
   Eigen::Quaterniond cam_from_imu = Eigen::Quaterniond::Identity();
   Eigen::Vector3d imu_in_cam_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();  // means
-  double time_offset_s = 0;                          // an image was taken that much later than it says
-  double place_sigma_m = 0, turn_sigma_rad = 0;      // of single images, as they turned out
-  double imu_noise_ratio = 0;                        // over what the options say
-  std::vector<size_t> image_idx;                     // those that it is of
-  std::vector<double> residuals_m;                   // of these: between where it is and where the IMU has it
-  std::vector<bool> is_off;                          // by more than four standard deviations
+  double time_offset_s = 0;                      // an image was taken that much later than it says
+  double place_sigma_m = 0, turn_sigma_rad = 0;  // of single images, as they turned out
+  double imu_noise_ratio = 0;                    // over what the options say
+  std::vector<size_t> image_idx;                 // those that it is of
+  std::vector<double> residuals_m;               // of these: between where it is and where the IMU has it
+  std::vector<bool> is_off;                      // by more than four standard deviations
 };
 
 // Scale and vertical of a reconstruction from an IMU.  The accelerometer measures how the camera moves, in
@@ -68,26 +68,29 @@ struct InertialAlignment {
 // that err, too:
 //
 //   min sum_k |r_k|^2 / (kappa^2 S_k)                          between images k and k + 1 [Forster17 eq. 45]
-//     + sum_i rho(|turn_i|^2 / sigma_turn^2) + rho(|shift_i|^2 / sigma_shift^2)     images, in the model's unit
-//     + what is stated: the IMU's place and turn, its biases (one for each half minute, a random walk), clocks
+//     + sum_i rho(|turn_i|^2 / sigma_turn^2) + rho(|shift_i|^2 / sigma_shift^2)     images, in the model's
+//     unit
+//     + what is stated: the IMU's place and turn, its biases (one for each half minute, a random walk),
+//     clocks
 //
 // over scale, direction of gravity, place, turn, biases, clocks' difference, and turn, shift and speed of
-// every image; rho: Huber's.  sigma_turn, sigma_shift and kappa >= 1 (noise beyond the data sheet's: vibration)
-// are those that the residuals show [Foerstner79].  Without the images' own errors the scale would be too small
-// wherever these are as large as what the IMU shows.
+// every image; rho: Huber's.  sigma_turn, sigma_shift and kappa >= 1 (noise beyond the data sheet's:
+// vibration) are those that the residuals show [Foerstner79].  Without the images' own errors the scale would
+// be too small wherever these are as large as what the IMU shows.
 //
-// Errors of the images' places look like accelerations, too.  Of the information I on the scale's logarithm the
-// part N that these errors alone would give is none: sigma = sqrt(I) / (I - N), and infinite from N = I / 2 on, as
-// for a camera that moves straight ahead at one speed.
+// Errors of the images' places look like accelerations, too.  Of the information I on the scale's logarithm
+// the part N that these errors alone would give is none: sigma = sqrt(I) / (I - N), and infinite from N = I /
+// 2 on, as for a camera that moves straight ahead at one speed.
 //
 // The scale's standard deviation is that one, or, where it is larger, what parts of the way say:
-// residuals of neighbours are correlated (a reconstruction bends, vibration comes and goes), so each of twelve
-// pieces of the way counts as one: sigma^2 = sum over pieces of (sum of w_k r_k in the piece)^2, w the influence
-// of a residual on the logarithm of the scale.  What all pieces share (the accelerometer's own scale) is in neither.
+// residuals of neighbours are correlated (a reconstruction bends, vibration comes and goes), so each of
+// twelve pieces of the way counts as one: sigma^2 = sum over pieces of (sum of w_k r_k in the piece)^2, w the
+// influence of a residual on the logarithm of the scale.  What all pieces share (the accelerometer's own
+// scale) is in neither.
 //
 // `images` in the order of their times.  Same result for any number of threads.  O(images + samples).
-// Errors: NoData, with what is missing: images in the IMU's time, turns about two axes where the IMU's turn is
-// not stated; gyro and images that disagree (units, another clock, a wrong statement).
+// Errors: NoData, with what is missing: images in the IMU's time, turns about two axes where the IMU's turn
+// is not stated; gyro and images that disagree (units, another clock, a wrong statement).
 Result<InertialAlignment> AlignToImu(const std::vector<TimedImage>& images, const ImuRecording& imu,
                                      const InertialOptions& options);
 

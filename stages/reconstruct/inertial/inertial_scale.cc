@@ -49,10 +49,11 @@ Result<std::vector<TimedImage>> ImagesOf(const ImuPlace& place, const std::map<s
     }
   }
   if (folders.empty()) {
-    return MakeError(ErrorCode::kNoData,
-                     "{}: no image is named by its time{}: seconds with a point (1700000000.250000000.jpg) or "
-                     "nanoseconds (1700000000250000000.jpg), by the IMU's clock; rename them",
-                     place.path, other.empty() ? "" : ", such as " + other);
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: no image is named by its time{}: seconds with a point (1700000000.250000000.jpg) or "
+        "nanoseconds (1700000000250000000.jpg), by the IMU's clock; rename them",
+        place.path, other.empty() ? "" : ", such as " + other);
   }
   auto most = folders.begin();
   for (auto folder = folders.begin(); folder != folders.end(); ++folder) {
@@ -66,11 +67,11 @@ Result<std::vector<TimedImage>> ImagesOf(const ImuPlace& place, const std::map<s
 
 void Warn(const ImuPlace& place, const InertialAlignment& alignment, std::vector<std::string>* warnings) {
   if (std::abs(alignment.time_offset_s) > kWorthSayingS) {
-    warnings->push_back(
-        fmt::format("{}: the images were taken {:.0f} ms {} than their names say, by the IMU's clock; that is "
-                    "taken into account",
-                    place.path, 1e3 * std::abs(alignment.time_offset_s),
-                    alignment.time_offset_s > 0 ? "later" : "earlier"));
+    warnings->push_back(fmt::format(
+        "{}: the images were taken {:.0f} ms {} than their names say, by the IMU's clock; that is "
+        "taken into account",
+        place.path, 1e3 * std::abs(alignment.time_offset_s),
+        alignment.time_offset_s > 0 ? "later" : "earlier"));
   }
   if (alignment.imu_noise_ratio > kWorthSayingNoiseRatio) {
     warnings->push_back(

@@ -99,26 +99,29 @@ Status CheckTurnRatio(const std::vector<TurnPair>& pairs) {
   if (ratios.size() < kMinNumTurns) return Ok();
   const double ratio = Median(ratios);
   if (ratio > 1 / kMaxTurnRatio && ratio < kMaxTurnRatio) return Ok();
-  return MakeError(ErrorCode::kNoData,
-                   "the gyro turns {:.3g} times as far as the images: its columns 2 to 4 are rad/s, and its clock "
-                   "that of the images",
-                   ratio);
+  return MakeError(
+      ErrorCode::kNoData,
+      "the gyro turns {:.3g} times as far as the images: its columns 2 to 4 are rad/s, and its clock "
+      "that of the images",
+      ratio);
 }
 
 Status CheckTurn(const ImuTurn& turn, size_t num_pairs, bool is_stated) {
   if (!is_stated && DegFromRad(turn.sigma_rad) > kMaxTurnSigmaDeg) {
-    return MakeError(ErrorCode::kNoData,
-                     "nothing says how the IMU is turned against the camera, which is not found from {} turns of "
-                     "the images, as they are about one axis at most: a line \"#imu_on_camera,X,Y,Z,QX,QY,QZ,QW\" "
-                     "states it (of a bag --imu-on-camera, or imu_on_camera in the recipe)",
-                     num_pairs);
+    return MakeError(
+        ErrorCode::kNoData,
+        "nothing says how the IMU is turned against the camera, which is not found from {} turns of "
+        "the images, as they are about one axis at most: a line \"#imu_on_camera,X,Y,Z,QX,QY,QZ,QW\" "
+        "states it (of a bag --imu-on-camera, or imu_on_camera in the recipe)",
+        num_pairs);
   }
   if (turn.left_ratio > kMaxLeftRatio) {
-    return MakeError(ErrorCode::kNoData,
-                     "the gyro's turns are not those of the images ({:.0f} % of them are left{}): another clock, "
-                     "another camera{}",
-                     100 * std::sqrt(turn.left_ratio), is_stated ? " after the stated turn" : "",
-                     is_stated ? ", or the IMU is not on it as imu_on_camera states" : "");
+    return MakeError(
+        ErrorCode::kNoData,
+        "the gyro's turns are not those of the images ({:.0f} % of them are left{}): another clock, "
+        "another camera{}",
+        100 * std::sqrt(turn.left_ratio), is_stated ? " after the stated turn" : "",
+        is_stated ? ", or the IMU is not on it as imu_on_camera states" : "");
   }
   return Ok();
 }
@@ -223,14 +226,16 @@ Result<InertialStart> StartInertial(const std::vector<TimedImage>& images, const
     const int64_t first_ns = images.front().time_ns, last_ns = images.back().time_ns;
     const int64_t imu_first_ns = imu.samples.front().time_ns, imu_last_ns = imu.samples.back().time_ns;
     if (last_ns < imu_first_ns || imu_last_ns < first_ns) {
-      return MakeError(ErrorCode::kNoData,
-                       "its times ({}) and those of the images' names ({}) are of two clocks; let both be of one",
-                       SpanText(imu_first_ns, imu_last_ns), SpanText(first_ns, last_ns));
+      return MakeError(
+          ErrorCode::kNoData,
+          "its times ({}) and those of the images' names ({}) are of two clocks; let both be of one",
+          SpanText(imu_first_ns, imu_last_ns), SpanText(first_ns, last_ns));
     }
-    return MakeError(ErrorCode::kNoData,
-                     "of {} images in a row, {} pairs at most {:g} s apart have samples all the time between them "
-                     "(at most {:g} s from one to the next); {} are wanted",
-                     images.size(), steps.size(), options.max_step_s, kMaxImuStepS, kMinNumSteps);
+    return MakeError(
+        ErrorCode::kNoData,
+        "of {} images in a row, {} pairs at most {:g} s apart have samples all the time between them "
+        "(at most {:g} s from one to the next); {} are wanted",
+        images.size(), steps.size(), options.max_step_s, kMaxImuStepS, kMinNumSteps);
   }
   CAIRN_ASSIGN_OR_RETURN(start.turn, FindTurn(images, imu, steps, &start.time_offset_s));
   start.steps = StepsOf(images, imu, options, start.time_offset_s, start.turn.gyro_bias);

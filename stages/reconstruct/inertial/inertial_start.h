@@ -24,13 +24,13 @@ struct InertialStart {
   ImuTurn turn;
   Eigen::Vector3d imu_in_cam_m = Eigen::Vector3d::Zero();
   double time_offset_s = 0;
-  std::vector<Eigen::Vector3d> speeds;  // of the IMU, m/s, model's axes
+  std::vector<Eigen::Vector3d> speeds;                // of the IMU, m/s, model's axes
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // m/s^2, model's axes
-  double scale = 0;                     // metres per unit; may be negative where nothing shows it
+  double scale = 0;  // metres per unit; may be negative where nothing shows it
 };
 
-// Steps, turn and clock, then speeds, gravity and scale by linear least squares [Qin18 eq. 11].  Errors: those
-// of AlignToImu.
+// Steps, turn and clock, then speeds, gravity and scale by linear least squares [Qin18 eq. 11].  Errors:
+// those of AlignToImu.
 Result<InertialStart> StartInertial(const std::vector<TimedImage>& images, const ImuRecording& imu,
                                     const InertialOptions& options);
 

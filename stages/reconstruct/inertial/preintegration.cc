@@ -78,7 +78,8 @@ std::optional<Preintegrated> Preintegrate(const std::vector<ImuSample>& samples,
   std::optional<ImuSample> at;
   while (!at || at->time_ns < end_ns) {
     const auto next = sample + 1;
-    if (next == samples.end() || SecondsOf(next->time_ns - sample->time_ns) > kMaxImuStepS) return std::nullopt;
+    if (next == samples.end() || SecondsOf(next->time_ns - sample->time_ns) > kMaxImuStepS)
+      return std::nullopt;
     if (!at) {
       at = At(*sample, *next, begin_ns);
       motion.gyro_begin = at->gyro - gyro_bias;

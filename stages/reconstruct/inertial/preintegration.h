@@ -29,15 +29,15 @@ struct Preintegrated {
   Eigen::Quaterniond dR = Eigen::Quaterniond::Identity();
   Eigen::Vector3d dv = Eigen::Vector3d::Zero(), dp = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();  // taken off
-  Matrix96d by_bias = Matrix96d::Zero();                // derivatives; columns: gyro's bias, accelerometer's
-  Matrix9d covariance = Matrix9d::Zero();               // of the white noise
+  Matrix96d by_bias = Matrix96d::Zero();                 // derivatives; columns: gyro's bias, accelerometer's
+  Matrix9d covariance = Matrix9d::Zero();                // of the white noise
   Eigen::Vector3d gyro_begin = Eigen::Vector3d::Zero();  // rad/s at both ends, without the bias
   Eigen::Vector3d gyro_end = Eigen::Vector3d::Zero();
 };
 
-// Integrates samples from one time to a later one, by the midpoint rule; samples are interpolated at both ends.
-// None: one of the times is not between two samples that are at most kMaxImuStepS apart, or there is a gap
-// between them.  REQUIRES: begin_ns < end_ns, samples ascending.  O(log of all samples + those between).
+// Integrates samples from one time to a later one, by the midpoint rule; samples are interpolated at both
+// ends. None: one of the times is not between two samples that are at most kMaxImuStepS apart, or there is a
+// gap between them.  REQUIRES: begin_ns < end_ns, samples ascending.  O(log of all samples + those between).
 std::optional<Preintegrated> Preintegrate(const std::vector<ImuSample>& samples, int64_t begin_ns,
                                           int64_t end_ns, const Eigen::Vector3d& gyro_bias,
                                           const Eigen::Vector3d& accel_bias, const ImuNoise& noise);

@@ -54,7 +54,8 @@ TEST_F(ReadImuTest, SamplesHaveTimesTurnsAndAccelerations) {
 
 TEST_F(ReadImuTest, ALineThatIsNoneIsNamed) {
   EXPECT_THAT(ErrorOf("0,0,0,0,0,0\n", ErrorCode::kCorrupt), HasSubstr(".csv:1: expected TIME_NS,WX"));
-  EXPECT_THAT(ErrorOf("0,0,0,0,0,0,9.8\n5,nan,0,0,0,0,9.8\n", ErrorCode::kCorrupt), HasSubstr(".csv:2: expected"));
+  EXPECT_THAT(ErrorOf("0,0,0,0,0,0,9.8\n5,nan,0,0,0,0,9.8\n", ErrorCode::kCorrupt),
+              HasSubstr(".csv:2: expected"));
   EXPECT_THAT(ErrorOf("0.5,0,0,0,0,0,9.8\n", ErrorCode::kCorrupt), HasSubstr("an integer, nanoseconds"));
   EXPECT_THAT(ErrorOf("5,0,0,0,0,0,9.8\n5,0,0,0,0,0,9.8\n", ErrorCode::kCorrupt),
               HasSubstr(".csv:2: the time 5 is not after 5, the one before: sort the lines"));
@@ -67,17 +68,21 @@ TEST_F(ReadImuTest, ALineThatIsNoneIsNamed) {
 
 TEST_F(ReadImuTest, WhatNoImuSaysIsNamed) {
   EXPECT_THAT(ErrorOf("", ErrorCode::kNoData), HasSubstr("0 samples"));
-  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,1"), ErrorCode::kNoData), HasSubstr("1 m/s^2 on the median, not gravity's 9.81: in g?"));
+  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,1"), ErrorCode::kNoData),
+              HasSubstr("1 m/s^2 on the median, not gravity's 9.81: in g?"));
   EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,1000"), ErrorCode::kNoData), HasSubstr(": in mg?"));
   EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,0.1"), ErrorCode::kNoData), HasSubstr("with gravity taken out?"));
-  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,30"), ErrorCode::kNoData), HasSubstr("30 m/s^2 on the median, not gravity's 9.81."));
+  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,30"), ErrorCode::kNoData),
+              HasSubstr("30 m/s^2 on the median, not gravity's 9.81."));
   EXPECT_THAT(ErrorOf(AtRest("40,0,0,0,0,9.8"), ErrorCode::kNoData), HasSubstr("in degrees a second?"));
   EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,9.8", 25'000'000), ErrorCode::kNoData),
               HasSubstr("40 samples a second; 50 to 10000 are of use"));
-  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,9.8", 20'000'001), ErrorCode::kNoData), HasSubstr("50 samples a second"));
+  EXPECT_THAT(ErrorOf(AtRest("0,0,0,0,0,9.8", 20'000'001), ErrorCode::kNoData),
+              HasSubstr("50 samples a second"));
   EXPECT_TRUE(Read(AtRest("0,0,0,0,0,9.8", 20'000'000)).ok());
   EXPECT_THAT(ErrorOf("0,0,0,0,0,0,9.8\n5000,0,0,0,0,0,9.8\n", ErrorCode::kNoData), HasSubstr("nanoseconds"));
-  EXPECT_THAT(ErrorOf("0,0,0,0,0,0,9.8\n5000000,0,0,0,0,0,9.8\n", ErrorCode::kNoData), HasSubstr("0.005 s are too short"));
+  EXPECT_THAT(ErrorOf("0,0,0,0,0,0,9.8\n5000000,0,0,0,0,0,9.8\n", ErrorCode::kNoData),
+              HasSubstr("0.005 s are too short"));
 }
 
 TEST(TimeOfImage, IsItsName) {
@@ -85,8 +90,8 @@ TEST(TimeOfImage, IsItsName) {
   EXPECT_EQ(TimeOfImageNs("000012.345.jpg"), 12'345'000'000);
   EXPECT_EQ(TimeOfImageNs("1305031102.175304.png"), 1'305'031'102'175'304'000);
   EXPECT_EQ(TimeOfImageNs("cam0/1403636579763555584.png"), 1'403'636'579'763'555'584);
-  for (const char* name : {"000012.jpg", "123456789.jpg", "a.5.jpg", "1.5b.jpg", "1-2.jpg", "12..jpg", ".5.jpg", "",
-                           "99999999999999.5.jpg"})
+  for (const char* name : {"000012.jpg", "123456789.jpg", "a.5.jpg", "1.5b.jpg", "1-2.jpg", "12..jpg",
+                           ".5.jpg", "", "99999999999999.5.jpg"})
     EXPECT_FALSE(TimeOfImageNs(name).has_value()) << name;
 }
 

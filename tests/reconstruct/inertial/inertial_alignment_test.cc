@@ -206,7 +206,8 @@ TEST(Preintegrate, DerivativesByTheBiasesAreThoseOfDifferences) {
   EXPECT_NEAR(middle.dt_s, 0.901765433, 1e-9);
   for (int i = 0; i < 6; ++i) {
     constexpr double h = 1e-4;
-    const Eigen::Vector3d gyro = i < 3 ? Eigen::Vector3d(h * Eigen::Vector3d::Unit(i)) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d gyro =
+        i < 3 ? Eigen::Vector3d(h * Eigen::Vector3d::Unit(i)) : Eigen::Vector3d::Zero();
     const Eigen::Vector3d accel =
         i < 3 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(h * Eigen::Vector3d::Unit(i - 3));
     const Preintegrated more = at(Eigen::Vector3d(0.01, 0, 0) + gyro, Eigen::Vector3d(0, 0.02, 0) + accel);
@@ -221,15 +222,21 @@ TEST(Preintegrate, CovarianceIsThatOfTheNoise) {
   const Motion motion = Handheld(4);
   SimulatedImu exact, noisy;
   exact.noise = {1e-12, 1e-12};
-  const Preintegrated truth =
-      *Preintegrate(RecordImu(motion, exact, 1.5, 1).samples, 500'000'000, 1'200'000'000, {}, {}, noisy.noise);
+  exact.gyro_bias.setZero();
+  exact.accel_bias.setZero();
+  noisy.gyro_bias.setZero();
+  noisy.accel_bias.setZero();
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  const Preintegrated truth = *Preintegrate(RecordImu(motion, exact, 1.5, 1).samples, 500'000'000,
+                                            1'200'000'000, none, none, noisy.noise);
   Matrix9d sum = Matrix9d::Zero();
   constexpr int kNum = 400;
   for (int seed = 0; seed < kNum; ++seed) {
     const Preintegrated said = *Preintegrate(RecordImu(motion, noisy, 1.5, seed).samples, 500'000'000,
-                                             1'200'000'000, {}, {}, noisy.noise);
+                                             1'200'000'000, none, none, noisy.noise);
     Eigen::Matrix<double, 9, 1> error;
-    error << VectorOf(Eigen::Quaterniond(truth.dR.conjugate() * said.dR)), said.dv - truth.dv, said.dp - truth.dp;
+    error << VectorOf(Eigen::Quaterniond(truth.dR.conjugate() * said.dR)), said.dv - truth.dv,
+        said.dp - truth.dp;
     sum += error * error.transpose() / kNum;
   }
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(sum(i, i) / truth.covariance(i, i), 1, 0.25) << i;

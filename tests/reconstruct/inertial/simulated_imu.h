@@ -14,8 +14,8 @@
 
 namespace cairn::reconstruct {
 
-// Motions with an IMU, for tests: where the camera is at a time, what a consumer's IMU on it measures, and what
-// a mapper makes of its images.
+// Motions with an IMU, for tests: where the camera is at a time, what a consumer's IMU on it measures, and
+// what a mapper makes of its images.
 
 using Motion = std::function<Pose(double time_s)>;  // world_from_cam, z up, metres
 
@@ -44,12 +44,13 @@ inline Waves RandomWaves(const std::vector<std::pair<double, double>>& amplitude
 inline Eigen::Quaterniond LooksAhead() { return {0.5, -0.5, 0.5, -0.5}; }
 
 inline Eigen::Quaterniond YawPitchRoll(double yaw, double pitch, double roll) {
-  return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+  return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
-// Someone who walks about a room at about 0.8 m/s with a camera in the hand: two steps a second, which go up and
-// down by 2 cm and to the sides by 2.5 cm, and a hand that looks about.
+// Someone who walks about a room at about 0.8 m/s with a camera in the hand: two steps a second, which go up
+// and down by 2 cm and to the sides by 2.5 cm, and a hand that looks about.
 inline Motion Handheld(uint64_t seed) {
   Random random(seed);
   const Waves x = RandomWaves({{3, 0.03}, {1, 0.08}, {0.01, 1.9}}, random);
@@ -63,7 +64,8 @@ inline Motion Handheld(uint64_t seed) {
   };
 }
 
-// A robot on wheels, 0.5 m/s on the mean, that speeds up, brakes and turns, on a floor that is not quite flat.
+// A robot on wheels, 0.5 m/s on the mean, that speeds up, brakes and turns, on a floor that is not quite
+// flat.
 inline Motion Wheeled(uint64_t seed) {
   Random random(seed);
   const Waves x = RandomWaves({{4, 0.015}, {0.6, 0.06}, {0.15, 0.15}}, random);
@@ -87,9 +89,9 @@ inline Motion Steady() {
 // A consumer's part.
 struct SimulatedImu {
   double rate_hz = 200;
-  ImuNoise noise;                                      // rad/s, m/s^2 a root of Hz
-  Eigen::Vector3d gyro_bias = {0.01, -0.007, 0.008};   // rad/s
-  Eigen::Vector3d accel_bias = {0.05, 0.03, -0.04};    // m/s^2
+  ImuNoise noise;                                     // rad/s, m/s^2 a root of Hz
+  Eigen::Vector3d gyro_bias = {0.01, -0.007, 0.008};  // rad/s
+  Eigen::Vector3d accel_bias = {0.05, 0.03, -0.04};   // m/s^2
   Pose cam_from_imu = {Eigen::Quaterniond(0.7, 0.1, -0.7, 0.1).normalized(), {0.03, -0.02, 0.01}};
   double time_offset_s = 0;  // of the images' clock: its stamps are so much too early
 };
@@ -105,7 +107,8 @@ inline SimulatedImu ImuOfSeed(uint64_t seed) {
 }
 
 // What it says from 0 to `duration_s`.
-inline ImuRecording RecordImu(const Motion& motion, const SimulatedImu& imu, double duration_s, uint64_t seed) {
+inline ImuRecording RecordImu(const Motion& motion, const SimulatedImu& imu, double duration_s,
+                              uint64_t seed) {
   Random random(MixSeed(seed, 23));
   const auto at = [&](double t) { return motion(t) * imu.cam_from_imu; };  // world_from_imu
   const double root = std::sqrt(imu.rate_hz);
@@ -143,8 +146,8 @@ struct SimulatedModel {
 inline Similarity ModelFromWorld(double model_per_metre) {
   return {model_per_metre, Eigen::Quaterniond(0.4, 0.5, -0.6, 0.2).normalized(), {3, -1, 7}};
 }
-inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const SimulatedModel& model, double duration_s,
-                                             double time_offset_s, uint64_t seed) {
+inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const SimulatedModel& model,
+                                             double duration_s, double time_offset_s, uint64_t seed) {
   Random random(MixSeed(seed, 31));
   const auto normal = [&](double sigma) {
     const double x = random.Normal(0, sigma), y = random.Normal(0, sigma);
@@ -159,12 +162,11 @@ inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const Simulat
     bent_rad += normal(RadFromDeg(model.bend_sigma_deg));
     Pose world_from_cam = motion(t + time_offset_s);
     world_from_cam.translation += bent_m + normal(model.place_sigma_m);
-    world_from_cam.rotation =
-        QuaternionOf<double>(bent_rad) * world_from_cam.rotation *
-        QuaternionOf<double>(normal(RadFromDeg(model.turn_sigma_deg)));
+    world_from_cam.rotation = QuaternionOf<double>(bent_rad) * world_from_cam.rotation *
+                              QuaternionOf<double>(normal(RadFromDeg(model.turn_sigma_deg)));
     const auto time_ns = std::llround(t * 1e9);
-    images.push_back({fmt::format("{:010}.{:09}.jpg", time_ns / 1'000'000'000, time_ns % 1'000'000'000), time_ns,
-                      TransformPose(model_from_world, world_from_cam.Inverse())});
+    images.push_back({fmt::format("{:010}.{:09}.jpg", time_ns / 1'000'000'000, time_ns % 1'000'000'000),
+                      time_ns, TransformPose(model_from_world, world_from_cam.Inverse())});
     t += model.step_s * random.Uniform(0.5, 1.5);
   }
   return images;
