@@ -108,7 +108,13 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
   const std::optional<Result<InertialScale>> imu = AskImuOnce(capture, model, options);
   const ScaleQuestion question{reconstruction, model, capture, options, imu};
   const Vertical vertical = VerticalOf(question);
-  if (from == "none") return WithoutScale(model, vertical, options, result);
+  if (from == "none") {
+    if (imu && !imu->ok()) {
+      if (imu->error().code != ErrorCode::kNoData) return imu->error();
+      result->warnings.push_back(imu->error().message);
+    }
+    return WithoutScale(model, vertical, options, result);
+  }
   std::vector<Answered> answered;
   std::optional<Error> refusal;  // of a source that the recipe names
   std::string nothing;

@@ -167,7 +167,6 @@ TEST_F(FindFrameByImu, ThatIsNotAcceleratedSaysWhereUpIsAlone) {
 }
 
 TEST_F(FindFrameByImu, OfImagesWithoutTimesSaysWhatTheirNamesAreToBe) {
-  Write("imu.csv", "");
   Walk(Handheld(5));
   model_ = {{"a.jpg", model_.begin()->second}, {"b.jpg", model_.rbegin()->second}};
   ASSERT_TRUE(Find("auto").ok());
@@ -175,6 +174,26 @@ TEST_F(FindFrameByImu, OfImagesWithoutTimesSaysWhatTheirNamesAreToBe) {
   std::filesystem::remove(capture_.root + "/imu.csv");
   EXPECT_EQ(Find("imu").error().code, ErrorCode::kNotFound);
   Write("imu.csv", "1,2\n");
+  EXPECT_EQ(Find("auto").error().code, ErrorCode::kCorrupt);
+  EXPECT_EQ(Find("none").error().code, ErrorCode::kCorrupt);
+}
+
+// Two walks, of which one measured in g.
+TEST_F(FindFrameByImu, OfOneSessionGivesMetresWhereThatOfAnotherSaysNothing) {
+  Walk(Handheld(5));
+  ModelPoses joined;
+  for (const auto& [name, pose] : model_) joined["day2/" + name] = joined["day1/" + name] = pose;
+  model_ = joined;
+  std::filesystem::remove(capture_.root + "/imu.csv");
+  std::filesystem::create_directories(capture_.root + "/imu");
+  Write("sessions.txt", "day1 /day1\nday2 /day2\n");
+  Write("imu/day1.csv", "0,0,0,0,0,0,1\n5000000,0,0,0,0,0,1\n2000000000,0,0,0,0,0,1\n");
+  Write("imu/day2.csv", csv_);
+  const auto similarity = Find("auto");
+  ASSERT_TRUE(similarity.ok()) << similarity.error().message;
+  EXPECT_NEAR(similarity->scale, 4, 0.12);
+  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("imu/day1.csv: ")));
+  Write("imu/day1.csv", "1,2\n");
   EXPECT_EQ(Find("auto").error().code, ErrorCode::kCorrupt);
 }
 

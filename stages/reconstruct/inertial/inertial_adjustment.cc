@@ -41,6 +41,9 @@ constexpr int kNumProbes = 16;
 constexpr double kMaxNoiseRatio = 0.5;
 constexpr int kNumParts = 12;
 constexpr size_t kMinImagesOfParts = 60;
+// Fewer do not show by how much parts disagree; 38 images of a drive, a second apart, are twice as far off as
+// the noise says.
+constexpr double kFewImagesFactor = 2;
 // Standard deviations that residuals are never believed to be below.
 constexpr double kLeastTurnSigmaRad = 1e-4, kLeastShiftOfStep = 1e-4;
 // A reconstruction bends by this: of its up, whatever the noise says.
@@ -440,8 +443,7 @@ void InertialProblem::Solve() {
     }
     double sum_squares = 0;
     for (const double part : parts) sum_squares += part * part;
-    parts_sigma_ =
-        start_.images.size() < kMinImagesOfParts ? 0 : std::sqrt(sum_squares * kNumParts / (kNumParts - 1));
+    parts_sigma_ = std::sqrt(sum_squares * kNumParts / (kNumParts - 1));
     break;
   }
 }
@@ -452,7 +454,8 @@ InertialAlignment InertialProblem::Answer() const {
   answer.scale = frame_.scale * std::exp(common[kLogScale]);
   answer.noise_sigma_ratio = sigma_;
   answer.parts_sigma_ratio = parts_sigma_;
-  answer.sigma_ratio = std::max(sigma_, parts_sigma_);
+  const bool has_parts = start_.images.size() >= kMinImagesOfParts;
+  answer.sigma_ratio = has_parts ? std::max(sigma_, parts_sigma_) : kFewImagesFactor * sigma_;
   answer.up = -(frame_.axes * Vector3d(common[kDown], common[kDown + 1], 1)).normalized();
   answer.up_sigma_rad = std::max(kLeastUpSigmaRad, up_sigma_rad_);
   answer.cam_from_imu =

@@ -85,7 +85,8 @@ struct InertialAlignment {
 // The scale's standard deviation is that one, or, where it is larger, what parts of the way say:
 // residuals of neighbours are correlated (a reconstruction bends, vibration comes and goes), so each of
 // twelve pieces of the way counts as one: sigma^2 = sum over pieces of (sum of w_k r_k in the piece)^2, w the
-// influence of a residual on the logarithm of the scale.  What all pieces share (the accelerometer's own
+// influence of a residual on the logarithm of the scale.  Of fewer than 60 images it is twice that of noise.
+// What all pieces share (the accelerometer's own
 // scale) is in neither.
 //
 // `images` in the order of their times.  Same result for any number of threads.  O(images + samples).

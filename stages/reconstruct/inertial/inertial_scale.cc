@@ -65,6 +65,16 @@ Result<std::vector<TimedImage>> ImagesOf(const ImuPlace& place, const std::map<s
   return std::move(images);
 }
 
+// Errors: those of ReadImu, ImagesOf and AlignToImu, with the file.
+Result<InertialAlignment> AlignToPlace(const ImuPlace& place, const std::map<std::string, Pose>& model,
+                                       const InertialOptions& options, std::vector<TimedImage>* images) {
+  CAIRN_ASSIGN_OR_RETURN(const ImuRecording imu, ReadImu(place.path));
+  CAIRN_ASSIGN_OR_RETURN(*images, ImagesOf(place, model));
+  Result<InertialAlignment> alignment = AlignToImu(*images, imu, options);
+  if (alignment.ok()) return alignment;
+  return MakeError(alignment.error().code, "{}: {}", place.path, alignment.error().message);
+}
+
 void Warn(const ImuPlace& place, const InertialAlignment& alignment, std::vector<std::string>* warnings) {
   if (std::abs(alignment.time_offset_s) > kWorthSayingS) {
     warnings->push_back(fmt::format(
@@ -93,13 +103,12 @@ Result<InertialScale> ScaleByImu(const Capture& capture, const std::map<std::str
   double sum = 0, weights = 0;
   std::string nothing;
   for (const ImuPlace& place : PlacesOfImus(capture)) {
-    CAIRN_ASSIGN_OR_RETURN(const ImuRecording imu, ReadImu(place.path));
-    const Result<std::vector<TimedImage>> images = ImagesOf(place, model);
-    const Result<InertialAlignment> alignment =
-        images.ok() ? AlignToImu(*images, imu, options) : Result<InertialAlignment>(images.error());
+    std::vector<TimedImage> images;
+    const Result<InertialAlignment> alignment = AlignToPlace(place, model, options, &images);
     if (!alignment.ok()) {
-      nothing += (nothing.empty() ? "" : "; ") +
-                 (images.ok() ? place.path + ": " + alignment.error().message : alignment.error().message);
+      // What cannot be read is an error; what says nothing leaves the question to others.
+      if (alignment.error().code != ErrorCode::kNoData) return alignment.error();
+      nothing += (nothing.empty() ? "" : "; ") + alignment.error().message;
       continue;
     }
     found.told_by += (found.told_by.empty() ? "" : ", ") + place.path;
@@ -112,7 +121,7 @@ Result<InertialScale> ScaleByImu(const Capture& capture, const std::map<std::str
     weights += weight;
     for (size_t i = 0; i < alignment->image_idx.size(); ++i) {
       found.residuals.push_back(
-          {(*images)[alignment->image_idx[i]].name, alignment->residuals_m[i], alignment->is_off[i]});
+          {images[alignment->image_idx[i]].name, alignment->residuals_m[i], alignment->is_off[i]});
     }
   }
   if (found.told_by.empty())

@@ -37,7 +37,8 @@ bool HasImu(const Capture& capture);
 // Scale and vertical by all IMUs of a capture, each with the images of its session whose names are times
 // (image_times.h), of the folder that has most: an IMU is on one camera.  Several are weighted by their
 // standard deviations.  `model`: cam_from_model by image name.
-// Errors: those of ReadImu; NoData, with the file, where none of them says anything (AlignToImu).
+// Errors: those of ReadImu but NoData, which leaves the question to the other IMUs; NoData, with the files,
+// where none of them says anything (ReadImu, AlignToImu).
 Result<InertialScale> ScaleByImu(const Capture& capture, const std::map<std::string, Pose>& model,
                                  const InertialOptions& options);
 

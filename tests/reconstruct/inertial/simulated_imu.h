@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -145,6 +146,11 @@ struct SimulatedModel {
 };
 inline Similarity ModelFromWorld(double model_per_metre) {
   return {model_per_metre, Eigen::Quaterniond(0.4, 0.5, -0.6, 0.2).normalized(), {3, -1, 7}};
+}
+// Between the world's up and what is found of it.
+inline double UpErrorDeg(const InertialAlignment& alignment) {
+  const Eigen::Vector3d up = ModelFromWorld(1).rotation * Eigen::Vector3d::UnitZ();
+  return DegFromRad(std::acos(std::min(1.0, up.dot(alignment.up))));
 }
 inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const SimulatedModel& model,
                                              double duration_s, double time_offset_s, uint64_t seed) {
