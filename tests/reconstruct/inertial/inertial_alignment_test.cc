@@ -51,6 +51,18 @@ TEST_F(AlignedWalk, FindsTurnBiasesPlaceAndNoise) {
   EXPECT_NEAR(found->time_offset_s, 0, 0.002);
 }
 
+TEST_F(AlignedWalk, OfFewerThanSixtyImagesIsBelievedHalfAsMuch) {
+  const auto many = Align();
+  ASSERT_TRUE(many.ok()) << many.error().message;
+  EXPECT_EQ(many->sigma_ratio, std::max(many->noise_sigma_ratio, many->parts_sigma_ratio));
+  model_.step_s = 1.5;
+  const auto few = Align();
+  ASSERT_TRUE(few.ok()) << few.error().message;
+  EXPECT_LT(few->image_idx.size(), 60u);
+  EXPECT_LT(few->sigma_ratio, 0.2);
+  EXPECT_DOUBLE_EQ(few->sigma_ratio, 2 * few->noise_sigma_ratio);
+}
+
 TEST_F(AlignedWalk, FindsTheClocksDifference) {
   for (const double offset_s : {0.02, -0.12}) {
     imu_.time_offset_s = offset_s;
