@@ -273,6 +273,10 @@ std::string SessionCamerasPath(const std::string& root, const std::string& sessi
   return fmt::format("{}/cameras/{}.txt", root, session);
 }
 
+std::string SessionImuPath(const std::string& root, const std::string& session) {
+  return fmt::format("{}/imu/{}.csv", root, session);
+}
+
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
   std::vector<CaptureImage> images;
   CAIRN_RETURN_IF_ERROR(VisitImageList(path, [&](ListedImage listed) {

@@ -53,9 +53,13 @@ Result<Capture> ReadCapture(const std::string& root);
 // In the folder of a capture without poses: what wheels or a tracker say of its images
 // (stages/reconstruct/known_places.h).
 inline constexpr const char* kOdometryFile = "odometry.txt";
+// And what an inertial measurement unit says meanwhile (stages/reconstruct/inertial/imu_file.h).
+inline constexpr const char* kImuFile = "imu.csv";
 
 // Where a capture of several sessions without poses has the cameras of one of them.
 std::string SessionCamerasPath(const std::string& root, const std::string& session);
+// The same of a session's IMU.
+std::string SessionImuPath(const std::string& root, const std::string& session);
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
 // may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;

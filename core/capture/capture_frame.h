@@ -16,8 +16,8 @@ struct CaptureFrame {
   std::string unit = "metre";
   // The world frame is east, north, up at this place; none: nothing ties the frame to the Earth.
   std::optional<GeodeticPosition> anchor;
-  // Where scale and axes come from: "survey", "control_points", "odometry", "gps", "rig",
-  // "camera_height", "distances", "mixed" or "none".
+  // Where scale and axes come from: "survey", "control_points", "odometry", "imu", "gps",
+  // "rig", "camera_height", "distances", "mixed" or "none".
   std::string source = "survey";
   // The poses come from the images themselves: they already fit them best and are not refined again.
   bool is_reconstructed = false;

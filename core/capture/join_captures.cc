@@ -188,6 +188,20 @@ Status WriteSessionOdometry(const std::vector<CaptureSession>& sessions, const s
   return joined.empty() ? Ok() : WriteFileAtomically(folder + "/" + kOdometryFile, joined);
 }
 
+// Copies the imu.csv of sessions without poses that have one.
+Status WriteSessionImus(const std::vector<CaptureSession>& sessions, const std::string& folder) {
+  for (const CaptureSession& session : sessions) {
+    const std::string given = session.root + "/" + kImuFile;
+    if (!fs::exists(given)) continue;
+    CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(given));
+    const std::string path = SessionImuPath(folder, session.name);
+    std::error_code error;
+    fs::create_directories(FolderOf(path), error);
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(path, text));
+  }
+  return Ok();
+}
+
 // images/SESSION -> the session's images.
 Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   std::error_code error;
@@ -245,6 +259,7 @@ Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, 
         CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + kSessionsFile, names));
         if (!HasPoses(sessions.front())) {
           CAIRN_RETURN_IF_ERROR(WriteSessionCameras(sessions, written));
+          CAIRN_RETURN_IF_ERROR(WriteSessionImus(sessions, written));
           return WriteSessionOdometry(sessions, written);
         }
         if (!cameras.empty()) CAIRN_RETURN_IF_ERROR(WriteCamerasText(written + "/cameras.txt", cameras));

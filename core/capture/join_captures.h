@@ -29,9 +29,9 @@ struct JoinedCapture {
 //   frame.json                 what all coordinates mean (CaptureFrame)
 //   sessions.txt               SESSION and its folder, a line each
 // Captures without poses have only images/, sessions.txt, for each that has cameras.txt cameras/SESSION.txt,
-// and odometry.txt with the lines of each that has one.  The folder is replaced as a whole
-// (ReplaceFolderAtomically): files that keep their bytes keep their date.  An image that one capture alone
-// would reject is kept; the reader of the result rejects it.
+// imu/SESSION.csv for each that has imu.csv, and odometry.txt with the lines of each that has one.  The
+// folder is replaced as a whole (ReplaceFolderAtomically): files that keep their bytes keep their date.  An
+// image that one capture alone would reject is kept; the reader of the result rejects it.
 //
 // All poses must be in one frame.  Errors: InvalidArgument (fewer than one session, a name that is invalid or
 // listed twice, captures with poses beside ones without, frames of different units or anchors; `folder` holds

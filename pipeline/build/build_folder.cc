@@ -131,7 +131,7 @@ std::string LinesOf(const std::string& name, const WordPairs& pairs) {
   return lines;
 }
 
-// Whose odometry gives poses their scale, and what of it: a line for each capture that may have some.
+// Whose odometry or IMU gives poses their scale, and what of it: a line for each capture that may have some.
 std::string OdometryLines(const Recipe& recipe) {
   std::string lines;
   for (const RecipeCapture& capture : recipe.captures) {
@@ -139,8 +139,11 @@ std::string OdometryLines(const Recipe& recipe) {
     if (capture.kind == CaptureKind::kBag) {
       lines += fmt::format("{}: {} {} {}\n", capture.name, options.odometry, options.camera_on_robot,
                            options.max_time_gap_s);
-    } else if (fs::exists(capture.path + "/" + kOdometryFile)) {
-      lines += capture.name + "\n";
+      if (!options.imu.empty() || !options.imu_on_camera.empty())
+        lines += fmt::format("{}: imu {} {}\n", capture.name, options.imu, options.imu_on_camera);
+    } else {
+      if (fs::exists(capture.path + "/" + kOdometryFile)) lines += capture.name + "\n";
+      if (fs::exists(capture.path + "/" + kImuFile)) lines += capture.name + ": imu\n";
     }
   }
   return lines;

@@ -32,7 +32,7 @@ bool LeavesOut(const Recipe& recipe);
 //   options/seed, name, capture, queries    one value each; `capture` has a line for each of several,
 //                         `queries` is "left_out" where LeavesOut
 //   options/film-NAME, options/bag-NAME     what is imported, and how
-//   options/odometry      whose odometry gives poses their scale, and how bags' is read
+//   options/odometry      whose odometry or IMU gives poses their scale, and how bags' is read
 //   options/program       hash of the program: another program redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES,
 //                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, LEFT_OUT, FLOOR_PLAN, NAME, SEED,

@@ -29,14 +29,14 @@ Status CheckTopic(const std::string& text) {
       "'{}': not a topic's name: expected letters, digits, '_' and '/', such as /camera/image_raw", text);
 }
 
-Result<std::string> CameraOnRobotText(const std::string& text) {
+// `what` is where.
+Result<std::string> PlaceText(const std::string& text, const char* what) {
   const std::optional<std::vector<double>> numbers = ParseNumbers(text);
   if (!numbers || numbers->size() != 7) {
     return MakeError(
         ErrorCode::kInvalidArgument,
-        "'{}': expected seven numbers [x, y, z, qx, qy, qz, qw]: where the camera's optical frame is on "
-        "the robot, metres, and its quaternion",
-        text);
+        "'{}': expected seven numbers [x, y, z, qx, qy, qz, qw]: where {}, metres, and its quaternion", text,
+        what);
   }
   if (const Result<Pose> pose = CameraOnRobot(*numbers); !pose.ok()) return pose.error();
   return fmt::format("{}", fmt::join(*numbers, ","));
@@ -51,9 +51,10 @@ Result<std::string> TimeGapText(const std::string& text) {
 
 // The text as the import takes it.
 Result<std::string> CheckedText(const std::string& name, const std::string& text) {
-  if (name == "camera_on_robot") return CameraOnRobotText(text);
+  if (name == "camera_on_robot") return PlaceText(text, "the camera's optical frame is on the robot");
+  if (name == "imu_on_camera") return PlaceText(text, "the IMU is in the camera's optical frame");
   if (name == "max_time_gap_s") return TimeGapText(text);
-  if (name == "topic" || name == "odometry") CAIRN_RETURN_IF_ERROR(CheckTopic(text));
+  if (name == "topic" || name == "odometry" || name == "imu") CAIRN_RETURN_IF_ERROR(CheckTopic(text));
   if (name == "keyframes") {
     if (const auto wanted = ParseFrameChoice(text); !wanted.ok()) return wanted.error();
   }
@@ -115,6 +116,18 @@ const std::vector<FootageKey>& FootageKeys() {
        "[x, y, "
        "z, qx, qy, qz, qw], metres and quaternion. Default: as `/tf` and `/tf_static` state.",
        false, &FootageOptions::camera_on_robot},
+      {"imu", "text",
+       "Of a bag: the topic of the IMU, or \"none\". Default: the only one that measures turns and "
+       "accelerations, "
+       "if there is one.",
+       false, &FootageOptions::imu},
+      {"imu_on_camera", "list",
+       "Of a bag: the IMU's frame in the camera's optical frame (x right, y down, z ahead), as [x, y, z, qx, "
+       "qy, qz, "
+       "qw], metres and quaternion. Default: as `/tf` and `/tf_static` state; where they do not, it is found "
+       "from "
+       "turns.",
+       false, &FootageOptions::imu_on_camera},
       {"max_time_gap_s", "number",
        "Of a bag: an image's odometry lies between poses at most this far from it, seconds. Default 0.2.",
        false, &FootageOptions::max_time_gap_s},

@@ -25,7 +25,7 @@ struct FootageOptions {
   std::string keyframes = "auto";
   std::string camera;
   // Of bags alone.
-  std::string topic, odometry, camera_on_robot, max_time_gap_s;
+  std::string topic, odometry, camera_on_robot, imu, imu_on_camera, max_time_gap_s;
 };
 
 // A key of a [[capture]] that is for footage.

@@ -48,12 +48,13 @@ $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
 # ---- The capture's files
 
 # Poses, cameras and frame, read by the stages that know the capture.
-CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt odometry.txt))
+CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt odometry.txt imu.csv))
 ifneq ($(SESSIONS),)
 # The files of the joined capture, whether they exist yet or not.
 ODOMETRY := $(wildcard $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session)))/odometry.txt))
+IMUS := $(foreach session,$(SESSIONS),$(if $(wildcard $(lastword $(subst =, ,$(session)))/imu.csv),imu/$(firstword $(subst =, ,$(session))).csv))
 CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)), \
-    $(if $(ODOMETRY),odometry.txt),cameras.txt images.txt frame.json $(if $(QUERIES),queries.txt)))
+    $(if $(ODOMETRY),odometry.txt) $(IMUS),cameras.txt images.txt frame.json $(if $(QUERIES),queries.txt)))
 endif
 # The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
 # removed image changes its folder's date.
@@ -177,7 +178,7 @@ define CAIRN_FOOTAGE
 $(BUILD)/$(1).stamp: $(call CAIRN_OF,FOOTAGE_FILES,$(1)) $(if $(wildcard $(BUILD)/$(1)/images),,cairn-missing)
 $(BUILD)/$(1).stamp: SOURCE := $(call CAIRN_OF,FOOTAGE,$(1))
 $(BUILD)/$(1).stamp: IMPORT_OPTIONS := $(call CAIRN_OF,FOOTAGE_OPTIONS,$(1))
-$(call CAIRN_MADE_LISTS,$(BUILD)/$(1).stamp,$(wildcard $(BUILD)/$(1)/cameras.txt $(BUILD)/$(1)/odometry.txt))
+$(call CAIRN_MADE_LISTS,$(BUILD)/$(1).stamp,$(wildcard $(BUILD)/$(1)/cameras.txt $(BUILD)/$(1)/odometry.txt $(BUILD)/$(1)/imu.csv))
 endef
 FOOTAGE_NAMES := $(foreach source,$(FOOTAGE),$(firstword $(subst =, ,$(source))))
 FOOTAGE_STAMPS := $(FOOTAGE_NAMES:%=$(BUILD)/%.stamp)
@@ -193,7 +194,7 @@ ifneq ($(SESSIONS),)
 $(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
 $(eval $(call CAIRN_MADE_LISTS,$(BUILD)/capture.stamp,$(CAPTURE_LISTS)))
 SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
-SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt,$(SESSION_FOLDERS:%=%/$(list)))) \
+SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt imu.csv,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
 $(BUILD)/capture.stamp: $(FOOTAGE_STAMPS)
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))

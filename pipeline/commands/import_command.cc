@@ -26,8 +26,8 @@ struct ImportArguments {
   HoldOut hold_out;
   std::string link = "symbolic";
   std::string keyframes = "auto";
-  std::string topic, odometry;
-  std::vector<double> camera_on_robot;   // x y z, then the quaternion x y z w
+  std::string topic, odometry, imu;
+  std::vector<double> camera_on_robot, imu_on_camera;  // x y z, then the quaternion x y z w
   std::optional<Argument> max_time_gap;  // whether it is given: bags have a default of their own
 };
 
@@ -84,6 +84,7 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
   CAIRN_ASSIGN_OR_RETURN(const WantedFrames wanted, ParseFrameChoice(arguments.keyframes));
   BagOptions options = {.topic = arguments.topic,
                         .odometry = arguments.odometry,
+                        .imu = arguments.imu,
                         .camera = arguments.options.camera,
                         .choice = wanted.choice,
                         .every_s = wanted.every_s};
@@ -94,6 +95,12 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
       return MakeError(ErrorCode::kInvalidArgument, "--camera-on-robot: {}", pose.error().message);
     options.base_from_camera = *pose;
   }
+  if (!arguments.imu_on_camera.empty()) {
+    const Result<Pose> pose = CameraOnRobot(arguments.imu_on_camera);
+    if (!pose.ok())
+      return MakeError(ErrorCode::kInvalidArgument, "--imu-on-camera: {}", pose.error().message);
+    options.camera_from_imu = *pose;
+  }
   CAIRN_ASSIGN_OR_RETURN(const BagReport report,
                          ImportBag(arguments.source, options, arguments.output, *environment.progress));
   for (const std::string& warning : report.warnings) spdlog::warn("{}", Printable(warning));
@@ -102,6 +109,8 @@ Status RunBagImport(const ImportArguments& arguments, const CommandEnvironment& 
   *environment.out << Printable(
       fmt::format("import: {} of {} images of {}, {} of them with odometry, {} cameras\n", report.num_images,
                   report.num_messages, report.topic, report.num_with_odometry, report.num_cameras));
+  if (report.num_imu_samples > 0)
+    *environment.out << fmt::format("import: {} samples of an IMU\n", report.num_imu_samples);
   return Ok();
 }
 
@@ -114,10 +123,13 @@ bool IsForBags(const ImportArguments& arguments) {
 
 Status RunImport(const ImportArguments& arguments, const CommandEnvironment& environment) {
   if (IsForBags(arguments)) return RunBagImport(arguments, environment);
-  if (!arguments.topic.empty() || !arguments.odometry.empty() || !arguments.camera_on_robot.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--topic, --odometry and --camera-on-robot are for bags, and {} is none; leave them out",
-                     arguments.source);
+  if (!arguments.topic.empty() || !arguments.odometry.empty() || !arguments.camera_on_robot.empty() ||
+      !arguments.imu.empty() || !arguments.imu_on_camera.empty()) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--topic, --odometry, --camera-on-robot, --imu and --imu-on-camera are for bags, and {} is none; "
+        "leave them out",
+        arguments.source);
   }
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(arguments.source, error);
@@ -176,6 +188,16 @@ void AddArguments(ArgumentParser& parser, ImportArguments* arguments) {
       .Add("--camera-on-robot", arguments->camera_on_robot,
            "bag: the camera's optical frame (x right, y down, z ahead) in the odometry's child frame, metres "
            "and quaternion [as /tf and /tf_static state]")
+      .Values(7)
+      .SeparatedByCommas()
+      .Type("X,Y,Z,QX,QY,QZ,QW");
+  parser.Add("--imu", arguments->imu, "bag: topic of the IMU; none: without [the only one, if there is one]")
+      .Type("TOPIC");
+  parser
+      .Add("--imu-on-camera", arguments->imu_on_camera,
+           "bag: the IMU's frame in the camera's optical frame, metres and quaternion [as /tf and /tf_static "
+           "state, "
+           "else found from turns]")
       .Values(7)
       .SeparatedByCommas()
       .Type("X,Y,Z,QX,QY,QZ,QW");

@@ -293,7 +293,7 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
     advice->push_back(
         {.text = fmt::format(
              "The map's metres are known to {:.1f} % only ({}): what is 10 m away may be {:.2f} m "
-             "nearer or farther. odometry.txt in the capture, or more and longer known distances "
+             "nearer or farther. odometry.txt or imu.csv in the capture, or more and longer known distances "
              "([reconstruct] distances), give the scale better.",
              100 * rows.frame.scale_sigma_ratio, rows.frame.source, 10 * rows.frame.scale_sigma_ratio)});
   }

@@ -31,13 +31,13 @@ double SpanOf(const ModelPoses& model) {
   return box.diagonal().norm();
 }
 
-Similarity WithoutScale(const ModelPoses& model, const ReconstructOptions& options,
+Similarity WithoutScale(const ModelPoses& model, const Vertical& vertical, const ReconstructOptions& options,
                         ReconstructResult* result) {
   result->frame.unit = "arbitrary";
   result->frame.source = "none";
   const std::vector<Pose> poses = PosesOf(model);
   const double step = MedianStep(poses);
-  return LevelledFrame(poses, step > 0 ? options.unscaled_step / step : 1);
+  return LevelledFrame(poses, step > 0 ? options.unscaled_step / step : 1, vertical.up);
 }
 
 Result<ScaleAnswer> Ask(const ScaleSource& source, const ScaleQuestion& question) {
@@ -105,8 +105,16 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
   ModelPoses model;
   for (const ModelImage& image : reconstruction.images) model.emplace(image.name, image.cam_from_world);
   const std::string& from = options.scale_from;
-  if (from == "none") return WithoutScale(model, options, result);
-  const ScaleQuestion question{reconstruction, model, capture, options};
+  const std::optional<Result<InertialScale>> imu = AskImuOnce(capture, model, options);
+  const ScaleQuestion question{reconstruction, model, capture, options, imu};
+  const Vertical vertical = VerticalOf(question);
+  if (from == "none") {
+    if (imu && !imu->ok()) {
+      if (imu->error().code != ErrorCode::kNoData) return imu->error();
+      result->warnings.push_back(imu->error().message);
+    }
+    return WithoutScale(model, vertical, options, result);
+  }
   std::vector<Answered> answered;
   std::optional<Error> refusal;  // of a source that the recipe names
   std::string nothing;
@@ -129,11 +137,12 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
   }
   if (answered.empty()) {
     if (refusal) return *refusal;
-    result->warnings.push_back(fmt::format(
-        "nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, control_points, "
-        "camera_height_m or distances for metres",
-        nothing));
-    return WithoutScale(model, options, result);
+    result->warnings.push_back(
+        fmt::format("nothing gives a scale ({}): the map's unit is arbitrary; give odometry.txt, imu.csv, "
+                    "control_points, "
+                    "camera_height_m or distances for metres",
+                    nothing));
+    return WithoutScale(model, vertical, options, result);
   }
   size_t taken = 0;
   if (from == "auto") {

@@ -298,10 +298,11 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->scale_from,
        .help =
            "where scale and axes come from; auto: the first that is there of control_points, the capture's "
-           "odometry.txt, GPS, rig_baselines, camera_height_m and distances, or one after it that knows the "
-           "scale three "
-           "times as well",
-       .choices = {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances", "none"}},
+           "odometry.txt, its imu.csv, GPS, rig_baselines, camera_height_m and distances, or one after it "
+           "that "
+           "knows the scale three times as well",
+       .choices = {"auto", "control_points", "odometry", "imu", "gps", "rig", "camera_height", "distances",
+                   "none"}},
       {.name = "control_points",
        .value = &o->control_points,
        .help =
@@ -340,6 +341,19 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .value = &o->odometry_sigma_ratio,
        .help = "standard deviation of what all of the odometry shares over its length: a wheel's radius",
        .min = 1e-6},
+      {.name = "imu_sigma_ratio",
+       .value = &o->imu_sigma_ratio,
+       .help =
+           "standard deviation of what all of an IMU shares over its length: the accelerometer's own scale",
+       .min = 1e-6},
+      {.name = "imu_accel_noise",
+       .value = &o->imu_accel_noise,
+       .help = "white noise of the IMU's accelerometer, as its data sheet has it, m/s^2/sqrt(Hz)",
+       .min = 1e-6},
+      {.name = "imu_gyro_noise",
+       .value = &o->imu_gyro_noise,
+       .help = "white noise of the IMU's gyro, as its data sheet has it, rad/s/sqrt(Hz)",
+       .min = 1e-7},
       {.name = "camera_height_m",
        .value = &o->camera_height_m,
        .help = "how high the camera is over a flat floor, wherever it drives, metres; 0: not known",
@@ -363,12 +377,12 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .min = 0},
   };
   // What does not give the scale is compared with what does.
-  AddCondition(
-      {"scale_from", {"auto", "control_points", "odometry", "gps", "rig", "camera_height", "distances"}},
-      {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "gps_sigma_m",
-       "gps_altitude_sigma_m", "rig_baselines", "rig_sigma_ratio", "camera_height_m", "camera_height_sigma_m",
-       "distances", "distance_sigma_ratio"},
-      &table);
+  AddCondition({"scale_from",
+                {"auto", "control_points", "odometry", "imu", "gps", "rig", "camera_height", "distances"}},
+               {"control_points", "control_point_sigma_m", "odometry_sigma_ratio", "imu_sigma_ratio",
+                "gps_sigma_m", "gps_altitude_sigma_m", "rig_baselines", "rig_sigma_ratio", "camera_height_m",
+                "camera_height_sigma_m", "distances", "distance_sigma_ratio"},
+               &table);
   AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
   return table;
 }

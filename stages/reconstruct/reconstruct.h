@@ -10,6 +10,7 @@
 #include "core/capture/capture.h"
 #include "core/capture/capture_frame.h"
 #include "core/options/options.h"
+#include "stages/reconstruct/inertial/preintegration.h"
 #include "stages/reconstruct/mapper.h"
 #include "stages/reconstruct/verdict/verdict.h"
 
@@ -25,9 +26,9 @@ struct ReconstructOptions {
   // Smallest part of the capture's images that the largest model must have; with fewer there is no
   // result.  REQUIRES: in [0, 1]
   double min_registered_ratio = 0.5;
-  // Where scale and axes come from: "control_points", "odometry" (the capture's odometry.txt), "gps" (EXIF),
-  // "rig", "camera_height", "distances", or "none"; "auto": the first of these that is there and says
-  // something (find_frame.h).
+  // Where scale and axes come from: "control_points", "odometry" (the capture's odometry.txt), "imu" (its
+  // imu.csv), "gps" (EXIF), "rig", "camera_height", "distances", or "none"; "auto": the first of these that
+  // is there and says something (find_frame.h).
   std::string scale_from = "auto";
   // Files, absolute or relative to the capture (known_places.h describes them).
   std::string control_points;
@@ -41,6 +42,12 @@ struct ReconstructOptions {
   double control_point_sigma_m = 0.05;
   double distance_sigma_ratio = 0.02;
   double odometry_sigma_ratio = 0.01;
+  // The same of all that an IMU says, over its length: its accelerometer's own scale.  REQUIRES: > 0
+  double imu_sigma_ratio = 0.005;
+  // Densities of an IMU's white noise, as data sheets have them: of the accelerometer, m/s^2/sqrt(Hz), and of
+  // the gyro, rad/s/sqrt(Hz).  More is noticed; less is not believed.  REQUIRES: > 0
+  double imu_accel_noise = ImuNoise().accel_m_s2_rthz;
+  double imu_gyro_noise = ImuNoise().gyro_rad_s_rthz;
   // The same of a stated baseline of a rig, which all its pairs of images share.  REQUIRES: > 0
   double rig_sigma_ratio = 0.01;
   // How high the camera is over a flat floor that it sees, all the way (floor_plane.h), and the standard

@@ -23,6 +23,9 @@ constexpr double kMaxOdometrySpread = 0.1;
 // So is odometry by which the cameras' mean up is farther from the vertical than this: a camera that looks at
 // the ceiling is at 90.
 constexpr double kMaxTiltDeg = 120;
+// An IMU that knows the scale less well than this was hardly accelerated: then its errors are no longer
+// normal.
+constexpr double kMaxImuSigmaRatio = 0.2;
 
 std::string InputPath(const Capture& capture, const std::string& path) {
   return (std::filesystem::path(capture.root) / path).lexically_normal().string();
@@ -42,8 +45,9 @@ Result<ScaleAnswer> AlignImages(const ScaleQuestion& question,
     targets.push_back(target);
     targets.back().model = pose->second.Center();
   }
-  CAIRN_ASSIGN_OR_RETURN(const Alignment alignment, AlignToPositions(targets, MeanUp(PosesOf(question.model)),
-                                                                     question.options.up_sigma_deg));
+  const Vertical vertical = VerticalOf(question);
+  CAIRN_ASSIGN_OR_RETURN(const Alignment alignment,
+                         AlignToPositions(targets, vertical.up, vertical.sigma_deg));
   ScaleAnswer answer{.world_from_model = alignment.world_from_model,
                      .sigma_ratio = alignment.scale_sigma_ratio,
                      .centre = alignment.centre};
@@ -122,7 +126,7 @@ Result<ScaleAnswer> ScaleByDistances(const ScaleQuestion& question, const std::s
     const bool is_off = residual_m > kMaxResidualSigmas * sigma_ratio * targets[i].world_m;
     answer.residuals.push_back({names[i], residual_m, is_off});
   }
-  answer.world_from_model = LevelledFrame(PosesOf(question.model), found->scale);
+  answer.world_from_model = LevelledFrame(PosesOf(question.model), found->scale, VerticalOf(question).up);
   answer.sigma_ratio = found->sigma_ratio;
   return answer;
 }
@@ -185,6 +189,32 @@ Result<ScaleAnswer> AskOdometry(const ScaleQuestion& question) {
   return answer;
 }
 
+Result<ScaleAnswer> AskImu(const ScaleQuestion& question) {
+  if (!question.imu) {
+    return MakeError(ErrorCode::kNotFound,
+                     "{}/{}: not found: what an IMU says, TIME_NS,WX,WY,WZ,AX,AY,AZ a line, belongs there",
+                     question.capture.root, kImuFile);
+  }
+  if (!question.imu->ok()) return question.imu->error();
+  const InertialScale& imu = **question.imu;
+  if (!(imu.sigma_ratio <= kMaxImuSigmaRatio)) {
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: the motion does not show the scale{}: only a camera that speeds up, brakes, or swings to "
+        "the sides shows it, in images that follow each other closely (keyframes = 0.3 of a bag or film); "
+        "what it says of up is taken",
+        imu.told_by,
+        std::isfinite(imu.sigma_ratio) ? fmt::format(" to better than {:.0f} %", 100 * imu.sigma_ratio) : "");
+  }
+  ScaleAnswer answer{.told_by = imu.told_by,
+                     .world_from_model = LevelledFrame(PosesOf(question.model), imu.scale, imu.up),
+                     .sigma_ratio = std::hypot(imu.sigma_ratio, question.options.imu_sigma_ratio),
+                     .warnings = imu.warnings};
+  for (const InertialResidual& residual : imu.residuals)
+    answer.residuals.push_back({residual.name, residual.residual_m, residual.is_off});
+  return answer;
+}
+
 Result<ScaleAnswer> AskCameraHeight(const ScaleQuestion& question) {
   const double height_m = question.options.camera_height_m;
   std::map<ImageId, int> camera_of_image;
@@ -200,7 +230,7 @@ Result<ScaleAnswer> AskCameraHeight(const ScaleQuestion& question) {
       points.back().cameras.push_back(camera_of_image.at(image_id));
   }
   const std::vector<Pose> poses = PosesOf(question.model);
-  const Result<FloorPlane> floor = FindFloor(points, centers, MeanUp(poses));
+  const Result<FloorPlane> floor = FindFloor(points, centers, VerticalOf(question).up);
   if (!floor.ok()) {
     return MakeError(
         floor.error().code,
@@ -229,12 +259,26 @@ std::vector<Pose> PosesOf(const ModelPoses& model) {
   return poses;
 }
 
+Vertical VerticalOf(const ScaleQuestion& question) {
+  if (question.imu && question.imu->ok()) return {(*question.imu)->up, (*question.imu)->up_sigma_deg};
+  return {MeanUp(PosesOf(question.model)), question.options.up_sigma_deg};
+}
+
+std::optional<Result<InertialScale>> AskImuOnce(const Capture& capture, const ModelPoses& model,
+                                                const ReconstructOptions& options) {
+  if (!HasImu(capture)) return std::nullopt;
+  return ScaleByImu(
+      capture, model,
+      {.noise = {.gyro_rad_s_rthz = options.imu_gyro_noise, .accel_m_s2_rthz = options.imu_accel_noise}});
+}
+
 const std::vector<ScaleSource>& ScaleSources() {
   static const std::vector<ScaleSource> sources = {
       {"control_points", [](const ScaleQuestion& q) { return !q.options.control_points.empty(); }, true,
        AskControlPoints},
       {"odometry", [](const ScaleQuestion& q) { return std::filesystem::exists(OdometryPath(q.capture)); },
        false, AskOdometry},
+      {"imu", [](const ScaleQuestion& q) { return q.imu.has_value(); }, false, AskImu},
       {"gps", [](const ScaleQuestion&) { return true; }, false, AskGps},
       {"rig", [](const ScaleQuestion& q) { return !q.options.rig_baselines.empty(); }, true, AskRig},
       {"camera_height", [](const ScaleQuestion& q) { return q.options.camera_height_m > 0; }, true,

@@ -13,6 +13,7 @@
 #include "core/geometry/geodesy.h"
 #include "core/geometry/similarity.h"
 #include "stages/reconstruct/find_frame.h"
+#include "stages/reconstruct/inertial/inertial_scale.h"
 #include "stages/reconstruct/reconstruct.h"
 
 namespace cairn::reconstruct {
@@ -23,7 +24,20 @@ struct ScaleQuestion {
   const ModelPoses& model;  // its poses
   const Capture& capture;
   const ReconstructOptions& options;
+  const std::optional<Result<InertialScale>>& imu;  // what it says of scale and vertical; none: there is none
 };
+
+// Which way is up in the model, and how well that is known.
+struct Vertical {
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // of length 1
+  double sigma_deg = 0;
+};
+// By the IMU's gravity where there is one, else the cameras' mean up.
+Vertical VerticalOf(const ScaleQuestion& question);
+
+// What the capture's IMU says, which several sources need; none: it has none.
+std::optional<Result<InertialScale>> AskImuOnce(const Capture& capture, const ModelPoses& model,
+                                                const ReconstructOptions& options);
 
 // What a source answers.
 struct ScaleAnswer {

@@ -1,16 +1,21 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <unsupported/Eigen/Splines>
 
 #include "core/capture/capture.h"
 #include "core/colmap/cameras_text.h"
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
 #include "tests/pipeline/exchange/bag_writers.h"
+#include "tests/reconstruct/inertial/simulated_imu.h"
 
 namespace cairn {
 namespace {
@@ -24,6 +29,8 @@ using testing::Not;
 constexpr int64_t kSecond = 1'000'000'000;
 // Half a metre above the base and ahead of it; looks ahead.
 const Pose kBaseFromCamera = {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.2, 0, 0.5}};
+// Lies on its side behind it.
+const Pose kBaseFromImu = {Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {-0.1, 0.05, 0.2}};
 
 // A rendered drive, and what a robot on it records: its camera, four images a second, and wheels without
 // error.
@@ -87,6 +94,60 @@ class Bag : public testing::Test {
     }
     return messages;
   }
+  // The same without odometry, with what a consumer's IMU on the robot says meanwhile.
+  static std::vector<Recorded> MessagesWithImu(size_t num_images) {
+    std::vector<Recorded> messages = Messages(0, num_images);
+    std::erase_if(messages, [](const Recorded& message) { return message.topic == "/odom"; });
+    messages.push_back({"/tf_static", "tf2_msgs/msg/TFMessage", 0,
+                        pipeline::TransformBytes({{"base_link", "imu_link", kBaseFromImu}})});
+    reconstruct::SimulatedImu imu;
+    imu.cam_from_imu = kBaseFromCamera.Inverse() * kBaseFromImu;
+    const double duration_s = static_cast<double>(num_images + 7) / 4;
+    for (const reconstruct::ImuSample& sample :
+         reconstruct::RecordImu(Driven(num_images), imu, duration_s, 1).samples) {
+      messages.push_back(
+          {"/imu", "sensor_msgs/msg/Imu", sample.time_ns,
+           pipeline::ImuBytes({.stamp_ns = sample.time_ns, .turn = sample.gyro, .accel = sample.accel})});
+    }
+    std::stable_sort(messages.begin(), messages.end(),
+                     [](const Recorded& a, const Recorded& b) { return a.time_ns < b.time_ns; });
+    return messages;
+  }
+  // Smoothly through the images' places and headings, at their times, at rest for a second before and after.
+  static reconstruct::Motion Driven(size_t num_images) {
+    constexpr Eigen::Index kRest = 4;
+    const auto num = static_cast<Eigen::Index>(num_images) + 2 * kRest;
+    Eigen::Matrix4Xd ways(4, num);  // x, y, z, heading
+    Eigen::Array<double, 1, Eigen::Dynamic> parts(num);
+    for (Eigen::Index k = 0; k < num; ++k) {
+      const Eigen::Index i = std::clamp<Eigen::Index>(k - kRest, 0, num - 2 * kRest - 1);
+      const Pose pose = truth_.images[static_cast<size_t>(i)].cam_from_world->Inverse();
+      const Eigen::Vector3d ahead = pose.rotation * Eigen::Vector3d::UnitZ();
+      double heading = std::atan2(ahead.y(), ahead.x());
+      if (k > 0) heading = ways(3, k - 1) + std::remainder(heading - ways(3, k - 1), 2 * std::numbers::pi);
+      ways.col(k) << pose.translation, heading;
+      parts[k] = static_cast<double>(k) / static_cast<double>(num - 1);
+    }
+    using Way = Eigen::Spline<double, 4>;
+    const Way way = Eigen::SplineFitting<Way>::Interpolate(ways, 3, parts);
+    const double duration_s = static_cast<double>(num - 1) / 4;
+    return [=](double time_s) -> Pose {
+      const Eigen::Vector4d at = way(std::clamp(time_s / duration_s, 0.0, 1.0));
+      return {reconstruct::YawPitchRoll(at[3], 0, 0) * reconstruct::LooksAhead(), at.head<3>()};
+    };
+  }
+  // The true frame from that of a build's poses.
+  static Eigen::Matrix4d TruthFromFound(const std::string& build_dir) {
+    const Capture mapped = ReadCapture(Path(build_dir + "/poses")).value();
+    Eigen::Matrix3Xd found(3, mapped.images.size()), truth(3, mapped.images.size());
+    for (size_t i = 0; i < mapped.images.size(); ++i) {
+      const std::string& name = mapped.images[i].name;
+      const auto number = static_cast<size_t>(std::lround(4 * std::stod(name))) - 4;
+      found.col(static_cast<Eigen::Index>(i)) = mapped.images[i].cam_from_world->Center();
+      truth.col(static_cast<Eigen::Index>(i)) = truth_.images[number].cam_from_world->Center();
+    }
+    return Eigen::umeyama(found, truth);
+  }
   static void Write(const std::string& name, const std::string& bytes) {
     fs::create_directories(fs::path(Path(name)).parent_path());
     ASSERT_TRUE(WriteFileAtomically(Path(name), bytes).ok());
@@ -111,15 +172,7 @@ TEST_F(Bag, ThatIsAFolderCompilesToAMapInMetresAndIsImportedAgainWhereItChanged)
   EXPECT_TRUE(fs::exists(Path("run.cairn")));
   EXPECT_EQ(Unit("run.build"), "metre");
   // It is as large as what it is of.
-  const Capture mapped = ReadCapture(Path("run.build/poses")).value();
-  Eigen::Matrix3Xd found(3, mapped.images.size()), truth(3, mapped.images.size());
-  for (size_t i = 0; i < mapped.images.size(); ++i) {
-    const auto number = static_cast<size_t>(std::lround(4 * std::stod(mapped.images[i].name))) - 4;
-    found.col(static_cast<Eigen::Index>(i)) = mapped.images[i].cam_from_world->Center();
-    truth.col(static_cast<Eigen::Index>(i)) = truth_.images[number].cam_from_world->Center();
-  }
-  const Eigen::Matrix4d truth_from_found = Eigen::umeyama(found, truth);
-  EXPECT_NEAR(truth_from_found.col(0).norm(), 1, 0.02);
+  EXPECT_NEAR(TruthFromFound("run.build").col(0).norm(), 1, 0.02);
   EXPECT_THAT(Compile("run").out, HasSubstr("up to date"));
 
   // A file that was only touched gives the same capture, and nothing follows.
@@ -201,6 +254,48 @@ TEST_F(Bag, OfSeveralCamerasSaysWhichLineToWrite) {
   // A topic that is not there.
   ReplaceInFile(Path("two.toml"), "/right/", "/middle/");
   EXPECT_THAT(Compile("two.toml").err, HasSubstr("no topic /middle/image_raw/compressed; there are\n"));
+}
+
+TEST_F(Bag, OfACameraAndAnImuCompilesToAMapInMetresAndSaysHowWellTheyAreKnown) {
+  Write("hand.mcap", pipeline::McapBytes(MessagesWithImu(150)));
+  Write("hand.toml", "name = \"hand\"\n[[capture]]\npath = \"hand.mcap\"\nkeyframes = \"all\"\n");
+  const ProgramRun first = Compile("hand.toml");
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(first.out + first.err,
+              AllOf(HasSubstr("samples of an IMU\n"), HasSubstr("reconstruct: scale from imu (+- ")));
+  const std::string csv = *ReadFile(Path("hand.build/bag-hand/imu.csv"));
+  EXPECT_THAT(csv, HasSubstr("\n#imu_on_camera,"));
+  const auto map = nlohmann::json::parse(RunShell("cairn inspect " + Path("hand.cairn") + " --json").out);
+  EXPECT_EQ(map["unit"], "metre");
+  EXPECT_EQ(map["frame_source"], "imu");
+  const double sigma_ratio = map["scale_sigma_ratio"].get<double>();
+  EXPECT_GT(sigma_ratio, 0.005);  // an accelerometer's own scale
+  EXPECT_LT(sigma_ratio, 0.05);
+  const Eigen::Matrix4d truth_from_found = TruthFromFound("hand.build");
+  const double scale = truth_from_found.col(0).norm();
+  EXPECT_LT(std::abs(std::log(scale)), 3 * sigma_ratio) << scale;
+  EXPECT_GT(truth_from_found(2, 2) / scale, std::cos(RadFromDeg(1.5))) << "level";
+  EXPECT_THAT(Compile("hand.toml").out, HasSubstr("up to date"));
+
+  // Without it the same images have no metres.
+  ReplaceInFile(Path("hand.toml"), "path = \"hand.mcap\"", "path = \"hand.mcap\"\nimu = \"none\"");
+  EXPECT_EQ(Compile("hand.toml --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("hand.build"), "arbitrary");
+  EXPECT_FALSE(fs::exists(Path("hand.build/bag-hand/imu.csv")));
+
+  // As a folder, whose imu.csv may be edited.
+  ASSERT_EQ(RunShell("cairn import " + Path("hand.mcap") + " --keyframes all -o " + Path("folder")).exit_code,
+            0);
+  ASSERT_EQ(*ReadFile(Path("folder/imu.csv")), csv);
+  ASSERT_EQ(Compile("folder --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("folder.build"), "metre");
+  Write("folder/imu.csv", csv + "# edited\n");
+  EXPECT_THAT(Compile("folder --until reconstruct").err, HasSubstr("poses: imu.csv changed"));
+  Write("folder/imu.csv", csv + "0,0,0,0,0,0,9.8\n");
+  EXPECT_THAT(Compile("folder --until reconstruct").err, HasSubstr("folder/imu.csv:"));
+  fs::remove(Path("folder/imu.csv"));
+  EXPECT_EQ(Compile("folder --until reconstruct").exit_code, 0);
+  EXPECT_EQ(Unit("folder.build"), "arbitrary");
 }
 
 // Images, and so features and matches, stay the same.

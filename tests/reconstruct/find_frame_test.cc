@@ -8,6 +8,7 @@
 
 #include "core/files/file.h"
 #include "tests/core/capture/exif_jpeg.h"
+#include "tests/reconstruct/inertial/simulated_imu.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -102,6 +103,99 @@ TEST_F(FindFrameTest, OdometryGivesMetresWhereItIsThere) {
   }
   ASSERT_TRUE(Find("none").ok());
   EXPECT_EQ(result_.frame.source, "none");
+}
+
+// A walk of a minute, and the IMU that was in the hand.
+class FindFrameByImu : public FindFrameTest {
+ protected:
+  void Walk(const Motion& motion) {
+    const ImuRecording imu = RecordImu(motion, {}, 60, 5);
+    model_.clear();
+    capture_.images.clear();
+    for (const TimedImage& image : ModelOfMotion(motion, {.model_per_metre = 0.25}, 60, 0, 5)) {
+      model_[image.name] = image.cam_from_model;
+      capture_.images.push_back({image.name, 1, std::nullopt});
+    }
+    for (const ImuSample& s : imu.samples) {
+      csv_ += fmt::format("{},{},{},{},{},{},{}\n", s.time_ns, s.gyro.x(), s.gyro.y(), s.gyro.z(),
+                          s.accel.x(), s.accel.y(), s.accel.z());
+    }
+    Write("imu.csv", csv_);
+  }
+  // Of what is found, against the world's.
+  double UpErrorDeg(const Similarity& world_from_model) const {
+    const Eigen::Vector3d up = ModelFromWorld(1).rotation * Eigen::Vector3d::UnitZ();
+    return DegFromRad(std::acos(std::min(1.0, (world_from_model.rotation * up).z())));
+  }
+  std::string csv_;
+};
+
+TEST_F(FindFrameByImu, GivesMetresAndLevel) {
+  Walk(Handheld(5));
+  for (const std::string from : {"auto", "imu"}) {
+    const auto similarity = Find(from);
+    ASSERT_TRUE(similarity.ok()) << similarity.error().message;
+    EXPECT_NEAR(similarity->scale, 4, 0.12);
+    EXPECT_EQ(result_.frame.source, "imu");
+    EXPECT_EQ(result_.frame.unit, "metre");
+    EXPECT_GT(result_.frame.scale_sigma_ratio, 0.005);
+    EXPECT_LT(result_.frame.scale_sigma_ratio, 0.03);
+    EXPECT_LT(UpErrorDeg(*similarity), 1);
+    EXPECT_THAT(result_.warnings, IsEmpty());
+  }
+  // A distance that says otherwise.
+  const std::string first = model_.begin()->first, last = model_.rbegin()->first;
+  const double apart_m = 4 * CenterErrorM(model_.at(first), model_.at(last));
+  Write("distances.txt", fmt::format("{} {} {}\n", first, last, 2 * apart_m));
+  options_.distances = "distances.txt";
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_THAT(Sources(), ElementsAre("imu", "distances"));
+  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("two sources contradict each other on the scale")));
+  // It says where up is, to those that do not know it.
+  EXPECT_LT(UpErrorDeg(*Find("distances")), 1);
+  EXPECT_LT(UpErrorDeg(*Find("none")), 1);
+}
+
+TEST_F(FindFrameByImu, ThatIsNotAcceleratedSaysWhereUpIsAlone) {
+  Walk(Steady());
+  const auto similarity = Find("auto");
+  ASSERT_TRUE(similarity.ok());
+  EXPECT_EQ(result_.frame.unit, "arbitrary");
+  EXPECT_LT(UpErrorDeg(*similarity), 1);
+  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("the motion does not show the scale"),
+                                            HasSubstr("nothing gives a scale")));
+  EXPECT_THAT(Find("imu").error().message, HasSubstr("scale_from = imu: "));
+}
+
+TEST_F(FindFrameByImu, OfImagesWithoutTimesSaysWhatTheirNamesAreToBe) {
+  Walk(Handheld(5));
+  model_ = {{"a.jpg", model_.begin()->second}, {"b.jpg", model_.rbegin()->second}};
+  ASSERT_TRUE(Find("auto").ok());
+  EXPECT_THAT(result_.warnings[0], HasSubstr("no image is named by its time, such as"));
+  std::filesystem::remove(capture_.root + "/imu.csv");
+  EXPECT_EQ(Find("imu").error().code, ErrorCode::kNotFound);
+  Write("imu.csv", "1,2\n");
+  EXPECT_EQ(Find("auto").error().code, ErrorCode::kCorrupt);
+  EXPECT_EQ(Find("none").error().code, ErrorCode::kCorrupt);
+}
+
+// Two walks, of which one measured in g.
+TEST_F(FindFrameByImu, OfOneSessionGivesMetresWhereThatOfAnotherSaysNothing) {
+  Walk(Handheld(5));
+  ModelPoses joined;
+  for (const auto& [name, pose] : model_) joined["day2/" + name] = joined["day1/" + name] = pose;
+  model_ = joined;
+  std::filesystem::remove(capture_.root + "/imu.csv");
+  std::filesystem::create_directories(capture_.root + "/imu");
+  Write("sessions.txt", "day1 /day1\nday2 /day2\n");
+  Write("imu/day1.csv", "0,0,0,0,0,0,1\n5000000,0,0,0,0,0,1\n2000000000,0,0,0,0,0,1\n");
+  Write("imu/day2.csv", csv_);
+  const auto similarity = Find("auto");
+  ASSERT_TRUE(similarity.ok()) << similarity.error().message;
+  EXPECT_NEAR(similarity->scale, 4, 0.12);
+  EXPECT_THAT(result_.warnings, ElementsAre(HasSubstr("imu/day1.csv: ")));
+  Write("imu/day1.csv", "1,2\n");
+  EXPECT_EQ(Find("auto").error().code, ErrorCode::kCorrupt);
 }
 
 TEST_F(FindFrameTest, OdometryThatDisagreesWithTheImagesIsReported) {

@@ -18,6 +18,7 @@ constexpr char kImageType[] = "sensor_msgs/Image";
 constexpr char kCompressedImageType[] = "sensor_msgs/CompressedImage";
 constexpr char kCameraInfoType[] = "sensor_msgs/CameraInfo";
 constexpr char kOdometryType[] = "nav_msgs/Odometry";
+constexpr char kImuType[] = "sensor_msgs/Imu";
 
 bool IsImageTopic(const BagTopic& topic) {
   return topic.type == kImageType || topic.type == kCompressedImageType;
@@ -54,7 +55,7 @@ class ContentsVisitor : public BagVisitor {
     contents.first_time_ns = is_new ? record_time_ns : std::min(contents.first_time_ns, record_time_ns);
     contents.last_time_ns = is_new ? record_time_ns : std::max(contents.last_time_ns, record_time_ns);
     return topic.type == kCameraInfoType || IsTransformTopic(topic) || IsImageTopic(topic) ||
-           topic.type == kOdometryType;
+           topic.type == kOdometryType || (topic.type == kImuType && !contents.header);
   }
 
   // What cannot be read is counted where it is imported; here it is no topic's first message.
@@ -65,6 +66,7 @@ class ContentsVisitor : public BagVisitor {
     if (message.topic.type == kCompressedImageType) status = TakeCompressedImage(message, &contents);
     if (message.topic.type == kCameraInfoType) status = TakeCameraInfo(message, &contents);
     if (message.topic.type == kOdometryType) status = TakeOdometry(message, &contents);
+    if (message.topic.type == kImuType) status = TakeImu(message, &contents);
     if (IsTransformTopic(message.topic)) status = TakeTransforms(message);
     if (status.ok() && (IsImageTopic(message.topic) || message.topic.type == kOdometryType)) {
       if (const Result<MessageHeader> header = DecodeHeader(message); header.ok())
@@ -125,6 +127,11 @@ class ContentsVisitor : public BagVisitor {
     if (contents->header) return Ok();
     contents->header = odometry.header;
     contents->child_frame_id = odometry.child_frame_id;
+    return Ok();
+  }
+  static Status TakeImu(const BagMessage& message, TopicContents* contents) {
+    CAIRN_ASSIGN_OR_RETURN(const ImuMessage imu, DecodeImu(message));
+    contents->header = imu.header;
     return Ok();
   }
   Status TakeTransforms(const BagMessage& message) {
@@ -313,6 +320,37 @@ Result<std::optional<TopicContents>> ChooseOdometry(const BagContents& contents,
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: the topic {} has no odometry ({}), but {}; there are{}", bag_path, asked,
                      kOdometryType, chosen->topic.type, TopicTable(contents));
+  }
+  return chosen;
+}
+
+Result<std::optional<TopicContents>> ChooseImu(const BagContents& contents, const std::string& bag_path,
+                                               const std::string& asked, std::vector<std::string>* warnings) {
+  if (asked == "none") return std::optional<TopicContents>();
+  const auto fits = [](const TopicContents& topic) { return topic.topic.type == kImuType && topic.header; };
+  if (asked.empty()) {
+    std::string names;
+    int num = 0;
+    for (const auto& [name, topic] : contents.topics) {
+      if (fits(topic)) names += (num++ == 0 ? "" : ", ") + name;
+    }
+    if (num > 1) {
+      warnings->push_back(fmt::format(
+          "{}: several topics have an IMU ({}), and none is taken: --imu chooses one, or imu in a recipe's "
+          "[[capture]]",
+          bag_path, names));
+      return std::optional<TopicContents>();
+    }
+  }
+  CAIRN_ASSIGN_OR_RETURN(std::optional<TopicContents> chosen,
+                         Choose(contents, bag_path, asked, {"an IMU", "--imu none, or --imu", "imu", fits}));
+  if (chosen && chosen->topic.type != kImuType) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the topic {} has no IMU ({}), but {}; there are{}",
+                     bag_path, asked, kImuType, chosen->topic.type, TopicTable(contents));
+  }
+  if (chosen && !chosen->header) {
+    return MakeError(ErrorCode::kCorrupt, "{}: no message of {} can be read; the first: {}", bag_path,
+                     chosen->topic.name, chosen->problem);
   }
   return chosen;
 }

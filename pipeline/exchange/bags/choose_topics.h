@@ -42,7 +42,7 @@ struct TopicContents {
   BagTopic topic;
   int64_t num_messages = 0;
   int64_t first_time_ns = 0, last_time_ns = 0;  // at which messages were recorded, since 1970
-  std::optional<MessageHeader> header;          // of images, camera_info and odometry
+  std::optional<MessageHeader> header;          // of images, camera_info, odometry and IMUs
   std::string encoding;                         // of images: "bgr8", "jpeg"
   int64_t width = 0, height = 0;                // of most images, px; 0: not known
   TopicClock clock;                             // of images and odometry
@@ -75,6 +75,12 @@ Result<TopicContents> ChooseImages(const BagContents& contents, const std::strin
 // Errors: as ChooseImages.
 Result<std::optional<TopicContents>> ChooseOdometry(const BagContents& contents, const std::string& bag_path,
                                                     const std::string& asked);
+
+// The topic of an IMU that is asked for, or the only one that measures both turns and accelerations; none if
+// there is none, if "none" is asked for, or if there are several, which `warnings` say.  Errors: as
+// ChooseImages, of what is asked for.
+Result<std::optional<TopicContents>> ChooseImu(const BagContents& contents, const std::string& bag_path,
+                                               const std::string& asked, std::vector<std::string>* warnings);
 
 // The camera_info of images: that beside them (/camera/camera_info of /camera/image_raw/compressed), else the
 // only one in their frame.

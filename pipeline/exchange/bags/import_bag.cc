@@ -63,6 +63,8 @@ struct BagPlan {
   TopicContents images;
   std::optional<TopicContents> odometry;  // only with `chain`
   std::optional<FrameChain> chain;        // between the odometry's child frame and the images' frame
+  std::optional<TopicContents> imu;
+  std::optional<FrameChain> imu_chain;  // between the images' frame and the IMU's
   std::optional<Camera> camera;
   bool camera_is_asked_for = false;
   // Added to the stamps of odometry, which are of another clock than those of the images; 0: of the same.
@@ -83,17 +85,22 @@ class ImportVisitor : public BagVisitor {
         folder_(std::move(folder)),
         progress_(progress),
         size_(static_cast<int>(plan.images.width), static_cast<int>(plan.images.height)),
-        motion_(plan.chain.value_or(FrameChain())) {}
+        motion_(plan.chain.value_or(FrameChain())),
+        imu_motion_(plan.imu_chain.value_or(FrameChain())) {}
 
   bool Wants(const BagTopic& topic, int64_t /*record_time_ns*/) override {
     return topic.name == plan_.images.topic.name ||
-           (plan_.odometry && (topic.name == plan_.odometry->topic.name || IsTransformTopic(topic)));
+           (plan_.odometry && topic.name == plan_.odometry->topic.name) ||
+           (plan_.imu && topic.name == plan_.imu->topic.name) ||
+           ((plan_.odometry || plan_.imu_chain) && IsTransformTopic(topic));
   }
 
   Status Take(const BagMessage& message) override {
     if (message.topic.name == plan_.images.topic.name) return TakeImage(message);
     if (IsTransformTopic(message.topic)) {
       TakeTransforms(message);
+    } else if (plan_.imu && message.topic.name == plan_.imu->topic.name) {
+      TakeImu(message);
     } else {
       TakeOdometry(message);
     }
@@ -103,6 +110,7 @@ class ImportVisitor : public BagVisitor {
   Status Finish() {
     odometry_.Sort();
     motion_.Sort();
+    imu_motion_.Sort();
     return options_.choice == FrameChoice::kKeyframes ? Write(chooser_.Finish()) : Ok();
   }
 
@@ -112,6 +120,8 @@ class ImportVisitor : public BagVisitor {
   std::vector<std::string> Warnings() const;
   // odometry.txt's lines.  What stands in the way is said in `warnings`.
   std::string OdometryLines(int64_t* num_lines, std::vector<std::string>* warnings) const;
+  // imu.csv, likewise.
+  std::string ImuLines(int64_t* num_lines, std::vector<std::string>* warnings) const;
 
  private:
   struct HeldImage {
@@ -127,6 +137,7 @@ class ImportVisitor : public BagVisitor {
   Result<HeldImage> DecodeMessage(const BagMessage& message);
   void TakeOdometry(const BagMessage& message);
   void LookForJump(int64_t time_ns, const Eigen::Vector3d& place);
+  void TakeImu(const BagMessage& message);
   void TakeTransforms(const BagMessage& message);
   Status Write(const std::vector<int64_t>& indices);
   Status WriteImage(const HeldImage& image);
@@ -148,6 +159,11 @@ class ImportVisitor : public BagVisitor {
   TimeSpan odometry_times_;
   std::optional<std::pair<int64_t, Eigen::Vector3d>> last_place_;  // of odometry, with its time
   std::vector<double> speeds_m_per_s_;                             // of odometry, between two messages
+  FrameMotion imu_motion_;
+  std::string imu_lines_;
+  int64_t num_imu_samples_ = 0;
+  TimeSpan imu_times_;
+  PassedOver damaged_imu_, late_imu_;
   PassedOver damaged_images_, resized_images_, late_images_, unstamped_images_, wild_images_, wild_odometry_,
       damaged_odometry_, damaged_transforms_, jumps_;
 };
@@ -245,6 +261,18 @@ void ImportVisitor::LookForJump(int64_t time_ns, const Eigen::Vector3d& place) {
   last_place_ = {time_ns, place};
 }
 
+void ImportVisitor::TakeImu(const BagMessage& message) {
+  const Result<ImuMessage> imu = DecodeImu(message);
+  if (!imu.ok()) return damaged_imu_.Add(imu.error().message);
+  const int64_t time_ns = TimeOf(imu->header, message);
+  if (!imu_times_.is_empty && time_ns <= imu_times_.last_ns) return late_imu_.Add(TimeName(time_ns, ""));
+  imu_times_.Add(time_ns);
+  const Eigen::Vector3d &turn = imu->turn_rad_s, &accel = imu->accel_m_s2;
+  imu_lines_ += fmt::format("{},{},{},{},{},{},{}\n", time_ns, turn.x(), turn.y(), turn.z(), accel.x(),
+                            accel.y(), accel.z());
+  ++num_imu_samples_;
+}
+
 void ImportVisitor::TakeTransforms(const BagMessage& message) {
   int64_t num_invalid = 0;
   const auto transforms = DecodeTransforms(message, &num_invalid);
@@ -254,6 +282,8 @@ void ImportVisitor::TakeTransforms(const BagMessage& message) {
   for (const TransformMessage& transform : *transforms) {
     if (motion_.Needs(transform.child_frame_id))
       motion_.Add(transform, TimeOf(transform.header, message), is_static);
+    if (imu_motion_.Needs(transform.child_frame_id))
+      imu_motion_.Add(transform, TimeOf(transform.header, message), is_static);
   }
 }
 
@@ -290,6 +320,12 @@ std::vector<std::string> ImportVisitor::Warnings() const {
       fmt::format("odometry jumps {} times, the first {}: was it reset, or corrected by a map? Lengths "
                   "across a jump are wrong; --odometry takes another topic, or none",
                   jumps_.count, jumps_.first));
+  say(damaged_imu_, fmt::format("{} messages of the IMU are left out; the first: {}", damaged_imu_.count,
+                                damaged_imu_.first));
+  say(late_imu_,
+      fmt::format("{} messages of the IMU are left out, whose stamps are not after those before them; "
+                  "the first: {}",
+                  late_imu_.count, late_imu_.first));
   say(damaged_transforms_, fmt::format("{} transforms are left out; the first: {}", damaged_transforms_.count,
                                        damaged_transforms_.first));
   return warnings;
@@ -347,6 +383,40 @@ std::string ImportVisitor::OdometryLines(int64_t* num_lines, std::vector<std::st
         plan_.path, sum_sines > 0 ? "up" : "down", plan_.images.header->frame_id));
   }
   return lines;
+}
+
+std::string ImportVisitor::ImuLines(int64_t* num_lines, std::vector<std::string>* warnings) const {
+  if (!plan_.imu) return {};
+  if (!image_times_.Meets(imu_times_)) {
+    warnings->push_back(
+        imu_times_.is_empty
+            ? fmt::format("{}: nothing valid on {}", plan_.path, plan_.imu->topic.name)
+            : fmt::format(
+                  "{}: the IMU is left out, as its stamps ({}) and those of the images ({}) are of two "
+                  "clocks; let both drivers stamp with the same one",
+                  plan_.path, imu_times_.Text(), image_times_.Text()));
+    return {};
+  }
+  std::optional<Pose> place = options_.camera_from_imu;
+  if (!place && plan_.imu_chain) {
+    const Result<Pose> stated = imu_motion_.BaseFromCamera(written_.front().time_ns, options_.max_time_gap_s);
+    if (stated.ok()) place = *stated;
+  }
+  std::string head = "#timestamp [ns],w_x [rad/s],w_y,w_z,a_x [m/s^2],a_y,a_z\n";
+  if (place) {
+    const Eigen::Vector3d& t = place->translation;
+    const Eigen::Quaterniond& q = place->rotation;
+    head +=
+        fmt::format("#imu_on_camera,{},{},{},{},{},{},{}\n", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  } else {
+    warnings->push_back(
+        fmt::format("{}: /tf does not say where the IMU ('{}') is on the camera ('{}'): how it is turned is "
+                    "found from turns "
+                    "about two axes at least; --imu-on-camera states it",
+                    plan_.path, plan_.imu->header->frame_id, plan_.images.header->frame_id));
+  }
+  *num_lines = num_imu_samples_;
+  return head + imu_lines_;
 }
 
 // Finds the camera, if one is stated; what is assumed or missing is said in `warnings`.
@@ -417,6 +487,14 @@ void CompareClocks(BagPlan* plan, std::vector<std::string>* warnings) {
       plan->path, plan->images.topic.name, plan->odometry->topic.name, apart_s));
 }
 
+// An IMU without a stated place is of use, too.
+void ChooseImuChain(const BagContents& contents, const BagOptions& options, BagPlan* plan) {
+  if (!plan->imu || options.camera_from_imu) return;
+  const Result<FrameChain> chain =
+      contents.frames.Chain(plan->images.header->frame_id, plan->imu->header->frame_id);
+  if (chain.ok()) plan->imu_chain = *chain;
+}
+
 // The camera is only of use where it is that of the images.
 Status CheckCameraSize(const cv::Size& size, BagPlan* plan, std::vector<std::string>* warnings) {
   if (!plan->camera || (plan->camera->width == size.width && plan->camera->height == size.height))
@@ -456,6 +534,8 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
   CAIRN_ASSIGN_OR_RETURN(plan.odometry, ChooseOdometry(contents, path, options.odometry));
   CAIRN_RETURN_IF_ERROR(ChooseCamera(contents, options, &plan, &report.warnings));
   ChooseChain(contents, options, &plan, &report.warnings);
+  CAIRN_ASSIGN_OR_RETURN(plan.imu, ChooseImu(contents, path, options.imu, &report.warnings));
+  ChooseImuChain(contents, options, &plan);
   CompareClocks(&plan, &report.warnings);
 
   progress.Begin("import", plan.images.num_messages, "images");
@@ -476,6 +556,8 @@ Result<BagReport> ImportBag(const std::string& path, const BagOptions& options, 
         report.num_cameras = plan.camera ? 1 : 0;
         if (plan.camera)
           CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", {{1, *plan.camera}}));
+        const std::string imu = visitor.ImuLines(&report.num_imu_samples, &report.warnings);
+        if (!imu.empty()) CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kImuFile, imu));
         const std::string lines = visitor.OdometryLines(&report.num_with_odometry, &report.warnings);
         return lines.empty() ? Ok() : WriteFileAtomically(folder + "/" + kOdometryFile, lines);
       });

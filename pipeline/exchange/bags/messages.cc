@@ -60,6 +60,16 @@ class MessageFields {
     const auto nanoseconds = Get<uint32_t>();
     return {std::max<int64_t>(seconds, 0) * 1'000'000'000 + (seconds < 0 ? 0 : nanoseconds), FrameName()};
   }
+  Eigen::Vector3d Vector() {
+    const auto x = Get<double>(), y = Get<double>();
+    return {x, y, Get<double>()};
+  }
+  // The first number of a covariance of three values.
+  double Covariance() {
+    const auto first = Get<double>();
+    for (int i = 1; i < 9; ++i) Get<double>();
+    return first;
+  }
   // x y z, then the quaternion x y z w.
   Result<Pose> ReadPose() {
     double v[7];
@@ -154,6 +164,26 @@ Result<OdometryMessage> DecodeOdometry(const BagMessage& message) {
   if (!pose.ok()) return pose.error();
   odometry.odom_from_child = *pose;
   return odometry;
+}
+
+Result<ImuMessage> DecodeImu(const BagMessage& message) {
+  CAIRN_ASSIGN_OR_RETURN(MessageFields fields, MessageFields::Of(message));
+  ImuMessage imu;
+  imu.header = fields.Header();
+  for (int i = 0; i < 4; ++i) fields.Get<double>();  // orientation, which the driver has guessed
+  fields.Covariance();
+  imu.turn_rad_s = fields.Vector();
+  const bool has_turn = fields.Covariance() != -1;
+  imu.accel_m_s2 = fields.Vector();
+  const bool has_accel = fields.Covariance() != -1;
+  CAIRN_RETURN_IF_ERROR(fields.Check(message));
+  if (!has_turn || !has_accel) {
+    return MakeError(ErrorCode::kCorrupt, "it says that it has no {}",
+                     has_turn ? "linear acceleration" : "angular velocity");
+  }
+  if (!imu.turn_rad_s.allFinite() || !imu.accel_m_s2.allFinite())
+    return MakeError(ErrorCode::kCorrupt, "a value that is not finite");
+  return imu;
 }
 
 Result<std::vector<TransformMessage>> DecodeTransforms(const BagMessage& message, int64_t* num_invalid) {

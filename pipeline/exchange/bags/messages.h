@@ -62,6 +62,15 @@ struct OdometryMessage {
 // Errors: also Corrupt for a pose that is not finite, or whose quaternion is not of length 1 to 0.01.
 Result<OdometryMessage> DecodeOdometry(const BagMessage& message);
 
+struct ImuMessage {
+  MessageHeader header;                                  // frame_id: the IMU's
+  Eigen::Vector3d turn_rad_s = Eigen::Vector3d::Zero();  // angular velocity
+  Eigen::Vector3d accel_m_s2 = Eigen::Vector3d::Zero();  // linear acceleration, with gravity
+};
+// Errors: also Corrupt for values that are not finite, and where a covariance that begins with -1 says that
+// there is no angular velocity or no acceleration.
+Result<ImuMessage> DecodeImu(const BagMessage& message);
+
 struct TransformMessage {
   MessageHeader header;  // frame_id: the parent
   std::string child_frame_id;

@@ -154,6 +154,19 @@ TEST_F(JoinCapturesTest, OdometryOfSessionsWithoutPosesIsKeptUnderTheirNames) {
   EXPECT_EQ(*ReadFile(Path("joined/odometry.txt")), "day1/1.pgm 1 2 3 0 0 0 1\nday3/1.pgm 4 5 6 0 0 0 1\n");
 }
 
+TEST_F(JoinCapturesTest, ImusOfSessionsWithoutPosesAreKeptUnderTheirNames) {
+  for (const std::string day : {"day1", "day2"}) Write(day + "/images/1.pgm", "P5\n1 1\n255\nx");
+  ASSERT_TRUE(Join({Session("day1"), Session("day2")}).ok());
+  EXPECT_FALSE(fs::exists(Path("joined/imu")));
+  Write("day2/imu.csv", "5,0,0,0,0,0,9.8\n");
+  ASSERT_TRUE(Join({Session("day1"), Session("day2")}).ok());
+  EXPECT_EQ(*ReadFile(Path("joined/imu/day2.csv")), "5,0,0,0,0,0,9.8\n");
+  EXPECT_FALSE(fs::exists(Path("joined/imu/day1.csv")));
+  fs::remove(Path("day2/imu.csv"));
+  ASSERT_TRUE(Join({Session("day1"), Session("day2")}).ok());
+  EXPECT_FALSE(fs::exists(Path("joined/imu/day2.csv")));
+}
+
 TEST_F(JoinCapturesTest, SecondJoinTouchesOnlyWhatChanged) {
   WriteCapture("day1", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
   WriteCapture("day2", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));

@@ -115,6 +115,10 @@ TEST_F(BuildFolderTest, ABagThatIsAFolderDependsOnTheFilesInIt) {
   recipe_.captures[0].footage.odometry = "none";
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_EQ(Text("options/odometry"), "run: none  \n");
+  recipe_.captures[0].footage.imu = "/imu";
+  recipe_.captures[0].footage.imu_on_camera = "0,0,0,0,0,0,1";
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/odometry"), "run: none  \nrun: imu /imu 0,0,0,0,0,0,1\n");
   for (const char* name : {"bag-run", "bag-run.stamp", "bag-run.report.json"})
     EXPECT_TRUE(IsBuildFileName(name)) << name;
   EXPECT_FALSE(IsBuildFileName("drive.bag"));
@@ -126,12 +130,15 @@ TEST_F(BuildFolderTest, ABagThatIsAFolderDependsOnTheFilesInIt) {
               testing::AllOf(HasSubstr("run 2.mcap' has a space"), HasSubstr("the file of a film or bag")));
 }
 
-TEST_F(BuildFolderTest, OdometryOfFoldersIsNoted) {
+TEST_F(BuildFolderTest, OdometryAndImusOfFoldersAreNoted) {
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_EQ(Text("options/odometry"), "");
   ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/odometry.txt", "").ok());
   ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
   EXPECT_EQ(Text("options/odometry"), "survey\n");
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/imu.csv", "").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_EQ(Text("options/odometry"), "survey\nsurvey: imu\n");
 }
 
 TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {

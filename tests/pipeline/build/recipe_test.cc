@@ -90,7 +90,9 @@ TEST_F(RecipeTest, ABagSaysHowItIsImported) {
       "name = \"a\"\n[[capture]]\npath = \"drive.bag\"\ntopic = \"/camera/left/image_raw\"\nodometry = "
       "\"none\"\n"
       "camera_on_robot = [0.25, 0, -1.5, -0.5, 0.5, -0.5, 0.5]\nmax_time_gap_s = 0.05\nkeyframes = \"all\"\n"
-      "[[capture]]\npath = \"run\"\ncamera_on_robot = \"-1, 2,3,0,0,0,1\"\nmax_time_gap_s = 0\n");
+      "[[capture]]\npath = \"run\"\ncamera_on_robot = \"-1, 2,3,0,0,0,1\"\nmax_time_gap_s = 0\nimu = "
+      "\"/imu/data\"\n"
+      "imu_on_camera = [0.1, 0, -0.2, 0, 0, 0.6, 0.8]\n");
   ASSERT_TRUE(recipe.ok()) << recipe.error().message;
   const RecipeCapture &file = recipe->captures[0], &folder = recipe->captures[1];
   EXPECT_EQ(file.kind, CaptureKind::kBag);
@@ -101,9 +103,10 @@ TEST_F(RecipeTest, ABagSaysHowItIsImported) {
                   "none", "--camera-on-robot", "0.25,0,-1.5,-0.5,0.5,-0.5,0.5", "--max-time-gap-s", "0.05"));
   EXPECT_EQ(folder.kind, CaptureKind::kBag);
   EXPECT_EQ(folder.name, "run");
-  EXPECT_THAT(FootageWords(folder.kind, folder.footage),
-              ElementsAre("--format", "bag", "--keyframes", "auto", "--camera-on-robot", "-1,2,3,0,0,0,1",
-                          "--max-time-gap-s", "0"));
+  EXPECT_THAT(
+      FootageWords(folder.kind, folder.footage),
+      ElementsAre("--format", "bag", "--keyframes", "auto", "--camera-on-robot", "-1,2,3,0,0,0,1", "--imu",
+                  "/imu/data", "--imu-on-camera", "0.1,0,-0.2,0,0,0.6,0.8", "--max-time-gap-s", "0"));
   // Compiled where it is, it holds the images of its build folder.
   fs::create_directories(folder_ / "run/run.build/bag-run/images");
   ASSERT_TRUE(WriteFileAtomically((folder_ / "run/run.build/bag-run/images/a.jpg").string(), "").ok());
@@ -123,7 +126,7 @@ TEST_F(RecipeTest, KeysOfBagsAreForBagsAndSayWhatIsWrongWithThem) {
     ASSERT_TRUE(WriteFileAtomically((folder_ / name).string(), "").ok());
   const std::string film = "name = \"a\"\n[[capture]]\npath = \"walk.mp4\"\n";
   for (const char* key : {"topic = \"/a\"", "odometry = \"none\"", "camera_on_robot = [0, 0, 0, 0, 0, 0, 1]",
-                          "max_time_gap_s = 1"}) {
+                          "imu = \"/a\"", "imu_on_camera = [0, 0, 0, 0, 0, 0, 1]", "max_time_gap_s = 1"}) {
     EXPECT_THAT(Message(film + key + "\n"),
                 AllOf(HasSubstr("is for bags, and "), HasSubstr("walk.mp4 is a film")));
   }
@@ -133,6 +136,7 @@ TEST_F(RecipeTest, KeysOfBagsAreForBagsAndSayWhatIsWrongWithThem) {
        {"", "a b", "~root", "-o", "$(touch x)", "`x`", "a;b", "/a=b", "/a%", "/\\u00e4", "/a\\n"}) {
     EXPECT_THAT(Message(bag + "topic = \"" + topic + "\"\n"), HasSubstr("topic: ")) << topic;
     EXPECT_THAT(Message(bag + "odometry = \"" + topic + "\"\n"), HasSubstr("not a topic's name")) << topic;
+    EXPECT_THAT(Message(bag + "imu = \"" + topic + "\"\n"), HasSubstr("not a topic's name")) << topic;
   }
   EXPECT_THAT(Message(bag + "topic = 5\n"), HasSubstr("recipe.toml:4: topic: expected text"));
   EXPECT_THAT(Message(bag + "topic = true\n"), HasSubstr("recipe.toml:4: topic: expected text"));
@@ -143,6 +147,10 @@ TEST_F(RecipeTest, KeysOfBagsAreForBagsAndSayWhatIsWrongWithThem) {
   EXPECT_THAT(Message(bag + "camera_on_robot = [0, 0, 0, 0, 0, 0, \"1\"]\n"), HasSubstr("expected list"));
   EXPECT_THAT(Message(bag + "camera_on_robot = [0, 0, 0, 0, 0, 0, 2]\n", ErrorCode::kCorrupt),
               HasSubstr("camera_on_robot: "));
+  EXPECT_THAT(Message(bag + "imu_on_camera = [0, 0, 0]\n"),
+              HasSubstr("seven numbers [x, y, z, qx, qy, qz, qw]: where the IMU is in the camera's"));
+  EXPECT_THAT(Message(bag + "imu_on_camera = [0, 0, 0, 0, 0, 0, 2]\n", ErrorCode::kCorrupt),
+              HasSubstr("imu_on_camera: "));
   for (const char* gap : {"-0.1", "\"long\"", "[1, 2]"})
     EXPECT_THAT(Message(bag + "max_time_gap_s = " + gap + "\n"), HasSubstr("expected seconds, at least 0"))
         << gap;

@@ -135,6 +135,24 @@ inline std::string OdometryBytes(int64_t stamp_ns, const Pose& odom_from_base,
   return writer.bytes();
 }
 
+struct ImuFields {
+  int64_t stamp_ns = 0;
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero(), accel = {0, 0, 9.8};
+  std::string frame = "imu_link";
+  bool has_accel = true;
+};
+inline std::string ImuBytes(const ImuFields& imu, MessageForm form = MessageForm::kCdr) {
+  MessageWriter writer(form);
+  writer.Header(imu.stamp_ns, imu.frame);
+  for (int i = 0; i < 4 + 9; ++i) writer.Put(0.0);  // orientation and its covariance
+  for (const double value : {imu.turn.x(), imu.turn.y(), imu.turn.z()}) writer.Put(value);
+  for (int i = 0; i < 9; ++i) writer.Put(0.0);
+  for (const double value : {imu.accel.x(), imu.accel.y(), imu.accel.z()}) writer.Put(value);
+  writer.Put(imu.has_accel ? 0.0 : -1.0);
+  for (int i = 1; i < 9; ++i) writer.Put(0.0);
+  return writer.bytes();
+}
+
 struct FrameLink {
   std::string parent, child;
   Pose parent_from_child;

@@ -150,6 +150,66 @@ TEST_F(ImportedBag, HasImagesCameraAndOdometryOfItsOnlyTopics) {
   EXPECT_EQ(report->num_cameras, 1);
 }
 
+TEST_F(ImportedBag, HasTheImuAndWhereItIsOnTheCamera) {
+  const auto imu = [](int64_t time_ns, const std::string& topic = "/imu", bool has_accel = true) -> Recorded {
+    return {
+        topic, "sensor_msgs/msg/Imu", time_ns,
+        ImuBytes(
+            {.stamp_ns = time_ns, .turn = {0.1, 0.2, 0.3}, .accel = {1, 2, 9.5}, .has_accel = has_accel})};
+  };
+  // The IMU is on base_link, turned by 180 degrees about z.
+  const Recorded mount = {"/tf_static", kTf, 0,
+                          TransformBytes({{"base_link", "imu_link", Turned(180, 0.1, 0, 0.2)}})};
+  std::vector<Recorded> messages = {
+      StaticFrames(), mount, imu(9'900'000'000), GreyMessage(10), imu(10'100'000'000), imu(10'100'000'000)};
+  const auto report = Import(messages);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->num_imu_samples, 2);
+  EXPECT_THAT(warnings_,
+              Contains(HasSubstr("1 messages of the IMU are left out, whose stamps are not after")));
+  const std::string csv = *ReadFile(root_ + "/capture/imu.csv");
+  const auto lines = SplitLines(csv);
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_EQ(lines[2], "9900000000,0.1,0.2,0.3,1,2,9.5");
+  const auto place = ParseNumbers(lines[1].substr(std::string("#imu_on_camera,").size()));
+  ASSERT_TRUE(place && place->size() == 7) << lines[1];
+  // Seen from the camera: behind it by 0.2 m, 0.3 m below; its z is up, the camera's -y.
+  EXPECT_LT((Eigen::Vector3d((*place)[0], (*place)[1], (*place)[2]) - Eigen::Vector3d(0, 0.3, -0.2)).norm(),
+            1e-9);
+  const Eigen::Quaterniond q((*place)[6], (*place)[3], (*place)[4], (*place)[5]);
+  EXPECT_LT((q * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  EXPECT_LT((q * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+
+  // An option goes before tf, and none leaves it out.
+  BagOptions options = kAll;
+  options.camera_from_imu = Pose{Eigen::Quaterniond::Identity(), {1, 2, 3}};
+  ASSERT_TRUE(Import(messages, options).ok());
+  EXPECT_THAT(*ReadFile(root_ + "/capture/imu.csv"), HasSubstr("\n#imu_on_camera,1,2,3,0,0,0,1\n"));
+  options.imu = "none";
+  ASSERT_TRUE(Import(messages, options).ok());
+  EXPECT_FALSE(Has("imu.csv"));
+  // A topic of turns alone is none; without tf the place is left open, and that is said.
+  messages = {GreyMessage(10), imu(9'900'000'000), imu(10'100'000'000), imu(10'000'000'000, "/gyro", false)};
+  ASSERT_TRUE(Import(messages).ok());
+  EXPECT_THAT(warnings_, Contains(HasSubstr("/tf does not say where the IMU ('imu_link') is on the camera")));
+  EXPECT_THAT(*ReadFile(root_ + "/capture/imu.csv"), Not(HasSubstr("imu_on_camera")));
+  // Of two none is taken unless one is named.
+  messages.push_back(imu(10'000'000'000, "/other"));
+  ASSERT_TRUE(Import(messages).ok());
+  EXPECT_FALSE(Has("imu.csv"));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("several topics have an IMU (/imu, /other)")));
+  options = kAll;
+  options.imu = "imu";
+  ASSERT_TRUE(Import(messages, options).ok());
+  EXPECT_TRUE(Has("imu.csv"));
+  options.imu = "/camera/image_raw";
+  EXPECT_THAT(ErrorOf(messages, options), HasSubstr("has no IMU (sensor_msgs/Imu), but sensor_msgs/Image"));
+  // Another clock.
+  ASSERT_TRUE(Import({GreyMessage(10), imu(99'000'000'000)}).ok());
+  EXPECT_FALSE(Has("imu.csv"));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("are of two clocks")));
+}
+
 TEST_F(ImportedBag, IsTheSameFromEveryStorageAndByteOrder) {
   std::vector<std::string> odometry;
   for (const MessageForm form : {MessageForm::kCdr, MessageForm::kCdrBigEndian, MessageForm::kRos1}) {
