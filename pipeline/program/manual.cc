@@ -21,6 +21,8 @@ std::string Escaped(const std::string& text) {
       escaped += "\\e";
     } else if (c == '-') {
       escaped += "\\-";
+    } else if (c == '|') {
+      escaped += "|\\:";  // a list of choices may be longer than a line: here it may be broken
     } else {
       escaped += c;
     }
@@ -31,7 +33,7 @@ std::string Escaped(const std::string& text) {
 std::string Header(const std::string& page, const std::string& version) {
   std::string title = page;
   std::transform(title.begin(), title.end(), title.begin(), [](unsigned char c) { return std::toupper(c); });
-  return fmt::format(".TH {} 1 \"\" \"cairn {}\" \"cairn\"\n", Escaped(title), version);
+  return fmt::format(".TH {} 1 \"\" \"cairn {}\" \"cairn\"\n.ad l\n", Escaped(title), version);
 }
 
 bool TakesValue(const CLI::Option& option) { return option.get_items_expected_max() > 0; }
