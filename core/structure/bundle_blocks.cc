@@ -103,7 +103,8 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
 
 ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem,
                                         Progress* progress) {
-  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.linear_solver_type =
+      options.linear_solver_ordering != nullptr ? ceres::SPARSE_SCHUR : ceres::SPARSE_NORMAL_CHOLESKY;
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;

@@ -63,9 +63,10 @@ struct MotionCost {
   }
 };
 
-// Sparse Schur on one thread: bit-stable.  Sets what the options say of solver and threads.
-// `progress`, if there is one, is advanced by max_num_iterations: by 1 for each, and at the end by what is
-// left. The solver ends when it is cancelled; progress changes nothing else.
+// On one thread: bit-stable.  By sparse Schur complement where the options have an ordering, whose first
+// group is eliminated, else by sparse Cholesky.  Sets what the options say of solver and threads. `progress`,
+// if there is one, is advanced by max_num_iterations: by 1 for each, and at the end by what is left. The
+// solver ends when it is cancelled; progress changes nothing else.
 ceres::Solver::Summary SolveOnOneThread(ceres::Solver::Options options, ceres::Problem* problem,
                                         Progress* progress = nullptr);
 

@@ -13,20 +13,15 @@
 
 #include "core/base/quantiles.h"
 #include "core/base/random.h"
+#include "core/geometry/rotation_vector.h"
+#include "core/structure/bundle_blocks.h"
+#include "stages/reconstruct/inertial/inertial_costs.h"
 
 namespace cairn::reconstruct {
+namespace inertial {
 namespace {
 
 using Vector3d = Eigen::Vector3d;
-using Eigen::Quaterniond;
-
-// Blocks of unknowns.  Common: log of the scale over the start's, gravity's direction (2), the IMU's place in
-// the camera (3), its turn from the start's (3), the clocks' difference from the start's, seconds.
-constexpr int kCommon = 10;
-enum CommonPart { kLogScale = 0, kDown = 1, kPlace = 3, kTurn = 6, kClock = 9 };
-constexpr int kBias = 6;   // gyro's, accelerometer's
-constexpr int kImage = 9;  // turn (camera's axes), shift (model's unit), speed (m/s)
-enum ImagePart { kImageTurn = 0, kImageShift = 3, kImageSpeed = 6 };
 
 // Least squares make the scale too small where images err, at most by these.
 constexpr double kStarts[] = {1, 3, 9, 27};
@@ -52,104 +47,6 @@ constexpr double kFirstTurnSigmaRad = 3e-3, kFirstShiftOfStep = 0.02;
 
 enum Group { kImu, kTurns, kShifts, kNumGroups, kStated = kNumGroups };
 
-// What stays the same for all steps.
-struct Frame {
-  double scale = 1;                                    // of the start
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // columns: two level ones, down
-  Quaterniond cam_from_imu = Quaterniond::Identity();
-};
-
-// Between two images [Forster17 eq. 45], whitened.
-struct StepCost {
-  const Frame& frame;
-  const TimedImage &from, &to;
-  const Preintegrated& imu;
-  Matrix9d whitening;  // L^-1 of the covariance L L^T
-
-  template <typename T>
-  struct State {
-    Eigen::Quaternion<T> model_from_imu;
-    Eigen::Matrix<T, 3, 1> place, speed;
-  };
-
-  // Where the IMU was at the image's stamp.
-  template <typename T>
-  State<T> StateOf(const TimedImage& image, const T* block, const T* common, const Vector3d& gyro) const {
-    using V = Eigen::Matrix<T, 3, 1>;
-    const Eigen::Map<const V> turn(block + kImageTurn), shift(block + kImageShift),
-        speed(block + kImageSpeed);
-    const Eigen::Map<const V> place(common + kPlace), mounted(common + kTurn);
-    const Eigen::Quaternion<T> model_from_cam =
-        image.cam_from_model.rotation.conjugate().cast<T>() * QuaternionOf<T>(V(turn));
-    const T scale = T(frame.scale) * ceres::exp(common[kLogScale]);
-    State<T> state;
-    state.speed = speed;
-    state.place = scale * (image.cam_from_model.Center().cast<T>() + shift) + model_from_cam * V(place) -
-                  common[kClock] * speed;
-    state.model_from_imu = model_from_cam * frame.cam_from_imu.cast<T>() * QuaternionOf<T>(V(mounted)) *
-                           QuaternionOf<T>(V(-common[kClock] * gyro.cast<T>()));
-    return state;
-  }
-
-  template <typename T>
-  bool operator()(const T* block1, const T* block2, const T* bias, const T* common, T* residual) const {
-    using V = Eigen::Matrix<T, 3, 1>;
-    const State<T> a = StateOf(from, block1, common, imu.gyro_begin);
-    const State<T> b = StateOf(to, block2, common, imu.gyro_end);
-    Eigen::Matrix<T, 6, 1> change = Eigen::Map<const Eigen::Matrix<T, 6, 1>>(bias);
-    change.template head<3>() -= imu.gyro_bias.cast<T>();
-    change.template tail<3>() -= imu.accel_bias.cast<T>();
-    const Eigen::Matrix<T, 9, 1> by_bias = imu.by_bias.cast<T>() * change;
-    const T dt(imu.dt_s);
-    const V gravity =
-        T(kGravityMS2) * (frame.axes.cast<T>() * V(common[kDown], common[kDown + 1], T(1)).normalized());
-    const Eigen::Quaternion<T> imu_from_model = a.model_from_imu.conjugate();
-    Eigen::Matrix<T, 9, 1> r;
-    const Eigen::Quaternion<T> said = imu.dR.cast<T>() * QuaternionOf<T>(V(by_bias.template head<3>()));
-    r.template head<3>() =
-        VectorOf(Eigen::Quaternion<T>(said.conjugate() * imu_from_model * b.model_from_imu));
-    r.template segment<3>(3) = imu_from_model * V(b.speed - a.speed - gravity * dt) - imu.dv.cast<T>() -
-                               by_bias.template segment<3>(3);
-    r.template tail<3>() =
-        imu_from_model * V(b.place - a.place - a.speed * dt - gravity * (T(0.5) * dt * dt)) -
-        imu.dp.cast<T>() - by_bias.template tail<3>();
-    Eigen::Map<Eigen::Matrix<T, 9, 1>> out(residual);
-    out = whitening.cast<T>() * r;
-    return true;
-  }
-};
-
-// Three values of an image's block over their standard deviation.
-struct PartCost {
-  int first;
-  double sigma;
-  template <typename T>
-  bool operator()(const T* block, T* residual) const {
-    for (int i = 0; i < 3; ++i) residual[i] = block[first + i] / T(sigma);
-    return true;
-  }
-};
-
-// Values over their standard deviations, about what they are taken for.
-template <int kSize>
-struct StatedCost {
-  std::array<double, kSize> value, sigma;
-  template <typename T>
-  bool operator()(const T* block, T* residual) const {
-    for (int i = 0; i < kSize; ++i) residual[i] = (block[i] - T(value[i])) / T(sigma[i]);
-    return true;
-  }
-};
-
-struct WalkCost {
-  std::array<double, kBias> sigma;
-  template <typename T>
-  bool operator()(const T* before, const T* after, T* residual) const {
-    for (int i = 0; i < kBias; ++i) residual[i] = (after[i] - before[i]) / T(sigma[i]);
-    return true;
-  }
-};
-
 // A block of residuals: what kind it is, and the image where it is.
 struct BlockOfResiduals {
   ceres::ResidualBlockId id = nullptr;
@@ -169,6 +66,8 @@ struct Linearized {
   Eigen::VectorXd residuals;
   std::vector<int> first_row;  // of each block of residuals
 };
+
+using Factors = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
 class InertialProblem {
  public:
@@ -207,7 +106,7 @@ class InertialProblem {
   void LayOut();
   void Build(ceres::Problem* problem);
   void AddStated(ceres::Problem* problem);
-  void Rescale(const Linearized& at);
+  void Rescale(const Linearized& at, const Factors& factors);
   double InformationOfNoise(const Linearized& at) const;
   Linearized Linearize(ceres::Problem* problem) const;
 
@@ -339,8 +238,6 @@ Linearized InertialProblem::Linearize(ceres::Problem* problem) const {
   return at;
 }
 
-using Factors = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
-
 // Information about the logarithm of the scale that errors of the images' places alone would seem to give,
 // were the camera not accelerated at all: of shifts of one standard deviation, by random signs
 // [Hutchinson90].
@@ -370,9 +267,7 @@ double InertialProblem::InformationOfNoise(const Linearized& at) const {
 
 // [Foerstner79]: sigma^2 grows by the group's squared residuals over its redundancy, its number less the part
 // of the unknowns that it determines, tr(J_g H^-1 J_g^T), estimated by random signs [Hutchinson90].
-void InertialProblem::Rescale(const Linearized& at) {
-  const Eigen::SparseMatrix<double> normal = at.jacobian.transpose() * at.jacobian;
-  const Factors factors(normal);
+void InertialProblem::Rescale(const Linearized& at, const Factors& factors) {
   std::array<double, kNumGroups> squares{}, num{}, trace{};
   for (size_t k = 0; k < residual_blocks_.size(); ++k) {
     const BlockOfResiduals& block = residual_blocks_[k];
@@ -412,15 +307,12 @@ void InertialProblem::Solve() {
     ceres::Problem problem;
     Build(&problem);
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.max_num_iterations = kMaxNumIterations;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem, &summary);
+    SolveOnOneThread(options, &problem);
     const Linearized at = Linearize(&problem);
-    Rescale(at);
     const Eigen::SparseMatrix<double> normal = at.jacobian.transpose() * at.jacobian;
     const Factors factors(normal);
+    Rescale(at, factors);
     const auto column = [&](int k) {
       return Eigen::VectorXd(factors.solve(Eigen::VectorXd::Unit(normal.cols(), k)));
     };
@@ -458,8 +350,8 @@ InertialAlignment InertialProblem::Answer() const {
   answer.sigma_ratio = has_parts ? std::max(sigma_, parts_sigma_) : kFewImagesFactor * sigma_;
   answer.up = -(frame_.axes * Vector3d(common[kDown], common[kDown + 1], 1)).normalized();
   answer.up_sigma_rad = std::max(kLeastUpSigmaRad, up_sigma_rad_);
-  answer.cam_from_imu =
-      frame_.cam_from_imu * QuaternionOf(Vector3d(common[kTurn], common[kTurn + 1], common[kTurn + 2]));
+  answer.cam_from_imu = frame_.cam_from_imu *
+                        QuaternionFromVector(Vector3d(common[kTurn], common[kTurn + 1], common[kTurn + 2]));
   answer.imu_in_cam_m = {common[kPlace], common[kPlace + 1], common[kPlace + 2]};
   const auto num_spans = static_cast<double>(span_begins_s_.size());
   for (size_t span = 0; span < span_begins_s_.size(); ++span) {
@@ -482,12 +374,13 @@ InertialAlignment InertialProblem::Answer() const {
 }
 
 }  // namespace
+}  // namespace inertial
 
 InertialAlignment AdjustInertial(const InertialStart& start, bool is_turn_stated,
                                  const InertialOptions& options) {
   InertialAlignment answer;
-  for (const double times : kStarts) {
-    InertialProblem problem(start, times, is_turn_stated, options);
+  for (const double times : inertial::kStarts) {
+    inertial::InertialProblem problem(start, times, is_turn_stated, options);
     problem.Solve();
     answer = problem.Answer();
     if (!problem.HasCollapsed()) return answer;

@@ -7,6 +7,7 @@
 #include <Eigen/SparseCore>
 
 #include "core/base/quantiles.h"
+#include "core/geometry/rotation_vector.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -55,7 +56,7 @@ std::vector<Eigen::Quaterniond> TurnsSinceFirst(const std::vector<ImuSample>& sa
   for (size_t i = 1; i < samples.size(); ++i) {
     const double dt_s = 1e-9 * static_cast<double>(samples[i].time_ns - samples[i - 1].time_ns);
     const Eigen::Vector3d turn = 0.5 * dt_s * (samples[i - 1].gyro + samples[i].gyro);
-    turns.push_back((turns.back() * QuaternionOf(turn)).normalized());
+    turns.push_back((turns.back() * QuaternionFromVector(turn)).normalized());
   }
   return turns;
 }
@@ -81,9 +82,10 @@ std::vector<TurnPair> TurnPairs(const std::vector<TimedImage>& images, const Imu
     const TimedImage &from = images[step.from], &to = images[step.to];
     const Eigen::Quaterniond before = TurnAt(imu.samples, turns, from.time_ns + NsOf(offset_s));
     const Eigen::Quaterniond after = TurnAt(imu.samples, turns, to.time_ns + NsOf(offset_s));
-    const TurnPair pair = {
-        VectorOf(Eigen::Quaterniond(from.cam_from_model.rotation * to.cam_from_model.rotation.conjugate())),
-        VectorOf(Eigen::Quaterniond(before.conjugate() * after)), step.imu.dt_s};
+    const TurnPair pair = {VectorFromQuaternion(Eigen::Quaterniond(from.cam_from_model.rotation *
+                                                                   to.cam_from_model.rotation.conjugate())),
+                           VectorFromQuaternion(Eigen::Quaterniond(before.conjugate() * after)),
+                           step.imu.dt_s};
     if (std::max(pair.of_camera.norm(), pair.of_imu.norm()) < kMaxTurnRad) pairs.push_back(pair);
   }
   return pairs;

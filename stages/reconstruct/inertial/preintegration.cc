@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/rotation_vector.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn::reconstruct {
@@ -28,11 +29,11 @@ void Advance(const ImuSample& from, const ImuSample& to, const ImuNoise& noise, 
   const Eigen::Vector3d turn = (0.5 * (from.gyro + to.gyro) - motion->gyro_bias) * dt;
   const Eigen::Vector3d accel = 0.5 * (from.accel + to.accel) - motion->accel_bias;
   const Eigen::Matrix3d middle =
-      (motion->dR * QuaternionOf<double>(0.5 * turn)).toRotationMatrix();  // halfway through the step
+      (motion->dR * QuaternionFromVector<double>(0.5 * turn)).toRotationMatrix();  // halfway through the step
   const Eigen::Matrix3d turned = -middle * CrossMatrix(accel) * dt;
 
   Matrix9d transition = Matrix9d::Identity();
-  transition.block<3, 3>(0, 0) = QuaternionOf<double>(-turn).toRotationMatrix();
+  transition.block<3, 3>(0, 0) = QuaternionFromVector<double>(-turn).toRotationMatrix();
   transition.block<3, 3>(3, 0) = turned;
   transition.block<3, 3>(6, 0) = 0.5 * dt * turned;
   transition.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
@@ -58,7 +59,7 @@ void Advance(const ImuSample& from, const ImuSample& to, const ImuNoise& noise, 
   const Eigen::Vector3d change = middle * accel * dt;
   motion->dp += motion->dv * dt + 0.5 * dt * change;
   motion->dv += change;
-  motion->dR = (motion->dR * QuaternionOf(turn)).normalized();
+  motion->dR = (motion->dR * QuaternionFromVector(turn)).normalized();
   motion->dt_s += dt;
 }
 

@@ -42,23 +42,4 @@ std::optional<Preintegrated> Preintegrate(const std::vector<ImuSample>& samples,
                                           int64_t end_ns, const Eigen::Vector3d& gyro_bias,
                                           const Eigen::Vector3d& accel_bias, const ImuNoise& noise);
 
-// The rotation by a vector, about it by its length; and back, in [0, pi].
-template <typename T>
-Eigen::Quaternion<T> QuaternionOf(const Eigen::Matrix<T, 3, 1>& v) {
-  using std::cos, std::sin, std::sqrt;
-  const T squared = v.squaredNorm();
-  if (squared < T(1e-16)) return Eigen::Quaternion<T>(T(1), v.x() / T(2), v.y() / T(2), v.z() / T(2));
-  const T angle = sqrt(squared), half = angle / T(2), part = sin(half) / angle;
-  return Eigen::Quaternion<T>(cos(half), part * v.x(), part * v.y(), part * v.z());
-}
-template <typename T>
-Eigen::Matrix<T, 3, 1> VectorOf(const Eigen::Quaternion<T>& q) {
-  using std::atan2, std::sqrt;
-  const T sign = q.w() < T(0) ? T(-1) : T(1);
-  const T squared = q.vec().squaredNorm();
-  if (squared < T(1e-16)) return T(2) * sign * q.vec();
-  const T sine = sqrt(squared);
-  return (T(2) * atan2(sine, sign * q.w()) / sine) * sign * q.vec();
-}
-
 }  // namespace cairn::reconstruct

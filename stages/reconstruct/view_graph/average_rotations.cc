@@ -4,6 +4,7 @@
 #include <cmath>
 #include <queue>
 
+#include "core/geometry/rotation_vector.h"
 #include "core/structure/disjoint_sets.h"
 #include "stages/reconstruct/view_graph/differences.h"
 
@@ -15,15 +16,11 @@ constexpr double kLeastErrorRad = 1e-4;  // below, absolute values are not told 
 constexpr double kConvergedRad = 1e-6;
 constexpr double kLeastWeight = 1e-3;
 
-Eigen::Vector3d LogOf(const Eigen::Quaterniond& q) {
-  const Eigen::AngleAxisd turn(q.w() < 0 ? Eigen::Quaterniond(-q.coeffs()) : q);
-  return turn.angle() * turn.axis();
-}
-
 // How a pair's rotation differs from that of the images, a rotation vector in the world's frame.
 Eigen::Vector3d ErrorOf(const ViewPair& pair, const std::vector<Eigen::Quaterniond>& rotations) {
-  return LogOf((rotations[pair.image2].conjugate() * pair.cam2_from_cam1.rotation * rotations[pair.image1])
-                   .normalized());
+  return VectorFromQuaternion(
+      (rotations[pair.image2].conjugate() * pair.cam2_from_cam1.rotation * rotations[pair.image1])
+          .normalized());
 }
 
 std::vector<std::vector<int>> PairsOfImages(int num_images, const std::vector<ViewPair>& pairs) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/geometry/rotation_vector.h"
 #include "tests/reconstruct/inertial/simulated_imu.h"
 
 namespace cairn::reconstruct {
@@ -155,7 +156,8 @@ TEST(Preintegrate, DerivativesByTheBiasesAreThoseOfDifferences) {
     const Eigen::Vector3d accel =
         i < 3 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(h * Eigen::Vector3d::Unit(i - 3));
     const Preintegrated more = at(Eigen::Vector3d(0.01, 0, 0) + gyro, Eigen::Vector3d(0, 0.02, 0) + accel);
-    const Eigen::Vector3d turn = VectorOf(Eigen::Quaterniond(middle.dR.conjugate() * more.dR)) / h;
+    const Eigen::Vector3d turn =
+        VectorFromQuaternion(Eigen::Quaterniond(middle.dR.conjugate() * more.dR)) / h;
     EXPECT_LT((turn - middle.by_bias.block<3, 1>(0, i)).norm(), 2e-3) << i;
     EXPECT_LT(((more.dv - middle.dv) / h - middle.by_bias.block<3, 1>(3, i)).norm(), 1e-2) << i;
     EXPECT_LT(((more.dp - middle.dp) / h - middle.by_bias.block<3, 1>(6, i)).norm(), 1e-2) << i;
@@ -179,7 +181,7 @@ TEST(Preintegrate, CovarianceIsThatOfTheNoise) {
     const Preintegrated said = *Preintegrate(RecordImu(motion, noisy, 1.5, seed).samples, 500'000'000,
                                              1'200'000'000, none, none, noisy.noise);
     Eigen::Matrix<double, 9, 1> error;
-    error << VectorOf(Eigen::Quaterniond(truth.dR.conjugate() * said.dR)), said.dv - truth.dv,
+    error << VectorFromQuaternion(Eigen::Quaterniond(truth.dR.conjugate() * said.dR)), said.dv - truth.dv,
         said.dp - truth.dp;
     sum += error * error.transpose() / kNum;
   }

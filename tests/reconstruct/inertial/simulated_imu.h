@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/base/random.h"
+#include "core/geometry/rotation_vector.h"
 #include "core/geometry/similarity.h"
 #include "stages/reconstruct/inertial/inertial_alignment.h"
 #include "stages/reconstruct/inertial/inertial_start.h"
@@ -129,7 +130,7 @@ inline ImuRecording RecordImu(const Motion& motion, const SimulatedImu& imu, dou
     const Eigen::Vector3d force =
         now.rotation.conjugate() * Eigen::Vector3d(acceleration + kGravityMS2 * Eigen::Vector3d::UnitZ());
     const Eigen::Vector3d turn =
-        VectorOf(Eigen::Quaterniond(before.rotation.conjugate() * after.rotation)) / (2 * h);
+        VectorFromQuaternion(Eigen::Quaterniond(before.rotation.conjugate() * after.rotation)) / (2 * h);
     recording.samples.push_back({std::llround(t * 1e9),
                                  turn + imu.gyro_bias + normal(imu.noise.gyro_rad_s_rthz * root),
                                  force + imu.accel_bias + normal(imu.noise.accel_m_s2_rthz * root)});
@@ -168,8 +169,8 @@ inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const Simulat
     bent_rad += normal(RadFromDeg(model.bend_sigma_deg));
     Pose world_from_cam = motion(t + time_offset_s);
     world_from_cam.translation += bent_m + normal(model.place_sigma_m);
-    world_from_cam.rotation = QuaternionOf<double>(bent_rad) * world_from_cam.rotation *
-                              QuaternionOf<double>(normal(RadFromDeg(model.turn_sigma_deg)));
+    world_from_cam.rotation = QuaternionFromVector<double>(bent_rad) * world_from_cam.rotation *
+                              QuaternionFromVector<double>(normal(RadFromDeg(model.turn_sigma_deg)));
     const auto time_ns = std::llround(t * 1e9);
     images.push_back({fmt::format("{:010}.{:09}.jpg", time_ns / 1'000'000'000, time_ns % 1'000'000'000),
                       time_ns, TransformPose(model_from_world, world_from_cam.Inverse())});
