@@ -48,7 +48,7 @@ std::vector<int> Backbone(int num_images, const std::vector<ViewPair>& pairs,
                           const std::vector<ImageMotion>& motions, bool is_drive) {
   const double min_trust = is_drive ? kMinTrustOfDrive : kMinTrust;
   const auto trust = [](const ViewPair& pair) { return pair.strength * pair.closed; };
-  std::vector<bool> is_taken(pairs.size(), false);
+  std::vector<bool> is_taken(pairs.size());
   DisjointSets components(num_images);
   for (const ImageMotion& motion : motions) components.Join(motion.image1, motion.image2);
   for (size_t p = 0; p < pairs.size(); ++p) {

@@ -44,6 +44,10 @@ TEST(SetWeights, OfADriveFallWithTheDistanceUpToTen) {
   pairs[1].matches.resize(25);
   SetWeights(true, &pairs);
   EXPECT_DOUBLE_EQ(pairs[1].weight, 0.1);
+  // So is one that may have another rotation.
+  pairs[2].alternatives.resize(1);
+  SetWeights(true, &pairs);
+  EXPECT_DOUBLE_EQ(pairs[2].weight, 0.024);
   SetWeights(false, &pairs);
   EXPECT_DOUBLE_EQ(pairs[1].weight, 0.4);
   EXPECT_DOUBLE_EQ(pairs[3].weight, 0.8);
