@@ -1,7 +1,6 @@
 #include "core/structure/union_matches.h"
 
 #include <algorithm>
-#include <numeric>
 #include <tuple>
 
 #include "core/structure/disjoint_sets.h"
@@ -12,19 +11,14 @@ namespace {
 // Disjoint sets that know their keypoints.
 class TrackSets {
  public:
-  explicit TrackSets(const std::vector<int>& num_keypoints)
-      : sets_(std::accumulate(num_keypoints.begin(), num_keypoints.end(), 0)) {
-    for (size_t image = 0; image < num_keypoints.size(); ++image) {
-      first_node_.push_back(static_cast<int>(elements_.size()));
-      for (int k = 0; k < num_keypoints[image]; ++k) {
+  // first_keypoint: per image, counted over all; then the number of all.
+  explicit TrackSets(const std::vector<int32_t>& first_keypoint) : sets_(first_keypoint.back()) {
+    elements_.reserve(first_keypoint.back());
+    for (size_t image = 0; image + 1 < first_keypoint.size(); ++image) {
+      for (int32_t k = 0; k < first_keypoint[image + 1] - first_keypoint[image]; ++k)
         elements_.push_back({static_cast<int32_t>(image), static_cast<KeypointIdx>(k)});
-      }
     }
     members_.resize(elements_.size());
-  }
-
-  int NodeOf(const TrackElement& element) const {
-    return first_node_[element.image_idx] + static_cast<int>(element.keypoint_idx);
   }
 
   // False when the two sets hold different keypoints of one image.
@@ -58,7 +52,6 @@ class TrackSets {
   // A set that was never joined has no member list.
   Track TrackOf(int root) const { return members_[root].empty() ? Track{elements_[root]} : members_[root]; }
 
-  std::vector<int> first_node_;
   std::vector<TrackElement> elements_;
   DisjointSets sets_;
   std::vector<Track> members_;  // at the first node of each set of two or more
@@ -66,17 +59,30 @@ class TrackSets {
 
 }  // namespace
 
-std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
-                                int64_t* num_conflicts) {
-  std::sort(matches.begin(), matches.end(), [](const ScoredMatch& a, const ScoredMatch& b) {
-    return std::tie(b.dot_product, a.element1, a.element2) < std::tie(a.dot_product, b.element1, b.element2);
+ScoredMatches::ScoredMatches(const std::vector<int>& num_keypoints) : first_keypoint_{0} {
+  for (const int num : num_keypoints) first_keypoint_.push_back(first_keypoint_.back() + num);
+}
+
+void ScoredMatches::Add(const TrackElement& element1, const TrackElement& element2, int32_t dot_product) {
+  const auto keypoint = [&](const TrackElement& element) {
+    return first_keypoint_[element.image_idx] + static_cast<int32_t>(element.keypoint_idx);
+  };
+  matches_.push_back({keypoint(element1), keypoint(element2), dot_product});
+}
+
+std::vector<Track> UnionMatches(ScoredMatches matches, int64_t* num_conflicts) {
+  using Match = ScoredMatches::Match;
+  std::sort(matches.matches_.begin(), matches.matches_.end(), [](const Match& a, const Match& b) {
+    return std::tie(b.dot_product, a.keypoint1, a.keypoint2) <
+           std::tie(a.dot_product, b.keypoint1, b.keypoint2);
   });
-  TrackSets sets(num_keypoints);
+  TrackSets sets(matches.first_keypoint_);
   *num_conflicts = 0;
-  for (const ScoredMatch& match : matches) {
+  for (const Match& match : matches.matches_) {
     // [Sala06 §VI-B] keypoints are equivalent where verified matches join them, not by their distance alone
-    if (!sets.Union(sets.NodeOf(match.element1), sets.NodeOf(match.element2))) ++*num_conflicts;
+    if (!sets.Union(match.keypoint1, match.keypoint2)) ++*num_conflicts;
   }
+  std::vector<Match>().swap(matches.matches_);
   return sets.Tracks();
 }
 

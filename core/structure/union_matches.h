@@ -1,11 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "core/base/ids.h"
-#include "core/colmap/colmap_database.h"
-#include "core/features/features.h"
 
 namespace cairn {
 
@@ -18,18 +17,31 @@ struct TrackElement {
 };
 using Track = std::vector<TrackElement>;  // ascending, one per image
 
-// A verified match between two images, and how alike its descriptors are (larger is better).
-struct ScoredMatch {
-  TrackElement element1;
-  TrackElement element2;
-  int32_t dot_product = 0;
+// Verified matches between images, with how alike their descriptors are.  There are millions: one takes
+// twelve bytes.
+class ScoredMatches {
+ public:
+  // num_keypoints[i]: number of keypoints of image i.
+  explicit ScoredMatches(const std::vector<int>& num_keypoints);
+  // Makes room for so many.
+  void Reserve(size_t num_matches) { matches_.reserve(num_matches); }
+  // A larger dot product is more alike.
+  void Add(const TrackElement& element1, const TrackElement& element2, int32_t dot_product);
+
+ private:
+  friend std::vector<Track> UnionMatches(ScoredMatches matches, int64_t* num_conflicts);
+  struct Match {
+    int32_t keypoint1, keypoint2;  // counted over all images
+    int32_t dot_product;
+  };
+  std::vector<int32_t> first_keypoint_;  // per image; then the number of all
+  std::vector<Match> matches_;
 };
 
 // Joins keypoints that match into tracks [Sala06 §VI-B: equivalence classes], most alike first.  A match that
 // would put two keypoints of one image into a class is not followed: the class stays split there.  Counts
 // such matches in `num_conflicts`.  Tracks of fewer than two keypoints are left out; ascending by first
-// element.  num_keypoints[i]: number of keypoints of image i.  O(matches log matches).
-std::vector<Track> UnionMatches(const std::vector<int>& num_keypoints, std::vector<ScoredMatch> matches,
-                                int64_t* num_conflicts);
+// element.  O(matches log matches).
+std::vector<Track> UnionMatches(ScoredMatches matches, int64_t* num_conflicts);
 
 }  // namespace cairn

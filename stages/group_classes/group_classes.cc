@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "core/base/parallel.h"
 #include "core/files/database.h"
 #include "core/structure/union_matches.h"
 #include "stages/group_classes/make_classes.h"
@@ -12,28 +13,45 @@
 namespace cairn::group_classes {
 namespace {
 
-std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed,
+// Per posed image and keypoint: whether its camera has a ray for it.
+std::vector<std::vector<bool>> FindRays(const MatchedFeatures& matched, const PosedImages& posed,
+                                        int num_threads) {
+  std::vector<std::vector<bool>> has_ray(posed.num_images());
+  ParallelFor(posed.num_images(), num_threads, [&](int64_t i) {
+    const auto num_keypoints =
+        static_cast<KeypointIdx>(matched.features[posed.feature_idx[i]].keypoints.size());
+    for (KeypointIdx k = 0; k < num_keypoints; ++k)
+      has_ray[i].push_back(RayOf(matched, posed, {static_cast<int32_t>(i), k}).has_value());
+  });
+  return has_ray;
+}
+
+std::vector<Track> BuildTracks(const MatchedFeatures& matched, const PosedImages& posed, int num_threads,
                                int64_t* num_conflicts) {
   std::map<ImageId, int> posed_idx;
   std::vector<int> num_keypoints;
   for (int i = 0; i < posed.num_images(); ++i) {
     posed_idx.emplace(matched.images[posed.feature_idx[i]].image_id, i);
-    num_keypoints.push_back(static_cast<int>(posed.rays[i].size()));
+    num_keypoints.push_back(static_cast<int>(matched.features[posed.feature_idx[i]].keypoints.size()));
   }
-  std::vector<ScoredMatch> matches;
+  const std::vector<std::vector<bool>> has_ray = FindRays(matched, posed, num_threads);
+  size_t num_matches = 0;
+  for (const TwoViewGeometry& geometry : matched.geometries) num_matches += geometry.inliers.size();
+  ScoredMatches matches(num_keypoints);
+  matches.Reserve(num_matches);
   for (const TwoViewGeometry& geometry : matched.geometries) {
     const auto image1 = posed_idx.find(geometry.image_id1), image2 = posed_idx.find(geometry.image_id2);
     if (image1 == posed_idx.end() || image2 == posed_idx.end()) continue;
     const DescriptorMatrix& descriptors1 = matched.features[posed.feature_idx[image1->second]].descriptors;
     const DescriptorMatrix& descriptors2 = matched.features[posed.feature_idx[image2->second]].descriptors;
     for (const Match& match : geometry.inliers) {
+      if (!has_ray[image1->second][match.idx1] || !has_ray[image2->second][match.idx2]) continue;
       const int32_t dot =
           descriptors1.row(match.idx1).cast<int32_t>().dot(descriptors2.row(match.idx2).cast<int32_t>());
-      if (!posed.rays[image1->second][match.idx1] || !posed.rays[image2->second][match.idx2]) continue;
-      matches.push_back({{image1->second, match.idx1}, {image2->second, match.idx2}, dot});
+      matches.Add({image1->second, match.idx1}, {image2->second, match.idx2}, dot);
     }
   }
-  return UnionMatches(num_keypoints, std::move(matches), num_conflicts);
+  return UnionMatches(std::move(matches), num_conflicts);
 }
 
 // Images without a pose, and pairs that have one of them.
@@ -157,7 +175,7 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
                                         Progress& progress, SolvedFile* solved) {
-  PosedImages posed = CollectPosedImages(matched, capture, num_threads);
+  PosedImages posed = CollectPosedImages(matched, capture);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
                      "{}: no image has a pose, but landmarks are triangulated from posed images; give an "
@@ -165,14 +183,14 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
                      capture.root);
   }
   GroupClassesResult result;
-  const std::vector<Track> tracks = BuildTracks(matched, posed, &result.num_conflicts);
+  const std::vector<Track> tracks = BuildTracks(matched, posed, num_threads, &result.num_conflicts);
   result.num_tracks = static_cast<int64_t>(tracks.size());
 
   progress.Begin("triangulate tracks", 1, "rounds");
   TriangulateOptions first = options.triangulation;
   first.max_reprojection_error_px =
       std::max(options.initial_reprojection_error_px, first.max_reprojection_error_px);
-  std::vector<Triangulation> triangulations = TriangulateTracks(tracks, posed, first, num_threads);
+  std::vector<Triangulation> triangulations = TriangulateTracks(matched, tracks, posed, first, num_threads);
   result.initial_rms_px = RmsErrorPx(triangulations);
   progress.Advance();
   progress.End();
@@ -188,7 +206,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   }
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while adjusting poses");
   progress.Begin("group classes", 2, "steps");
-  triangulations = TriangulateTracks(tracks, posed, options.triangulation, num_threads);
+  triangulations = TriangulateTracks(matched, tracks, posed, options.triangulation, num_threads);
   progress.Advance();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while grouping classes");
   result.final_rms_px = RmsErrorPx(triangulations);

@@ -21,7 +21,7 @@ namespace cairn::group_classes {
 // Turns keypoints that match into feature classes: one per scene feature, with its place in space and one
 // descriptor.  Before: match_features.  After: filter_visibility, emit_map.  Implements [Sala06 §VI-B]
 // (equivalence classes, ambiguity).  Differs from it: keypoints are joined by verified matches
-// (tracks/union_matches.h), not by distance in feature space alone; classes are triangulated from the
+// (core/structure/union_matches.h), not by distance in feature space alone; classes are triangulated from the
 // survey's poses and cameras, which are themselves adjusted as far as the images show that they are wrong
 // (adjust/adjust_survey.h); a class whose look-alike lies at the same place is that place's duplicate, not
 // ambiguous.

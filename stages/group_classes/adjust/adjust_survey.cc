@@ -135,9 +135,6 @@ class SurveyAdjuster {
         if (candidates_[c][v].name == findings.cameras[c].variant) variants_[c] = static_cast<int>(v);
       }
     }
-    const auto is_as_stated = [](const CameraFinding& camera) { return camera.variant.empty(); };
-    if (!std::all_of(findings.cameras.begin(), findings.cameras.end(), is_as_stated))
-      MakeRays(matched_, num_threads_, &posed_);
     const Pose offset = findings.camera_from_given;
     for (int i = 0; i < posed_.num_images(); ++i) {
       posed_.poses[i] = offset * posed_.stated[i];
@@ -155,11 +152,11 @@ class SurveyAdjuster {
     if (progress_.Cancelled()) return;
     progress_.Begin("adjust all poses", 2 * int64_t{options_.max_num_iterations}, "steps at most");
     bundle_options_.steps = &progress_;
-    Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
+    Select(TriangulateTracks(matched_, tracks_, posed_, first, num_threads_));
     Adjust(nullptr);
     if (!progress_.Cancelled()) {  // again, with all that agrees now, and to the end
       bundle_options_.function_tolerance = BundleOptions().function_tolerance;
-      Select(TriangulateTracks(tracks_, posed_, triangulate_, num_threads_));
+      Select(TriangulateTracks(matched_, tracks_, posed_, triangulate_, num_threads_));
       Adjust(nullptr);
     }
     progress_.End();
@@ -178,7 +175,7 @@ class SurveyAdjuster {
       problem_.images[i].cam_from_world = posed_.poses[i];
       problem_.images[i].drifted = drifted[i];
     }
-    Select(TriangulateTracks(tracks_, posed_, first, num_threads_));
+    Select(TriangulateTracks(matched_, tracks_, posed_, first, num_threads_));
     Adjust(nullptr);
     for (int i = 0; i < posed_.num_images(); ++i) drifted[i] = problem_.images[i].drifted;
     return {posed_.poses, std::move(drifted)};
@@ -297,7 +294,7 @@ class SurveyAdjuster {
         observation.image_idx = element.image_idx;
         observation.point_idx = point_idx;
         observation.pixel = {keypoint.x, keypoint.y};
-        observation.ray = *posed_.rays[element.image_idx][element.keypoint_idx];
+        observation.ray = RayOfTrack(matched_, posed_, element);
         problem_.observations.push_back(std::move(observation));
         scales_.push_back(keypoint.scale);
       }
@@ -358,18 +355,14 @@ class SurveyAdjuster {
   void Adjust(BundleEvidence* evidence) {
     AdjustBundle(bundle_options_, &problem_, evidence);
     for (int i = 0; i < posed_.num_images(); ++i) posed_.poses[i] = problem_.images[i].cam_from_world;
-    bool changed = false;
     for (size_t c = 0; c < problem_.cameras.size(); ++c) {
       const CameraBlock& block = problem_.cameras[c];
-      for (size_t k = 0; k < block.free.size(); ++k) {
+      for (size_t k = 0; k < block.free.size(); ++k)
         posed_.cameras[c].params[block.free[k]] += block.delta[k];
-        changed = true;
-      }
     }
-    if (changed) MakeRays(matched_, num_threads_, &posed_);
     if (!is_learning_) return;  // tracks are selected anew
     findings_.keypoints = MeasureKeypointNoise(problem_, scales_);
-    Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
+    Fill(TriangulateTracks(matched_, selected_, posed_, triangulate_, num_threads_));
   }
 
   void LearnNoise() {
@@ -441,8 +434,7 @@ class SurveyAdjuster {
       posed_.cameras[c] = candidates_[c][best].camera;
     }
     if (changed) {
-      MakeRays(matched_, num_threads_, &posed_);
-      Fill(TriangulateTracks(selected_, posed_, triangulate_, num_threads_));
+      Fill(TriangulateTracks(matched_, selected_, posed_, triangulate_, num_threads_));
       Adjust(nullptr);
     }
     return changed;
@@ -498,7 +490,7 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
                             int num_threads, const PosedImages& posed) {
   SubSurvey sub = Restrict(posed, tracks, ImagesToLearnFrom(posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
-      TriangulateTracks(sub.tracks, sub.posed, triangulate, num_threads);
+      TriangulateTracks(matched, sub.tracks, sub.posed, triangulate, num_threads);
   NoProgress progress;
   return SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, nullptr, &sub.posed)
       .Measure(triangulations);
@@ -510,7 +502,7 @@ SurveyFindings AdjustSurvey(const MatchedFeatures& matched, const std::vector<Tr
                             SolvedFile* solved, PosedImages* posed) {
   SubSurvey sub = Restrict(*posed, tracks, ImagesToLearnFrom(*posed, options.num_images_learnt));
   const std::vector<Triangulation> triangulations =
-      TriangulateTracks(sub.tracks, sub.posed, first, num_threads);
+      TriangulateTracks(matched, sub.tracks, sub.posed, first, num_threads);
   const SurveyFindings findings =
       SurveyAdjuster(matched, sub.tracks, triangulate, options, num_threads, progress, solved, &sub.posed)
           .Learn(triangulations);

@@ -74,7 +74,7 @@ KeypointNoise MeasureSurvey(const MatchedFeatures& matched, const std::vector<Tr
 //   - an offset that is not significant is none;
 //   - a large survey is straightened in parts first (parts.h), so that its size adds no steps to the
 //     adjustment of the whole.
-// The world frame stays that of the stated poses, in the mean.  Changes poses, cameras, rays and
+// The world frame stays that of the stated poses, in the mean.  Changes poses, cameras and
 // camera_from_given of `posed`.  `solved`: where what was solved is kept (solved_file.h); may be null.
 // `first`: how tracks are triangulated by poses and cameras as stated.  Stops early, with no meaning, when
 // progress is cancelled.  Pure; same result for any number of threads.  O(images

@@ -8,7 +8,7 @@
 
 namespace cairn::group_classes {
 
-PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture, int num_threads) {
+PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture) {
   std::map<std::string, Pose> poses;
   for (const CaptureImage& image : capture.images) {
     if (image.cam_from_world) poses.emplace(image.name, *image.cam_from_world);
@@ -27,26 +27,31 @@ PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& ca
     posed.stated.push_back(*pose);
   }
   posed.poses = posed.stated;
-  MakeRays(matched, num_threads, &posed);
   return posed;
 }
 
-void MakeRays(const MatchedFeatures& matched, int num_threads, PosedImages* posed) {
-  posed->rays.assign(posed->num_images(), {});
-  ParallelFor(posed->num_images(), num_threads, [&](int64_t i) {
-    const Camera& camera = posed->cameras[posed->camera_idx[i]];
-    for (const Keypoint& keypoint : matched.features[posed->feature_idx[i]].keypoints)
-      posed->rays[i].push_back(MakePixelRay(camera, Eigen::Vector2d(keypoint.x, keypoint.y)));
-  });
+std::optional<PixelRay> RayOf(const MatchedFeatures& matched, const PosedImages& posed,
+                              const TrackElement& element) {
+  const Keypoint& keypoint =
+      matched.features[posed.feature_idx[element.image_idx]].keypoints[element.keypoint_idx];
+  return MakePixelRay(posed.cameras[posed.camera_idx[element.image_idx]],
+                      Eigen::Vector2d(keypoint.x, keypoint.y));
 }
 
-std::vector<Triangulation> TriangulateTracks(const std::vector<Track>& tracks, const PosedImages& posed,
-                                             const TriangulateOptions& options, int num_threads) {
+PixelRay RayOfTrack(const MatchedFeatures& matched, const PosedImages& posed, const TrackElement& element) {
+  PixelRay lost;
+  lost.normal.setZero();
+  return RayOf(matched, posed, element).value_or(lost);
+}
+
+std::vector<Triangulation> TriangulateTracks(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                                             const PosedImages& posed, const TriangulateOptions& options,
+                                             int num_threads) {
   std::vector<Triangulation> triangulations(tracks.size());
   ParallelFor(static_cast<int64_t>(tracks.size()), num_threads, [&](int64_t t) {
     std::vector<PosedRay> rays;
     for (const TrackElement& element : tracks[t])
-      rays.push_back({posed.poses[element.image_idx], *posed.rays[element.image_idx][element.keypoint_idx]});
+      rays.push_back({posed.poses[element.image_idx], RayOfTrack(matched, posed, element)});
     triangulations[t] = Triangulate(rays, options);
   });
   return triangulations;

@@ -29,18 +29,23 @@ struct PosedImages {
   std::vector<Pose> stated;
   std::vector<Pose> poses;
   Pose camera_from_given;
-  std::vector<std::vector<std::optional<PixelRay>>> rays;  // per image and keypoint, by `cameras`
   int num_images() const { return static_cast<int>(stated.size()); }
 };
 
-PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture, int num_threads);
+PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture);
 
-// Makes the rays again: the cameras have changed.
-void MakeRays(const MatchedFeatures& matched, int num_threads, PosedImages* posed);
+// The ray of a keypoint by `cameras` as they are by now: a ray of each would take a hundred bytes, so none is
+// kept.  Nothing where the camera's model has none.
+std::optional<PixelRay> RayOf(const MatchedFeatures& matched, const PosedImages& posed,
+                              const TrackElement& element);
+// The same of one that had a ray when tracks were made; where a camera has lost it since, a ray that no point
+// is in front of.
+PixelRay RayOfTrack(const MatchedFeatures& matched, const PosedImages& posed, const TrackElement& element);
 
 // Each track triangulated from the images' poses.
-std::vector<Triangulation> TriangulateTracks(const std::vector<Track>& tracks, const PosedImages& posed,
-                                             const TriangulateOptions& options, int num_threads);
+std::vector<Triangulation> TriangulateTracks(const MatchedFeatures& matched, const std::vector<Track>& tracks,
+                                             const PosedImages& posed, const TriangulateOptions& options,
+                                             int num_threads);
 
 // Root mean square reprojection error of the keypoints kept, pixels; 0 without any.
 double RmsErrorPx(const std::vector<Triangulation>& triangulations);

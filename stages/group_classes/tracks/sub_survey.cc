@@ -19,7 +19,6 @@ PosedImages SelectImages(const PosedImages& all, const std::vector<int>& images)
     selected.camera_idx.push_back(all.camera_idx[i]);
     selected.stated.push_back(all.stated[i]);
     selected.poses.push_back(all.poses[i]);
-    selected.rays.push_back(all.rays[i]);
   }
   return selected;
 }

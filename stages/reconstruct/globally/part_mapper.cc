@@ -166,16 +166,16 @@ Eigen::Vector2d PartMapper::PixelOf(const TrackElement& element) const {
 void PartMapper::MakeTracks() {
   std::vector<int> num_keypoints;
   for (const int image : images_) num_keypoints.push_back(static_cast<int>(input_.keypoints[image].size()));
-  std::vector<ScoredMatch> matches;
+  ScoredMatches matches(num_keypoints);
   for (size_t p = 0; p < pairs_.size(); ++p) {
     if (!is_accepted_[p]) continue;
     // Of strong pairs first.
     const auto score = static_cast<int32_t>(1e6 * pairs_[p].strength);
     for (const Match& match : pairs_[p].matches)
-      matches.push_back({{pairs_[p].image1, match.idx1}, {pairs_[p].image2, match.idx2}, score});
+      matches.Add({pairs_[p].image1, match.idx1}, {pairs_[p].image2, match.idx2}, score);
   }
   int64_t num_conflicts = 0;
-  tracks_ = UnionMatches(num_keypoints, std::move(matches), &num_conflicts);
+  tracks_ = UnionMatches(std::move(matches), &num_conflicts);
   std::erase_if(tracks_, [](const Track& track) { return static_cast<int>(track.size()) < kMinTrackLength; });
   std::stable_sort(tracks_.begin(), tracks_.end(),
                    [](const Track& a, const Track& b) { return a.size() > b.size(); });
