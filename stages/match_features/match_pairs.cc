@@ -30,10 +30,15 @@ uint64_t CurvePosition(const std::pair<int, int>& pair) {
   return SpreadBits(static_cast<uint32_t>(pair.first)) << 1 | SpreadBits(static_cast<uint32_t>(pair.second));
 }
 
+// Whether an image's pairs may be matched again by their geometry: that alone reads unpacked descriptors.
+bool IsGuided(const MatchImage& image, const VerifyPairOptions& options) {
+  return options.guided_matching == "all" || (options.guided_matching == "posed" && image.cam_from_world);
+}
+
 // Features of all images of pairs [begin, end); those in `held` are not read again.
 Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImages& images,
-                                     const IndexPairs& pairs, int64_t begin, int64_t end,
-                                     const FeaturesOfImages& held, const Progress& progress) {
+                                     const VerifyPairOptions& options, const IndexPairs& pairs, int64_t begin,
+                                     int64_t end, const FeaturesOfImages& held, const Progress& progress) {
   FeaturesOfImages result;
   for (int64_t i = begin; i < end; ++i) {
     for (const int idx : {pairs[i].first, pairs[i].second}) {
@@ -44,8 +49,9 @@ Result<FeaturesOfImages> ReadStretch(SQLite::Database& database, const MatchImag
       }
       if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while reading features");
       const MatchImage& image = images.images[idx];
-      CAIRN_ASSIGN_OR_RETURN(ImageFeatures features,
-                             ReadImageFeatures(database, image, images.cameras.at(image.camera_id)));
+      CAIRN_ASSIGN_OR_RETURN(
+          ImageFeatures features,
+          ReadImageFeatures(database, image, images.cameras.at(image.camera_id), IsGuided(image, options)));
       result.emplace(idx, std::make_shared<const ImageFeatures>(std::move(features)));
     }
   }
@@ -59,8 +65,8 @@ struct MatchedPair {
 
 ViewForVerification ForVerification(const MatchImages& images, const MatchImage& image,
                                     const ImageFeatures& features) {
-  return {&images.cameras.at(image.camera_id), &features.keypoints, &features.bearings, &features.descriptors,
-          image.cam_from_world};
+  return {&images.cameras.at(image.camera_id), &features.keypoints, &features.bearings,
+          features.descriptors.rows() > 0 ? &features.descriptors : nullptr, image.cam_from_world};
 }
 
 MatchedPair MatchPair(const MatchImages& images, const std::pair<int, int>& pair,
@@ -86,22 +92,21 @@ void SortAlongCurve(IndexPairs* pairs) {
             [](const auto& a, const auto& b) { return CurvePosition(a) < CurvePosition(b); });
 }
 
-std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<MatchImage>& images,
+std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<int64_t>& num_bytes,
                                       int64_t max_num_bytes) {
   std::vector<int64_t> ends;
   std::unordered_set<int> held;
-  int64_t num_bytes = 0;
+  int64_t num_held_bytes = 0;
   for (int64_t i = 0; i < static_cast<int64_t>(pairs.size()); ++i) {
     const auto [idx1, idx2] = pairs[i];
-    const auto bytes_of = [&](int idx) { return ImageFeatures::NumBytes(images[idx].num_features); };
     const int64_t num_more =
-        (held.contains(idx1) ? 0 : bytes_of(idx1)) + (held.contains(idx2) ? 0 : bytes_of(idx2));
-    if (!held.empty() && num_bytes + num_more > max_num_bytes) {
+        (held.contains(idx1) ? 0 : num_bytes[idx1]) + (held.contains(idx2) ? 0 : num_bytes[idx2]);
+    if (!held.empty() && num_held_bytes + num_more > max_num_bytes) {
       ends.push_back(i);
       held.clear();
-      num_bytes = bytes_of(idx1) + bytes_of(idx2);
+      num_held_bytes = num_bytes[idx1] + num_bytes[idx2];
     } else {
-      num_bytes += num_more;
+      num_held_bytes += num_more;
     }
     held.insert({idx1, idx2});
   }
@@ -114,17 +119,22 @@ Status MatchPairs(SQLite::Database& database, const MatchImages& images, IndexPa
                   const TakeGeometry& take) {
   SortAlongCurve(&pairs);
   const int64_t budget = static_cast<int64_t>(options.memory_budget_mib) << 20;
-  const std::vector<int64_t> ends = CutIntoStretches(pairs, images.images, budget / 2);
+  std::vector<int64_t> num_bytes;
+  for (const MatchImage& image : images.images)
+    num_bytes.push_back(ImageFeatures::NumBytes(image.num_features, IsGuided(image, options.verification)));
+  const std::vector<int64_t> ends = CutIntoStretches(pairs, num_bytes, budget / 2);
   FeaturesOfImages features;
   int64_t begin = 0;
   for (size_t stretch = 0; stretch < ends.size(); ++stretch) {
     if (stretch == 0) {
-      CAIRN_ASSIGN_OR_RETURN(features, ReadStretch(database, images, pairs, 0, ends[0], {}, progress));
+      CAIRN_ASSIGN_OR_RETURN(
+          features, ReadStretch(database, images, options.verification, pairs, 0, ends[0], {}, progress));
     }
     std::future<Result<FeaturesOfImages>> next;
     if (stretch + 1 < ends.size()) {
       next = std::async(std::launch::async | std::launch::deferred, [&, stretch] {
-        return ReadStretch(database, images, pairs, ends[stretch], ends[stretch + 1], features, progress);
+        return ReadStretch(database, images, options.verification, pairs, ends[stretch], ends[stretch + 1],
+                           features, progress);
       });
     }
     for (; begin < ends[stretch]; begin = std::min(begin + kBatchSize, ends[stretch])) {

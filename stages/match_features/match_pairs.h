@@ -17,7 +17,7 @@ namespace cairn::match_features {
 struct MatchPairsOptions {
   // Largest memory that the features of images may take at a time, MiB: features beyond it are read again
   // when they are needed.  Two images are always held.  REQUIRES: >= 1
-  int memory_budget_mib = 1024;
+  int memory_budget_mib = 512;
   DescriptorMatcherOptions matcher;  // has the defaults of max_ratio and max_angle_rad
   VerifyPairOptions verification;
 };
@@ -30,8 +30,8 @@ OptionTable DescribeOptions(MatchPairsOptions* options);
 void SortAlongCurve(IndexPairs* pairs);
 
 // Stretches of `pairs` whose images take at most `max_num_bytes`: the end of each, ascending, the last is
-// pairs.size().  A stretch holds at least one pair.
-std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<MatchImage>& images,
+// pairs.size().  A stretch holds at least one pair.  `num_bytes`: what each image takes.
+std::vector<int64_t> CutIntoStretches(const IndexPairs& pairs, const std::vector<int64_t>& num_bytes,
                                       int64_t max_num_bytes);
 
 // Takes a pair's verified geometry (no inliers: not verified) and its number of putative matches.

@@ -115,6 +115,27 @@ TEST_F(MatchFeaturesTest, RetrievalMatchesImagesThatShowTheSameWords) {
   EXPECT_EQ(geometries->at(1).image_id1, 3u);
 }
 
+TEST_F(MatchFeaturesTest, LookAlikesAreMatchedByTheGeometryWhereItMayGuide) {
+  // Points 0 and 1 look the same: of 80 points 78 are matched by their looks alone.
+  const auto same_looks = [](SQLite::Database& database) {
+    DescriptorMatrix descriptors = *ReadDatabaseDescriptors(database, 1);
+    descriptors.row(1) = descriptors.row(0);
+    SQLite::Statement update(database, "UPDATE descriptors SET data = ?");
+    update.bind(1, descriptors.data(), static_cast<int>(descriptors.size()));
+    update.exec();
+  };
+  WriteFeatures(2, same_looks);
+  const auto num_inliers = [&](bool with_poses, const std::string& guided_matching) {
+    options_.matching.verification.guided_matching = guided_matching;
+    const auto summary = Match(with_poses);
+    return summary.ok() ? summary->num_inliers : -1;
+  };
+  EXPECT_EQ(num_inliers(true, "none"), 78);
+  EXPECT_EQ(num_inliers(true, "posed"), 80);
+  EXPECT_EQ(num_inliers(false, "posed"), 78);
+  EXPECT_EQ(num_inliers(false, "all"), 80);
+}
+
 TEST_F(MatchFeaturesTest, VocabularyWithoutWordsIsAnError) {
   WriteFeatures(3);
   Vocabulary vocabulary;

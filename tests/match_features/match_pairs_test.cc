@@ -9,12 +9,6 @@ namespace {
 using testing::ElementsAre;
 using testing::Pair;
 
-std::vector<MatchImage> Images(int num_images, int num_features) {
-  std::vector<MatchImage> images(num_images);
-  for (MatchImage& image : images) image.num_features = num_features;
-  return images;
-}
-
 TEST(MatchPairs, OrderFollowsTheCurve) {
   //        idx2  1  2  3      the curve visits (0, 1), then the square of 0 1 x 2 3 in the order
   // idx1 0       1  2  3      0 2, 0 3, 1 2, 1 3, then 2 3
@@ -26,8 +20,8 @@ TEST(MatchPairs, OrderFollowsTheCurve) {
 }
 
 TEST(MatchPairs, StretchesFitTheBudget) {
-  const int64_t size = ImageFeatures::NumBytes(100);
-  const std::vector<MatchImage> images = Images(4, 100);
+  const int64_t size = 1000;
+  const std::vector<int64_t> images(4, size);
   IndexPairs pairs = ExhaustivePairs(4);
   SortAlongCurve(&pairs);
   EXPECT_THAT(CutIntoStretches(pairs, images, 4 * size), ElementsAre(6));
@@ -41,10 +35,10 @@ TEST(MatchPairs, StretchesFitTheBudget) {
 TEST(MatchPairs, FewImagesAreReadAgainForASmallBudget) {
   // 256 images exhaustively, 32 held at a time: the pairs are 8 x 8 / 2 blocks of 32 x 32 images, each read
   // as a part of 2 x 16 images; image by image it would be 256 * 255 / 2 reads.
-  const std::vector<MatchImage> images = Images(256, 1000);
+  const std::vector<int64_t> images(256, 1000);
   IndexPairs pairs = ExhaustivePairs(256);
   SortAlongCurve(&pairs);
-  const std::vector<int64_t> ends = CutIntoStretches(pairs, images, 32 * ImageFeatures::NumBytes(1000));
+  const std::vector<int64_t> ends = CutIntoStretches(pairs, images, 32 * 1000);
   EXPECT_LE(ends.size() * 32, 256 * 255 / 2 / 6);
   EXPECT_TRUE(std::is_sorted(ends.begin(), ends.end()));
   EXPECT_EQ(ends.back(), 256 * 255 / 2);

@@ -74,18 +74,20 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
   return result;
 }
 
-int64_t ImageFeatures::NumBytes(int num_features) {
-  constexpr int64_t kRowBytes = sizeof(Keypoint) + sizeof(Eigen::Vector3d) + kDescriptorDim;
-  return PackedDescriptors::NumBytes(num_features) + kRowBytes * num_features;
+int64_t ImageFeatures::NumBytes(int num_features, bool has_descriptors) {
+  const int64_t row_bytes =
+      sizeof(Keypoint) + sizeof(Eigen::Vector3d) + (has_descriptors ? kDescriptorDim : 0);
+  return PackedDescriptors::NumBytes(num_features) + row_bytes * num_features;
 }
 
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
-                                        const Camera& camera) {
+                                        const Camera& camera, bool keep_descriptors) {
   ImageFeatures features;
   CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, image.image_id));
   CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, image.image_id));
   features.packed = PackedDescriptors(features.descriptors);
   features.bearings = BearingsOf(features.keypoints, camera);
+  if (!keep_descriptors) features.descriptors = {};
   return features;
 }
 

@@ -42,16 +42,17 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
 struct ImageFeatures {
   std::vector<Keypoint> keypoints;
   std::vector<Eigen::Vector3d> bearings;  // of the keypoints, unit vectors, NaN where undefined
-  DescriptorMatrix descriptors;
+  DescriptorMatrix descriptors;           // for guided matching; without rows where there is none
   PackedDescriptors packed;
 
   // Upper limit of the memory that the features of an image take, bytes.
-  static int64_t NumBytes(int num_features);
+  static int64_t NumBytes(int num_features, bool has_descriptors);
 };
 
-// Errors: Corrupt.  Throws like ReadMatchImages.
+// Unpacked descriptors are left out where `keep_descriptors` is false.  Errors: Corrupt.  Throws like
+// ReadMatchImages.
 Result<ImageFeatures> ReadImageFeatures(SQLite::Database& database, const MatchImage& image,
-                                        const Camera& camera);
+                                        const Camera& camera, bool keep_descriptors);
 
 // Only the bearings of ImageFeatures.  Errors: Corrupt.  Throws like ReadMatchImages.
 Result<std::vector<Eigen::Vector3d>> ReadImageBearings(SQLite::Database& database, const MatchImage& image,
