@@ -50,8 +50,7 @@ ReprojectionCost::ReprojectionCost(const PixelRay& ray, const CameraSensitivity&
     : ray_(ray), camera_(camera), weight_(1 / sigma_px) {
   set_num_residuals(2);
   *mutable_parameter_block_sizes() = {kPoseBlockSize, 3};
-  if (!camera.by_param.empty())
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.by_param.size()));
+  if (!camera.empty()) mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.size()));
 }
 
 bool ReprojectionCost::Evaluate(double const* const* parameters, double* residuals,
@@ -66,12 +65,12 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   residual = weight_ / depth * (ray_.pixel_from_plane * x);
   Eigen::Matrix<double, 2, 3> from_x;
   from_x = (weight_ * ray_.pixel_from_plane - residual * ray_.normal.transpose()) / depth;
-  const size_t num_free = camera_.by_param.size();
+  const size_t num_free = camera_.size();
   const Eigen::Vector2d before = residual;
   Eigen::Matrix2d growth = Eigen::Matrix2d::Identity();
   for (size_t p = 0; p < num_free; ++p) {
-    residual += parameters[2][p] * (weight_ * camera_.by_param[p] + camera_.growth[p] * before);
-    growth += parameters[2][p] * camera_.growth[p];
+    residual += parameters[2][p] * (weight_ * camera_[p].by_param + camera_[p].growth * before);
+    growth += parameters[2][p] * camera_[p].growth;
   }
   from_x = (growth * from_x).eval();
   if (jacobians == nullptr) return true;
@@ -95,7 +94,7 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
     Eigen::Map<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> out(
         jacobians[2], 2, static_cast<Eigen::Index>(num_free));
     for (size_t p = 0; p < num_free; ++p) {
-      out.col(static_cast<Eigen::Index>(p)) = weight_ * camera_.by_param[p] + camera_.growth[p] * before;
+      out.col(static_cast<Eigen::Index>(p)) = weight_ * camera_[p].by_param + camera_[p].growth * before;
     }
   }
   return true;

@@ -27,9 +27,7 @@ CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pix
   const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(kStepPx, 0),
                                                   Eigen::Vector2d(-kStepPx, 0), Eigen::Vector2d(0, kStepPx),
                                                   Eigen::Vector2d(0, -kStepPx)};
-  CameraSensitivity sensitivity;
-  sensitivity.by_param.assign(params.size(), Eigen::Vector2d::Zero());
-  sensitivity.growth.assign(params.size(), Eigen::Matrix2d::Zero());
+  CameraSensitivity sensitivity(params.size());
   std::array<std::optional<Eigen::Vector3d>, 5> bearings;
   for (size_t i = 0; i < offsets.size(); ++i) {
     bearings[i] = BearingFromImage(camera, pixel + offsets[i]);
@@ -45,9 +43,9 @@ CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pix
       const auto a = ImageFromCamera(less, *bearings[i]), b = ImageFromCamera(more, *bearings[i]);
       derivatives[i] = a && b ? Eigen::Vector2d((*b - *a) / (2 * step)) : Eigen::Vector2d::Zero().eval();
     }
-    sensitivity.by_param[p] = derivatives[0];
-    sensitivity.growth[p].col(0) = (derivatives[1] - derivatives[2]) / (2 * kStepPx);
-    sensitivity.growth[p].col(1) = (derivatives[3] - derivatives[4]) / (2 * kStepPx);
+    sensitivity[p].by_param = derivatives[0];
+    sensitivity[p].growth.col(0) = (derivatives[1] - derivatives[2]) / (2 * kStepPx);
+    sensitivity[p].growth.col(1) = (derivatives[3] - derivatives[4]) / (2 * kStepPx);
   }
   return sensitivity;
 }

@@ -15,10 +15,11 @@ int NumFocals(CameraModel model);
 //   r + sum_p d_p (by_param_p + growth_p r)
 // The growth must not be left out: without it residuals seem to shrink as the focal length grows, and every
 // focal length is found too long.
-struct CameraSensitivity {
-  std::vector<Eigen::Vector2d> by_param;  // d pixel / d parameter, along the pixel's ray
-  std::vector<Eigen::Matrix2d> growth;    // d by_param / d pixel
+struct ParameterSensitivity {
+  Eigen::Vector2d by_param = Eigen::Vector2d::Zero();  // d pixel / d parameter, along the pixel's ray
+  Eigen::Matrix2d growth = Eigen::Matrix2d::Zero();    // d by_param / d pixel
 };
+using CameraSensitivity = std::vector<ParameterSensitivity>;  // per parameter
 
 // Of parameters by their indices, by differences; zero where the model does not see the pixel's neighbours.
 CameraSensitivity SensitivityOf(const Camera& camera, const Eigen::Vector2d& pixel,

@@ -78,9 +78,11 @@ ContentHash HashBundle(const BundleOptions& options, const BundleProblem& proble
     hasher.Add(observation.image_idx, observation.point_idx, observation.sigma_px);
     hasher.AddAll(observation.ray.normal);
     hasher.AddAll(observation.ray.pixel_from_plane);
-    hasher.Add(observation.camera.by_param.size());
-    for (const Eigen::Vector2d& by_param : observation.camera.by_param) hasher.AddAll(by_param);
-    for (const Eigen::Matrix2d& growth : observation.camera.growth) hasher.AddAll(growth);
+    hasher.Add(observation.camera.size());
+    for (const ParameterSensitivity& parameter : observation.camera) {
+      hasher.AddAll(parameter.by_param);
+      hasher.AddAll(parameter.growth);
+    }
   }
   hasher.Add(problem.points.size());
   for (const Eigen::Vector3d& point : problem.points) hasher.AddAll(point);

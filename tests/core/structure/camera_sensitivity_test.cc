@@ -28,10 +28,10 @@ TEST(CameraSensitivity, ResidualsFollowAChangedCamera) {
     const Eigen::Vector2d before = ray->Residual(point);
     Eigen::Vector2d residual = before;
     for (size_t p = 0; p < change.size(); ++p)
-      residual += change[p] * (sensitivity.by_param[p] + sensitivity.growth[p] * before);
+      residual += change[p] * (sensitivity[p].by_param + sensitivity[p].growth * before);
     EXPECT_LT((residual - (*ImageFromCamera(changed, point) - pixel)).norm(), 0.05) << pixel.transpose();
     // What the growth is there for: a longer focal length stretches residuals.
-    EXPECT_NEAR(sensitivity.growth[0](0, 0), 1.0 / 500, 3e-4);
+    EXPECT_NEAR(sensitivity[0].growth(0, 0), 1.0 / 500, 3e-4);
   }
 }
 
