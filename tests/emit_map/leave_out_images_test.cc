@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/colmap/colmap_database.h"
 #include "stages/emit_map/emit_map.h"
 #include "tests/core/map/example.h"
 #include "tests/core/promise/wall_survey.h"
@@ -125,6 +128,49 @@ TEST(ChooseLeftOut, SurveysOfOneViewTryNothingAndSmallOnesAreRefused) {
   ASSERT_FALSE(few.ok());
   EXPECT_EQ(few.error().code, ErrorCode::kNoData);
   EXPECT_THAT(few.error().message, testing::HasSubstr("there are only 11; at least 12"));
+}
+
+// More classes than are described at a time, each seen by three images but the first, which image 3 lacks.
+TEST(LeaveOutImages, ClassesAreDescribedByTheImagesThatAreLeft) {
+  constexpr int kNumClasses = 16500, kNumImages = 3;
+  const std::string path = testing::TempDir() + "/leave_out_images.db";
+  Classes classes;
+  classes.cameras.push_back({.camera_id = 1, .model = CameraModel::kPinhole});
+  classes.cameras[0].width = 640, classes.cameras[0].height = 480;
+  classes.cameras[0].params = {500, 500, 320, 240};
+  std::vector<Features> features(kNumImages);
+  for (int image = 0; image < kNumImages; ++image) {
+    features[image].keypoints.resize(kNumClasses);
+    features[image].descriptors.resize(kNumClasses, kDescriptorDim);
+    for (int i = 0; i < kNumClasses; ++i) {
+      for (int k = 0; k < kDescriptorDim; ++k)
+        features[image].descriptors(i, k) = static_cast<uint8_t>((7 * i + 13 * k * (image + 1)) % 251 / 4);
+    }
+    classes.images.push_back({.image_id = static_cast<ImageId>(image + 1), .name = {}, .camera_id = 1});
+  }
+  for (int i = 0; i < kNumClasses; ++i) {
+    FeatureClass& row = classes.classes.emplace_back();
+    row.class_id = i + 1;
+    for (ImageId image = 1; image <= (i == 0 ? 2 : 3); ++image)
+      row.observations.push_back({.image_id = image, .keypoint_idx = static_cast<KeypointIdx>(i)});
+  }
+  ASSERT_TRUE(WriteDatabase(path, kColmapSchema, [&](SQLite::Database& database) -> Status {
+                WriteDatabaseCamera(database, classes.cameras[0]);
+                for (ImageId image = 1; image <= kNumImages; ++image) {
+                  WriteDatabaseImage(database, {image, std::to_string(image) + ".png", 1});
+                  WriteDatabaseFeatures(database, image, features[image - 1]);
+                }
+                return Ok();
+              }).ok());
+  const auto survey = LeaveOutImages(classes, path, {.left_out = {2}, .tried = {2}});
+  ASSERT_TRUE(survey.ok()) << survey.error().message;
+  ASSERT_EQ(survey->classes.classes.size(), static_cast<size_t>(kNumClasses));
+  EXPECT_EQ(survey->classes.classes[0].descriptor, classes.classes[0].descriptor) << "as it was";
+  for (int i = 1; i < kNumClasses; ++i) {
+    const DescriptorSum sum =
+        features[0].descriptors.row(i).cast<double>() + features[1].descriptors.row(i).cast<double>();
+    ASSERT_EQ(survey->classes.classes[i].descriptor, MeanDescriptor(sum)) << i;
+  }
 }
 
 TEST(ErrorRatio, IsTheGeometricMeanOverImagesThatBothLocalize) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <unordered_map>
+#include <span>
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
@@ -26,29 +26,52 @@ Result<Features> ReadFeatures(SQLite::Database& database, ImageId image_id) {
   return features;
 }
 
+// Classes whose descriptors are summed at a time, half a kilobyte each.
+constexpr size_t kNumDescribedAtOnce = 16384;
+
 // Descriptors of these classes (positions), from the observations that are left.
-Status DescribeAnew(SQLite::Database& database, const std::set<size_t>& affected, Classes* classes) {
-  std::map<ImageId, std::vector<std::pair<size_t, KeypointIdx>>> by_image;
-  for (const size_t i : affected) {
-    for (const Observation& observation : classes->classes[i].observations)
-      by_image[observation.image_id].emplace_back(i, observation.keypoint_idx);
+Status DescribeTogether(SQLite::Database& database, std::span<const size_t> affected, Classes* classes) {
+  struct Seen {
+    ImageId image_id = 0;
+    KeypointIdx keypoint = 0;
+    uint32_t described = 0;  // position in `affected`
+  };
+  std::vector<Seen> seen;
+  for (uint32_t k = 0; k < affected.size(); ++k) {
+    for (const Observation& observation : classes->classes[affected[k]].observations)
+      seen.push_back({observation.image_id, observation.keypoint_idx, k});
   }
-  std::unordered_map<size_t, DescriptorSum> sums;
-  for (const size_t i : affected) sums[i] = DescriptorSum::Zero();
-  for (const auto& [image_id, seen] : by_image) {
-    CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors, ReadDatabaseDescriptors(database, image_id));
-    for (const auto& [i, keypoint] : seen) {
-      if (keypoint >= descriptors.rows()) {
-        return MakeError(
-            ErrorCode::kInvalidArgument,
-            "emit_map: class {} is keypoint {} of image {}, which has {}; were the classes made from "
-            "other matches?",
-            classes->classes[i].class_id, keypoint, image_id, descriptors.rows());
-      }
-      sums[i] += descriptors.row(keypoint).cast<double>();
+  std::stable_sort(seen.begin(), seen.end(),
+                   [](const Seen& a, const Seen& b) { return a.image_id < b.image_id; });
+  using Sum = Eigen::Matrix<uint32_t, 1, kDescriptorDim>;  // exact
+  std::vector<Sum> sums(affected.size(), Sum::Zero());
+  DescriptorMatrix descriptors;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    const auto& [image_id, keypoint, described] = seen[i];
+    if (i == 0 || image_id != seen[i - 1].image_id) {
+      CAIRN_ASSIGN_OR_RETURN(descriptors, ReadDatabaseDescriptors(database, image_id));
     }
+    if (keypoint >= descriptors.rows()) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "emit_map: class {} is keypoint {} of image {}, which has {}; were the classes made from "
+          "other matches?",
+          classes->classes[affected[described]].class_id, keypoint, image_id, descriptors.rows());
+    }
+    sums[described] += descriptors.row(keypoint).cast<uint32_t>();
   }
-  for (const size_t i : affected) classes->classes[i].descriptor = MeanDescriptor(sums[i]);
+  for (size_t k = 0; k < affected.size(); ++k)
+    classes->classes[affected[k]].descriptor = MeanDescriptor(sums[k].cast<double>());
+  return Ok();
+}
+
+// A part at a time: classes follow each other along the survey, so that few images are read for several.
+Status DescribeAnew(SQLite::Database& database, std::span<const size_t> affected, Classes* classes) {
+  while (!affected.empty()) {
+    const std::span<const size_t> part = affected.first(std::min(affected.size(), kNumDescribedAtOnce));
+    CAIRN_RETURN_IF_ERROR(DescribeTogether(database, part, classes));
+    affected = affected.subspan(part.size());
+  }
   return Ok();
 }
 
@@ -157,18 +180,19 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
     std::erase_if(survey.classes.images,
                   [&](const SurveyImage& image) { return left_out.contains(image.image_id); });
     std::vector<FeatureClass>& list = survey.classes.classes;
-    std::set<ClassId> affected_ids;
+    std::vector<ClassId> affected_ids;  // ascending, as classes are
     for (FeatureClass& feature_class : list) {
       const size_t num_erased = std::erase_if(
           feature_class.observations,
           [&](const Observation& observation) { return left_out.contains(observation.image_id); });
-      if (num_erased > 0) affected_ids.insert(feature_class.class_id);
+      if (num_erased > 0) affected_ids.push_back(feature_class.class_id);
     }
     std::erase_if(list,
                   [](const FeatureClass& row) { return row.observations.size() < kMinNumObservations; });
-    std::set<size_t> affected;
+    std::vector<size_t> affected;
     for (size_t i = 0; i < list.size(); ++i) {
-      if (affected_ids.contains(list[i].class_id)) affected.insert(i);
+      if (std::binary_search(affected_ids.begin(), affected_ids.end(), list[i].class_id))
+        affected.push_back(i);
     }
     CAIRN_RETURN_IF_ERROR(DescribeAnew(database, affected, &survey.classes));
     return survey;
