@@ -6,12 +6,6 @@
 namespace cairn::group_classes {
 namespace {
 
-// A track that triangulates, and may become a class.
-struct Candidate {
-  size_t track_idx = 0;
-  FeatureClass feature_class;
-};
-
 DropReason ReasonOf(const Track& track, const Triangulation& triangulation,
                     const TriangulateOptions& options) {
   if (triangulation.outcome == TriangulateOutcome::kSmallAngle) return DropReason::kSmallAngle;
@@ -35,25 +29,34 @@ std::vector<uint32_t> KeypointsOf(const MatchedFeatures& matched, const Track& t
   return keypoints;
 }
 
+ClassAppearance AppearanceOf(const MatchedFeatures& matched, const Track& track,
+                             const Triangulation& triangulation, const std::vector<int>& matched_idx) {
+  std::vector<const uint8_t*> descriptors;
+  for (const int i : triangulation.inliers) {
+    const Features& features = matched.features[matched_idx[track[i].image_idx]];
+    descriptors.push_back(features.descriptors.row(track[i].keypoint_idx).data());
+  }
+  ClassAppearance appearance;
+  DescribeClass(descriptors, &appearance);
+  appearance.position = triangulation.position;
+  appearance.num_observations = static_cast<int>(triangulation.inliers.size());
+  return appearance;
+}
+
 FeatureClass ClassOf(const MatchedFeatures& matched, const Track& track, const Triangulation& triangulation,
-                     const std::vector<int>& matched_idx, ClassAppearance* appearance) {
+                     const std::vector<int>& matched_idx, const ClassAppearance& appearance) {
   FeatureClass feature_class;
   feature_class.position = triangulation.position;
   feature_class.covariance = triangulation.covariance;
   feature_class.reprojection_error_px = triangulation.rms_error_px;
-  std::vector<const uint8_t*> descriptors;
+  feature_class.descriptor = appearance.centre;
+  feature_class.observations.reserve(triangulation.inliers.size());
   for (const int i : triangulation.inliers) {
     const TrackElement& element = track[i];
     const int idx = matched_idx[element.image_idx];
-    const Features& features = matched.features[idx];
-    feature_class.observations.push_back(
-        {matched.images[idx].image_id, element.keypoint_idx, features.keypoints[element.keypoint_idx]});
-    descriptors.push_back(features.descriptors.row(element.keypoint_idx).data());
+    feature_class.observations.push_back({matched.images[idx].image_id, element.keypoint_idx,
+                                          matched.features[idx].keypoints[element.keypoint_idx]});
   }
-  DescribeClass(descriptors, appearance);
-  appearance->position = feature_class.position;
-  appearance->num_observations = static_cast<int>(feature_class.observations.size());
-  feature_class.descriptor = appearance->centre;
   return feature_class;
 }
 
@@ -69,19 +72,23 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
                               .item_id = static_cast<int64_t>(t),
                               .seen_at = KeypointsOf(matched, tracks[t], matched_idx, {})});
   };
-  std::vector<Candidate> candidates;
+  std::vector<size_t> candidates;  // tracks that may become classes
   std::vector<ClassAppearance> appearances;
+  appearances.reserve(std::count_if(
+      triangulations.begin(), triangulations.end(),
+      [](const Triangulation& triangulation) { return triangulation.outcome == TriangulateOutcome::kOk; }));
   for (size_t t = 0; t < tracks.size(); ++t) {
     if (triangulations[t].outcome != TriangulateOutcome::kOk) {
       drop(t, ReasonOf(tracks[t], triangulations[t], options.triangulation));
       continue;
     }
-    candidates.push_back(
-        {t, ClassOf(matched, tracks[t], triangulations[t], matched_idx, &appearances.emplace_back())});
+    candidates.push_back(t);
+    appearances.push_back(AppearanceOf(matched, tracks[t], triangulations[t], matched_idx));
   }
   const std::vector<Ambiguity> ambiguity = FindAmbiguous(appearances, options.ambiguity);
+  classes->classes.reserve(std::count(ambiguity.begin(), ambiguity.end(), Ambiguity::kNone));
   for (size_t i = 0; i < candidates.size(); ++i) {
-    const size_t t = candidates[i].track_idx;
+    const size_t t = candidates[i];
     if (ambiguity[i] != Ambiguity::kNone) {
       drop(t, ambiguity[i] == Ambiguity::kAmbiguous ? DropReason::kAmbiguous : DropReason::kDuplicate);
       continue;
@@ -92,8 +99,8 @@ void MakeClasses(const MatchedFeatures& matched, const std::vector<Track>& track
       dropped_items->push_back(
           {.reason = DropReason::kOutlier, .item_id = class_id, .seen_at = std::move(outliers)});
     }
-    candidates[i].feature_class.class_id = class_id;
-    classes->classes.push_back(std::move(candidates[i].feature_class));
+    classes->classes.push_back(ClassOf(matched, tracks[t], triangulations[t], matched_idx, appearances[i]));
+    classes->classes.back().class_id = class_id;
   }
 }
 
