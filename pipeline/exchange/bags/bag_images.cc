@@ -9,6 +9,20 @@
 #include "core/files/file.h"
 
 namespace cairn::pipeline {
+namespace {
+
+// Where an IMU is all that gives the scale, images are at most so far apart while the camera moves, seconds
+// (bench/reconstruct/imu_keyframes.cc).
+constexpr double kImuIntervalS = 0.4;
+
+KeyframeOptions ChooserOptions(const BagPlan& plan) {
+  KeyframeOptions options;
+  if (plan.imu && !plan.odometry) options.max_interval_s = kImuIntervalS;
+  return options;
+}
+
+}  // namespace
+
 std::string TimeName(int64_t time_ns, const char* suffix) {
   return fmt::format("{:010}.{:09}{}", time_ns / 1'000'000'000, time_ns % 1'000'000'000, suffix);
 }
@@ -18,6 +32,7 @@ ImageImporter::ImageImporter(const BagPlan& plan, const BagOptions& options, std
       options_(options),
       folder_(std::move(folder)),
       times_(plan.images.clock, 0),
+      chooser_(ChooserOptions(plan)),
       size_(static_cast<int>(plan.images.width), static_cast<int>(plan.images.height)) {}
 
 Status ImageImporter::Take(const BagMessage& message) {
@@ -45,8 +60,10 @@ Status ImageImporter::Take(const BagMessage& message) {
   }
   const int64_t index = num_taken_++;
   const cv::Mat grey = image->picture.grey;
+  const int64_t time_ns = image->time_ns;
   held_.emplace(index, std::move(*image));
-  CAIRN_RETURN_IF_ERROR(Write(chooser_.Add(index, grey)));
+  CAIRN_RETURN_IF_ERROR(
+      Write(chooser_.Add(index, grey, 1e-9 * static_cast<double>(time_ns - span_.first_ns))));
   const std::optional<int64_t> candidate = chooser_.Candidate();
   std::erase_if(held_, [&](const auto& held) { return held.first != candidate; });
   return Ok();

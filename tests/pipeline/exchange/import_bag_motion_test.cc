@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
@@ -304,6 +305,46 @@ TEST_F(ImportedBag, StampsOfAnImuAndOfFramesThatNoClockGaveAreThoseOfTheRecordin
     const Eigen::Vector3d ahead = odometry[i].world_from_camera.rotation * Eigen::Vector3d::UnitZ();
     EXPECT_NEAR(DegFromRad(std::atan2(ahead.y(), ahead.x())), 10 * i, 1e-6) << i;
   }
+}
+
+// A camera that goes slowly along a wall, a pixel of 160 an image, twenty a second.
+TEST_F(ImportedBag, KeyframesAreCloseInTimeWhereOnlyAnImuGivesTheScale) {
+  cv::Mat wall(120, 400, CV_8UC1);
+  cv::theRNG().state = 1;
+  cv::randu(wall, 0, 255);
+  cv::GaussianBlur(wall, wall, {}, 2);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  std::vector<Recorded> messages = {StaticFrames()}, imu, odometry;
+  for (int i = 0; i < 200; ++i) {
+    const int64_t time_ns = 10 * kSecond + i * kSecond / 20;
+    const cv::Mat picture = wall(cv::Rect(i, 0, 160, 120)).clone();
+    messages.push_back({"/i", kImage, time_ns,
+                        ImageBytes({.stamp_ns = time_ns,
+                                    .width = 160,
+                                    .height = 120,
+                                    .pixels = std::string(picture.ptr<char>(), picture.total())})});
+    imu.push_back(
+        {"/imu", "sensor_msgs/msg/Imu", time_ns, ImuBytes({.stamp_ns = time_ns, .accel = {0, 0, 9.8}})});
+    odometry.push_back(OdometryMessageAt(1e-9 * static_cast<double>(time_ns), Turned(0, 0.01 * i, 0, 0)));
+  }
+  const auto longest_s = [&](const std::vector<std::vector<Recorded>>& others, const BagOptions& options) {
+    std::vector<Recorded> all = messages;
+    for (const auto& other : others) all.insert(all.end(), other.begin(), other.end());
+    EXPECT_TRUE(Import(all, options).ok());
+    double longest = 0;
+    const std::vector<std::string> names = Names();
+    for (size_t i = 1; i < names.size(); ++i)
+      longest = std::max(longest, std::stod(names[i]) - std::stod(names[i - 1]));
+    return longest;
+  };
+  const double usual_s = longest_s({}, {});
+  EXPECT_GT(usual_s, 0.6);
+  EXPECT_LE(longest_s({imu}, {}), 0.4 + 1e-6);
+  // What odometry or a choice say goes before.
+  EXPECT_EQ(longest_s({imu, odometry}, {}), usual_s);
+  EXPECT_EQ(longest_s({imu}, {.imu = "none"}), usual_s);
+  EXPECT_LE(longest_s({imu, odometry}, {.odometry = "none"}), 0.4 + 1e-6);
+  EXPECT_NEAR(longest_s({imu}, {.choice = FrameChoice::kEvery, .every_s = 1}), 1, 1e-6);
 }
 
 // A driver whose second message says 2106, and whose fourth says nothing.
