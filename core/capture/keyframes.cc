@@ -31,6 +31,10 @@ constexpr double kBlankDeviation = 4;
 constexpr double kLostRatio = 0.15;
 // How far the camera may go while the first keyframe of a part is chosen, ...
 constexpr double kBeginningWay = 0.3;
+// ... how far it has to have gone for its time to count, ...
+constexpr double kMovedWay = 0.1;
+// (a frame that is due counts although it comes early by this part of the interval: stamps are rounded), ...
+constexpr double kEarlyPart = 0.01;
 // ... and how far it has to have gone for the last frame of a film to become one.
 constexpr double kEndingWay = 0.5;
 // Of candidates about as sharp as the sharpest the last one counts.
@@ -131,9 +135,9 @@ size_t RemoveStill(double longer_side, std::vector<cv::Point2f>* before, std::ve
 
 KeyframeChooser::KeyframeChooser(const KeyframeOptions& options) : options_(options) {}
 
-std::vector<int64_t> KeyframeChooser::Add(int64_t index, const cv::Mat& grey) {
+std::vector<int64_t> KeyframeChooser::Add(int64_t index, const cv::Mat& grey, double time_s) {
   ++stats_.num_frames;
-  Frame frame = {.index = index, .small = MakeSmall(grey, options_.max_side_px)};
+  Frame frame = {.index = index, .time_s = time_s, .small = MakeSmall(grey, options_.max_side_px)};
   if (IsBlank(frame.small)) {
     ++stats_.num_blank;
     return {};
@@ -185,6 +189,7 @@ bool KeyframeChooser::Begin(const Frame& frame) {
 
 void KeyframeChooser::SetReference(const Frame& frame) {
   reference_ = Pyramid(frame.small);
+  reference_s_ = frame.time_s;
   corners_ = FindCorners(frame.small, options_.num_corners);
   guesses_ = corners_;
   num_lost_ = 0;
@@ -232,6 +237,12 @@ double KeyframeChooser::Look(const cv::Mat& small, double* way) {
   return found_ratio;
 }
 
+// How far it is on the way because of the time, once the camera moved.
+double KeyframeChooser::WayByTime(const Frame& frame) const {
+  if (options_.max_interval_s <= 0 || !reference_is_keyframe_ || frame.way < kMovedWay) return 0;
+  return (frame.time_s - reference_s_) / ((1 - kEarlyPart) * options_.max_interval_s);
+}
+
 void KeyframeChooser::Follow(Frame frame, std::vector<int64_t>* keyframes) {
   for (;;) {
     const bool is_same_size = frame.small.size() == reference_.front().size();
@@ -244,7 +255,10 @@ void KeyframeChooser::Follow(Frame frame, std::vector<int64_t>* keyframes) {
       if (Begin(frame)) stats_.cuts.push_back(frame.index);
       return;
     }
-    if (is_seen) num_lost_ = 0;
+    if (is_seen) {
+      num_lost_ = 0;
+      frame.way = std::max(frame.way, WayByTime(frame));
+    }
     const double last = reference_is_keyframe_ ? options_.last_candidate : kBeginningWay;
     if (!is_seen || (frame.way > last && candidate_)) {
       // Seen from what was nearer to it than the reference is.

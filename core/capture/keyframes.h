@@ -23,6 +23,9 @@ struct KeyframeOptions {
   double shift_ratio = 0.12;
   // ... or fewer of them than this are still found.  REQUIRES: in (0, 1)
   double min_overlap_ratio = 0.5;
+  // ... or, where the camera moved by a tenth of the first two, so long after the last one, seconds: an IMU
+  // says less of two images the longer it is from one to the other; 0: at any time.  REQUIRES: >= 0
+  double max_interval_s = 0;
   // Frames as far as this from the last keyframe to the next are candidates for the next.  REQUIRES: in (0,
   // 1)
   double first_candidate = 0.7;
@@ -51,7 +54,8 @@ struct KeyframeStats {
 // keyframe are looked for in every frame (pyramidal Lucas-Kanade [Bouguet 2000], forwards and backwards, so
 // that they do not drift while the camera stands).  How far the camera is on the way to the next keyframe is
 // the largest of
-//   parallax / parallax_ratio,  shift / shift_ratio,  (1 - share found) / (1 - min_overlap_ratio):
+//   parallax / parallax_ratio,  shift / shift_ratio,  (1 - share found) / (1 - min_overlap_ratio),
+//   time / max_interval_s:
 // 0 while it stands, 1 when a keyframe is due.  Corners that stand while the others move far are of a logo or
 // a frame in the picture, and do not count.  Among the frames from first_candidate on the sharpest becomes
 // it (variance of the Laplacian).  Blank frames are passed over, and blurred ones where corners are lost.  In
@@ -64,9 +68,10 @@ class KeyframeChooser {
  public:
   explicit KeyframeChooser(const KeyframeOptions& options = {});
 
-  // Takes the next frame, CV_8UC1 of any size; `index` ascends.  Returns the frames, this or earlier ones,
-  // that are now known to be keyframes, ascending; often none.  A frame of another size begins a new part.
-  std::vector<int64_t> Add(int64_t index, const cv::Mat& grey);
+  // Takes the next frame, CV_8UC1 of any size; `index` ascends, and so does its time, which only
+  // max_interval_s asks for.  Returns the frames, this or earlier ones, that are now known to be keyframes,
+  // ascending; often none.  A frame of another size begins a new part.
+  std::vector<int64_t> Add(int64_t index, const cv::Mat& grey, double time_s = 0);
 
   // The only frame so far, besides those that Add returned, that may still become a keyframe: the caller
   // keeps its picture and may forget all others.
@@ -80,6 +85,7 @@ class KeyframeChooser {
  private:
   struct Frame {
     int64_t index = 0;
+    double time_s = 0;
     cv::Mat small;
     double sharpness = 0;
     double way = 0;  // from the reference, 1: a keyframe is due
@@ -88,6 +94,7 @@ class KeyframeChooser {
   bool Begin(const Frame& frame);
   void SetReference(const Frame& frame);
   double Look(const cv::Mat& small, double* way);
+  double WayByTime(const Frame& frame) const;
   void Follow(Frame frame, std::vector<int64_t>* keyframes);
   void Lose(const Frame& frame);
   void Consider(const Frame& frame);
@@ -98,6 +105,7 @@ class KeyframeChooser {
   KeyframeStats stats_;
   // The last keyframe; at the beginning of a part its first frame, which need not become one.
   std::vector<cv::Mat> reference_;  // its pyramid; empty: no part has begun
+  double reference_s_ = 0;
   bool reference_is_keyframe_ = false;
   bool has_still_part_ = false;       // in a frame since the reference
   std::vector<cv::Point2f> corners_;  // of the reference

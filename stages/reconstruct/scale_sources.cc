@@ -201,7 +201,7 @@ Result<ScaleAnswer> AskImu(const ScaleQuestion& question) {
     return MakeError(
         ErrorCode::kNoData,
         "{}: the motion does not show the scale{}: only a camera that speeds up, brakes, or swings to "
-        "the sides shows it, in images that follow each other closely (keyframes = 0.3 of a bag or film); "
+        "the sides shows it, in images that follow each other closely (keyframes = 0.2 of a bag or film); "
         "what it says of up is taken",
         imu.told_by,
         std::isfinite(imu.sigma_ratio) ? fmt::format(" to better than {:.0f} %", 100 * imu.sigma_ratio) : "");

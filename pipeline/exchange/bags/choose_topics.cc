@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <functional>
-#include <limits>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -24,38 +23,22 @@ bool IsImageTopic(const BagTopic& topic) {
   return topic.type == kImageType || topic.type == kCompressedImageType;
 }
 
-// Stamps are wild where they are off by more than this, ns, and by this many times what is usual.
-constexpr int64_t kWildNs = 10'000'000'000, kWildFactor = 10;
+// Whose messages count by when they were sent.
+bool IsTimedTopic(const BagTopic& topic) {
+  return IsImageTopic(topic) || topic.type == kOdometryType || topic.type == kImuType;
+}
+
 // Every so many compressed images one is decoded for its size, and more at the beginning.
 constexpr int64_t kImagesPerSize = 50;
-
-int64_t MedianOf(std::vector<int64_t> values) {
-  const auto middle = values.begin() + static_cast<int64_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-// Differences of times as they stand in damaged messages, too.
-int64_t Minus(int64_t a, int64_t b) {
-  int64_t difference = 0;
-  if (!__builtin_sub_overflow(a, b, &difference)) return difference;
-  return a < b ? std::numeric_limits<int64_t>::min() : std::numeric_limits<int64_t>::max();
-}
-uint64_t Distance(int64_t a, int64_t b) {
-  return a < b ? static_cast<uint64_t>(b) - static_cast<uint64_t>(a)
-               : static_cast<uint64_t>(a) - static_cast<uint64_t>(b);
-}
 
 class ContentsVisitor : public BagVisitor {
  public:
   bool Wants(const BagTopic& topic, int64_t record_time_ns) override {
     TopicContents& contents = contents_.topics[topic.name];
     contents.topic = topic;
-    const bool is_new = contents.num_messages++ == 0;
-    contents.first_time_ns = is_new ? record_time_ns : std::min(contents.first_time_ns, record_time_ns);
-    contents.last_time_ns = is_new ? record_time_ns : std::max(contents.last_time_ns, record_time_ns);
-    return topic.type == kCameraInfoType || IsTransformTopic(topic) || IsImageTopic(topic) ||
-           topic.type == kOdometryType || (topic.type == kImuType && !contents.header);
+    ++contents.num_messages;
+    contents.recorded.Add(record_time_ns);
+    return topic.type == kCameraInfoType || IsTransformTopic(topic) || IsTimedTopic(topic);
   }
 
   // What cannot be read is counted where it is imported; here it is no topic's first message.
@@ -68,7 +51,7 @@ class ContentsVisitor : public BagVisitor {
     if (message.topic.type == kOdometryType) status = TakeOdometry(message, &contents);
     if (message.topic.type == kImuType) status = TakeImu(message, &contents);
     if (IsTransformTopic(message.topic)) status = TakeTransforms(message);
-    if (status.ok() && (IsImageTopic(message.topic) || message.topic.type == kOdometryType)) {
+    if (status.ok() && IsTimedTopic(message.topic)) {
       if (const Result<MessageHeader> header = DecodeHeader(message); header.ok())
         contents.clock.Add(header->stamp_ns, message.record_time_ns);
     }
@@ -86,6 +69,7 @@ class ContentsVisitor : public BagVisitor {
         std::tie(contents.width, contents.height) = size;
       }
     }
+    for (auto& [child, clock] : contents_.frame_clocks) clock.Finish();
     return std::move(contents_);
   }
 
@@ -131,14 +115,17 @@ class ContentsVisitor : public BagVisitor {
   }
   static Status TakeImu(const BagMessage& message, TopicContents* contents) {
     CAIRN_ASSIGN_OR_RETURN(const ImuMessage imu, DecodeImu(message));
-    contents->header = imu.header;
+    if (!contents->header) contents->header = imu.header;
     return Ok();
   }
   Status TakeTransforms(const BagMessage& message) {
     int64_t num_invalid = 0;
     CAIRN_ASSIGN_OR_RETURN(const auto transforms, DecodeTransforms(message, &num_invalid));
-    for (const TransformMessage& transform : transforms)
+    for (const TransformMessage& transform : transforms) {
       contents_.frames.AddLink(transform.header.frame_id, transform.child_frame_id);
+      if (IsStaticTransformTopic(message.topic)) continue;
+      contents_.frame_clocks[transform.child_frame_id].Add(transform.header.stamp_ns, message.record_time_ns);
+    }
     return Ok();
   }
 
@@ -154,7 +141,8 @@ bool HasPictures(const TopicContents& contents) {
 }
 
 std::string RateText(const TopicContents& contents) {
-  const double seconds = 1e-9 * static_cast<double>(contents.last_time_ns - contents.first_time_ns);
+  const TimeSpan& recorded = contents.recorded;
+  const double seconds = 1e-9 * static_cast<double>(recorded.last_ns - recorded.first_ns);
   if (!(seconds > 0)) return "";
   return fmt::format("{:.1f}", static_cast<double>(contents.num_messages - 1) / seconds);
 }
@@ -238,37 +226,11 @@ Result<std::optional<TopicContents>> Choose(const BagContents& contents, const s
 
 }  // namespace
 
-void TopicClock::Add(int64_t stamp_ns, int64_t record_time_ns) {
-  if (stamp_ns != 0) aheads_ns_.push_back(Minus(stamp_ns, record_time_ns));
-}
-
-void TopicClock::Finish() {
-  if (aheads_ns_.empty()) return;
-  ahead_ns_ = MedianOf(aheads_ns_);
-  std::vector<int64_t> distances;
-  for (const int64_t ahead_ns : aheads_ns_) {
-    distances.push_back(static_cast<int64_t>(std::min<uint64_t>(
-        Distance(ahead_ns, ahead_ns_), static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))));
-  }
-  spread_ns_ = MedianOf(std::move(distances));
-}
-
-bool TopicClock::IsWild(int64_t stamp_ns, int64_t record_time_ns) const {
-  if (stamp_ns == 0) return false;
-  const uint64_t off_ns = Distance(Minus(stamp_ns, record_time_ns), ahead_ns_);
-  return off_ns > kWildNs && off_ns / kWildFactor > static_cast<uint64_t>(spread_ns_);
-}
-
-int64_t TopicClock::TimeOf(int64_t stamp_ns, int64_t record_time_ns) const {
-  if (stamp_ns != 0 && !IsWild(stamp_ns, record_time_ns)) return stamp_ns;
-  int64_t time_ns = 0;
-  if (__builtin_add_overflow(record_time_ns, ahead_ns_, &time_ns))
-    return std::max<int64_t>(record_time_ns, 0);
-  return std::max<int64_t>(time_ns, 0);
-}
-
 bool IsTransformTopic(const BagTopic& topic) {
   return topic.type == "tf2_msgs/TFMessage" || topic.type == "tf/tfMessage";
+}
+bool IsStaticTransformTopic(const BagTopic& topic) {
+  return IsTransformTopic(topic) && topic.name.ends_with("tf_static");
 }
 
 Result<BagContents> LookThrough(Bag& bag) {

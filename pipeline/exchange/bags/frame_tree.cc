@@ -51,6 +51,11 @@ void FrameMotion::Add(const TransformMessage& transform, int64_t time_ns, bool i
   motion.trajectory.Add(time_ns, pose);
 }
 
+bool FrameMotion::Moves(const std::string& child) const {
+  const auto motion = motions_.find(child);
+  return motion != motions_.end() && !motion->second.is_constant;
+}
+
 void FrameMotion::Sort() {
   for (auto& [child, motion] : motions_) motion.trajectory.Sort();
 }

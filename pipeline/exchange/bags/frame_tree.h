@@ -39,6 +39,8 @@ class FrameMotion {
   bool Needs(const std::string& child) const { return links_.contains(child); }
   // Links on /tf_static hold for ever, as do those that never change.
   void Add(const TransformMessage& transform, int64_t time_ns, bool is_static);
+  // Whether poses of the link differ: its times count.
+  bool Moves(const std::string& child) const;
   // To be called once, before BaseFromCamera.
   void Sort();
   // Errors: NoData (a link without a pose near that time; names it).

@@ -2,7 +2,7 @@
 
 #include <tuple>
 
-#include "pipeline/exchange/bags/bag_bytes.h"
+#include "pipeline/exchange/bags/files/bag_bytes.h"
 #include "pipeline/exchange/import/parts.h"
 
 namespace cairn::pipeline {

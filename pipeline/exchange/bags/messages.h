@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
-#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/files/bag.h"
 
 namespace cairn::pipeline {
 

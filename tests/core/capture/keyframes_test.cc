@@ -18,6 +18,7 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 const cv::Size kFrame(320, 240);
+constexpr double kFramesPerSecond = 30;
 
 // Frames of a camera that goes along a wall, from `begin_px` on.
 std::vector<cv::Mat> Walk(int num_frames, int step_px, int begin_px = 0, int seed = 1) {
@@ -35,7 +36,7 @@ std::vector<int64_t> Choose(const std::vector<cv::Mat>& frames, KeyframeStats* s
   std::vector<int64_t> keyframes;
   std::optional<int64_t> kept;
   for (int64_t i = 0; i < std::ssize(frames); ++i) {
-    for (const int64_t keyframe : chooser.Add(i, frames[i])) {
+    for (const int64_t keyframe : chooser.Add(i, frames[i], static_cast<double>(i) / kFramesPerSecond)) {
       EXPECT_TRUE(keyframe == i || keyframe == kept) << keyframe << " had been forgotten at " << i;
       keyframes.push_back(keyframe);
     }
@@ -65,6 +66,43 @@ TEST(Keyframes, AreAsFarApartAsTheOptionsSay) {
   }
   const size_t num_of_half = Choose(Walk(200, 4), nullptr, {.shift_ratio = 0.06}).size();
   EXPECT_NEAR(static_cast<double>(num_of_half), 2.0 * keyframes.size(), 0.3 * keyframes.size());
+}
+
+// A pixel a frame: 38 frames would be due by what moves.  By the time 12 are, from the 4th on, when it moved
+// by a tenth of 38 pixels; frames from the 9th on are candidates.
+TEST(Keyframes, AreNoFartherApartInTimeThanIsAskedFor) {
+  const std::vector<cv::Mat> frames = Walk(200, 1);
+  EXPECT_LE(Choose(frames).size(), 8u);
+  std::vector<int64_t> keyframes = Choose(frames, nullptr, {.max_interval_s = 0.4});
+  ASSERT_GE(keyframes.size(), 15u);
+  keyframes.pop_back();  // where the film ends there is no choice
+  for (size_t i = 1; i < keyframes.size(); ++i) {
+    EXPECT_GE(keyframes[i] - keyframes[i - 1], 9) << i;
+    EXPECT_LE(keyframes[i] - keyframes[i - 1], 12) << i;
+  }
+  // What is due by what moves is due earlier.
+  EXPECT_EQ(Choose(Walk(100, 8), nullptr, {.max_interval_s = 0.4}), Choose(Walk(100, 8)));
+}
+
+// It rests for 2 s in noise, and moves too little for the time to count; then it goes on, and the rest's last
+// image is one of them.
+TEST(Keyframes, ARestIsNotDividedByTime) {
+  cv::RNG random(3);
+  std::vector<cv::Mat> frames = Walk(40, 4);
+  const cv::Mat stand = frames.back();
+  for (int i = 0; i < 60; ++i) {
+    cv::Mat noise(kFrame, CV_16SC1), frame;
+    random.fill(noise, cv::RNG::NORMAL, 0, 4);
+    cv::add(stand, noise, frame, cv::noArray(), CV_8U);
+    frames.push_back(frame);
+  }
+  const std::vector<cv::Mat> more = Walk(40, 1, 160);
+  frames.insert(frames.end(), more.begin(), more.end());
+  const std::vector<int64_t> keyframes = Choose(frames, nullptr, {.max_interval_s = 0.4});
+  const auto num_in_rest =
+      std::count_if(keyframes.begin(), keyframes.end(), [](int64_t i) { return i >= 42 && i < 97; });
+  EXPECT_LE(num_in_rest, 1);
+  EXPECT_GE(std::count_if(keyframes.begin(), keyframes.end(), [](int64_t i) { return i >= 97; }), 3);
 }
 
 // A third of the picture is a frame around a screen: most corners stand on it, and the walk counts as before.

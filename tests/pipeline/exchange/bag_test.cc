@@ -1,5 +1,5 @@
 // Bags: what is read of their files, whole, damaged and hostile.
-#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/files/bag.h"
 
 #include <filesystem>
 #include <fstream>
@@ -10,7 +10,7 @@
 
 #include "core/capture/bag_file.h"
 #include "core/files/file.h"
-#include "pipeline/exchange/bags/chunk_compression.h"
+#include "pipeline/exchange/bags/files/chunk_compression.h"
 #include "pipeline/exchange/bags/image_pixels.h"
 #include "pipeline/exchange/bags/messages.h"
 #include "tests/pipeline/exchange/bag_writers.h"

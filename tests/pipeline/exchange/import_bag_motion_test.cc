@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
@@ -222,6 +223,128 @@ TEST_F(ImportedBag, TwoClocksAreBroughtTogetherByWhenMessagesWereRecorded) {
   import(25200, 0.5);
   EXPECT_THAT(warnings_, Contains(HasSubstr("odometry is left out, as its stamps")));
   EXPECT_FALSE(Has("odometry.txt"));
+}
+
+// The wheels' computer, which also turns the mast and has the IMU, counts from when it was switched on; the
+// camera's counts from 1970.
+TEST_F(ImportedBag, AnImuAndFramesOfAnotherClockAreBroughtToThatOfTheImagesToo) {
+  const double ahead_s = 25200;
+  std::vector<Recorded> messages = {
+      {"/tf_static", kTf, 0, TransformBytes({{"mast", "camera_optical", kOptical}})},
+      {"/tf_static", kTf, 0, TransformBytes({{"base_link", "imu_link", Turned(0, 0.1, 0, 0)}})}};
+  for (int i = 0; i < 9; ++i) {
+    const double time_s = 100 + 0.1 * i;
+    const int64_t time_ns = std::llround(time_s * 1e9);
+    messages.push_back(OdometryMessageAt(time_s, Turned(0, i, 0, 0)));
+    messages.push_back(
+        {"/tf", kTf, time_ns, TransformBytes({{"base_link", "mast", Turned(10 * i, 0, 0, 1), time_ns}})});
+    messages.push_back(
+        {"/imu", "sensor_msgs/msg/Imu", time_ns, ImuBytes({.stamp_ns = time_ns, .accel = {0, 0, 9.8}})});
+    Recorded image = GreyMessage(time_s + 0.05 + ahead_s);
+    image.time_ns = time_ns + kSecond / 20;
+    messages.push_back(image);
+  }
+  const auto report = Import(messages);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  for (const char* source : {"/odom", "/imu", "the frame 'mast' on /tf"}) {
+    EXPECT_THAT(warnings_,
+                Contains(HasSubstr(fmt::format(
+                    "the stamps of /camera/image_raw and of {} are of two clocks, 25200.0", source))));
+  }
+  EXPECT_EQ(report->num_imu_samples, 9);
+  const auto lines = SplitLines(*ReadFile(root_ + "/capture/imu.csv"));
+  EXPECT_THAT(std::string(lines.back()), HasSubstr("25300800000000,"));
+  const std::vector<OdometryLine> odometry = ReadOdometry();
+  ASSERT_EQ(odometry.size(), 8u);  // nothing is after the last image
+  EXPECT_EQ(odometry[4].name, "0000025300.450000000.png");
+  EXPECT_NEAR(odometry[4].world_from_camera.translation.x(), 4.5, 1e-6);
+  const Eigen::Vector3d ahead = odometry[4].world_from_camera.rotation * Eigen::Vector3d::UnitZ();
+  EXPECT_NEAR(DegFromRad(std::atan2(ahead.y(), ahead.x())), 45, 1e-6);
+  // The IMU is seen from where the mast was at the first image: 5 degrees to the left, the base's z up.
+  const auto place = ParseNumbers(lines[1].substr(std::string("#imu_on_camera,").size()));
+  ASSERT_TRUE(place && place->size() == 7) << lines[1];
+  const Eigen::Quaterniond turn((*place)[6], (*place)[3], (*place)[4], (*place)[5]);
+  const Eigen::Vector3d imu_x = turn * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR(DegFromRad(std::atan2(imu_x.x(), imu_x.z())), 5, 1e-6);
+}
+
+// An IMU's driver, and a mast's.
+TEST_F(ImportedBag, StampsOfAnImuAndOfFramesThatNoClockGaveAreThoseOfTheRecording) {
+  std::vector<Recorded> messages = {
+      {"/tf_static", kTf, 0, TransformBytes({{"mast", "camera_optical", kOptical}})}};
+  for (int i = 0; i < 9; ++i) {
+    const double time_s = 1000 + 0.1 * i;
+    const int64_t time_ns = std::llround(time_s * 1e9);
+    const auto stamp_ns = [&](int wild, int unset) {
+      const int64_t seven_behind_ns = time_ns - 7 * kSecond;
+      return i == wild ? 4'200'000'000 * kSecond : i == unset ? 0 : seven_behind_ns;
+    };
+    messages.push_back({"/imu", "sensor_msgs/msg/Imu", time_ns,
+                        ImuBytes({.stamp_ns = stamp_ns(1, 3), .accel = {0, 0, 9.8}})});
+    messages.push_back({"/tf", kTf, time_ns,
+                        TransformBytes({{"base_link", "mast", Turned(10 * i, 0, 0, 1), stamp_ns(5, 6)}})});
+    Recorded odometry = OdometryMessageAt(time_s - 7, {});
+    odometry.time_ns = time_ns;
+    messages.push_back(odometry);
+    messages.push_back({"/i", kImage, time_ns, ImageBytes(Grey(time_s - 7))});
+  }
+  const auto report = Import(messages, {.choice = FrameChoice::kAll, .max_time_gap_s = 0.05});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->num_imu_samples, 9);
+  const auto lines = SplitLines(*ReadFile(root_ + "/capture/imu.csv"));
+  EXPECT_THAT(std::string(lines[lines.size() - 8]), HasSubstr("993100000000,"));
+  EXPECT_THAT(std::string(lines[lines.size() - 6]), HasSubstr("993300000000,"));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 messages of the IMU have stamps far from when they were")));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 messages of the IMU have no stamp")));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 transforms of 'mast' have stamps far from when they were")));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("1 transforms of 'mast' have no stamp")));
+  EXPECT_THAT(warnings_, Not(Contains(HasSubstr("two clocks"))));
+  const std::vector<OdometryLine> odometry = ReadOdometry();
+  ASSERT_EQ(odometry.size(), 9u);
+  for (int i = 0; i < 9; ++i) {
+    const Eigen::Vector3d ahead = odometry[i].world_from_camera.rotation * Eigen::Vector3d::UnitZ();
+    EXPECT_NEAR(DegFromRad(std::atan2(ahead.y(), ahead.x())), 10 * i, 1e-6) << i;
+  }
+}
+
+// A camera that goes slowly along a wall, a pixel of 160 an image, twenty a second.
+TEST_F(ImportedBag, KeyframesAreCloseInTimeWhereOnlyAnImuGivesTheScale) {
+  cv::Mat wall(120, 400, CV_8UC1);
+  cv::theRNG().state = 1;
+  cv::randu(wall, 0, 255);
+  cv::GaussianBlur(wall, wall, {}, 2);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  std::vector<Recorded> messages = {StaticFrames()}, imu, odometry;
+  for (int i = 0; i < 200; ++i) {
+    const int64_t time_ns = 10 * kSecond + i * kSecond / 20;
+    const cv::Mat picture = wall(cv::Rect(i, 0, 160, 120)).clone();
+    messages.push_back({"/i", kImage, time_ns,
+                        ImageBytes({.stamp_ns = time_ns,
+                                    .width = 160,
+                                    .height = 120,
+                                    .pixels = std::string(picture.ptr<char>(), picture.total())})});
+    imu.push_back(
+        {"/imu", "sensor_msgs/msg/Imu", time_ns, ImuBytes({.stamp_ns = time_ns, .accel = {0, 0, 9.8}})});
+    odometry.push_back(OdometryMessageAt(1e-9 * static_cast<double>(time_ns), Turned(0, 0.01 * i, 0, 0)));
+  }
+  const auto longest_s = [&](const std::vector<std::vector<Recorded>>& others, const BagOptions& options) {
+    std::vector<Recorded> all = messages;
+    for (const auto& other : others) all.insert(all.end(), other.begin(), other.end());
+    EXPECT_TRUE(Import(all, options).ok());
+    double longest = 0;
+    const std::vector<std::string> names = Names();
+    for (size_t i = 1; i < names.size(); ++i)
+      longest = std::max(longest, std::stod(names[i]) - std::stod(names[i - 1]));
+    return longest;
+  };
+  const double usual_s = longest_s({}, {});
+  EXPECT_GT(usual_s, 0.6);
+  EXPECT_LE(longest_s({imu}, {}), 0.4 + 1e-6);
+  // What odometry or a choice say goes before.
+  EXPECT_EQ(longest_s({imu, odometry}, {}), usual_s);
+  EXPECT_EQ(longest_s({imu}, {.imu = "none"}), usual_s);
+  EXPECT_LE(longest_s({imu, odometry}, {.odometry = "none"}), 0.4 + 1e-6);
+  EXPECT_NEAR(longest_s({imu}, {.choice = FrameChoice::kEvery, .every_s = 1}), 1, 1e-6);
 }
 
 // A driver whose second message says 2106, and whose fourth says nothing.

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/files/bag.h"
 #include "tests/pipeline/exchange/bag_writers.h"
 
 namespace cairn::pipeline {

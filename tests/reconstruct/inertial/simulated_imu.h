@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -153,30 +154,48 @@ inline double UpErrorDeg(const InertialAlignment& alignment) {
   const Eigen::Vector3d up = ModelFromWorld(1).rotation * Eigen::Vector3d::UnitZ();
   return DegFromRad(std::acos(std::min(1.0, up.dot(alignment.up))));
 }
+// Makes a model image by image; times are those of the images' clock.
+class ModelMaker {
+ public:
+  ModelMaker(Motion motion, const SimulatedModel& model, double time_offset_s, uint64_t seed)
+      : motion_(std::move(motion)),
+        model_(model),
+        time_offset_s_(time_offset_s),
+        random_(MixSeed(seed, 31)),
+        model_from_world_(ModelFromWorld(model.model_per_metre)) {}
+  Random& random() { return random_; }
+  void Add(double time_s) {
+    bent_m_ += Normal(model_.bend_sigma_m);
+    bent_rad_ += Normal(RadFromDeg(model_.bend_sigma_deg));
+    Pose world_from_cam = motion_(time_s + time_offset_s_);
+    world_from_cam.translation += bent_m_ + Normal(model_.place_sigma_m);
+    world_from_cam.rotation = QuaternionFromVector<double>(bent_rad_) * world_from_cam.rotation *
+                              QuaternionFromVector<double>(Normal(RadFromDeg(model_.turn_sigma_deg)));
+    const auto time_ns = std::llround(time_s * 1e9);
+    images_.push_back({fmt::format("{:010}.{:09}.jpg", time_ns / 1'000'000'000, time_ns % 1'000'000'000),
+                       time_ns, TransformPose(model_from_world_, world_from_cam.Inverse())});
+  }
+  std::vector<TimedImage> Finish() { return std::move(images_); }
+
+ private:
+  Eigen::Vector3d Normal(double sigma) {
+    const double x = random_.Normal(0, sigma), y = random_.Normal(0, sigma);
+    return {x, y, random_.Normal(0, sigma)};
+  }
+  Motion motion_;
+  SimulatedModel model_;
+  double time_offset_s_;
+  Random random_;
+  Similarity model_from_world_;
+  std::vector<TimedImage> images_;
+  Eigen::Vector3d bent_m_ = Eigen::Vector3d::Zero(), bent_rad_ = Eigen::Vector3d::Zero();
+};
 inline std::vector<TimedImage> ModelOfMotion(const Motion& motion, const SimulatedModel& model,
                                              double duration_s, double time_offset_s, uint64_t seed) {
-  Random random(MixSeed(seed, 31));
-  const auto normal = [&](double sigma) {
-    const double x = random.Normal(0, sigma), y = random.Normal(0, sigma);
-    return Eigen::Vector3d(x, y, random.Normal(0, sigma));
-  };
-  const Similarity model_from_world = ModelFromWorld(model.model_per_metre);
-  std::vector<TimedImage> images;
-  Eigen::Vector3d bent_m = Eigen::Vector3d::Zero(), bent_rad = Eigen::Vector3d::Zero();
-  double t = 0.1;
-  while (t < duration_s - 0.1) {
-    bent_m += normal(model.bend_sigma_m);
-    bent_rad += normal(RadFromDeg(model.bend_sigma_deg));
-    Pose world_from_cam = motion(t + time_offset_s);
-    world_from_cam.translation += bent_m + normal(model.place_sigma_m);
-    world_from_cam.rotation = QuaternionFromVector<double>(bent_rad) * world_from_cam.rotation *
-                              QuaternionFromVector<double>(normal(RadFromDeg(model.turn_sigma_deg)));
-    const auto time_ns = std::llround(t * 1e9);
-    images.push_back({fmt::format("{:010}.{:09}.jpg", time_ns / 1'000'000'000, time_ns % 1'000'000'000),
-                      time_ns, TransformPose(model_from_world, world_from_cam.Inverse())});
-    t += model.step_s * random.Uniform(0.5, 1.5);
-  }
-  return images;
+  ModelMaker maker(motion, model, time_offset_s, seed);
+  for (double t = 0.1; t < duration_s - 0.1; t += model.step_s * maker.random().Uniform(0.5, 1.5))
+    maker.Add(t);
+  return maker.Finish();
 }
 
 }  // namespace cairn::reconstruct

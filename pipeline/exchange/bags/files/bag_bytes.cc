@@ -1,4 +1,4 @@
-#include "pipeline/exchange/bags/bag_bytes.h"
+#include "pipeline/exchange/bags/files/bag_bytes.h"
 
 #include <filesystem>
 

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "core/files/database.h"
-#include "pipeline/exchange/bags/bag.h"
-#include "pipeline/exchange/bags/chunk_compression.h"
+#include "pipeline/exchange/bags/files/bag.h"
+#include "pipeline/exchange/bags/files/chunk_compression.h"
 
 namespace cairn::pipeline {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/exchange/bags/bag.h"
+#include "pipeline/exchange/bags/files/bag.h"
 
 #include <filesystem>
 

@@ -1,4 +1,4 @@
-#include "pipeline/exchange/bags/chunk_compression.h"
+#include "pipeline/exchange/bags/files/chunk_compression.h"
 
 #include <algorithm>
 #include <memory>

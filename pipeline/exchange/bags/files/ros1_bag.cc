@@ -6,9 +6,9 @@
 #include <map>
 #include <optional>
 
-#include "pipeline/exchange/bags/bag.h"
-#include "pipeline/exchange/bags/bag_bytes.h"
-#include "pipeline/exchange/bags/chunk_compression.h"
+#include "pipeline/exchange/bags/files/bag.h"
+#include "pipeline/exchange/bags/files/bag_bytes.h"
+#include "pipeline/exchange/bags/files/chunk_compression.h"
 
 namespace cairn::pipeline {
 namespace {
