@@ -52,6 +52,25 @@ TEST(AdjustBundle, MovedPosesAndPointsReturn) {
   }
 }
 
+// Points that lie far off, along their rays or not, are placed by the poses of a step before it is judged:
+// after one step they are where these poses see them.  By a step alone they are not, as it is linear.
+TEST(AdjustBundle, PointsFollowTheStepOfThePoses) {
+  const Camera camera = Lens();
+  const auto root_mean_square_px = [&](bool points_follow) {
+    Circle circle = MakeCircle(camera, camera, 0.1, {});
+    Random random(9);
+    for (Eigen::Vector3d& point : circle.problem.points)
+      point += 0.5 * Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+    AdjustBundle({.max_num_iterations = 1, .points_follow = points_follow}, &circle.problem, nullptr);
+    double sum = 0;
+    for (const BundleProblem::Observation& observation : circle.problem.observations)
+      sum += ResidualOf(circle.problem, observation).squaredNorm();
+    return std::sqrt(sum / static_cast<double>(circle.problem.observations.size()));
+  };
+  EXPECT_LT(root_mean_square_px(true), 0.3);
+  EXPECT_GT(root_mean_square_px(false), 1);
+}
+
 TEST(AdjustBundle, EvidenceCountsWhatKeypointsDetermine) {
   const Camera camera = Lens();
   for (const auto& [own, is_determined] : {std::pair(0.5, true), std::pair(1e-7, false)}) {
