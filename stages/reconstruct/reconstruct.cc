@@ -20,6 +20,8 @@ namespace {
 
 // All at once, this many times as many images as by COLMAP are many more.
 constexpr double kManyMore = 1.1;
+// Of images in no order, COLMAP is asked, too, where fewer are joined.
+constexpr double kMinJoinedRatio = 0.8;
 
 size_t NumRegistered(const Result<std::vector<ColmapModel>>& models) {
   return models.ok() ? models->front().images.size() : 0;
@@ -131,7 +133,9 @@ Result<std::vector<ColmapModel>> MapImages(const MapperInput& input, const Captu
   const auto num_global = global.ok() ? static_cast<double>(global->models.front().images.size()) : 0;
   const bool is_enough =
       num_global >= options.min_registered_ratio * static_cast<double>(input.images.size());
-  if (global.ok() && is_enough && (mapper.mapper == "global" || global->is_drive)) return global->models;
+  const bool is_whole = num_global >= kMinJoinedRatio * static_cast<double>(input.images.size());
+  if (global.ok() && is_enough && (mapper.mapper == "global" || global->is_drive || is_whole))
+    return global->models;
   std::vector<std::string> warnings;
   Result<std::vector<ColmapModel>> by_colmap =
       MapByColmap(input, capture, options, work_folder, progress, &warnings);
@@ -273,7 +277,8 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
       {.name = "mapper",
        .value = &o->mapper.mapper,
        .help = "global: poses of all images at once, by COLMAP if that joins too few; colmap: by COLMAP "
-               "alone; auto: global for a drive, else COLMAP unless all at once many more are joined",
+               "alone; auto: global, by COLMAP, too, where less than four fifths of images in no order are "
+               "joined, unless all at once many more are",
        .choices = {"auto", "global", "colmap"}},
       {.name = "max_hours",
        .value = &o->mapper.max_hours,

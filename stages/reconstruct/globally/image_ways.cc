@@ -15,6 +15,7 @@ namespace {
 // (without parallax it is short), and of a step that only is one.
 constexpr double kSigmaRatio = 0.05, kLeastSigma = 0.02, kShortSigma = 0.5, kStepSigma = 2;
 // Of the logarithm of a step's length about the unit, and of one that a motion tells.
+constexpr double kTypicalNumMatches = 200;
 constexpr double kLogStepSigma = 0.7, kLogMotionSigma = 0.05;
 
 PairDepths DepthsOfMatches(ViewPair pair, const BearingOf& bearing_of, double sigma_rad) {
@@ -53,7 +54,7 @@ std::map<std::pair<int, int>, KnownLength> KnownLengths(const std::vector<ImageM
 std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
                         const std::vector<ImageMotion>& motions,
                         const std::vector<std::pair<int, int>>& steps, const BearingOf& bearing_of,
-                        double sigma_rad, int num_threads) {
+                        double sigma_rad, bool weigh_by_matches, int num_threads) {
   // A typical step.
   const double median_way_m = MedianWayM(motions), unit = median_way_m > 0 ? median_way_m : 1;
   std::vector<PairDepths> depths(pairs.size());
@@ -72,8 +73,10 @@ std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const 
   for (size_t p = 0; p < pairs.size(); ++p) {
     const Eigen::Vector3d direction =
         rotations[pairs[p].image1].conjugate() * pairs[p].cam2_from_cam1.Center().normalized();
-    ways.push_back({pairs[p].image1, pairs[p].image2, unit * lengths[p] * direction,
-                    unit * (lengths[p] > 0 ? kLeastSigma + kSigmaRatio * lengths[p] : kShortSigma)});
+    ways.push_back(
+        {pairs[p].image1, pairs[p].image2, unit * lengths[p] * direction,
+         unit * (lengths[p] > 0 ? kLeastSigma + kSigmaRatio * lengths[p] : kShortSigma),
+         weigh_by_matches ? static_cast<double>(pairs[p].matches.size()) / kTypicalNumMatches : 1});
   }
   for (const ImageMotion& motion : motions) {
     ways.push_back({motion.image1, motion.image2, rotations[motion.image1].conjugate() * motion.Way(),
@@ -88,7 +91,7 @@ std::vector<Eigen::Vector3d> CentersAlong(int num_images, const std::vector<Way>
   Eigen::MatrixXd differences(std::ssize(ways), 3);
   for (const Way& way : ways) {
     differences.row(std::ssize(links)) = way.way.transpose();
-    links.push_back({way.from, way.to, way.sigma});
+    links.push_back({way.from, way.to, way.sigma, way.weight});
   }
   const Eigen::MatrixXd found = SolveDifferencesRobustly(num_images, links, differences);
   std::vector<Eigen::Vector3d> centers;

@@ -18,7 +18,8 @@ namespace cairn::reconstruct {
 struct Way {
   int from = 0, to = 0;
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
-  double sigma = 1;  // per axis
+  double sigma = 1;   // per axis
+  double weight = 1;  // beside ways that contradict it
 };
 
 // Where a keypoint is seen, a unit vector in its camera's frame; none outside of what the lens shows.
@@ -26,12 +27,12 @@ using BearingOf = std::function<std::optional<Eigen::Vector3d>(int image, Keypoi
 
 // Ways by pairs, whose lengths are averaged, and by motions, in metres if there are any; of pairs that know
 // no length, and of `steps` (images of which one follows the other), that they are short.  `sigma_rad`: of
-// bearings.  Same result for
-// any number of threads.
+// bearings.  `weigh_by_matches`: a way counts by its pair's matches beside those that contradict it, as
+// look-alikes do, of which there may be as many.  Same result for any number of threads.
 std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<ViewPair>& pairs,
                         const std::vector<ImageMotion>& motions,
                         const std::vector<std::pair<int, int>>& steps, const BearingOf& bearing_of,
-                        double sigma_rad, int num_threads);
+                        double sigma_rad, bool weigh_by_matches, int num_threads);
 
 // The images' centres that explain the ways best, robustly; the first at zero.  REQUIRES: the ways join all
 // images

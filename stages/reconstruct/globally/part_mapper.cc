@@ -13,6 +13,7 @@
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
 #include "core/structure/camera_sensitivity.h"
+#include "stages/reconstruct/globally/agreeing_pieces.h"
 #include "stages/reconstruct/view_graph/average_rotations.h"
 
 namespace cairn::reconstruct {
@@ -47,6 +48,15 @@ constexpr double kMinPartAccepted = 0.01;
 // Keypoints that decide in the last round: of an image, and of all.
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
 constexpr int kMaxNumObservations = 800000;
+
+// What is held by look-alikes alone is moved before the last round, at most so often.
+constexpr int kMaxNumMoved = 8;
+// Points this near to each other, over the median depth, may be one.
+constexpr double kSameDepthRatio = 0.05;
+// Matches of a pair that say where else its images may belong.
+constexpr size_t kMaxNumShared = 60;
+// Images of a cluster, which look at the same, have on average so many matches with each other.
+constexpr double kMinClusterMatches = 40;
 
 }  // namespace
 
@@ -103,6 +113,13 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
     TriangulateAll(round.max_error_px);
+    const bool is_last = &round == std::end(kRounds) - 1;
+    // The order of a drive says where its images belong.
+    for (int k = 0; is_last && !is_drive_ && k < kMaxNumMoved && MoveMisplacedPart(); ++k) {
+      AgreeAgain(progress);
+      if (progress.Cancelled()) return ColmapModel();
+      TriangulateAll(round.max_error_px);
+    }
     if (round.accepted_rad > 0) {
       const bool is_again = round.accepted_rad == (&round)[-1].accepted_rad;
       const int num_changed = AcceptPairs(round.accepted_rad);
@@ -220,7 +237,7 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
     return BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
   };
   const std::vector<Way> ways = WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of,
-                                       1 / CameraOf(0).MeanFocal(), num_threads_);
+                                       1 / CameraOf(0).MeanFocal(), !is_drive_, num_threads_);
   const std::vector<Eigen::Vector3d> centers = CentersAlong(static_cast<int>(images_.size()), ways);
   std::vector<Way> steps;
   for (const auto& [from, to] : steps_) steps.push_back({from, to, centers[to] - centers[from]});
@@ -251,17 +268,28 @@ void PartMapper::TriangulateAll(double max_error_px) {
   });
 }
 
-// A pair agrees with the map where the points of its keypoints in one image are, on the median, seen in the
-// other where they match.
-int PartMapper::AcceptPairs(double max_error_rad) {
+std::vector<Eigen::Quaterniond> PartMapper::Rotations() const {
+  std::vector<Eigen::Quaterniond> rotations;
+  for (const Pose& pose : problem_.cam_from_world) rotations.push_back(pose.rotation);
+  return rotations;
+}
+
+// Per image and keypoint; -1 where there is no point.
+std::vector<std::vector<int>> PartMapper::TracksOfKeypoints() const {
   std::vector<std::vector<int>> track_of(images_.size());
   for (size_t i = 0; i < images_.size(); ++i) track_of[i].assign(input_.keypoints[images_[i]].size(), -1);
   for (size_t t = 0; t < tracks_.size(); ++t) {
     for (const int e : triangulations_[t].inliers)
       track_of[tracks_[t][e].image_idx][tracks_[t][e].keypoint_idx] = static_cast<int>(t);
   }
-  std::vector<Eigen::Quaterniond> rotations;
-  for (const Pose& pose : problem_.cam_from_world) rotations.push_back(pose.rotation);
+  return track_of;
+}
+
+// A pair agrees with the map where the points of its keypoints in one image are, on the median, seen in the
+// other where they match.
+int PartMapper::AcceptPairs(double max_error_rad) {
+  const std::vector<std::vector<int>> track_of = TracksOfKeypoints();
+  const std::vector<Eigen::Quaterniond> rotations = Rotations();
   std::vector<char> verdict(pairs_.size(), 0);
   ParallelFor(static_cast<int64_t>(pairs_.size()), num_threads_, [&](int64_t p) {
     const ViewPair& pair = pairs_[p];
@@ -289,6 +317,77 @@ int PartMapper::AcceptPairs(double max_error_rad) {
     is_accepted_[p] = is_accepted;
   }
   return num_changed;
+}
+
+double PartMapper::MedianDepth() const {
+  std::vector<double> depths;
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    for (const int e : triangulations_[t].inliers)
+      depths.push_back(
+          (problem_.cam_from_world[tracks_[t][e].image_idx] * triangulations_[t].position).norm());
+  }
+  return depths.empty() ? 0 : Median(depths);
+}
+
+// Whether images were moved that belong elsewhere.
+bool PartMapper::MoveMisplacedPart() {
+  const int num_images = static_cast<int>(images_.size());
+  const double depth = MedianDepth();
+  if (!(depth > 0)) return false;
+  const std::vector<std::vector<int>> track_of = TracksOfKeypoints();
+  std::vector<SignedLink> links;
+  std::vector<SharedTurn> turns;
+  std::vector<SharedPoint> points;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    const ViewPair& pair = pairs_[p];
+    const auto num_matches = static_cast<double>(pair.matches.size());
+    links.push_back({pair.image1, pair.image2, is_accepted_[p] ? num_matches : -num_matches});
+    std::vector<Eigen::Quaterniond> rotations = {pair.cam2_from_cam1.rotation};
+    for (const Pose& other : pair.alternatives) rotations.push_back(other.rotation);
+    for (const Eigen::Quaterniond& rotation : rotations) {
+      turns.push_back({pair.image1, pair.image2,
+                       (rotation * problem_.cam_from_world[pair.image1].rotation).conjugate() *
+                           problem_.cam_from_world[pair.image2].rotation});
+    }
+    const size_t stride = 1 + pair.matches.size() / kMaxNumShared;
+    for (size_t m = 0; m < pair.matches.size(); m += stride) {
+      const int track1 = track_of[pair.image1][pair.matches[m].idx1],
+                track2 = track_of[pair.image2][pair.matches[m].idx2];
+      if (track1 < 0 || track2 < 0) continue;
+      points.push_back(
+          {pair.image1, pair.image2, triangulations_[track1].position, triangulations_[track2].position});
+    }
+  }
+  const std::optional<MisplacedPart> part = FindMisplacedPart(
+      AgreeingPieces(num_images, links, 0), AgreeingPieces(num_images, links, kMinClusterMatches), links,
+      turns, points, {.tolerance = kSameDepthRatio * depth}, num_threads_);
+  if (!part) return false;
+  spdlog::debug("reconstruct: {} of {} images belong elsewhere: {} cells of space shared there, {} here",
+                part->images.size(), num_images, part->num_cells_there, part->num_cells_here);
+  for (const int i : part->images) {
+    // A point x of theirs is now at move * x.
+    Pose& pose = problem_.cam_from_world[i];
+    const Eigen::Quaterniond rotation = pose.rotation * Eigen::Quaterniond(part->move.linear()).conjugate();
+    pose = {rotation.normalized(), pose.translation - rotation * part->move.translation()};
+  }
+  return true;
+}
+
+// With pairs that agree with where images are now; then the last round follows.
+void PartMapper::AgreeAgain(Progress& progress) {
+  progress.End();
+  progress.Begin("images that looked alike moved, finding places again",
+                 3 * AdjustModelOptions().max_num_iterations, "steps");
+  const std::vector<Eigen::Quaterniond> rotations = Rotations();
+  for (const Round* round : {std::end(kRounds) - 3, std::end(kRounds) - 2}) {
+    TriangulateAll(round->max_error_px);
+    AcceptPairs(round->accepted_rad);
+    MakeTracks();
+    TriangulateAll(round->max_error_px);
+    problem_.rotations.clear();
+    KeepRotations(rotations);
+    Adjust(round->num_keypoints, round->adjust_cameras, progress);
+  }
 }
 
 void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progress) {

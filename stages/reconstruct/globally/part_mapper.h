@@ -13,6 +13,7 @@
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
 #include "stages/reconstruct/globally/image_ways.h"
+#include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 
@@ -67,6 +68,11 @@ class PartMapper {
   void Position(const std::vector<Eigen::Quaterniond>& rotations);
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
+  std::vector<Eigen::Quaterniond> Rotations() const;
+  std::vector<std::vector<int>> TracksOfKeypoints() const;
+  double MedianDepth() const;
+  bool MoveMisplacedPart();
+  void AgreeAgain(Progress& progress);
   void Adjust(int num_keypoints, bool adjust_cameras, Progress& progress);
   ColmapModel MakeModel() const;
 

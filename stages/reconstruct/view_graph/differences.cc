@@ -24,7 +24,7 @@ Eigen::MatrixXd SolveDifferences(int num_nodes, const std::vector<Link>& links,
     if (row > 0 && column > 0) triplets.emplace_back(row - 1, column - 1, value);
   };
   for (size_t k = 0; k < links.size(); ++k) {
-    const auto [a, b, sigma] = links[k];
+    const int a = links[k].from, b = links[k].to;
     const auto row = static_cast<Eigen::Index>(k);
     add(a, a, weights[k]);
     add(b, b, weights[k]);
@@ -43,13 +43,14 @@ Eigen::MatrixXd SolveDifferences(int num_nodes, const std::vector<Link>& links,
 Eigen::MatrixXd SolveDifferencesRobustly(int num_nodes, const std::vector<Link>& links,
                                          const Eigen::MatrixXd& differences) {
   std::vector<double> precisions, weights(links.size());
-  for (const Link& link : links) precisions.push_back(1 / (link.sigma * link.sigma));
+  for (const Link& link : links) precisions.push_back(link.weight / (link.sigma * link.sigma));
   Eigen::MatrixXd values = SolveDifferences(num_nodes, links, differences, precisions);
   for (int iteration = 0; iteration < kNumByAbsolute + kNumBySquares; ++iteration) {
     for (size_t k = 0; k < links.size(); ++k) {
-      const auto [from, to, sigma] = links[k];
       const auto row = static_cast<Eigen::Index>(k);
-      const double error = (values.row(to) - values.row(from) - differences.row(row)).norm() / sigma;
+      const double error =
+          (values.row(links[k].to) - values.row(links[k].from) - differences.row(row)).norm() /
+          links[k].sigma;
       weights[k] =
           precisions[k] * (iteration < kNumByAbsolute ? 1 / std::max(error, kLeastError)
                                                       : std::pow(1 + std::pow(error / kRobustScale, 2), -2));

@@ -93,9 +93,10 @@ BearingOf BearingsOf(const Drive& drive) {
   };
 }
 
-std::vector<Way> Find(const Drive& drive, const std::vector<ImageMotion>& motions = {}, int num_threads = 2) {
+std::vector<Way> Find(const Drive& drive, const std::vector<ImageMotion>& motions = {}, int num_threads = 2,
+                      bool weigh_by_matches = false) {
   return WaysBy(drive.Rotations(), drive.pairs, motions, drive.steps, BearingsOf(drive), kNoiseRad,
-                num_threads);
+                weigh_by_matches, num_threads);
 }
 
 double LengthOf(const std::vector<Eigen::Vector3d>& centers, int from, int to) {
@@ -181,6 +182,19 @@ TEST(ImageWays, TellHowMuchLongerStepsAreBehindATurnOnTheSpot) {
   EXPECT_NEAR(LengthOf(centers, 17, 29) / scale, 3.6, 0.1);
   EXPECT_LT(LengthOf(centers, 12, 17) / scale, 0.01);
   for (int i = 0; i < 30; ++i) EXPECT_LT((centers[i] / scale - drive.Center(i)).norm(), 0.1) << i;
+}
+
+TEST(ImageWays, WeighAsMuchAsMatchesIfAsked) {
+  const Drive drive = MakeDrive();
+  const std::vector<Way> plain = Find(drive), weighed = Find(drive, {}, 2, true);
+  ASSERT_EQ(plain.size(), weighed.size());
+  for (size_t w = 0; w < drive.pairs.size(); ++w) {
+    EXPECT_EQ(plain[w].weight, 1);
+    EXPECT_DOUBLE_EQ(weighed[w].weight / weighed[0].weight,
+                     static_cast<double>(drive.pairs[w].matches.size()) /
+                         static_cast<double>(drive.pairs[0].matches.size()));
+    EXPECT_EQ(plain[w].way, weighed[w].way);
+  }
 }
 
 TEST(ImageWays, MotionsGiveTheUnitAlsoWhereTheyAreMissing) {

@@ -61,5 +61,14 @@ TEST(Differences, WhatIsSureOutvotesWhatIsNot) {
   EXPECT_NEAR(SolveDifferencesRobustly(2, links, rows)(1, 0), 3, 0.01);
 }
 
+// Three that say 0 against one that says 3 and weighs more than they do.
+TEST(Differences, WhatWeighsMoreOutvotesWhatIsMore) {
+  std::vector<Link> links = {{0, 1, 1, 0.5}, {0, 1, 1, 0.5}, {0, 1, 1, 0.5}, {0, 1, 1, 4}};
+  const Eigen::VectorXd rows = (Eigen::VectorXd(4) << 0, 0, 0, 30).finished();
+  EXPECT_NEAR(SolveDifferencesRobustly(2, links, rows)(1, 0), 30, 0.1);
+  links[3].weight = 0.5;
+  EXPECT_NEAR(SolveDifferencesRobustly(2, links, rows)(1, 0), 0, 0.1);
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct
