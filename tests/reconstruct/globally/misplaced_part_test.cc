@@ -106,6 +106,30 @@ TEST(MisplacedPart, IsTheSmallerSide) {
   EXPECT_TRUE(part->move.isApprox(folded.truth, 1e-6));
 }
 
+// Turns are known to a degree, points to centimetres, and a third of what pairs match is wrong: all that
+// agrees decides where the part goes.
+TEST(MisplacedPart, IsMovedByAllThatAgrees) {
+  Folded folded = MakeFolded(30);
+  Random random(5);
+  const auto noise = [&](double sigma) {
+    return Eigen::Vector3d(random.Normal(0, sigma), random.Normal(0, sigma), random.Normal(0, sigma));
+  };
+  for (SharedTurn& turn : folded.turns) {
+    const Eigen::Vector3d by = noise(0.02);
+    turn.turn = turn.turn * Eigen::Quaterniond(Eigen::AngleAxisd(by.norm(), by.normalized()));
+  }
+  for (size_t k = 0; k < folded.points.size(); ++k) {
+    folded.points[k].in2 += k % 3 == 0 ? noise(2) : noise(0.02);
+  }
+  const auto part = Find(folded);
+  ASSERT_TRUE(part);
+  EXPECT_THAT(part->images, ElementsAre(10, 11, 12, 13, 14, 15));
+  for (const Eigen::Vector3d& corner : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(8, 6, 2.5)}) {
+    const Eigen::Vector3d here = folded.truth.inverse() * corner;
+    EXPECT_LT((part->move * here - corner).norm(), 0.02);
+  }
+}
+
 // Those who look at the panel from both rooms hold on to each other: one cluster, taken for the first room's.
 TEST(MisplacedPart, IsCutThroughAClusterThatLooksAtTheLookAlike) {
   Folded folded = MakeFolded(12);
