@@ -1,5 +1,9 @@
 #pragma once
 
+#include <deque>
+#include <memory>
+#include <vector>
+
 #include <ceres/ceres.h>
 #include <Eigen/Core>
 
@@ -43,6 +47,25 @@ class ReprojectionCost : public ceres::CostFunction {
   const PixelRay& ray_;
   const CameraSensitivity& camera_;
   double weight_;
+};
+
+// Of a problem whose costs, losses and manifolds are the caller's, unchecked.
+ceres::Problem::Options UncheckedProblem();
+
+// The costs of such a problem, side by side: Ceres would keep count of each of its own in a map.
+class BundleCosts {
+ public:
+  // Refers to its arguments, as ReprojectionCost does.
+  ceres::CostFunction* AddReprojection(const PixelRay& ray, const CameraSensitivity& camera,
+                                       double sigma_px) {
+    return &reprojections_.emplace_back(ray, camera, sigma_px);
+  }
+  // Takes ownership.
+  ceres::CostFunction* Add(ceres::CostFunction* cost) { return others_.emplace_back(cost).get(); }
+
+ private:
+  std::deque<ReprojectionCost> reprojections_;
+  std::vector<std::unique_ptr<ceres::CostFunction>> others_;
 };
 
 // The motion between two images, later_from_earlier, against one that is stated: turn, then the translation.

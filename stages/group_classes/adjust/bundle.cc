@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <memory>
 #include <utility>
 
@@ -101,20 +100,24 @@ class StepCallback : public ceres::IterationCallback {
 class CeresBundle {
  public:
   CeresBundle(const BundleOptions& options, BundleProblem* problem)
-      : options_(options), bundle_(*problem), num_images_(problem->images.size()), problem_(Unchecked()) {
+      : options_(options),
+        bundle_(*problem),
+        num_images_(problem->images.size()),
+        problem_(UncheckedProblem()) {
     AddParameters();
     for (const BundleProblem::Observation& observation : bundle_.observations) AddObservation(observation);
     for (size_t i = 0; i < bundle_.images.size(); ++i) AddStatedPose(i);
     if (bundle_.is_offset_free) {
       other_blocks_.push_back(problem_.AddResidualBlock(
-          Keep(new ceres::AutoDiffCostFunction<OffsetPriorCost, 6, 7>(
+          costs_.Add(new ceres::AutoDiffCostFunction<OffsetPriorCost, 6, 7>(
               new OffsetPriorCost{RadFromDeg(bundle_.offset_sigma_deg), bundle_.offset_sigma_m})),
           nullptr, Offset()));
     }
     for (size_t c = 0; c < bundle_.cameras.size(); ++c) {
       const CameraBlock& camera = bundle_.cameras[c];
       if (camera.free.empty()) continue;
-      other_blocks_.push_back(problem_.AddResidualBlock(Keep(new CameraPrior(camera)), nullptr, Delta(c)));
+      other_blocks_.push_back(
+          problem_.AddResidualBlock(costs_.Add(new CameraPrior(camera)), nullptr, Delta(c)));
     }
   }
 
@@ -223,20 +226,6 @@ class CeresBundle {
   }
 
  private:
-  static ceres::Problem::Options Unchecked() {
-    ceres::Problem::Options options;
-    options.disable_all_safety_checks = true;
-    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    return options;
-  }
-
-  ceres::CostFunction* Keep(ceres::CostFunction* cost) {
-    other_costs_.emplace_back(cost);
-    return cost;
-  }
-
   double* CamFromWorld(size_t image) { return &values_[size_t{kPoseBlockSize} * image]; }
   double* Drifted(size_t image) { return &values_[size_t{kPoseBlockSize} * (num_images_ + image)]; }
   double* Offset() { return &values_[size_t{kPoseBlockSize} * 2 * num_images_]; }
@@ -281,26 +270,26 @@ class CeresBundle {
     std::vector<double*> blocks = {CamFromWorld(observation.image_idx),
                                    bundle_.points[observation.point_idx].data()};
     if (!camera.free.empty()) blocks.push_back(Delta(camera_idx));
-    reprojections_.emplace_back(observation.ray, observation.camera, observation.sigma_px);
-    other_blocks_.push_back(
-        problem_.AddResidualBlock(&reprojections_.back(), losses_[observation.image_idx].get(), blocks));
+    other_blocks_.push_back(problem_.AddResidualBlock(
+        costs_.AddReprojection(observation.ray, observation.camera, observation.sigma_px),
+        losses_[observation.image_idx].get(), blocks));
   }
 
   void AddStatedPose(size_t i) {
     const BundleProblem::Image& image = bundle_.images[i];
     const PoseNoise& noise = bundle_.noise;
     stated_pose_blocks_.push_back(
-        problem_.AddResidualBlock(Keep(new ceres::AutoDiffCostFunction<OwnErrorCost, 6, 7, 7, 7>(
+        problem_.AddResidualBlock(costs_.Add(new ceres::AutoDiffCostFunction<OwnErrorCost, 6, 7, 7, 7>(
                                       new OwnErrorCost{RadFromDeg(noise.own_deg), noise.own_m})),
                                   nullptr, CamFromWorld(i), Drifted(i), Offset()));
     is_walk_block_.push_back(false);
     if (i == 0) return;
     const double root = std::sqrt(image.way_m);
-    stated_pose_blocks_.push_back(
-        problem_.AddResidualBlock(Keep(new ceres::AutoDiffCostFunction<MotionCost, 6, 7, 7>(new MotionCost{
-                                      image.stated * bundle_.images[i - 1].stated.Inverse(),
-                                      RadFromDeg(noise.walk_deg) * root, noise.walk_m * root})),
-                                  nullptr, Drifted(i - 1), Drifted(i)));
+    stated_pose_blocks_.push_back(problem_.AddResidualBlock(
+        costs_.Add(new ceres::AutoDiffCostFunction<MotionCost, 6, 7, 7>(
+            new MotionCost{image.stated * bundle_.images[i - 1].stated.Inverse(),
+                           RadFromDeg(noise.walk_deg) * root, noise.walk_m * root})),
+        nullptr, Drifted(i - 1), Drifted(i)));
     is_walk_block_.push_back(true);
   }
 
@@ -312,9 +301,7 @@ class CeresBundle {
   std::vector<double> values_;
   std::vector<size_t> first_delta_;                           // per camera
   std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // per image
-  // Ceres would keep count of each of its own in a map.
-  std::deque<ReprojectionCost> reprojections_;
-  std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
+  BundleCosts costs_;
   PoseManifold manifold_;
   ceres::Problem problem_;
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering_ =

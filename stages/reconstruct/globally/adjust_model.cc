@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -136,19 +135,8 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   std::vector<Seen> seen(problem->observations.size());
   PoseManifold manifold;
   ceres::CauchyLoss loss(options.loss_scale_px);
-  // Ceres would keep count of each of its own in a map.
-  std::deque<ReprojectionCost> reprojections;
-  std::vector<std::unique_ptr<ceres::CostFunction>> other_costs;
-  const auto keep = [&](ceres::CostFunction* cost) {
-    other_costs.emplace_back(cost);
-    return cost;
-  };
-  ceres::Problem::Options problem_options;
-  problem_options.disable_all_safety_checks = true;
-  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem ceres_problem(problem_options);
+  BundleCosts costs;
+  ceres::Problem ceres_problem(UncheckedProblem());
   std::vector<bool> is_camera_used(problem->cameras.size(), false);
   const std::vector<int> none;
   for (size_t k = 0; k < problem->observations.size(); ++k) {
@@ -164,8 +152,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
       blocks.push_back(&values[first_change[c]]);
       is_camera_used[c] = true;
     }
-    reprojections.emplace_back(seen[k].ray, seen[k].sensitivity, 1);
-    ceres_problem.AddResidualBlock(&reprojections.back(), &loss, blocks);
+    ceres_problem.AddResidualBlock(costs.AddReprojection(seen[k].ray, seen[k].sensitivity, 1), &loss, blocks);
   }
   ceres::CauchyLoss weak_loss(1);
   const auto are_known = [&](size_t a, size_t b) {
@@ -174,7 +161,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   for (const RelativeRotation& rotation : problem->rotations) {
     if (!are_known(rotation.image1, rotation.image2)) continue;
     ceres_problem.AddResidualBlock(
-        keep(new ceres::AutoDiffCostFunction<RelativeRotationCost, 3, kPoseBlockSize, kPoseBlockSize>(
+        costs.Add(new ceres::AutoDiffCostFunction<RelativeRotationCost, 3, kPoseBlockSize, kPoseBlockSize>(
             new RelativeRotationCost{rotation.cam2_from_cam1, RadFromDeg(options.rotation_sigma_deg)})),
         rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
   }
@@ -182,14 +169,14 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   for (const ModelStep& step : problem->steps) {
     if (!(typical_step > 0) || !are_known(step.from, step.to)) continue;
     ceres_problem.AddResidualBlock(
-        keep(new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
+        costs.Add(new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
             new StepLengthCost{typical_step, step.length, options.step_sigma})),
         &weak_loss, pose_of(step.from), pose_of(step.to));
   }
   const double median_way_m = MedianWayM(problem->motions);
   for (const ImageMotion& motion : problem->motions) {
     if (!(median_way_m > 0) || !are_known(motion.image1, motion.image2)) continue;
-    ceres_problem.AddResidualBlock(keep(MakeMotionCost(options, motion, median_way_m)), &weak_loss,
+    ceres_problem.AddResidualBlock(costs.Add(MakeMotionCost(options, motion, median_way_m)), &weak_loss,
                                    pose_of(motion.image1), pose_of(motion.image2));
   }
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -207,7 +194,7 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   }
   for (size_t c = 0; c < problem->cameras.size(); ++c) {
     if (!is_camera_used[c]) continue;
-    ceres_problem.AddResidualBlock(keep(new CameraPriorCost(problem->cameras[c])), nullptr,
+    ceres_problem.AddResidualBlock(costs.Add(new CameraPriorCost(problem->cameras[c])), nullptr,
                                    &values[first_change[c]]);
     ordering->AddElementToGroup(&values[first_change[c]], 1);
     for (size_t k = 0; k < problem->cameras[c].free.size(); ++k) {
