@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/geometry/nearest_rotation.h"
 #include "core/geometry/vector_geometry.h"
 
 namespace cairn {
@@ -92,9 +93,7 @@ Eigen::Quaterniond RefineRotation(const Eigen::Quaterniond& cam2_from_cam1, cons
       const double error = SquaredTransferError(R, c.bearings1[i], c.bearings2[i]);
       covariance += c.bearings2[i] * c.bearings1[i].transpose() / (1 + error / (scale_rad * scale_rad));
     }
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-    R = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+    R = NearestRotation(covariance);
   }
   return Eigen::Quaterniond(R).normalized();
 }

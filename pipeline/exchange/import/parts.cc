@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <array>
 
-#include <Eigen/SVD>
-
 #include "core/base/text.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/colmap_model.h"
+#include "core/geometry/nearest_rotation.h"
 
 namespace cairn::pipeline {
 
@@ -46,9 +45,7 @@ Result<Pose> PoseFromMatrix(std::span<const double> rows) {
                      "the pose's rotation is not valid: R R^T is off by {:g}, its determinant is {:g}", error,
                      R.determinant());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  return Pose{Eigen::Quaterniond(nearest).normalized(), matrix.col(3)};
+  return Pose{Eigen::Quaterniond(NearestRotation(R)).normalized(), matrix.col(3)};
 }
 
 Result<Pose> PoseFromNumbers(std::span<const double> numbers) {

@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
 #include "core/base/quantiles.h"
+#include "core/geometry/nearest_rotation.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -15,14 +15,6 @@ constexpr int kNumRounds = 20;
 constexpr double kMedianLengthOf3 = 1.538;
 constexpr double kSigmasOff = 3;
 constexpr double kLeastSpreadRad = 1e-6;
-
-// The rotation that turns the IMU's vectors into the camera's best [Umeyama91].
-Eigen::Quaterniond BestRotation(const Eigen::Matrix3d& camera_times_imu) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(camera_times_imu, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs.z() = -1;
-  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
-}
 
 }  // namespace
 
@@ -36,7 +28,7 @@ ImuTurn FitImuTurn(const std::vector<TurnPair>& pairs, const std::optional<Eigen
       moments +=
           weights[k] * pairs[k].of_camera * (pairs[k].of_imu - found.gyro_bias * pairs[k].dt_s).transpose();
     }
-    if (!stated) found.cam_from_imu = BestRotation(moments);
+    if (!stated) found.cam_from_imu = Eigen::Quaterniond(NearestRotation(moments));
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double sum_squares = 0;
     for (size_t k = 0; k < pairs.size(); ++k) {
