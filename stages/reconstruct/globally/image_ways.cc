@@ -14,8 +14,9 @@ namespace {
 // Standard deviations of a way, as a part of it and of the unit; in units, of one whose length nothing tells
 // (without parallax it is short), and of a step that only is one.
 constexpr double kSigmaRatio = 0.05, kLeastSigma = 0.02, kShortSigma = 0.5, kStepSigma = 2;
-// Of the logarithm of a step's length about the unit, and of one that a motion tells.
+// Matches of a pair whose way weighs as much as a motion.
 constexpr double kTypicalNumMatches = 200;
+// Of the logarithm of a step's length about the unit, and of one that a motion tells.
 constexpr double kLogStepSigma = 0.7, kLogMotionSigma = 0.05;
 
 PairDepths DepthsOfMatches(ViewPair pair, const BearingOf& bearing_of, double sigma_rad) {

@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
 #include <queue>
 #include <set>
 #include <tuple>
 #include <utility>
 
-#include <Eigen/SVD>
-
 #include "core/base/parallel.h"
-#include "core/base/random.h"
+#include "core/geometry/nearest_rotation.h"
 #include "core/geometry/pose.h"
 
 namespace cairn::reconstruct {
@@ -112,8 +109,7 @@ std::vector<CommonTurn> CommonTurns(Turns turns) {
       sum += turn.turn.toRotationMatrix();
       found.images.emplace(turn.image1, turn.image2);
     }
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    found.turn = Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose()));
+    found.turn = Eigen::Quaterniond(NearestRotation(sum));
     common.push_back(std::move(found));
     turns = std::move(left);
   }
@@ -228,16 +224,16 @@ struct Shared {
 };
 
 // What pieces share, by two of them, the lower first.
-std::map<std::pair<int, int>, Shared> SharedBetween(const std::vector<int>& piece_of, const Turns& turns,
-                                                    const Points& points) {
+std::map<std::pair<int, int>, Shared> SharedBetween(const std::vector<int>& piece_of,
+                                                    const PairEvidence& evidence) {
   std::map<std::pair<int, int>, Shared> between;
   const auto add = [&](const auto& shared, auto member) {
     const int piece1 = piece_of[shared.image1], piece2 = piece_of[shared.image2];
     if (piece1 < piece2) (between[{piece1, piece2}].*member).push_back(shared);
     if (piece1 > piece2) (between[{piece2, piece1}].*member).push_back(Reversed(shared));
   };
-  for (const SharedTurn& turn : turns) add(turn, &Shared::turns);
-  for (const SharedPoint& point : points) add(point, &Shared::points);
+  for (const SharedTurn& turn : evidence.turns) add(turn, &Shared::turns);
+  for (const SharedPoint& point : evidence.points) add(point, &Shared::points);
   return between;
 }
 
@@ -308,15 +304,13 @@ MisplacedPart SmallerSide(const Cut& cut) {
 
 std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int>>& pieces,
                                                const std::vector<std::vector<int>>& clusters,
-                                               const std::vector<SignedLink>& links,
-                                               const std::vector<SharedTurn>& turns,
-                                               const std::vector<SharedPoint>& points,
+                                               const PairEvidence& evidence,
                                                const MisplacedPartOptions& options, int num_threads) {
   size_t num_images = 0;
   for (const std::vector<int>& piece : pieces) num_images += piece.size();
-  const std::vector<OtherPlace> places = OtherPlacesOfAll(
-      SharedBetween(GroupOf(num_images, pieces), turns, points), options.tolerance, num_threads);
-  const Neighbourhood neighbours = AgreeingNeighbours(num_images, links);
+  const std::vector<OtherPlace> places =
+      OtherPlacesOfAll(SharedBetween(GroupOf(num_images, pieces), evidence), options.tolerance, num_threads);
+  const Neighbourhood neighbours = AgreeingNeighbours(num_images, evidence.links);
   // Images that look at the look-alike from both places hold on to each other, not to their sides: cut by all
   // links, by those that leave clusters, and by these and then all.
   const std::vector<int> cluster_of = GroupOf(num_images, clusters);
@@ -328,7 +322,7 @@ std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int
     cuts[k].side = GrowSides(neighbours, pieces[place.piece1], pieces[place.piece2]);
     if (way != 0) RefineSides(neighbours, cluster_of, &cuts[k].side);
     if (way != 1) RefineSides(neighbours, {}, &cuts[k].side);
-    CountCells(points, place.relation, options.tolerance, &cuts[k]);
+    CountCells(evidence.points, place.relation, options.tolerance, &cuts[k]);
   });
   const Cut* best = nullptr;
   for (const Cut& cut : cuts) {

@@ -5,21 +5,9 @@
 
 #include <Eigen/Geometry>
 
-#include "stages/reconstruct/globally/agreeing_pieces.h"
+#include "stages/reconstruct/globally/pair_evidence.h"
 
 namespace cairn::reconstruct {
-
-// A point as two images have it: two points of a map that a match says are one.
-struct SharedPoint {
-  int image1 = 0, image2 = 0;
-  Eigen::Vector3d in1 = Eigen::Vector3d::Zero(), in2 = Eigen::Vector3d::Zero();
-};
-
-// How the pair of two images says that the first's surroundings are turned from the second's.
-struct SharedTurn {
-  int image1 = 0, image2 = 0;
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  // of points near the second
-};
 
 struct MisplacedPartOptions {
   // Points this near to each other are one; and how far apart points are that count as two.  REQUIRES: > 0
@@ -43,14 +31,11 @@ struct MisplacedPart {
 // weakly.  What counts is therefore how many cells of space hold points that both sides have in one place,
 // not how many matches or images do [as Heinly, Dunn & Frahm 2014, "Correcting for duplicate scene structure
 // in sparse 3D reconstruction", split a map and ask what each side sees of the other]. `pieces`: images
-// between which the map is doubtful; `clusters`: smaller ones, of images that look at the same; `links`: of
-// pairs, positive where they agree with the map; `turns` and `points`: of all pairs.  Nothing where the map
-// holds.  Same result for any number of threads.  O(points * pairs of pieces).
+// between which the map is doubtful; `clusters`: smaller ones, of images that look at the same.  Nothing
+// where the map holds.  Same result for any number of threads.  O(points * pairs of pieces).
 std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int>>& pieces,
                                                const std::vector<std::vector<int>>& clusters,
-                                               const std::vector<SignedLink>& links,
-                                               const std::vector<SharedTurn>& turns,
-                                               const std::vector<SharedPoint>& points,
+                                               const PairEvidence& evidence,
                                                const MisplacedPartOptions& options, int num_threads);
 
 }  // namespace cairn::reconstruct

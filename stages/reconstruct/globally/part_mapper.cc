@@ -14,6 +14,8 @@
 #include "core/base/quantiles.h"
 #include "core/structure/camera_sensitivity.h"
 #include "stages/reconstruct/globally/agreeing_pieces.h"
+#include "stages/reconstruct/globally/misplaced_part.h"
+#include "stages/reconstruct/globally/pair_evidence.h"
 #include "stages/reconstruct/view_graph/average_rotations.h"
 
 namespace cairn::reconstruct {
@@ -53,8 +55,6 @@ constexpr int kMaxNumObservations = 800000;
 constexpr int kMaxNumMoved = 8;
 // Points this near to each other, over the median depth, may be one.
 constexpr double kSameDepthRatio = 0.05;
-// Matches of a pair that say where else its images may belong.
-constexpr size_t kMaxNumShared = 60;
 // Images of a cluster, which look at the same, have on average so many matches with each other.
 constexpr double kMinClusterMatches = 40;
 
@@ -335,41 +335,20 @@ bool PartMapper::MoveMisplacedPart() {
   const double depth = MedianDepth();
   if (!(depth > 0)) return false;
   const std::vector<std::vector<int>> track_of = TracksOfKeypoints();
-  std::vector<SignedLink> links;
-  std::vector<SharedTurn> turns;
-  std::vector<SharedPoint> points;
-  for (size_t p = 0; p < pairs_.size(); ++p) {
-    const ViewPair& pair = pairs_[p];
-    const auto num_matches = static_cast<double>(pair.matches.size());
-    links.push_back({pair.image1, pair.image2, is_accepted_[p] ? num_matches : -num_matches});
-    std::vector<Eigen::Quaterniond> rotations = {pair.cam2_from_cam1.rotation};
-    for (const Pose& other : pair.alternatives) rotations.push_back(other.rotation);
-    for (const Eigen::Quaterniond& rotation : rotations) {
-      turns.push_back({pair.image1, pair.image2,
-                       (rotation * problem_.cam_from_world[pair.image1].rotation).conjugate() *
-                           problem_.cam_from_world[pair.image2].rotation});
-    }
-    const size_t stride = 1 + pair.matches.size() / kMaxNumShared;
-    for (size_t m = 0; m < pair.matches.size(); m += stride) {
-      const int track1 = track_of[pair.image1][pair.matches[m].idx1],
-                track2 = track_of[pair.image2][pair.matches[m].idx2];
-      if (track1 < 0 || track2 < 0) continue;
-      points.push_back(
-          {pair.image1, pair.image2, triangulations_[track1].position, triangulations_[track2].position});
-    }
-  }
-  const std::optional<MisplacedPart> part = FindMisplacedPart(
-      AgreeingPieces(num_images, links, 0), AgreeingPieces(num_images, links, kMinClusterMatches), links,
-      turns, points, {.tolerance = kSameDepthRatio * depth}, num_threads_);
+  const auto point_of = [&](int image, KeypointIdx keypoint) -> const Eigen::Vector3d* {
+    const int track = track_of[image][keypoint];
+    return track < 0 ? nullptr : &triangulations_[track].position;
+  };
+  const PairEvidence evidence = EvidenceOf(pairs_, is_accepted_, problem_.cam_from_world, point_of);
+  const std::optional<MisplacedPart> part =
+      FindMisplacedPart(AgreeingPieces(num_images, evidence.links, 0),
+                        AgreeingPieces(num_images, evidence.links, kMinClusterMatches), evidence,
+                        {.tolerance = kSameDepthRatio * depth}, num_threads_);
   if (!part) return false;
   spdlog::debug("reconstruct: {} of {} images belong elsewhere: {} cells of space shared there, {} here",
                 part->images.size(), num_images, part->num_cells_there, part->num_cells_here);
-  for (const int i : part->images) {
-    // A point x of theirs is now at move * x.
-    Pose& pose = problem_.cam_from_world[i];
-    const Eigen::Quaterniond rotation = pose.rotation * Eigen::Quaterniond(part->move.linear()).conjugate();
-    pose = {rotation.normalized(), pose.translation - rotation * part->move.translation()};
-  }
+  const Pose move{Eigen::Quaterniond(part->move.linear()), part->move.translation()};
+  for (const int i : part->images) problem_.cam_from_world[i] = problem_.cam_from_world[i] * move.Inverse();
   return true;
 }
 

@@ -13,7 +13,6 @@
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
 #include "stages/reconstruct/globally/image_ways.h"
-#include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 

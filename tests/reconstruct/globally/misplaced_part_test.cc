@@ -17,16 +17,14 @@ constexpr int kNumFirst = 10, kNumImages = 16;
 struct Folded {
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // of the second room, where the map has it
   std::vector<std::vector<int>> pieces = {{}, {}}, clusters;
-  std::vector<SignedLink> links;
-  std::vector<SharedTurn> turns;
-  std::vector<SharedPoint> points;
+  PairEvidence evidence;
 
   void Add(int image1, int image2, double weight, const Eigen::Isometry3d& relation,
            const std::vector<Eigen::Vector3d>& in1) {
-    links.push_back({image1, image2, weight});
-    turns.push_back({image1, image2, Eigen::Quaterniond(relation.linear())});
+    evidence.links.push_back({image1, image2, weight});
+    evidence.turns.push_back({image1, image2, Eigen::Quaterniond(relation.linear())});
     for (const Eigen::Vector3d& point : in1)
-      points.push_back({image1, image2, point, relation.inverse() * point});
+      evidence.points.push_back({image1, image2, point, relation.inverse() * point});
   }
 };
 
@@ -64,8 +62,7 @@ Folded MakeFolded(int num_true) {
 }
 
 std::optional<MisplacedPart> Find(const Folded& folded, int num_threads = 2) {
-  return FindMisplacedPart(folded.pieces, folded.clusters, folded.links, folded.turns, folded.points,
-                           {.tolerance = 0.1}, num_threads);
+  return FindMisplacedPart(folded.pieces, folded.clusters, folded.evidence, {.tolerance = 0.1}, num_threads);
 }
 
 TEST(MisplacedPart, IsMovedToWhereItSharesMoreOfSpace) {
@@ -84,8 +81,7 @@ TEST(MisplacedPart, StaysWhereMostHoldsIt) { EXPECT_FALSE(Find(MakeFolded(2))); 
 TEST(MisplacedPart, MustShareEnoughMoreThere) {
   const Folded folded = MakeFolded(12);
   const auto find = [&](const MisplacedPartOptions& options) {
-    return FindMisplacedPart(folded.pieces, folded.clusters, folded.links, folded.turns, folded.points,
-                             options, 1);
+    return FindMisplacedPart(folded.pieces, folded.clusters, folded.evidence, options, 1);
   };
   const auto part = Find(folded);
   ASSERT_TRUE(part);
@@ -114,12 +110,12 @@ TEST(MisplacedPart, IsMovedByAllThatAgrees) {
   const auto noise = [&](double sigma) {
     return Eigen::Vector3d(random.Normal(0, sigma), random.Normal(0, sigma), random.Normal(0, sigma));
   };
-  for (SharedTurn& turn : folded.turns) {
+  for (SharedTurn& turn : folded.evidence.turns) {
     const Eigen::Vector3d by = noise(0.02);
     turn.turn = turn.turn * Eigen::Quaterniond(Eigen::AngleAxisd(by.norm(), by.normalized()));
   }
-  for (size_t k = 0; k < folded.points.size(); ++k) {
-    folded.points[k].in2 += k % 3 == 0 ? noise(2) : noise(0.02);
+  for (size_t k = 0; k < folded.evidence.points.size(); ++k) {
+    folded.evidence.points[k].in2 += k % 3 == 0 ? noise(2) : noise(0.02);
   }
   const auto part = Find(folded);
   ASSERT_TRUE(part);
@@ -135,7 +131,7 @@ TEST(MisplacedPart, IsCutThroughAClusterThatLooksAtTheLookAlike) {
   Folded folded = MakeFolded(12);
   folded.clusters = {{0, 1, 2, 10, 11, 12}, {3, 4, 5, 6, 7, 8, 9}, {13, 14, 15}};
   folded.pieces = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, {13, 14, 15}};
-  for (SignedLink& link : folded.links) {
+  for (SignedLink& link : folded.evidence.links) {
     if (link.weight == 200) link.weight = 900;
   }
   const auto part = Find(folded);
@@ -152,8 +148,9 @@ TEST(MisplacedPart, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(MisplacedPart, IsNoneWhereNothingIsShared) {
-  EXPECT_FALSE(FindMisplacedPart({}, {}, {}, {}, {}, {}, 1));
-  EXPECT_FALSE(FindMisplacedPart({{0, 1}, {2}}, {{0, 1}, {2}}, {{0, 1, 5}}, {}, {}, {}, 1));
+  EXPECT_FALSE(FindMisplacedPart({}, {}, {}, {}, 1));
+  EXPECT_FALSE(FindMisplacedPart({{0, 1}, {2}}, {{0, 1}, {2}},
+                                 {.links = {{0, 1, 5}}, .turns = {}, .points = {}}, {}, 1));
 }
 
 }  // namespace
