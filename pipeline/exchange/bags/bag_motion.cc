@@ -17,6 +17,16 @@ constexpr double kJumpM = 0.5, kJumpMPerS = 10;
 // unit.
 constexpr double kOtherUnitMPerS = 50;
 
+// Why nothing of a source counts: it had nothing at the times of the images.
+std::string MissesImages(const TimeSpan& images, const TimeSpan& source, const std::string& none,
+                         const std::string& source_name) {
+  if (source.is_empty) return none;
+  return fmt::format(
+      "{} is left out, as its stamps ({}) and those of the images ({}) are of two clocks; let "
+      "both drivers stamp with the same one",
+      source_name, source.Text(), images.Text());
+}
+
 SourceTimes TimesOf(const BagPlan& plan, const TopicClock& clock) {
   return {clock, ShiftToClock(plan.images.clock, clock)};
 }
@@ -112,20 +122,17 @@ std::string MotionImporter::OdometryLines(const ImageImporter& images, int64_t* 
                                           std::vector<std::string>* warnings) const {
   if (!plan_.odometry) return {};
   if (!images.span().Meets(odometry_span_)) {
-    warnings->push_back(
-        odometry_span_.is_empty
-            ? fmt::format("{}: no valid odometry on {}", plan_.path, plan_.odometry->topic.name)
-            : fmt::format("{}: odometry is left out, as its stamps ({}) and those of the images ({}) are of "
-                          "two clocks; let both drivers stamp with the same one",
-                          plan_.path, odometry_span_.Text(), images.span().Text()));
+    warnings->push_back(plan_.path + ": " +
+                        MissesImages(images.span(), odometry_span_,
+                                     "no valid odometry on " + plan_.odometry->topic.name, "odometry"));
     return {};
   }
   if (const double m_per_s = speeds_m_per_s_.empty() ? 0 : Median(speeds_m_per_s_);
       m_per_s > kOtherUnitMPerS) {
     warnings->push_back(fmt::format(
         "{}: odometry is left out, as it goes at {:.0f} m/s where it moves, on the median: it is not in "
-        "metres "
-        "(of millimetres a thousandth is {:.2f} m/s), or its stamps are wrong; record it in metres, as "
+        "metres (of millimetres a thousandth is {:.2f} m/s), or its stamps are wrong; record it in metres, "
+        "as "
         "nav_msgs/Odometry says, or give distances ([reconstruct] distances)",
         plan_.path, m_per_s, 1e-3 * m_per_s));
     return {};
@@ -168,12 +175,8 @@ std::string MotionImporter::ImuLines(const ImageImporter& images, int64_t* num_l
   if (!plan_.imu) return {};
   if (!images.span().Meets(imu_span_)) {
     warnings->push_back(
-        imu_span_.is_empty
-            ? fmt::format("{}: nothing valid on {}", plan_.path, plan_.imu->topic.name)
-            : fmt::format(
-                  "{}: the IMU is left out, as its stamps ({}) and those of the images ({}) are of two "
-                  "clocks; let both drivers stamp with the same one",
-                  plan_.path, imu_span_.Text(), images.span().Text()));
+        plan_.path + ": " +
+        MissesImages(images.span(), imu_span_, "nothing valid on " + plan_.imu->topic.name, "the IMU"));
     return {};
   }
   std::optional<Pose> place = options_.camera_from_imu;
@@ -191,8 +194,7 @@ std::string MotionImporter::ImuLines(const ImageImporter& images, int64_t* num_l
   } else {
     warnings->push_back(
         fmt::format("{}: /tf does not say where the IMU ('{}') is on the camera ('{}'): how it is turned is "
-                    "found from turns "
-                    "about two axes at least; --imu-on-camera states it",
+                    "found from turns about two axes at least; --imu-on-camera states it",
                     plan_.path, plan_.imu->header->frame_id, plan_.images.header->frame_id));
   }
   *num_lines = num_imu_samples_;

@@ -309,20 +309,11 @@ TEST_F(ImportedBag, StampsOfAnImuAndOfFramesThatNoClockGaveAreThoseOfTheRecordin
 
 // A camera that goes slowly along a wall, a pixel of 160 an image, twenty a second.
 TEST_F(ImportedBag, KeyframesAreCloseInTimeWhereOnlyAnImuGivesTheScale) {
-  cv::Mat wall(120, 400, CV_8UC1);
-  cv::theRNG().state = 1;
-  cv::randu(wall, 0, 255);
-  cv::GaussianBlur(wall, wall, {}, 2);
-  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  const cv::Mat wall = Wall(400);
   std::vector<Recorded> messages = {StaticFrames()}, imu, odometry;
   for (int i = 0; i < 200; ++i) {
     const int64_t time_ns = 10 * kSecond + i * kSecond / 20;
-    const cv::Mat picture = wall(cv::Rect(i, 0, 160, 120)).clone();
-    messages.push_back({"/i", kImage, time_ns,
-                        ImageBytes({.stamp_ns = time_ns,
-                                    .width = 160,
-                                    .height = 120,
-                                    .pixels = std::string(picture.ptr<char>(), picture.total())})});
+    messages.push_back(ImageOf(wall(cv::Rect(i, 0, 160, 120)).clone(), time_ns, time_ns));
     imu.push_back(
         {"/imu", "sensor_msgs/msg/Imu", time_ns, ImuBytes({.stamp_ns = time_ns, .accel = {0, 0, 9.8}})});
     odometry.push_back(OdometryMessageAt(1e-9 * static_cast<double>(time_ns), Turned(0, 0.01 * i, 0, 0)));

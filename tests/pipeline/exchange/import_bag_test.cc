@@ -411,11 +411,7 @@ TEST_F(ImportedBag, ImagesAreChosenByTime) {
 // Images are written when the chooser has decided, often some images later.
 TEST_F(ImportedBag, KeyframesAreThoseOfTheChooser) {
   // A camera slides along a wall, three pixels an image; three of four images are less sharp.
-  cv::Mat wall(120, 1200, CV_8UC1);
-  cv::theRNG().state = 1;
-  cv::randu(wall, 0, 255);
-  cv::GaussianBlur(wall, wall, {}, 2);
-  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  const cv::Mat wall = Wall(1200);
   const auto view = [&](int i) {
     cv::Mat picture = wall(cv::Rect(3 * i, 0, 160, 120)).clone();
     if (i % 4 != 0) cv::GaussianBlur(picture, picture, {}, 1);
@@ -427,11 +423,7 @@ TEST_F(ImportedBag, KeyframesAreThoseOfTheChooser) {
   int num_late = 0;
   for (int i = 0; i < 300; ++i) {
     const cv::Mat picture = view(i);
-    messages.push_back({"/i", kImage, 0,
-                        ImageBytes({.stamp_ns = (1 + i) * kSecond,
-                                    .width = 160,
-                                    .height = 120,
-                                    .pixels = std::string(picture.ptr<char>(), picture.total())})});
+    messages.push_back(ImageOf(picture, 0, (1 + i) * kSecond));
     for (const int64_t keyframe : chooser.Add(i, picture)) {
       expected.push_back(keyframe);
       num_late += keyframe < i;

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/base/text.h"
 #include "core/files/file.h"
@@ -33,6 +34,24 @@ inline RawImage Grey(double time_s, int value = 100, int width = 8, int height =
 inline Recorded GreyMessage(double time_s, const std::string& topic = "/camera/image_raw") {
   return {topic, kImage, std::llround(time_s * 1e9), ImageBytes(Grey(time_s))};
 }
+// A wall full of corners, 120 pixels high, that cameras slide along.
+inline cv::Mat Wall(int width) {
+  cv::Mat wall(120, width, CV_8UC1);
+  cv::theRNG().state = 1;
+  cv::randu(wall, 0, 255);
+  cv::GaussianBlur(wall, wall, {}, 2);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  return wall;
+}
+// What a camera sees of it.
+inline Recorded ImageOf(const cv::Mat& picture, int64_t time_ns, int64_t stamp_ns) {
+  return {"/i", kImage, time_ns,
+          ImageBytes({.stamp_ns = stamp_ns,
+                      .width = static_cast<uint32_t>(picture.cols),
+                      .height = static_cast<uint32_t>(picture.rows),
+                      .pixels = std::string(picture.ptr<char>(), picture.total())})};
+}
+
 inline Pose Turned(double yaw_deg, double x, double y, double z) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(RadFromDeg(yaw_deg), Eigen::Vector3d::UnitZ())), {x, y, z}};
 }
