@@ -15,6 +15,8 @@ import sys
 
 import numpy as np
 
+from compare_mappers import read_poses
+
 METRES_APART = 100
 PAIR_BASE = 2**31 - 1  # of COLMAP's pair_id
 
@@ -47,24 +49,19 @@ def repeat_matches(source, target, times):
     return stride
 
 
-def rotation_of(w, x, y, z):
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
 def repeat_poses(source, target, times, stride):
     (target / "images").mkdir(parents=True)
     for name in ("cameras.txt", "frame.json"):
         shutil.copy(source / name, target / name)
+    poses = read_poses(source / "images.txt")
     rows = [words for words in map(str.split, (source / "images.txt").read_text().splitlines()) if len(words) == 10]
     with open(target / "images.txt", "w") as file:
         for copy in range(times):
             for words in rows:
-                rotation = rotation_of(*map(float, words[1:5]))
-                shift = np.array(words[5:8], float) - rotation @ [METRES_APART * copy, 0, 0]
+                rotation, center = poses[words[9]]
+                translation = -rotation @ (center + [METRES_APART * copy, 0, 0])
                 name = f"c{copy}_{words[9]}" if copy else words[9]
-                file.write(" ".join([str(int(words[0]) + copy * stride), *words[1:5], *map(repr, map(float, shift)), words[8],
+                file.write(" ".join([str(int(words[0]) + copy * stride), *words[1:5], *map(repr, map(float, translation)), words[8],
                                      name]) + "\n\n")
                 os.link((source / "images" / words[9]).resolve(), target / "images" / name)
 

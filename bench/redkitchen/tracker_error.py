@@ -11,6 +11,8 @@ import os
 
 import numpy as np
 
+from pose_errors import read_poses
+
 CHI_SQUARE_90 = 10.645  # of 6 degrees of freedom
 
 
@@ -42,15 +44,9 @@ def log(rotation):
     return axis / 2 / np.sinc(angle / np.pi)
 
 
-def read_poses(path):
-    poses = {}
-    with open(path, encoding="utf-8") as lines:
-        for line in lines:
-            words = line.split()
-            if len(words) >= 10 and not line.startswith("#"):
-                values = np.array([float(word) for word in words[1:8]])
-                poses[words[9]] = Pose(rotation_of(values[:4]), values[4:])
-    return poses
+def poses_of(path):
+    return {name: Pose(rotation_of(np.array(quaternion)), np.array(translation))
+            for name, (quaternion, translation) in read_poses(path).items()}
 
 
 def errors_of(tracked, true, names, rounds=30):
@@ -108,7 +104,7 @@ def main():
     parser.add_argument("--sigma-m", type=float, default=0.0169)
     parser.add_argument("--sigma-deg", type=float, default=1.06)
     args = parser.parse_args()
-    lists = [[read_poses(os.path.join(folder, name)) for folder in (args.tracker, args.sfm)]
+    lists = [[poses_of(os.path.join(folder, name)) for folder in (args.tracker, args.sfm)]
              for name in ("images.txt", "queries.txt")]
     tracked, true = ({**lists[0][k], **lists[1][k]} for k in range(2))
     names = sorted(set(tracked) & set(true))
