@@ -9,16 +9,19 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Images at these places along x, in the order of their names, listed backwards.
-ColmapModel DriveOf(const std::vector<double>& steps) {
+// Images at these places along x, in the order of their names, listed backwards; turned by as many degrees
+// from one to the next as `turns_deg` has, where it has any.
+ColmapModel DriveOf(const std::vector<double>& steps, const std::vector<double>& turns_deg = {}) {
   ColmapModel model;
-  double x = 0;
+  double x = 0, heading_deg = 0;
   for (size_t i = 0; i <= steps.size(); ++i) {
     ModelImage image;
     image.name = fmt::format("{}.jpg", i);
-    image.cam_from_world.translation = {-x, 0, 0};
+    image.cam_from_world.rotation = Eigen::AngleAxisd(RadFromDeg(heading_deg), Eigen::Vector3d::UnitY());
+    image.cam_from_world.translation = image.cam_from_world.rotation * Eigen::Vector3d(-x, 0, 0);
     model.images.insert(model.images.begin(), image);
     if (i < steps.size()) x += steps[i];
+    if (i < turns_deg.size()) heading_deg += turns_deg[i];
   }
   return model;
 }
@@ -47,6 +50,23 @@ TEST(UnevenSteps, LookAtTheLastStepsToo) {
   std::vector<double> steps(100, 0.5);
   for (int i = 87; i < 100; ++i) steps[i] = 0.1;  // 13 of the last 25
   EXPECT_THAT(UnevenSteps(DriveOf(steps)), HasSubstr("from 75.jpg to 100.jpg"));
+}
+
+TEST(UnevenSteps, AreThoseOfACameraThatDoesNotTurn) {
+  std::vector<double> steps(100, 0.5), turns_deg(100, 0.2);
+  for (int i = 30; i < 60; ++i) steps[i] = 0.01;
+  EXPECT_NE(UnevenSteps(DriveOf(steps, turns_deg)), "");
+  for (int i = 30; i < 60; ++i) turns_deg[i] = 0.9;  // as a camera that goes straight on may
+  EXPECT_NE(UnevenSteps(DriveOf(steps, turns_deg)), "");
+  for (int i = 30; i < 60; ++i) turns_deg[i] = 1.1;
+  EXPECT_EQ(UnevenSteps(DriveOf(steps, turns_deg)), "");
+  for (int i = 0; i < 100; ++i) turns_deg[i] = i < 30 || i >= 60 ? 2 : 5.9;  // it turns all the way
+  EXPECT_NE(UnevenSteps(DriveOf(steps, turns_deg)), "");
+  for (int i = 30; i < 60; ++i) turns_deg[i] = 6.1;
+  EXPECT_EQ(UnevenSteps(DriveOf(steps, turns_deg)), "");
+  for (int i = 75; i < 100; ++i) steps[i] = 4 + 0.05 * (i - 87);  // after the turn
+  EXPECT_THAT(UnevenSteps(DriveOf(steps, turns_deg)),
+              AllOf(HasSubstr("from 75.jpg to 100.jpg"), HasSubstr("8.0 times as long as elsewhere")));
 }
 
 TEST(UnevenSteps, NeedFiftySteps) {
