@@ -15,25 +15,24 @@
 #include "core/files/file.h"
 #include "tests/end_to_end/program_run.h"
 #include "tests/pipeline/exchange/bag_writers.h"
+#include "tests/pipeline/exchange/recorded_drive.h"
 #include "tests/reconstruct/inertial/simulated_imu.h"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
+using pipeline::kBaseFromCamera;
+using pipeline::kSecondNs;
 using pipeline::Recorded;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr int64_t kSecond = 1'000'000'000;
-// Half a metre above the base and ahead of it; looks ahead.
-const Pose kBaseFromCamera = {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.2, 0, 0.5}};
 // Lies on its side behind it.
 const Pose kBaseFromImu = {Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {-0.1, 0.05, 0.2}};
 
-// A rendered drive, and what a robot on it records: its camera, four images a second, and wheels without
-// error.
+// A rendered drive, and what a robot on it records.
 class Bag : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -64,35 +63,10 @@ class Bag : public testing::Test {
         std::distance(fs::directory_iterator(Path(capture + "/images")), fs::directory_iterator()));
   }
 
-  // Of the images `first` to `end`.
   static std::vector<Recorded> Messages(size_t first, size_t end,
                                         pipeline::MessageForm form = pipeline::MessageForm::kCdr,
                                         const std::string& camera = "/camera") {
-    std::vector<Recorded> messages = {
-        {"/tf_static", "tf2_msgs/msg/TFMessage", 0,
-         pipeline::TransformBytes({{"base_link", "camera_optical", kBaseFromCamera}}, form)}};
-    const Camera& lens = truth_.cameras.begin()->second;
-    // ROS counts from the first pixel's centre.
-    const double cx = lens.params[2] - 0.5, cy = lens.params[3] - 0.5;
-    const pipeline::CameraInfoFields info = {
-        .width = lens.width,
-        .height = lens.height,
-        .d = {0, 0, 0, 0, 0},
-        .k = {lens.params[0], 0, cx, 0, lens.params[1], cy, 0, 0, 1},
-        .p = {lens.params[0], 0, cx, 0, 0, lens.params[1], cy, 0, 0, 0, 1, 0}};
-    for (size_t i = first; i < std::min(end, truth_.images.size()); ++i) {
-      const CaptureImage& image = truth_.images[i];
-      const auto time_ns = static_cast<int64_t>(i + 4) * kSecond / 4;
-      messages.push_back({"/odom", "nav_msgs/msg/Odometry", time_ns,
-                          pipeline::OdometryBytes(
-                              time_ns, image.cam_from_world->Inverse() * kBaseFromCamera.Inverse(), form)});
-      messages.push_back({camera + "/camera_info", "sensor_msgs/msg/CameraInfo", time_ns,
-                          pipeline::CameraInfoBytes(info, form)});
-      messages.push_back(
-          {camera + "/image_raw/compressed", "sensor_msgs/msg/CompressedImage", time_ns,
-           pipeline::CompressedImageBytes(time_ns, "jpeg", *ReadFile(truth_.ImagePath(image)), form)});
-    }
-    return messages;
+    return pipeline::RecordedDrive(truth_, first, end, form, camera);
   }
   // The same without odometry, with what a consumer's IMU on the robot says meanwhile.
   static std::vector<Recorded> MessagesWithImu(size_t num_images) {
@@ -184,7 +158,7 @@ TEST_F(Bag, ThatIsAFolderCompilesToAMapInMetresAndIsImportedAgainWhereItChanged)
   for (Recorded& message : twice) {
     if (message.topic != "/odom") continue;
     Pose pose =
-        truth_.images[static_cast<size_t>(4 * message.time_ns / kSecond) - 4].cam_from_world->Inverse() *
+        truth_.images[static_cast<size_t>(4 * message.time_ns / kSecondNs) - 4].cam_from_world->Inverse() *
         kBaseFromCamera.Inverse();
     pose.translation *= 2;
     message.bytes = pipeline::OdometryBytes(message.time_ns, pose);

@@ -24,6 +24,7 @@
 #include "core/files/file.h"
 #include "pipeline/build/stage_options.h"
 #include "tests/end_to_end/program_run.h"
+#include "tests/pipeline/exchange/recorded_drive.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -186,6 +187,23 @@ std::vector<Kind> Kinds() {
        SmallStages({{"reconstruct", {{"min_registered_ratio", "0.4"}}}}),
        {"reconstruct"},
        8},
+      // Imported first: their images have names that the option's user has not seen.
+      {"Film",
+       OneCapture("walk.mp4", "keyframes = \"all\"\n"),
+       SmallStages({{"reconstruct", {{"min_registered_ratio", "0.3"}}}}),
+       {"extract_features", "match_features", "reconstruct"},
+       8},
+      {"Bag",
+       OneCapture("run.db3", "keyframes = \"all\"\n"),
+       SmallStages({{"reconstruct", {{"min_registered_ratio", "0.3"}}}}),
+       {"extract_features", "reconstruct", "leave_out"},
+       8},
+      // Two cameras side by side.
+      {"Rig",
+       OneCapture("rig"),
+       SmallStages({{"reconstruct", {{"min_registered_ratio", "0.3"}}}}),
+       {"reconstruct", "leave_out"},
+       8},
       {"Simulated",
        "name = \"it\"\n[simulate]\n" + kTinyPlace + "spacing_m = 1.4\nnum_queries = 2\n",
        SmallStages(),
@@ -251,8 +269,33 @@ class EveryOption : public testing::TestWithParam<Kind> {
       Slice(rendered, Path("folder2"), 20, 12, false, no_order);
       WriteKnownPlaces("folder", 12, no_order);
       if (kind == "Odometry") WriteKnownPlaces("odometry", 12, nullptr);
+      if (kind == "Rig") MakeRig();
+      if (kind == "Film") MakeFilm();
+      if (kind == "Bag") {
+        WriteDb3(Path("run.db3"), RecordedDrive(*ReadCapture(rendered), 12, 32));
+      }
     }
     for (const char* capture : {"lattice", "drive", "panoramas", "odometry"}) WriteMasks(capture);
+  }
+
+  // The right camera is where the left one is two steps later.
+  void MakeRig() {
+    const auto name_by_time = [](size_t first) {
+      return [first](size_t i) { return fmt::format("{:02}.jpg", i - first); };
+    };
+    for (const auto& [side, first] : {std::pair("left", size_t{12}), std::pair("right", size_t{14})}) {
+      Slice(Path("rendered"), Path("sides/") + side, first, 12, false, name_by_time(first));
+      fs::create_directories(Path("rig/images"));
+      fs::rename(Path("sides/") + side + "/images", Path("rig/images/") + side);
+    }
+    std::ofstream(Path("rig.txt")) << "left right 0.5\n";
+  }
+
+  void MakeFilm() {
+    const ProgramRun run =
+        RunShell("ffmpeg -v error -y -framerate 4 -start_number 13 -i " + Path("rendered") +
+                 "/images/d%04d.jpg -frames:v 20 -c:v libx264 -pix_fmt yuv420p " + Path("walk.mp4"));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
   }
 
   // World from camera, in the order of the drive.
