@@ -15,6 +15,7 @@ struct SyntheticSurvey {
   MapperInput input;
   Capture capture;                    // the images' names; no files, no poses
   std::vector<Pose> cams_from_world;  // per image, metres, z up
+  std::vector<Eigen::Vector3d> points;
   Camera camera;
 };
 
@@ -33,9 +34,8 @@ inline SyntheticSurvey MakeSyntheticSurvey(int num_images, uint64_t seed, const 
   Camera guess = GuessCamera(1, 640, 480);  // 768 px: 54 % off
   survey.input.cameras.emplace(1, guess);
   survey.capture.cameras = survey.input.cameras;
-  std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 500; ++i)
-    points.emplace_back(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(0, 3));
+    survey.points.emplace_back(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(0, 3));
   std::vector<std::vector<int>> point_of_keypoint;
   for (int i = 0; i < num_images; ++i) {
     const double angle = 1.6 * i / num_images;
@@ -49,8 +49,8 @@ inline SyntheticSurvey MakeSyntheticSurvey(int num_images, uint64_t seed, const 
     Pose pose{Eigen::Quaterniond(rotation), -(rotation * centre)};
     std::vector<Keypoint> keypoints;
     std::vector<int> shown;
-    for (size_t p = 0; p < points.size(); ++p) {
-      const auto pixel = ImageFromCamera(survey.camera, pose * points[p]);
+    for (size_t p = 0; p < survey.points.size(); ++p) {
+      const auto pixel = ImageFromCamera(survey.camera, pose * survey.points[p]);
       const bool is_seen = pixel && pixel->x() > 0 && pixel->x() < 640 && pixel->y() > 0 && pixel->y() < 480;
       if (!is_seen || random.Uniform() < 0.3) continue;
       keypoints.push_back({.x = static_cast<float>(pixel->x() + random.Normal(0, kKeypointNoisePx)),
@@ -92,6 +92,7 @@ inline void AppendSurvey(const SyntheticSurvey& other, SyntheticSurvey* survey) 
   append(other.input.geometries, &survey->input.geometries);
   append(other.capture.images, &survey->capture.images);
   append(other.cams_from_world, &survey->cams_from_world);
+  append(other.points, &survey->points);
 }
 
 }  // namespace cairn::reconstruct

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -114,8 +115,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
     if (progress.Cancelled()) return ColmapModel();
     TriangulateAll(round.max_error_px);
     const bool is_last = &round == std::end(kRounds) - 1;
-    // The order of a drive says where its images belong.
-    for (int k = 0; is_last && !is_drive_ && k < kMaxNumMoved && MoveMisplacedPart(); ++k) {
+    for (int k = 0; is_last && k < kMaxNumMoved && MoveMisplacedPart(); ++k) {
       AgreeAgain(progress);
       if (progress.Cancelled()) return ColmapModel();
       TriangulateAll(round.max_error_px);
@@ -329,6 +329,14 @@ double PartMapper::MedianDepth() const {
   return depths.empty() ? 0 : Median(depths);
 }
 
+// Of a drive: images that follow each other and share enough are not parted, whatever speaks against it.
+void PartMapper::HoldSteps(std::vector<SignedLink>* links) const {
+  for (SignedLink& link : *links) {
+    const bool is_next = std::abs(link.image2 - link.image1) <= kMaxSureDistance;
+    if (is_next && link.weight >= kMinSureMatches) link.weight = std::numeric_limits<double>::infinity();
+  }
+}
+
 // Whether images were moved that belong elsewhere.
 bool PartMapper::MoveMisplacedPart() {
   const int num_images = static_cast<int>(images_.size());
@@ -339,10 +347,12 @@ bool PartMapper::MoveMisplacedPart() {
     const int track = track_of[image][keypoint];
     return track < 0 ? nullptr : &triangulations_[track].position;
   };
-  const PairEvidence evidence = EvidenceOf(pairs_, is_accepted_, problem_.cam_from_world, point_of);
+  PairEvidence evidence = EvidenceOf(pairs_, is_accepted_, problem_.cam_from_world, point_of);
+  const std::vector<std::vector<int>> clusters =
+      AgreeingPieces(num_images, evidence.links, kMinClusterMatches);
+  if (is_drive_) HoldSteps(&evidence.links);
   const std::optional<MisplacedPart> part =
-      FindMisplacedPart(AgreeingPieces(num_images, evidence.links, 0),
-                        AgreeingPieces(num_images, evidence.links, kMinClusterMatches), evidence,
+      FindMisplacedPart(AgreeingPieces(num_images, evidence.links, 0), clusters, evidence,
                         {.tolerance = kSameDepthRatio * depth}, num_threads_);
   if (!part) return false;
   spdlog::debug("reconstruct: {} of {} images belong elsewhere: {} cells of space shared there, {} here",

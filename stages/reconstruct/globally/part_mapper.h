@@ -12,6 +12,7 @@
 #include "core/structure/triangulate.h"
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
+#include "stages/reconstruct/globally/agreeing_pieces.h"
 #include "stages/reconstruct/globally/image_ways.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
@@ -70,6 +71,7 @@ class PartMapper {
   std::vector<Eigen::Quaterniond> Rotations() const;
   std::vector<std::vector<int>> TracksOfKeypoints() const;
   double MedianDepth() const;
+  void HoldSteps(std::vector<SignedLink>* links) const;
   bool MoveMisplacedPart();
   void AgreeAgain(Progress& progress);
   void Adjust(int num_keypoints, bool adjust_cameras, Progress& progress);

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "stages/reconstruct/globally/part_mapper.h"
+#include "stages/reconstruct/view_graph/average_rotations.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 #include "tests/reconstruct/synthetic_survey.h"
 
@@ -306,6 +307,73 @@ TEST(MapGlobally, InNoOrderPairsThatNoTriangleBearsOutDoNotBendTheMap) {
   ASSERT_TRUE(models.ok());
   EXPECT_EQ(models->front().images.size(), 30u);
   EXPECT_LT(LargestErrorM(models->front(), survey), 0.1);
+}
+
+// Images 20 to 29 hang on a poster near images 0 to 5 that hangs before them, too: at first they are mapped
+// before that one, and what images 15 to 24 share says otherwise.
+class MisplacedPartOfAMap : public testing::TestWithParam<bool> {
+ protected:
+  static constexpr int kNumImages = 30, kFirstMisplaced = 20;
+
+  // `elsewhere`: poses of images as far as they are told from the poster.
+  void SetUp() override {
+    const Pose move = survey.cams_from_world[26].Inverse() * survey.cams_from_world[4];
+    elsewhere = survey.cams_from_world;
+    for (int i = kFirstMisplaced; i < kNumImages; ++i) elsewhere[i] = elsewhere[i] * move;
+    std::vector<Eigen::Vector3d> poster;
+    for (const Eigen::Vector3d& point : survey.points) {
+      if (std::abs(point.x()) < 1 && std::abs(point.y()) < 1) poster.push_back(point);
+    }
+    std::vector<size_t> num_before;
+    for (int i = 0; i < kNumImages; ++i) {
+      num_before.push_back(survey.input.keypoints[i].size());
+      for (const Eigen::Vector3d& point : poster) {
+        const auto pixel = ImageFromCamera(survey.camera, elsewhere[i] * point);
+        survey.input.keypoints[i].push_back({.x = static_cast<float>(pixel->x()),
+                                             .y = static_cast<float>(pixel->y()),
+                                             .scale = 2,
+                                             .orientation = 0});
+      }
+    }
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 26; j < kNumImages; ++j) {
+        TwoViewGeometry geometry{.image_id1 = static_cast<ImageId>(i + 1),
+                                 .image_id2 = static_cast<ImageId>(j + 1),
+                                 .config = TwoViewConfig::kUncalibrated};
+        for (size_t k = 0; k < poster.size(); ++k)
+          geometry.inliers.push_back(
+              {static_cast<KeypointIdx>(num_before[i] + k), static_cast<KeypointIdx>(num_before[j] + k)});
+        survey.input.geometries.push_back(geometry);
+      }
+    }
+  }
+
+  SyntheticSurvey survey = MakeSyntheticSurvey(kNumImages, 6);
+  std::vector<Pose> elsewhere;
+};
+
+INSTANTIATE_TEST_SUITE_P(InOrderOrNot, MisplacedPartOfAMap, testing::Bool());
+
+TEST_P(MisplacedPartOfAMap, IsMovedToWhereMostOfSpaceIsShared) {
+  std::map<CameraId, Camera> cameras = {{1, survey.camera}};
+  std::vector<int> images(kNumImages), backbone;
+  std::vector<Eigen::Quaterniond> rotations;
+  for (int i = 0; i < kNumImages; ++i) {
+    images[i] = i;
+    rotations.push_back(elsewhere[i].rotation);
+  }
+  NoProgress progress;
+  const std::vector<ViewPair> pairs = EstimateViewPairs(survey.input, cameras, {}, 2, progress);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    if (RotationErrorDeg(pairs[p], rotations) < 3) backbone.push_back(static_cast<int>(p));
+  }
+  ASSERT_LT(backbone.size(), pairs.size() - 10);
+  const MapGloballyOptions options;
+  PartMapper mapper(survey.input, cameras, options, 2, images, pairs, {}, backbone, GetParam());
+  const auto model = mapper.Map(rotations, 1, progress);
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->images.size(), 30u);
+  EXPECT_LT(LargestErrorM(*model, survey), 0.05);
 }
 
 // Two surveys, joined by one pair of hardly a match: two models, not one with half of it anywhere.
