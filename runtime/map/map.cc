@@ -311,8 +311,10 @@ Result<Camera> Map::CameraForSize(int width, int height) const {
   }
   if (num_found == 1) return *found;
   return MakeError(ErrorCode::kNotFound,
-                   "{} cameras of map '{}' take images of {} x {} px (its cameras: {}); give the camera",
-                   num_found, store_->head.name, width, height, fmt::join(sizes, ", "));
+                   "{} of map '{}' take images of {} x {} px (its cameras: {}); give the camera, or the "
+                   "whole picture in one of these sizes",
+                   num_found == 0 ? "no cameras" : fmt::format("{} cameras", num_found), store_->head.name,
+                   width, height, fmt::join(sizes, ", "));
 }
 
 }  // namespace cairn

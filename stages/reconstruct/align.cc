@@ -273,18 +273,4 @@ Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale,
   return similarity;
 }
 
-double MedianStep(const std::vector<Pose>& cams_from_model) {
-  std::vector<double> steps;
-  for (size_t i = 0; i < cams_from_model.size(); ++i) {
-    double nearest = -1;
-    for (size_t j = 0; j < cams_from_model.size(); ++j) {
-      if (i == j) continue;
-      const double distance = CenterErrorM(cams_from_model[i], cams_from_model[j]);
-      if (nearest < 0 || distance < nearest) nearest = distance;
-    }
-    if (nearest >= 0) steps.push_back(nearest);
-  }
-  return steps.empty() ? 0 : Median(steps);
-}
-
 }  // namespace cairn::reconstruct

@@ -65,7 +65,4 @@ Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale)
 // The same with this direction, of length 1, along +z.
 Similarity LevelledFrame(const std::vector<Pose>& cams_from_model, double scale, const Eigen::Vector3d& up);
 
-// Median distance of a camera to the nearest other one; 0 with fewer than two cameras.  O(n^2).
-double MedianStep(const std::vector<Pose>& cams_from_model);
-
 }  // namespace cairn::reconstruct

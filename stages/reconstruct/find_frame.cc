@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "core/base/quantiles.h"
 #include "stages/reconstruct/align.h"
 #include "stages/reconstruct/scale_sources.h"
 
@@ -18,6 +21,8 @@ namespace {
 constexpr double kContradictingSigmas = 3, kMuchBetter = 3;
 // A source that knows the scale less well than this says nothing of it.
 constexpr double kMaxSigmaRatio = 0.5;
+// What people and robots look at is not nearer, nor farther, on the median, metres: lengths of another unit.
+constexpr double kMinDepthM = 0.05, kMaxDepthM = 200;
 
 struct Answered {
   const ScaleSource* source = nullptr;
@@ -31,13 +36,39 @@ double SpanOf(const ModelPoses& model) {
   return box.diagonal().norm();
 }
 
-Similarity WithoutScale(const ModelPoses& model, const Vertical& vertical, const ReconstructOptions& options,
-                        ReconstructResult* result) {
+// Median distance of the points from the images that see them; 0 without points.
+double MedianDepth(const ColmapModel& reconstruction) {
+  std::map<ImageId, Eigen::Vector3d> centres;
+  for (const ModelImage& image : reconstruction.images) {
+    centres.emplace(image.image_id, image.cam_from_world.Center());
+  }
+  std::vector<double> depths;
+  for (const ModelPoint& point : reconstruction.points) {
+    for (const auto& [image_id, keypoint] : point.track) {
+      depths.push_back((point.position - centres.at(image_id)).norm());
+    }
+  }
+  return depths.empty() ? 0 : Median(std::move(depths));
+}
+
+// Warns of lengths that are not in metres.
+void CheckUnit(double depth_m, const Answered& taken, std::vector<std::string>* warnings) {
+  if (depth_m == 0 || (depth_m >= kMinDepthM && depth_m <= kMaxDepthM)) return;
+  if (taken.source->name == std::string("gps")) return;  // it has no unit to mistake
+  warnings->push_back(fmt::format(
+      "{}: by it what the images see is {:.4g} m away on the median, and their places span {:.4g} "
+      "m; are its lengths in {}?  State them in metres",
+      taken.answer.told_by, depth_m, taken.span_m,
+      depth_m > kMaxDepthM ? "millimetres or centimetres" : "kilometres"));
+}
+
+Similarity WithoutScale(const ColmapModel& reconstruction, const ModelPoses& model, const Vertical& vertical,
+                        const ReconstructOptions& options, ReconstructResult* result) {
   result->frame.unit = "arbitrary";
   result->frame.source = "none";
   const std::vector<Pose> poses = PosesOf(model);
-  const double step = MedianStep(poses);
-  return LevelledFrame(poses, step > 0 ? options.unscaled_step / step : 1, vertical.up);
+  const double depth = MedianDepth(reconstruction);
+  return LevelledFrame(poses, depth > 0 ? options.unscaled_depth / depth : 1, vertical.up);
 }
 
 Result<ScaleAnswer> Ask(const ScaleSource& source, const ScaleQuestion& question) {
@@ -113,7 +144,7 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
       if (imu->error().code != ErrorCode::kNoData) return imu->error();
       result->warnings.push_back(imu->error().message);
     }
-    return WithoutScale(model, vertical, options, result);
+    return WithoutScale(reconstruction, model, vertical, options, result);
   }
   std::vector<Answered> answered;
   std::optional<Error> refusal;  // of a source that the recipe names
@@ -142,7 +173,7 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
                     "control_points, "
                     "camera_height_m or distances for metres",
                     nothing));
-    return WithoutScale(model, vertical, options, result);
+    return WithoutScale(reconstruction, model, vertical, options, result);
   }
   size_t taken = 0;
   if (from == "auto") {
@@ -151,6 +182,8 @@ Result<Similarity> FindFrame(const ColmapModel& reconstruction, const Capture& c
     while (answered[taken].source->name != from) ++taken;
   }
   ComparePairs(capture, answered, taken, &result->warnings);
+  CheckUnit(answered[taken].answer.world_from_model.scale * MedianDepth(reconstruction), answered[taken],
+            &result->warnings);
   for (const Answered& one : answered) {
     result->warnings.insert(result->warnings.end(), one.answer.warnings.begin(), one.answer.warnings.end());
     result->scales.push_back({one.source->name, one.answer.told_by, one.span_m, one.answer.sigma_ratio});

@@ -372,9 +372,10 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
        .help = "standard deviation of the cameras' mean up against the vertical, degrees",
        .min = 1e-3,
        .max = 180},
-      {.name = "unscaled_step",
-       .value = &o->unscaled_step,
-       .help = "without any scale: median distance of an image to the nearest other one, in the map's unit",
+      {.name = "unscaled_depth",
+       .value = &o->unscaled_depth,
+       .help =
+           "without any scale: median distance of the points from images that see them, in the map's unit",
        .min = 1e-6},
       {.name = "hold_out_every",
        .value = &o->hold_out_every,
@@ -388,7 +389,7 @@ OptionTable DescribeOptions(ReconstructOptions* o) {
                 "gps_sigma_m", "gps_altitude_sigma_m", "rig_baselines", "rig_sigma_ratio", "camera_height_m",
                 "camera_height_sigma_m", "distances", "distance_sigma_ratio"},
                &table);
-  AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_step"}, &table);
+  AddCondition({"scale_from", {"auto", "none"}}, {"unscaled_depth"}, &table);
   return table;
 }
 

@@ -55,9 +55,10 @@ struct ReconstructOptions {
   double camera_height_m = 0;
   double camera_height_sigma_m = 0.02;
   double up_sigma_deg = 5;
-  // Where nothing gives a scale: median distance of an image to the nearest other, in the map's unit, so that
-  // lengths in options of later stages are meaningful.  REQUIRES: > 0
-  double unscaled_step = 0.5;
+  // Where nothing gives a scale: median distance of the points from the images that see them, in the map's
+  // unit.  What is looked at indoors is two or three metres away however densely pictures are taken, so that
+  // lengths in options of later stages, and of localization, are meant nearly as they stand.  REQUIRES: > 0
+  double unscaled_depth = 2.5;
   // One in this many registered images, in the order of names, is kept out of the map and becomes a query
   // with its reconstructed pose; 0: none.  REQUIRES: >= 0, not 1
   int hold_out_every = 0;

@@ -176,14 +176,5 @@ TEST(LevelledFrame, FirstCameraIsTheOriginAndLooksAlongX) {
   EXPECT_LT((TransformPose(frame, second).Center() - Eigen::Vector3d(2, 0, 0)).norm(), 1e-9);
 }
 
-TEST(MedianStep, OfThreeOnALine) {
-  //  0 -- 1 ---- 3: nearest 1, 1 and 2
-  std::vector<Pose> poses(3);
-  poses[1].translation.x() = -1;
-  poses[2].translation.x() = -3;
-  EXPECT_DOUBLE_EQ(MedianStep(poses), 1);
-  EXPECT_DOUBLE_EQ(MedianStep({Pose()}), 0);
-}
-
 }  // namespace
 }  // namespace cairn::reconstruct

@@ -105,6 +105,36 @@ TEST_F(FindFrameTest, OdometryGivesMetresWhereItIsThere) {
   EXPECT_EQ(result_.frame.source, "none");
 }
 
+// 0.1 m a step, told in other units; what is seen is 2 m away.
+TEST_F(FindFrameTest, OdometryInMillimetresIsWarnedOf) {
+  points_.push_back({.position = {0, 0, 0.5}, .track = {{1, 0}}});
+  for (const auto& [step, warning] : std::vector<std::pair<double, std::string>>{
+           {0.1, ""}, {100, "2000 m away on the median"}, {10, ""}, {0.0001, "kilometres"}}) {
+    WriteOdometry(step, step);
+    ASSERT_TRUE(Find("odometry").ok());
+    if (warning.empty()) {
+      EXPECT_THAT(result_.warnings, IsEmpty());
+    } else {
+      EXPECT_THAT(result_.warnings, ElementsAre(AllOf(HasSubstr("odometry.txt"), HasSubstr(warning))));
+    }
+  }
+}
+
+// A centimetre apart or a metre: what they look at says how large the unit is.
+TEST_F(FindFrameTest, WithoutScaleTheUnitIsThatOfWhatIsSeenHoweverDenselyPicturesAreTaken) {
+  points_.resize(3);
+  points_[0] = {.position = {0, 0, 1}, .track = {{1, 0}}};
+  points_[1] = {.position = {0.025 * 9, 0, 5}, .track = {{10, 0}}};  // the median
+  points_[2] = {.position = {0.025 * 20, 3, 4}, .track = {{10, 0}, {21, 0}}};
+  ASSERT_DOUBLE_EQ(options_.unscaled_depth, 2.5);
+  const auto similarity = Find("none");
+  ASSERT_TRUE(similarity.ok()) << similarity.error().message;
+  EXPECT_EQ(result_.frame.unit, "arbitrary");
+  EXPECT_NEAR(similarity->scale, 0.5, 1e-12);
+  points_.clear();
+  EXPECT_DOUBLE_EQ(Find("none")->scale, 1);
+}
+
 // A walk of a minute, and the IMU that was in the hand.
 class FindFrameByImu : public FindFrameTest {
  protected:

@@ -138,7 +138,8 @@ TEST_P(ReconstructTest, GpsGivesAnAnchoredFrame) {
 }
 
 TEST_P(ReconstructTest, WithoutAnythingKnownTheUnitIsArbitraryAndSaidSo) {
-  const auto result = Run(MakeSyntheticSurvey(8, 14), {.unscaled_step = 0.25, .hold_out_every = 3});
+  const SyntheticSurvey survey = MakeSyntheticSurvey(8, 14);
+  const auto result = Run(survey, {.unscaled_depth = 4.75, .hold_out_every = 3});
   ASSERT_TRUE(result.ok()) << result.error().message;
   EXPECT_EQ(result->frame.unit, "arbitrary");
   EXPECT_EQ(result->frame.source, "none");
@@ -148,8 +149,9 @@ TEST_P(ReconstructTest, WithoutAnythingKnownTheUnitIsArbitraryAndSaidSo) {
   EXPECT_EQ(result->queries[0].name, "image02.jpg");
   EXPECT_EQ(result->queries[1].name, "image05.jpg");
   EXPECT_THAT(result->images, SizeIs(6));
-  // Neighbours are about a step apart.
-  EXPECT_NEAR(CenterErrorM(*result->images[0].cam_from_world, *result->images[1].cam_from_world), 0.25, 0.1);
+  // The cameras stand 9 to 10 m from the middle of the cloud: everything is half as large as it was.
+  EXPECT_NEAR(CenterErrorM(*result->images[0].cam_from_world, *result->images[5].cam_from_world),
+              0.5 * CenterErrorM(survey.cams_from_world[0], survey.cams_from_world[7]), 0.1);
 }
 
 TEST_P(ReconstructTest, AskedForGpsThatIsNotThereIsAnError) {

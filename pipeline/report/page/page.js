@@ -40,8 +40,9 @@ const bytes = value => value >= 1e6 ? `${(value / 1e6).toFixed(2)} MB` : `${(val
 const roundBytes = value => bytes(value).replace(/\.0+ /, ' ');
 const percent = (value, digits = 1) => `${(100 * value).toFixed(digits)} %`;
 const metres = (value, digits = 2) => `${value.toFixed(digits)} ${unit}`;
-// Short lengths in centimetres, where the unit is the metre.
-const lengthText = value => unit !== 'm' || value >= 1 ? metres(value) : `${(100 * value).toFixed(value < 0.01 ? 2 : 1)} cm`;
+// Short lengths in centimetres, where the unit is the metre; else with two digits that say something.
+const inUnits = value => metres(value, value > 0 && value < 1 ? Math.min(6, 1 - Math.floor(Math.log10(value))) : 2);
+const lengthText = value => unit !== 'm' || value >= 1 ? inUnits(value) : `${(100 * value).toFixed(value < 0.01 ? 2 : 1)} cm`;
 const degrees = value => `${value.toFixed(value < 1 ? 2 : 1)}\u00B0`;
 const most = values => values.reduce((a, b) => Math.max(a, b), 0);
 const quantile = (values, part) => values.slice().sort((a, b) => a - b)[Math.ceil(part * values.length) - 1];
