@@ -405,7 +405,9 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
     if (mapped.error().code != ErrorCode::kNoData || zoomed.empty()) return mapped.error();
     return MakeError(ErrorCode::kNoData, "{}; {}", mapped.error().message, zoomed);
   }
-  if (!zoomed.empty()) result.warnings.push_back(fmt::format("{}: {}", capture.root, zoomed));
+  for (const std::string& warning : {zoomed, zoomed.empty() ? ZoomedPart(input) : ""}) {
+    if (!warning.empty()) result.warnings.push_back(fmt::format("{}: {}", capture.root, warning));
+  }
   const std::vector<ColmapModel>& models = *mapped;
   const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;

@@ -1,14 +1,19 @@
 #include "stages/reconstruct/zoomed_lens.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "core/base/quantiles.h"
+#include "core/base/text.h"
+#include "stages/reconstruct/view_graph/calibrate_from_pairs.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -22,6 +27,12 @@ constexpr double kMinZoomedRatio = 0.8;
 constexpr int64_t kMinNumZoomed = 3;
 // Matches that are off by more than so many times the median are none, when it is fitted again.
 constexpr double kOutlierFactor = 3;
+
+// Images that follow each other: as many, every so many, with at least so many pairs of which at most so many
+// are asked.
+constexpr int kRunLength = 16, kRunStep = 8;
+constexpr size_t kMinNumPairs = 20, kMaxNumAsked = 80;
+constexpr double kMinFocalFactor = 1.2, kMinCostDifference = 0.6;
 
 enum class PairMotion { kNone, kZoom, kOther };
 
@@ -92,14 +103,112 @@ PairMotion MotionOf(const Points& points, double longer_side) {
   return is_about_the_middle && explains_all ? PairMotion::kZoom : PairMotion::kOther;
 }
 
+// Images of a camera that follow each other, and the mean cost of their pairs by each focal length.
+struct Run {
+  int first = 0, last = 0;  // in the order of names
+  std::array<double, kNumFocals> cost = {};
+
+  int Best() const { return static_cast<int>(std::min_element(cost.begin(), cost.end()) - cost.begin()); }
+};
+
+// Pairs within a run, of one camera.
+std::optional<Run> RunOf(const Camera& camera, int first, int last,
+                         const std::vector<const TwoViewGeometry*>& pairs) {
+  if (pairs.size() < kMinNumPairs) return std::nullopt;
+  Run run{first, last};
+  double weight = 0;
+  const size_t stride = 1 + (pairs.size() - 1) / kMaxNumAsked;
+  for (size_t p = 0; p < pairs.size(); p += stride) {
+    const double of_pair = std::sqrt(static_cast<double>(pairs[p]->inliers.size()));
+    weight += of_pair;
+    for (int i = 0; i < kNumFocals; ++i) {
+      const double focal = FocalOfLadder(camera, i);
+      run.cost[i] += of_pair * FocalCost(pairs[p]->F, camera, focal, camera, focal);
+    }
+  }
+  for (double& cost : run.cost) cost /= weight;
+  return run;
+}
+
+// `place`: of the camera's images, in the order of their names.
+std::vector<Run> RunsOf(const MapperInput& input, const Camera& camera, size_t num_images,
+                        const std::map<ImageId, int>& place) {
+  // By the earlier image.
+  std::vector<std::vector<std::pair<int, const TwoViewGeometry*>>> pairs(num_images);
+  for (const TwoViewGeometry& geometry : input.geometries) {
+    const auto one = place.find(geometry.image_id1), other = place.find(geometry.image_id2);
+    if (one == place.end() || other == place.end() || !TellsFocalLengths(geometry)) continue;
+    const auto [earlier, later] = std::minmax(one->second, other->second);
+    if (later - earlier < kRunLength) pairs[earlier].emplace_back(later, &geometry);
+  }
+  std::vector<Run> runs;
+  for (int first = 0; first + kRunLength <= static_cast<int>(num_images); first += kRunStep) {
+    const int last = first + kRunLength - 1;
+    std::vector<const TwoViewGeometry*> within;
+    for (int i = first; i <= last; ++i) {
+      for (const auto& [later, geometry] : pairs[i]) {
+        if (later <= last) within.push_back(geometry);
+      }
+    }
+    if (const std::optional<Run> run = RunOf(camera, first, last, within)) runs.push_back(*run);
+  }
+  return runs;
+}
+
+// By how much two runs contradict each other; 0 where their focal lengths are nearly the same.
+double CostDifference(const Camera& camera, const Run& a, const Run& b) {
+  const int best_a = a.Best(), best_b = b.Best();
+  const double longer = FocalOfLadder(camera, std::max(best_a, best_b)),
+               shorter = FocalOfLadder(camera, std::min(best_a, best_b));
+  if (longer < kMinFocalFactor * shorter) return 0;
+  return std::min(a.cost[best_b] - a.cost[best_a], b.cost[best_a] - b.cost[best_b]);
+}
+
 }  // namespace
 
+std::string ZoomedPart(const MapperInput& input) {
+  for (const auto& [camera_id, camera] : input.cameras) {
+    std::vector<std::string> names;
+    std::vector<ImageId> ids;
+    for (const DatabaseImage& image : input.images) {
+      if (image.camera_id != camera_id) continue;
+      names.push_back(image.name);
+      ids.push_back(image.image_id);
+    }
+    const std::vector<int> order = NaturalOrder(names);
+    std::map<ImageId, int> place;
+    for (size_t i = 0; i < order.size(); ++i) place[ids[order[i]]] = static_cast<int>(i);
+    const std::vector<Run> runs = RunsOf(input, camera, names.size(), place);
+    double most = kMinCostDifference;
+    const Run *one = nullptr, *other = nullptr;
+    for (size_t a = 0; a < runs.size(); ++a) {
+      for (size_t b = a + 1; b < runs.size(); ++b) {
+        const double difference = CostDifference(camera, runs[a], runs[b]);
+        if (difference < most) continue;
+        most = difference;
+        one = &runs[a];
+        other = &runs[b];
+      }
+    }
+    if (one == nullptr) continue;
+    const auto said = [&](const Run& run) {
+      return fmt::format("from {} to {} about {:.0f} px", names[order[run.first]], names[order[run.last]],
+                         FocalOfLadder(camera, run.Best()));
+    };
+    return fmt::format(
+        "images differ in focal length, {}, {}: the lens zoomed, or they are of several cameras; a map takes "
+        "one focal length for all, and its places are not to be trusted; take the images with a fixed focal "
+        "length, or give those of each as a [[capture]] of its own",
+        said(*one), said(*other));
+  }
+  return "";
+}
+
 std::string ZoomedLens(const MapperInput& input) {
-  std::map<ImageId, size_t> index_of;
-  for (size_t i = 0; i < input.images.size(); ++i) index_of[input.images[i].image_id] = i;
+  const std::map<ImageId, int> index_of = IndexOf(input);
   int64_t num_zoomed = 0, num_others = 0;
   for (const TwoViewGeometry& geometry : input.geometries) {
-    const size_t image1 = index_of.at(geometry.image_id1), image2 = index_of.at(geometry.image_id2);
+    const int image1 = index_of.at(geometry.image_id1), image2 = index_of.at(geometry.image_id2);
     const CameraId camera_id = input.images[image1].camera_id;
     if (camera_id != input.images[image2].camera_id || geometry.inliers.empty()) continue;
     const Camera& camera = input.cameras.at(camera_id);

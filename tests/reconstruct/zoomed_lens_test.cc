@@ -1,5 +1,6 @@
 #include "stages/reconstruct/zoomed_lens.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -8,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "core/base/random.h"
+#include "core/geometry/relative_pose.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -133,6 +135,78 @@ TEST(ZoomedLens, IsToldDespiteMatchesThatAreWrong) {
       keypoints[k].x += static_cast<float>(7 * (k % 9) * (&keypoints - film.keypoints.data()));
   }
   EXPECT_NE(ZoomedLens(film), "");
+}
+
+// Images whose lens has these focal lengths, each a pair with the next `num_next`, by the fundamental matrix
+// of a motion that tells them.
+MapperInput FilmByFocals(int num_images, int num_next, const std::function<double(int)>& focal_px) {
+  MapperInput film;
+  film.cameras.emplace(1, GuessCamera(1, 640, 480));
+  film.cameras.emplace(2, GuessCamera(2, 640, 480));
+  Random random(4);
+  const auto to_bearing = [&](int i) {
+    Eigen::Matrix3d K;
+    K << focal_px(i), 0, 320, 0, focal_px(i), 240, 0, 0, 1;
+    return Eigen::Matrix3d(K.inverse());
+  };
+  for (int i = 0; i < num_images; ++i) {
+    film.images.push_back({static_cast<ImageId>(i + 1), fmt::format("{}.jpg", i), 1});
+    for (int j = std::max(0, i - num_next); j < i; ++j) {
+      const auto direction = [&] {
+        return Eigen::Vector3d(random.Normal(0, 1), random.Normal(0, 1), random.Normal(0, 1));
+      };
+      const Pose pose{
+          Eigen::Quaterniond(Eigen::AngleAxisd(random.Uniform(0.1, 0.5), direction().normalized())),
+          direction()};
+      TwoViewGeometry& pair = film.geometries.emplace_back();
+      pair.image_id1 = static_cast<ImageId>(j + 1);
+      pair.image_id2 = static_cast<ImageId>(i + 1);
+      pair.config = TwoViewConfig::kUncalibrated;
+      pair.F = to_bearing(i).transpose() * EssentialMatrix(pose) * to_bearing(j);
+      pair.inliers.resize(100);
+    }
+  }
+  return film;
+}
+
+double ZoomedAtHalf(int i) { return i < 25 ? 500 : 900; }
+
+TEST(ZoomedPart, NamesTheImagesAndTheirFocalLengths) {
+  EXPECT_THAT(ZoomedPart(FilmByFocals(50, 2, ZoomedAtHalf)),
+              AllOf(HasSubstr("from 0.jpg to 15.jpg about 5"), HasSubstr("from 32.jpg to 47.jpg about 9"),
+                    HasSubstr("fixed focal length")));
+  // As long on the way from the one to the other as the lens of a phone takes.
+  EXPECT_NE(ZoomedPart(FilmByFocals(60, 3, [](int i) { return std::clamp(20.0 * i, 400.0, 800.0); })), "");
+}
+
+TEST(ZoomedPart, IsNoneWhereTheFocalLengthStaysOrNearlySo) {
+  EXPECT_EQ(ZoomedPart(FilmByFocals(50, 2, [](int) { return 500; })), "");
+  EXPECT_EQ(ZoomedPart(FilmByFocals(50, 2, [](int i) { return i < 25 ? 500 : 570; })), "");
+  EXPECT_NE(ZoomedPart(FilmByFocals(50, 2, [](int i) { return i < 25 ? 500 : 620; })), "");
+  EXPECT_EQ(ZoomedPart({}), "");
+}
+
+TEST(ZoomedPart, NeedsPairsThatTell) {
+  EXPECT_EQ(ZoomedPart(FilmByFocals(50, 1, ZoomedAtHalf)), "");  // 15 of 16 images
+  MapperInput planar = FilmByFocals(50, 2, ZoomedAtHalf);
+  for (TwoViewGeometry& pair : planar.geometries) pair.config = TwoViewConfig::kPlanarOrPanoramic;
+  EXPECT_EQ(ZoomedPart(planar), "");
+  // Fifteen images of the one and as many of the other are no run.
+  EXPECT_EQ(ZoomedPart(FilmByFocals(15, 4, ZoomedAtHalf)), "");
+}
+
+TEST(ZoomedPart, IsOfOneCamera) {
+  MapperInput film = FilmByFocals(50, 2, ZoomedAtHalf);
+  for (int i = 25; i < 50; ++i) film.images[i].camera_id = 2;
+  EXPECT_EQ(ZoomedPart(film), "");
+}
+
+// A camera that goes straight ahead says nothing about its focal length.
+TEST(ZoomedPart, IsNoneWhereTheMotionDoesNotTell) {
+  MapperInput film = FilmByFocals(50, 2, ZoomedAtHalf);
+  for (size_t p = film.geometries.size() / 2; p < film.geometries.size(); ++p)
+    film.geometries[p].F = EssentialMatrix({Eigen::Quaterniond::Identity(), {320, 240, 1}});
+  EXPECT_EQ(ZoomedPart(film), "");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "stages/reconstruct/globally/part_mapper.h"
 #include "stages/reconstruct/view_graph/average_rotations.h"
 #include "stages/reconstruct/view_graph/backbone.h"
+#include "stages/reconstruct/view_graph/calibrate_from_pairs.h"
 #include "stages/reconstruct/view_graph/triangles.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 

@@ -4,6 +4,13 @@
 
 namespace cairn::reconstruct {
 
+std::map<ImageId, int> IndexOf(const MapperInput& input) {
+  std::map<ImageId, int> index;
+  for (size_t i = 0; i < input.images.size(); ++i)
+    index.emplace(input.images[i].image_id, static_cast<int>(i));
+  return index;
+}
+
 Result<MapperInput> ReadMapperInput(const std::string& matches_path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<MapperInput> {

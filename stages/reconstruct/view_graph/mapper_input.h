@@ -18,6 +18,9 @@ struct MapperInput {
   std::vector<TwoViewGeometry> geometries;       // pairs with at least kMinNumMatches inliers
 };
 
+// Where each image stands in `images`.
+std::map<ImageId, int> IndexOf(const MapperInput& input);
+
 // Fewest verified matches of a pair that the mapper uses (its own default).
 inline constexpr int kMinNumMatches = 15;
 

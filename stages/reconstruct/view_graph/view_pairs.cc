@@ -6,130 +6,17 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/SVD>
-
 #include "core/base/parallel.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
-#include "core/structure/camera_sensitivity.h"
 
 namespace cairn::reconstruct {
 namespace {
 
-// Ladder of focal lengths, as parts of the image's longer side.
-constexpr double kMinFocalRatio = 0.3, kMaxFocalRatio = 4;
-constexpr int kNumFocalSteps = 80, kNumSweeps = 10, kNumRefineSteps = 12;
-// Difference of the two singular values over their mean that counts as that of a good pair.
-constexpr double kGoodDifference = 0.02;
-// What is likely of a focal length before anything is seen: as a part of the longer side, the logarithm's
-// standard deviation, and how much that counts beside the pairs' mean cost.  Cameras that turn on the spot or
-// walk about have a cost that is lower by 1 to 4 at the right one; one that drives straight ahead has nearly
-// the same everywhere.
-constexpr double kLikelyFocalRatio = 0.8, kLogSigma = 0.35, kWeightOfLikely = 0.2;
 constexpr int kNumRefinements = 8;
 // Relative poses with costs within this ratio of the least explain the matches as well; they are different
 // from this angle on.
 constexpr double kAsGoodRatio = 1.2, kSameRotationDeg = 3;
-
-std::map<ImageId, int> IndexOf(const MapperInput& input) {
-  std::map<ImageId, int> index;
-  for (size_t i = 0; i < input.images.size(); ++i)
-    index.emplace(input.images[i].image_id, static_cast<int>(i));
-  return index;
-}
-
-Eigen::Matrix3d CalibrationMatrix(double focal, const Eigen::Vector2d& centre) {
-  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-  K(0, 0) = K(1, 1) = focal;
-  K(0, 2) = centre.x();
-  K(1, 2) = centre.y();
-  return K;
-}
-
-// A pair with a fundamental matrix, of two cameras.
-struct FocalPair {
-  const Eigen::Matrix3d* F;
-  CameraId camera1, camera2;
-  double weight;
-};
-
-class FocalSearch {
- public:
-  explicit FocalSearch(const MapperInput& input) : cameras_(input.cameras) {
-    for (const auto& [camera_id, camera] : cameras_) focals_[camera_id] = camera.MeanFocal();
-    const std::map<ImageId, int> index = IndexOf(input);
-    for (const TwoViewGeometry& geometry : input.geometries) {
-      if (geometry.F.isZero() || geometry.config == TwoViewConfig::kPlanarOrPanoramic) continue;
-      const CameraId camera1 = input.images[index.at(geometry.image_id1)].camera_id,
-                     camera2 = input.images[index.at(geometry.image_id2)].camera_id;
-      if (cameras_.at(camera1).has_focal_prior && cameras_.at(camera2).has_focal_prior) continue;
-      pairs_.push_back(
-          {&geometry.F, camera1, camera2, std::sqrt(static_cast<double>(geometry.inliers.size()))});
-    }
-  }
-
-  std::map<CameraId, Camera> Search() {
-    for (int sweep = 0; sweep < kNumSweeps; ++sweep) {
-      bool changed = false;
-      for (auto& [camera_id, camera] : cameras_) {
-        if (!camera.has_focal_prior && SearchCamera(camera_id, camera)) changed = true;
-      }
-      if (!changed || cameras_.size() == 1) break;
-    }
-    for (auto& [camera_id, camera] : cameras_) {
-      if (camera.has_focal_prior) continue;
-      const double ratio = focals_[camera_id] / camera.MeanFocal();
-      for (int p = 0; p < NumFocals(camera.model); ++p) camera.params[p] *= ratio;
-    }
-    return cameras_;
-  }
-
- private:
-  double Cost(CameraId camera_id, double focal) const {
-    double cost = 0, weight = 0;
-    for (const FocalPair& pair : pairs_) {
-      if (pair.camera1 != camera_id && pair.camera2 != camera_id) continue;
-      const auto focal_of = [&](CameraId id) { return id == camera_id ? focal : focals_.at(id); };
-      const Eigen::Matrix3d E =
-          CalibrationMatrix(focal_of(pair.camera2), cameras_.at(pair.camera2).PrincipalPoint()).transpose() *
-          *pair.F * CalibrationMatrix(focal_of(pair.camera1), cameras_.at(pair.camera1).PrincipalPoint());
-      const Eigen::Vector3d values = E.jacobiSvd().singularValues();
-      const double difference = 2 * (values[0] - values[1]) / std::max(values[0] + values[1], 1e-300);
-      cost += pair.weight * std::log1p(difference * difference / (kGoodDifference * kGoodDifference));
-      weight += pair.weight;
-    }
-    const Camera& camera = cameras_.at(camera_id);
-    const double from_likely =
-        std::log(focal / (kLikelyFocalRatio * std::max(camera.width, camera.height))) / kLogSigma;
-    return (weight > 0 ? cost / weight : 0) + kWeightOfLikely * from_likely * from_likely;
-  }
-
-  bool SearchCamera(CameraId camera_id, const Camera& camera) {
-    const double side = std::max(camera.width, camera.height);
-    const double step = std::log(kMaxFocalRatio / kMinFocalRatio) / kNumFocalSteps;
-    const auto focal_at = [&](double i) { return side * kMinFocalRatio * std::exp(step * i); };
-    double best = -1, least = 0;
-    for (int i = 0; i <= kNumFocalSteps; ++i) {
-      const double cost = Cost(camera_id, focal_at(i));
-      if (best >= 0 && !(cost < least)) continue;
-      best = i, least = cost;
-    }
-    double width = 0.5;
-    for (int refine = 0; refine < kNumRefineSteps; ++refine, width *= 0.5) {
-      for (const double at : {best - width, best + width}) {
-        const double cost = Cost(camera_id, focal_at(at));
-        if (cost < least) best = at, least = cost;
-      }
-    }
-    const bool changed = focals_[camera_id] != focal_at(best);
-    focals_[camera_id] = focal_at(best);
-    return changed;
-  }
-
-  std::map<CameraId, Camera> cameras_;
-  std::map<CameraId, double> focals_;
-  std::vector<FocalPair> pairs_;
-};
 
 double CauchyCost(const Eigen::Matrix3d& E, const Correspondences& c, double scale_rad) {
   double cost = 0;
@@ -139,7 +26,10 @@ double CauchyCost(const Eigen::Matrix3d& E, const Correspondences& c, double sca
 }
 
 Eigen::Matrix3d CalibrationOf(const Camera& camera) {
-  return CalibrationMatrix(camera.MeanFocal(), camera.PrincipalPoint());
+  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
+  K(0, 0) = K(1, 1) = camera.MeanFocal();
+  K.topRightCorner<2, 1>() = camera.PrincipalPoint();
+  return K;
 }
 
 double TurnOf(const Pose& pose) { return pose.rotation.angularDistance(Eigen::Quaterniond::Identity()); }
@@ -233,10 +123,6 @@ void ChooseRotation(const Eigen::Quaterniond& cam2_from_cam1, ViewPair* pair) {
         pair->cam2_from_cam1.rotation.angularDistance(cam2_from_cam1))
       std::swap(other, pair->cam2_from_cam1);
   }
-}
-
-std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input) {
-  return FocalSearch(input).Search();
 }
 
 std::vector<ViewPair> EstimateViewPairs(const MapperInput& input, const std::map<CameraId, Camera>& cameras,

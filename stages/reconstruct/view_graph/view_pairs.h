@@ -25,14 +25,6 @@ struct ViewPair {
   double weight = 0;  // beside pairs that contradict it
 };
 
-// Focal lengths of cameras that have none but a guess, from fundamental matrices: with the right ones an
-// essential matrix's two singular values are equal [Fetzer, Reis & Stricker 2020, "Stable intrinsic
-// auto-calibration from fundamental matrices of devices with uncorrelated camera parameters"; as in Pan et
-// al. 2024, GLOMAP, §3.2].  Per camera, the one of a ladder from 0.3 to 4 times the image's longer side that
-// most pairs agree on, refined; a pair whose motion says nothing about it has no say.  Cameras with a stated
-// focal length stay.  O(pairs * steps).
-std::map<CameraId, Camera> CalibrateFromPairs(const MapperInput& input);
-
 // Takes the one of the relative poses whose rotation is nearest to this.
 void ChooseRotation(const Eigen::Quaterniond& cam2_from_cam1, ViewPair* pair);
 
