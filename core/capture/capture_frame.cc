@@ -11,8 +11,16 @@ namespace cairn {
 namespace {
 
 constexpr double kMaxCoordinateM = 1e7;
+constexpr int kNumDigits = 3;  // that say something, of a length in an arbitrary unit
 
 }  // namespace
+
+const char* LengthUnit(const CaptureFrame& frame) { return frame.unit == "metre" ? "m" : "units"; }
+
+std::string ShortLength(const CaptureFrame& frame, double length, int digits) {
+  if (frame.unit == "metre") return fmt::format("{:.{}f} cm", 100 * length, digits);
+  return fmt::format("{:.{}g} units", length, kNumDigits);
+}
 
 Status CheckCaptureFrame(const CaptureFrame& frame) {
   if (frame.unit != "metre" && frame.unit != "arbitrary") {

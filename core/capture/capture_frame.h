@@ -34,6 +34,11 @@ inline Eigen::Vector3d ScaleSigmaAt(const CaptureFrame& frame, const Eigen::Vect
   return frame.scale_sigma_ratio * (point - frame.scale_centre);
 }
 
+// Lengths of the world frame for people: "m", or "units" where the unit is arbitrary; and a short one in
+// centimetres, "1.25 cm", there "0.0125 units".
+const char* LengthUnit(const CaptureFrame& frame);
+std::string ShortLength(const CaptureFrame& frame, double length, int digits = 2);
+
 inline constexpr const char* kCaptureFrameFile = "frame.json";
 
 // Errors: InvalidArgument for an invalid unit, anchor or standard deviation of the scale.

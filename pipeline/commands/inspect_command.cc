@@ -255,12 +255,12 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
     }
     if (key == "self_test_regions") {
       if (!value.empty())
-        text += "\n" + check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines);
+        text += "\n" +
+                check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines, rows.frame);
       continue;
     }
     if (key == "promise") {
-      text +=
-          "\n" + check_map::PromiseText(*rows.findings.promise, rows.frame.unit == "metre" ? "m" : "units");
+      text += "\n" + check_map::PromiseText(*rows.findings.promise, LengthUnit(rows.frame));
       continue;
     }
     if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before

@@ -29,9 +29,11 @@ Status RunRoute(const RouteArguments& arguments, const CommandEnvironment& envir
   CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.from));
   CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.to));
   CAIRN_ASSIGN_OR_RETURN(const Route route, PlanRoute(*map, from, to, arguments.options));
+  const std::string unit = LengthUnit(map->head().frame);
   auto json = nlohmann::ordered_json{
       {"num_links", route.num_links}, {"cost", route.cost}, {"images", nlohmann::ordered_json::array()}};
-  std::string text = fmt::format("{:>4}  {:>9} {:>9} {:>8}  {}\n", "", "x, m", "y, m", "heading", "image");
+  std::string text =
+      fmt::format("{:>4}  {:>9} {:>9} {:>8}  {}\n", "", "x, " + unit, "y, " + unit, "heading", "image");
   for (const int32_t index : route.images) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map->Image(index));
     const FloorPose place = FloorPoseOf(image->cam_from_world, map->head().floor_from_world);

@@ -387,7 +387,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
   const MapRows& rows = *inputs.rows;
   Json json = {{"name", rows.name},
                {"writer", rows.writer},
-               {"unit", rows.frame.unit == "metre" ? "m" : "units"},
+               {"unit", LengthUnit(rows.frame)},
                {"scale_sigma_ratio", rows.frame.scale_sigma_ratio},
                {"frame_source", rows.frame.source},
                {"sealed", rows.sealed},

@@ -140,7 +140,7 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
   for (const auto& [name, value] : rows.self_test) self_test += fmt::format("{:<26} {:.4g}\n", name, value);
   html += block("Self-test", self_test);
   html += block("Self-test by region",
-                check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines));
+                check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines, rows.frame));
   html += block("Held-out images not localized, or wrong", FailedImagesText(data));
   if (inputs.reconstruction != nullptr) {
     html += block("Reconstruction", ReconstructionText(*inputs.reconstruction));

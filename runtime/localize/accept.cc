@@ -208,7 +208,7 @@ Verdict JudgeGuided(const GuidedEvidence& evidence, const AcceptOptions& options
 }
 
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  double distance_from_survey_m, const AcceptOptions& options) {
+                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit) {
   if (static_cast<int>(inliers.size()) < options.min_num_inliers) {
     return {NoFix::kTooFewInliers,
             fmt::format("{} inliers, at least {} are needed", inliers.size(), options.min_num_inliers)};
@@ -222,13 +222,13 @@ Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& in
   const double sigma_m = LargestSigma(pose.covariance.bottomRightCorner<3, 3>());
   if (!(sigma_m <= options.max_sigma_m) || !(sigma_deg <= options.max_sigma_deg)) {
     return {NoFix::kUncertain,
-            fmt::format("standard deviation {:.3f} m and {:.2f} degrees, at most {} and {} are allowed",
-                        sigma_m, sigma_deg, options.max_sigma_m, options.max_sigma_deg)};
+            fmt::format("standard deviation {:.3f} {} and {:.2f} degrees, at most {} and {} are allowed",
+                        sigma_m, length_unit, sigma_deg, options.max_sigma_m, options.max_sigma_deg)};
   }
   if (options.max_distance_from_survey_m > 0 && distance_from_survey_m > options.max_distance_from_survey_m) {
     return {NoFix::kFarFromSurvey,
-            fmt::format("{:.1f} m from the nearest survey image, at most {} m are allowed",
-                        distance_from_survey_m, options.max_distance_from_survey_m)};
+            fmt::format("{:.1f} {} from the nearest survey image, at most {} are allowed",
+                        distance_from_survey_m, length_unit, options.max_distance_from_survey_m)};
   }
   return {};
 }

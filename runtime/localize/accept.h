@@ -45,6 +45,6 @@ Verdict JudgeGuided(const GuidedEvidence& evidence, const AcceptOptions& options
 
 // Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey.
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
-                  double distance_from_survey_m, const AcceptOptions& options);
+                  double distance_from_survey_m, const AcceptOptions& options, const char* length_unit);
 
 }  // namespace cairn

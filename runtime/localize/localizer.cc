@@ -422,7 +422,8 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
             localization.num_unguided_inliers, localization.num_inliers, 100 * min_kept_ratio));
   }
   CAIRN_ASSIGN_OR_RETURN(const double distance, DistanceFromSurvey(*map_, refined->cam_from_world.Center()));
-  Verdict verdict = JudgePose(*refined, inliers, query, distance, options_.accept);
+  Verdict verdict =
+      JudgePose(*refined, inliers, query, distance, options_.accept, LengthUnit(map_->head().frame));
   if (verdict.reason != NoFix::kNone) return fail(verdict.reason, std::move(verdict.message));
   localization.reason = NoFix::kNone;
   localization.cam_from_world = refined->cam_from_world;

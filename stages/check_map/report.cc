@@ -138,28 +138,34 @@ std::string ReportText(const PrintedReport& report) {
       line("by retrieval", fmt::format("{}, with all images {}", Text(figure("num_by_retrieval"), 1, 0),
                                        Text(figure("all_images_num_by_retrieval"), 1, 0)));
     }
-    line("median error", fmt::format("{} cm, {} deg", Text(figure("median_error_m"), 0.01, 2),
-                                     Text(figure("median_error_deg"), 1, 3)));
-    line("90th percentile", fmt::format("{} cm, {} deg", Text(figure("p90_error_m"), 0.01, 2),
-                                        Text(figure("p90_error_deg"), 1, 3)));
+    const CaptureFrame& frame = report.rows->frame;
+    const auto length = [&](const std::optional<double>& value, int digits = 2) {
+      return value ? ShortLength(frame, *value, digits) : "-";
+    };
+    line("median error",
+         fmt::format("{}, {} deg", length(figure("median_error_m")), Text(figure("median_error_deg"), 1, 3)));
+    line("90th percentile",
+         fmt::format("{}, {} deg", length(figure("p90_error_m")), Text(figure("p90_error_deg"), 1, 3)));
     for (const auto& [prefix, name] :
          {std::pair("similarity", "after a similarity"), std::pair("rig", "and a camera offset")}) {
       const auto fitted = [&](const char* suffix) {
         return figure(fmt::format("{}_{}", prefix, suffix).c_str());
       };
       if (!fitted("scale")) continue;
-      line(name, fmt::format("{} cm, {} deg; 90 %: {} cm, {} deg; scale {}{}",
-                             Text(fitted("median_error_m"), 0.01, 2), Text(fitted("median_error_deg"), 1, 3),
-                             Text(fitted("p90_error_m"), 0.01, 2), Text(fitted("p90_error_deg"), 1, 3),
-                             Text(fitted("scale"), 1, 4),
-                             fitted("offset_m")
-                                 ? fmt::format(", offset {} cm, {} deg", Text(fitted("offset_m"), 0.01, 1),
-                                               Text(fitted("offset_deg"), 1, 2))
-                                 : ""));
+      line(name,
+           fmt::format("{}, {} deg; 90 %: {}, {} deg; scale {}{}", length(fitted("median_error_m")),
+                       Text(fitted("median_error_deg"), 1, 3), length(fitted("p90_error_m")),
+                       Text(fitted("p90_error_deg"), 1, 3), Text(fitted("scale"), 1, 4),
+                       fitted("offset_m") ? fmt::format(", offset {}, {} deg", length(fitted("offset_m"), 1),
+                                                        Text(fitted("offset_deg"), 1, 2))
+                                          : ""));
     }
-    line("within 5 cm, 5 deg", Text(figure("within_5cm_5deg_ratio"), 0.01, 1) + " %");
-    line("within 10 cm, 2 deg", Text(figure("within_10cm_2deg_ratio"), 0.01, 1) + " %");
-    line("within 10 cm, 5 deg", Text(figure("within_10cm_5deg_ratio"), 0.01, 1) + " %");
+    line(fmt::format("within {}, 5 deg", ShortLength(frame, 0.05, 0)),
+         Text(figure("within_5cm_5deg_ratio"), 0.01, 1) + " %");
+    line(fmt::format("within {}, 2 deg", ShortLength(frame, 0.1, 0)),
+         Text(figure("within_10cm_2deg_ratio"), 0.01, 1) + " %");
+    line(fmt::format("within {}, 5 deg", ShortLength(frame, 0.1, 0)),
+         Text(figure("within_10cm_5deg_ratio"), 0.01, 1) + " %");
     if (IsInAnotherFrame(held_out)) {
       line("precision",
            fmt::format("not known: the images' poses are in another frame than the map, as they stand {} of "
@@ -172,7 +178,7 @@ std::string ReportText(const PrintedReport& report) {
     line("NEES", fmt::format("mean {}, median {} (95 % band of the mean {} to {})",
                              Text(figure("mean_nees"), 1, 2), Text(figure("median_nees"), 1, 2),
                              Text(figure("nees_low"), 1, 2), Text(figure("nees_high"), 1, 2)));
-    text += SelfTestRegionsText(held_out.regions, kMaxRegionLines);
+    text += SelfTestRegionsText(held_out.regions, kMaxRegionLines, frame);
     line("ms per image",
          fmt::format("{:.1f} (SIFT alone {:.1f})", held_out.mean_total_ms, held_out.mean_sift_ms));
   }
@@ -221,7 +227,8 @@ std::string ReportJson(const PrintedReport& report, bool with_times) {
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines) {
+std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines,
+                                const CaptureFrame& frame) {
   if (regions.empty()) return "";
   std::vector<RegionSelfTest> order = regions;
   std::stable_sort(order.begin(), order.end(), [](const RegionSelfTest& a, const RegionSelfTest& b) {
@@ -230,20 +237,22 @@ std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int 
     };
     return key(a) < key(b);
   });
-  std::string text = fmt::format("{:<22} {:>6} {:>9} {:>9} {:>19} {:>19}\n", "by region, worst first",
-                                 "images", "localized", "precision", "median error", "90th percentile");
+  const int width = frame.unit == "metre" ? 19 : 26;
+  std::string text =
+      fmt::format("{:<22} {:>6} {:>9} {:>9} {:>{}} {:>{}}\n", "by region, worst first", "images", "localized",
+                  "precision", "median error", width, "90th percentile", width);
   const size_t num_lines = std::min<size_t>(order.size(), max_num_lines);
   for (size_t i = 0; i < num_lines; ++i) {
     const RegionSelfTest& row = order[i];
-    const auto error = [](double m, double deg) {
-      return fmt::format("{:.2f} cm, {:.3f} deg", 100 * m, deg);
+    const auto error = [&](double length, double deg) {
+      return fmt::format("{}, {:.3f} deg", ShortLength(frame, length), deg);
     };
-    text += fmt::format("  {:<20} {:>6} {:>9} {:>9} {:>19} {:>19}\n",
+    text += fmt::format("  {:<20} {:>6} {:>9} {:>9} {:>{}} {:>{}}\n",
                         row.region == kOutsideRegions ? "outside" : fmt::format("region {}", row.region),
                         row.num_held_out, fmt::format("{:.1f} %", 100 * row.LocalizedRatio()),
                         row.errors ? fmt::format("{:.1f} %", 100 * row.PrecisionRatio()) : "-",
-                        row.errors ? error(row.errors->median_m, row.errors->median_deg) : "-",
-                        row.errors ? error(row.errors->p90_m, row.errors->p90_deg) : "-");
+                        row.errors ? error(row.errors->median_m, row.errors->median_deg) : "-", width,
+                        row.errors ? error(row.errors->p90_m, row.errors->p90_deg) : "-", width);
   }
   if (const size_t num_more = order.size() - num_lines; num_more > 0)
     text += fmt::format("  ... and {} better {}\n", num_more, num_more == 1 ? "one" : "ones");

@@ -29,8 +29,9 @@ std::string ReportText(const PrintedReport& report);
 std::string ReportJson(const PrintedReport& report, bool with_times);
 
 // For people, a line per region: those with the fewest images localized right first, at most `max_num_lines`.
-// Empty where no region has held-out images.
-std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines);
+// Lengths in the unit of the map's frame.  Empty where no region has held-out images.
+std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int max_num_lines,
+                                const CaptureFrame& frame);
 // For programs: a list, ascending; "region" is null for images outside.
 nlohmann::ordered_json SelfTestRegionsJson(const std::vector<RegionSelfTest>& regions);
 

@@ -185,25 +185,25 @@ double LeastErrorM(const EmitMapOptions& options) {
   return options.least_error_ratio * options.left_out_max_error_m;
 }
 
-std::string RecallText(const FittedSize& fitted, const EmitMapOptions& options) {
+std::string RecallText(const FittedSize& fitted, const EmitMapOptions& options, const CaptureFrame& frame) {
   if (fitted.trial_of_all.NumTried() == 0) return "no survey image was left out to try it on";
   const double least_error_m = LeastErrorM(options);
   return fmt::format(
-      "of {} left-out survey images {} are localized, {} with everything; median error {:.2g}, {:.2g} with "
-      "everything; image by image {:.2f} times as large, where less than {:.2g} counts as that",
+      "of {} left-out survey images {} are localized, {} with everything; median error {}, {} with "
+      "everything; image by image {:.2f} times as large, where less than {} counts as that",
       fitted.trial.NumTried(), fitted.trial.NumRight(), fitted.trial_of_all.NumRight(),
-      fitted.trial.MedianErrorM(), fitted.trial_of_all.MedianErrorM(),
-      ErrorRatio(fitted.trial, fitted.trial_of_all, least_error_m), least_error_m);
+      ShortLength(frame, fitted.trial.MedianErrorM()), ShortLength(frame, fitted.trial_of_all.MedianErrorM()),
+      ErrorRatio(fitted.trial, fitted.trial_of_all, least_error_m), ShortLength(frame, least_error_m));
 }
 
 std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const EmitMapOptions& options) {
   if (options.max_bytes == 0) {
     return fmt::format("emit_map: the fewest landmarks: {} bits a descriptor value; {}\n",
-                       fitted.descriptor_bits, RecallText(fitted, options));
+                       fitted.descriptor_bits, RecallText(fitted, options, rows.frame));
   }
   if (fitted.promises) {
     return fmt::format("emit_map: at most {} bytes: {} bits a descriptor value; {}\n", options.max_bytes,
-                       fitted.descriptor_bits, RecallText(fitted, options));
+                       fitted.descriptor_bits, RecallText(fitted, options, rows.frame));
   }
   const SizeGuarantee guarantee = GuaranteeOf(rows);
   return fmt::format(
@@ -211,7 +211,7 @@ std::string GuaranteeText(const MapRows& rows, const FittedSize& fitted, const E
       "{} of {} stations see fewer than k = {}; {}\n",
       options.max_bytes, fitted.descriptor_bits, guarantee.min_common_landmarks,
       guarantee.num_stations_below_k, rows.stations.size(), rows.k,
-      fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted, options));
+      fitted.trial_of_all.NumTried() == 0 ? "everything fits" : RecallText(fitted, options, rows.frame));
 }
 
 std::string FixNoiseText(const MapRows& rows) {
@@ -230,14 +230,14 @@ std::string FixNoiseText(const MapRows& rows) {
       wider(30), wider(300));
 }
 
-std::string PromiseText(const MapPromise& promise) {
+std::string PromiseText(const MapPromise& promise, const CaptureFrame& frame) {
   const PromiseTerms& terms = promise.terms;
   return fmt::format(
       "emit_map: the promise: {:.0f} % of the images find at least {} landmarks and are localized within "
       "{:.3g} "
       "{}, {:.3g} deg; kept at {} of {} places and headings; no map with fewer than {} landmarks keeps it at "
       "all of these\n",
-      100 * terms.probability, terms.min_matches, terms.max_error_m, "m", terms.max_error_deg,
+      100 * terms.probability, terms.min_matches, terms.max_error_m, LengthUnit(frame), terms.max_error_deg,
       promise.NumKept(), promise.nodes.size(), promise.landmarks_lower_bound);
 }
 
@@ -292,7 +292,7 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits,
                                             fitted.promises ? &*fitted.promises : nullptr));
   std::string text = GuaranteeText(rows, fitted, arguments.options);
-  if (fitted.promises) text += PromiseText(fitted.promises->findings);
+  if (fitted.promises) text += PromiseText(fitted.promises->findings, rows.frame);
   return std::pair(std::move(rows), std::move(text));
 }
 

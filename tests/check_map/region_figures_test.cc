@@ -161,12 +161,13 @@ TEST(RegionFigures, ReportListsTheWorstRegionsFirst) {
   const std::vector<RegionSelfTest> regions = {{kOutsideRegions, 2, 0, 0, {}},
                                                {0, 4, 4, 0, RegionSelfTest::Errors{0.02, 0.2, 0.04, 0.4}},
                                                {7, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
-  const std::string text = SelfTestRegionsText(regions, 2);
+  const std::string text = SelfTestRegionsText(regions, 2, {});
   EXPECT_LT(text.find("outside"), text.find("region 7"));
   EXPECT_THAT(text, HasSubstr("3.00 cm, 0.300 deg"));
   EXPECT_THAT(text, HasSubstr("66.7 %"));
   EXPECT_THAT(text, HasSubstr("and 1 better one"));
-  EXPECT_EQ(SelfTestRegionsText({}, 2), "");
+  EXPECT_EQ(SelfTestRegionsText({}, 2, {}), "");
+  EXPECT_THAT(SelfTestRegionsText(regions, 2, {.unit = "arbitrary"}), HasSubstr("0.03 units, 0.300 deg"));
 
   const nlohmann::ordered_json json = SelfTestRegionsJson(regions);
   ASSERT_EQ(json.size(), 3u);
