@@ -236,6 +236,17 @@ TEST(GroupClasses, DriftIsStraightenedInPartsToo) {
   }
 }
 
+// What was straightened in parts is nearly right, but joints and far points are not: two steps straighten
+// the whole, as points follow them.  Where they do not, these steps leave 3.4 of 4 degrees.
+TEST(GroupClasses, PointsFollowTheStepsOfAWholeThatWasInParts) {
+  const Survey survey = MakeSurvey({.walk_m = 0.025, .walk_deg = 1});
+  GroupClassesOptions options;
+  options.adjustment.num_images_at_once = 10;
+  options.adjustment.max_num_iterations = 2;
+  const Classes classes = Group(survey, options).classes;
+  EXPECT_LT(MeanErrorDeg(survey, classes, false), 0.1 * MeanErrorDeg(survey, classes, true));
+}
+
 TEST(GroupClasses, LensThatNobodyStatedIsFound) {
   const Survey survey = MakeSurvey({.k1 = -0.12});
   GroupClassesOptions options;
