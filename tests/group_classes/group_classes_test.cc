@@ -142,7 +142,9 @@ double MedianPointError(const Survey& survey, const Classes& classes) {
 }
 
 TEST(GroupClasses, ExactPosesAndCamerasStayWhatTheyAre) {
-  const Survey survey = MakeSurvey({});
+  Survey survey = MakeSurvey({});
+  // Files have rotations that are one to some digits: normalised anew they would have other bits.
+  for (CaptureImage& image : survey.capture.images) image.cam_from_world->rotation.coeffs() *= 1 + 1e-14;
   const GroupClassesResult result = Group(survey);
   EXPECT_EQ(result.findings.pose_gain, 0);
   EXPECT_FALSE(result.findings.has_offset);
