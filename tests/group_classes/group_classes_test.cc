@@ -142,7 +142,9 @@ double MedianPointError(const Survey& survey, const Classes& classes) {
 }
 
 TEST(GroupClasses, ExactPosesAndCamerasStayWhatTheyAre) {
-  const Survey survey = MakeSurvey({});
+  Survey survey = MakeSurvey({});
+  // Files have rotations that are one to some digits: normalised anew they would have other bits.
+  for (CaptureImage& image : survey.capture.images) image.cam_from_world->rotation.coeffs() *= 1 + 1e-14;
   const GroupClassesResult result = Group(survey);
   EXPECT_EQ(result.findings.pose_gain, 0);
   EXPECT_FALSE(result.findings.has_offset);
@@ -234,6 +236,17 @@ TEST(GroupClasses, DriftIsStraightenedInPartsToo) {
     EXPECT_EQ(again.images[i].cam_from_world.translation, in_parts.images[i].cam_from_world.translation);
     EXPECT_EQ(thrice.images[i].cam_from_world.translation, in_parts.images[i].cam_from_world.translation);
   }
+}
+
+// What was straightened in parts is nearly right, but joints and far points are not: two steps straighten
+// the whole, as points follow them.  Where they do not, these steps leave 3.4 of 4 degrees.
+TEST(GroupClasses, PointsFollowTheStepsOfAWholeThatWasInParts) {
+  const Survey survey = MakeSurvey({.walk_m = 0.025, .walk_deg = 1});
+  GroupClassesOptions options;
+  options.adjustment.num_images_at_once = 10;
+  options.adjustment.max_num_iterations = 2;
+  const Classes classes = Group(survey, options).classes;
+  EXPECT_LT(MeanErrorDeg(survey, classes, false), 0.1 * MeanErrorDeg(survey, classes, true));
 }
 
 TEST(GroupClasses, LensThatNobodyStatedIsFound) {

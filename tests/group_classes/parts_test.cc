@@ -13,6 +13,7 @@ TEST(Parts, OnlyASurveyThatIsTooLargeAtOnceIsCut) {
   EXPECT_THAT(NumPartsOfRounds(600, 600), IsEmpty());
   // 4 of 150 images, at most 200; before them 8 of 75, and 16 of 37, at most 50.
   EXPECT_THAT(NumPartsOfRounds(601, 600), ElementsAre(16, 8, 4));
+  EXPECT_THAT(NumPartsOfRounds(800, 600), ElementsAre(16, 8, 4));  // 200 and 50 images, just
   EXPECT_THAT(NumPartsOfRounds(10000, 600), ElementsAre(256, 128, 64));
   EXPECT_THAT(NumPartsOfRounds(24, 20), ElementsAre(8, 4));  // no part is smaller than is worth it
   EXPECT_THAT(NumPartsOfRounds(40, 10), ElementsAre(16));

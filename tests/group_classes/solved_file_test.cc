@@ -2,8 +2,12 @@
 
 #include <filesystem>
 #include <functional>
+#include <sstream>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "core/files/file.h"
 #include "stages/group_classes/adjust/bundle.h"
@@ -14,6 +18,8 @@ namespace cairn::group_classes {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
 
 const ContentHash kOne = {1, 2}, kTwo = {1, 3};
 
@@ -97,6 +103,33 @@ TEST_F(SolvedFileTest, WhereThereCanBeNoneNothingIsKept) {
   nowhere.Add(kOne, "one");
 }
 
+// What opening it logs.
+std::string SaidOf(const std::string& path) {
+  std::ostringstream said;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("said", std::make_shared<spdlog::sinks::ostream_sink_st>(said)));
+  SolvedFile file(path);
+  spdlog::set_default_logger(before);
+  return said.str();
+}
+
+TEST_F(SolvedFileTest, SaysWhatItTakesOverAndWhyItKeepsNothing) {
+  const std::string whole = SaidOf(path_);
+  EXPECT_THAT(whole, HasSubstr("goes on where an earlier run stood, after 2 adjustments"));
+  EXPECT_THAT(whole, Not(HasSubstr("damaged")));
+  const SolvedFile other(path_);
+  EXPECT_THAT(SaidOf(path_), HasSubstr("belongs to another run that is going on; a run"));
+  EXPECT_THAT(SaidOf(path_ + "/under_a_file"), HasSubstr("cannot be opened: Not a directory; a run"));
+  const std::string fresh = path_ + ".fresh";
+  EXPECT_EQ(SaidOf(fresh), "");
+  // Once it is there it has a head, and nothing to go on from.
+  EXPECT_EQ(SaidOf(fresh), "");
+  EXPECT_EQ(fs::status(fresh).permissions() & fs::perms::owner_all,
+            fs::perms::owner_read | fs::perms::owner_write);
+  fs::remove(fresh);
+}
+
 BundleProblem Problem() {
   const Camera camera = Lens();
   Circle circle = MakeCircle(camera, camera, 0.5, {0, 1});
@@ -165,6 +198,35 @@ TEST_F(SolvedFileTest, SolutionIsReadAsItWasWritten) {
   taken.points.pop_back();
   EXPECT_FALSE(ReadSolution(bytes, &taken, &found).has_value());
   EXPECT_FALSE(ReadSolution(bytes, &taken, nullptr).has_value());
+}
+
+TEST_F(SolvedFileTest, ACameraMayHaveNothingFreeAndNoSizeIsBelieved) {
+  BundleProblem solved = Problem(), taken = Problem();
+  solved.cameras.emplace_back();
+  taken.cameras.emplace_back();
+  BundleEvidence evidence, found;
+  evidence.camera_sigma = {{1, 2}, {}};
+  std::string bytes = WriteSolution(solved, {}, &evidence);
+  ASSERT_TRUE(ReadSolution(bytes, &taken, &found).has_value());
+  EXPECT_EQ(found.camera_sigma, evidence.camera_sigma);
+  // The last four bytes are the number of deviations of the second camera.
+  bytes.replace(bytes.size() - 4, 4, "\xff\xff\xff\x7f");
+  EXPECT_FALSE(ReadSolution(bytes, &taken, &found).has_value());
+}
+
+// Numbers are hashed in pieces: a large problem has many of them, and the first counts as the last does.
+TEST_F(SolvedFileTest, AllPiecesOfALargeProblemAreInItsHash) {
+  BundleProblem problem = Problem();
+  const std::vector<BundleProblem::Observation> once = problem.observations;
+  for (int times = 1; times < 6; ++times)
+    problem.observations.insert(problem.observations.end(), once.begin(), once.end());
+  const ContentHash hash = HashBundle({}, problem, false);
+  EXPECT_EQ(HashBundle({}, problem, false), hash);
+  for (const size_t i : {size_t{0}, problem.observations.size() / 2, problem.observations.size() - 1}) {
+    BundleProblem changed = problem;
+    changed.observations[i].sigma_px += 1e-9;
+    EXPECT_NE(HashBundle({}, changed, false), hash) << i;
+  }
 }
 
 TEST_F(SolvedFileTest, AllThatASolutionDependsOnIsInItsHash) {

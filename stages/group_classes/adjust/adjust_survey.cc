@@ -137,7 +137,8 @@ class SurveyAdjuster {
     }
     const Pose offset = findings.camera_from_given;
     for (int i = 0; i < posed_.num_images(); ++i) {
-      posed_.poses[i] = offset * posed_.stated[i];
+      // Without an offset bit for bit: a product would be normalised anew.
+      posed_.poses[i] = findings.has_offset ? offset * posed_.stated[i] : posed_.stated[i];
       problem_.images[i].cam_from_world = posed_.poses[i];
     }
     posed_.camera_from_given = offset;
