@@ -38,10 +38,12 @@ struct Round {
   double max_error_px;  // of what is triangulated
   int num_keypoints;    // of an image that decide; 0: as many as the budget allows
   bool adjust_cameras;
+  bool position_again;
 };
-constexpr Round kRounds[] = {{0, 24, 100, false},  {0, 12, 120, true},   {0.2, 12, 120, true},
-                             {0.2, 12, 120, true}, {0.2, 12, 120, true}, {0.1, 6, 150, true},
-                             {0.05, 4, 0, true}};
+constexpr Round kRounds[] = {{0, 24, 100, false, false},  {0, 12, 120, true, false},
+                             {0.2, 12, 120, true, true},  {0.2, 12, 120, true, true},
+                             {0.2, 12, 120, true, false}, {0.1, 6, 150, true, false},
+                             {0.05, 4, 0, true, false}};
 constexpr double kTypicalQuantile = 0.75;
 // Rounds up to this one take in no pairs.
 constexpr int kLastStartingRound = 1;
@@ -50,7 +52,13 @@ constexpr int kLastStartingRound = 1;
 constexpr double kMinPartAccepted = 0.01;
 // Keypoints that decide in the last round: of an image, and of all.
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
-constexpr int kMaxNumObservations = 800000;
+constexpr int kMaxNumObservations = 600000;
+
+// A drive is torn where it steps so many times as far as it typically does: right maps of drives and films
+// have steps of at most 3.8, torn ones of 6 to 24.
+constexpr double kTornStep = 5;
+// Standard deviation of a step as the map has it, as a part of it and of a typical one.
+constexpr double kSameStepRatio = 0.3, kLeastSameStep = 0.1;
 
 // What is held by look-alikes alone is moved before the last round, at most so often.
 constexpr int kMaxNumMoved = 8;
@@ -109,7 +117,7 @@ double PartMapper::FocalChange() const {
 std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>& rotations,
                                            double max_focal_change_ratio, Progress& progress) {
   KeepRotations(rotations);
-  Position(rotations);
+  PlaceAlong(rotations, AcceptedWays(rotations));
   MakeTracks();
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
@@ -128,6 +136,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
         continue;
       }
       if (num_changed > 0) {
+        if (round.position_again && is_drive_ && problem_.motions.empty() && IsTorn()) PositionAgain();
         MakeTracks();
         TriangulateAll(round.max_error_px);
       }
@@ -220,6 +229,7 @@ std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
 
 // A typical one is as long as one of those that are longer than most: images may turn on the spot in many.
 void PartMapper::KeepSteps(const std::vector<Way>& steps) {
+  problem_.steps.clear();
   std::vector<double> lengths;
   for (const Way& step : steps) lengths.push_back(step.way.norm());
   const double typical = lengths.empty() ? 0 : Quantile(lengths, kTypicalQuantile);
@@ -228,7 +238,7 @@ void PartMapper::KeepSteps(const std::vector<Way>& steps) {
   }
 }
 
-void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
+std::vector<Way> PartMapper::AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const {
   std::vector<ViewPair> pairs;
   for (size_t p = 0; p < pairs_.size(); ++p) {
     if (is_accepted_[p]) pairs.push_back(pairs_[p]);
@@ -236,14 +246,51 @@ void PartMapper::Position(const std::vector<Eigen::Quaterniond>& rotations) {
   const auto bearing_of = [&](int image, KeypointIdx keypoint) {
     return BearingFromImage(CameraOf(image), PixelOf({image, keypoint}));
   };
-  const std::vector<Way> ways = WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of,
-                                       1 / CameraOf(0).MeanFocal(), !is_drive_, num_threads_);
+  return WaysBy(rotations, pairs, problem_.motions, steps_, bearing_of, 1 / CameraOf(0).MeanFocal(),
+                !is_drive_, num_threads_);
+}
+
+void PartMapper::PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways) {
   const std::vector<Eigen::Vector3d> centers = CentersAlong(static_cast<int>(images_.size()), ways);
   std::vector<Way> steps;
   for (const auto& [from, to] : steps_) steps.push_back({from, to, centers[to] - centers[from]});
   KeepSteps(steps);
+  problem_.cam_from_world.clear();
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * centers[i])});
+}
+
+bool PartMapper::IsTorn() const {
+  std::vector<double> lengths;
+  for (const auto& [from, to] : steps_)
+    lengths.push_back(CenterErrorM(problem_.cam_from_world[from], problem_.cam_from_world[to]));
+  return !lengths.empty() &&
+         *std::max_element(lengths.begin(), lengths.end()) > kTornStep * Quantile(lengths, kTypicalQuantile);
+}
+
+// By the ways of all pairs that agree with the map so far.  What was lost where the camera turned on the spot
+// in front of little, the scale of all that follows, no adjustment finds again: a track is triangulated where
+// most of it agrees, and images that see it from elsewhere have no say.  The steps as they are hold what few
+// pairs join.
+void PartMapper::PositionAgain() {
+  const std::vector<Eigen::Quaterniond> rotations = Rotations();
+  std::vector<Way> ways = AcceptedWays(rotations);
+  const auto now = [&](int from, int to) {
+    return Eigen::Vector3d(problem_.cam_from_world[to].Center() - problem_.cam_from_world[from].Center());
+  };
+  std::vector<double> ratios;
+  for (const Way& way : ways) {
+    const double length = now(way.from, way.to).norm();
+    if (way.way.norm() > 0 && length > 0) ratios.push_back(way.way.norm() / length);
+  }
+  if (ratios.empty()) return;
+  const double scale = UpperMedian(ratios);
+  spdlog::debug("reconstruct: the drive is torn, places anew by {} ways", ways.size());
+  for (const auto& [from, to] : steps_) {
+    const Eigen::Vector3d way = scale * now(from, to);
+    ways.push_back({from, to, way, kLeastSameStep + kSameStepRatio * way.norm()});
+  }
+  PlaceAlong(rotations, ways);
 }
 
 void PartMapper::TriangulateAll(double max_error_px) {

@@ -65,7 +65,10 @@ class PartMapper {
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
   void KeepSteps(const std::vector<Way>& steps);
-  void Position(const std::vector<Eigen::Quaterniond>& rotations);
+  std::vector<Way> AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const;
+  void PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways);
+  bool IsTorn() const;
+  void PositionAgain();
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
   std::vector<Eigen::Quaterniond> Rotations() const;
