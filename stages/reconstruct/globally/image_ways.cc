@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "stages/reconstruct/globally/pair_lengths.h"
 #include "stages/reconstruct/view_graph/differences.h"
 
@@ -18,6 +19,10 @@ constexpr double kSigmaRatio = 0.05, kLeastSigma = 0.02, kShortSigma = 0.5, kSte
 constexpr double kTypicalNumMatches = 200;
 // Of the logarithm of a step's length about the unit, and of one that a motion tells.
 constexpr double kLogStepSigma = 0.7, kLogMotionSigma = 0.05;
+// A step that tears a drive, over one that is longer than so many of them.
+constexpr double kTornStep = 5, kTypicalQuantile = 0.75;
+// Standard deviation of a step as it is, as a part of it and of the unit.
+constexpr double kSameStepRatio = 0.3, kLeastSameStep = 0.1;
 
 PairDepths DepthsOfMatches(ViewPair pair, const BearingOf& bearing_of, double sigma_rad) {
   std::vector<Eigen::Vector3d> bearings1, bearings2;
@@ -98,6 +103,29 @@ std::vector<Eigen::Vector3d> CentersAlong(int num_images, const std::vector<Way>
   std::vector<Eigen::Vector3d> centers;
   for (int i = 0; i < num_images; ++i) centers.emplace_back(found.row(i).transpose());
   return centers;
+}
+
+bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::pair<int, int>>& steps) {
+  std::vector<double> lengths;
+  for (const auto& [from, to] : steps) lengths.push_back((centers[to] - centers[from]).norm());
+  return !lengths.empty() &&
+         *std::max_element(lengths.begin(), lengths.end()) > kTornStep * Quantile(lengths, kTypicalQuantile);
+}
+
+std::vector<Way> WithStepsOf(const std::vector<Eigen::Vector3d>& centers,
+                             const std::vector<std::pair<int, int>>& steps, std::vector<Way> ways) {
+  std::vector<double> ratios;
+  for (const Way& way : ways) {
+    const double length = (centers[way.to] - centers[way.from]).norm();
+    if (way.way.norm() > 0 && length > 0) ratios.push_back(way.way.norm() / length);
+  }
+  if (ratios.empty()) return ways;
+  const double scale = UpperMedian(ratios);
+  for (const auto& [from, to] : steps) {
+    const Eigen::Vector3d way = scale * (centers[to] - centers[from]);
+    ways.push_back({from, to, way, kLeastSameStep + kSameStepRatio * way.norm()});
+  }
+  return ways;
 }
 
 }  // namespace cairn::reconstruct

@@ -54,12 +54,6 @@ constexpr double kMinPartAccepted = 0.01;
 constexpr int kMinNumKeypoints = 250, kMaxNumKeypoints = 1000;
 constexpr int kMaxNumObservations = 600000;
 
-// A drive is torn where it steps so many times as far as it typically does: right maps of drives and films
-// have steps of at most 3.8, torn ones of 6 to 24.
-constexpr double kTornStep = 5;
-// Standard deviation of a step as the map has it, as a part of it and of a typical one.
-constexpr double kSameStepRatio = 0.3, kLeastSameStep = 0.1;
-
 // What is held by look-alikes alone is moved before the last round, at most so often.
 constexpr int kMaxNumMoved = 8;
 // Points this near to each other, over the median depth, may be one.
@@ -136,7 +130,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
         continue;
       }
       if (num_changed > 0) {
-        if (round.position_again && is_drive_ && problem_.motions.empty() && IsTorn()) PositionAgain();
+        if (round.position_again && is_drive_ && problem_.motions.empty()) PositionAgain();
         MakeTracks();
         TriangulateAll(round.max_error_px);
       }
@@ -260,37 +254,16 @@ void PartMapper::PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, co
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * centers[i])});
 }
 
-bool PartMapper::IsTorn() const {
-  std::vector<double> lengths;
-  for (const auto& [from, to] : steps_)
-    lengths.push_back(CenterErrorM(problem_.cam_from_world[from], problem_.cam_from_world[to]));
-  return !lengths.empty() &&
-         *std::max_element(lengths.begin(), lengths.end()) > kTornStep * Quantile(lengths, kTypicalQuantile);
-}
-
-// By the ways of all pairs that agree with the map so far.  What was lost where the camera turned on the spot
-// in front of little, the scale of all that follows, no adjustment finds again: a track is triangulated where
-// most of it agrees, and images that see it from elsewhere have no say.  The steps as they are hold what few
-// pairs join.
+// Of a drive that is torn, by the ways of all pairs that agree with the map so far.  What was lost where the
+// camera turned on the spot in front of little, the scale of all that follows, no adjustment finds again: a
+// track is triangulated where most of it agrees, and images that see it from elsewhere have no say.
 void PartMapper::PositionAgain() {
+  std::vector<Eigen::Vector3d> centers;
+  for (const Pose& pose : problem_.cam_from_world) centers.push_back(pose.Center());
+  if (!IsTorn(centers, steps_)) return;
   const std::vector<Eigen::Quaterniond> rotations = Rotations();
-  std::vector<Way> ways = AcceptedWays(rotations);
-  const auto now = [&](int from, int to) {
-    return Eigen::Vector3d(problem_.cam_from_world[to].Center() - problem_.cam_from_world[from].Center());
-  };
-  std::vector<double> ratios;
-  for (const Way& way : ways) {
-    const double length = now(way.from, way.to).norm();
-    if (way.way.norm() > 0 && length > 0) ratios.push_back(way.way.norm() / length);
-  }
-  if (ratios.empty()) return;
-  const double scale = UpperMedian(ratios);
-  spdlog::debug("reconstruct: the drive is torn, places anew by {} ways", ways.size());
-  for (const auto& [from, to] : steps_) {
-    const Eigen::Vector3d way = scale * now(from, to);
-    ways.push_back({from, to, way, kLeastSameStep + kSameStepRatio * way.norm()});
-  }
-  PlaceAlong(rotations, ways);
+  PlaceAlong(rotations, WithStepsOf(centers, steps_, AcceptedWays(rotations)));
+  spdlog::debug("reconstruct: the drive was torn, and has places anew");
 }
 
 void PartMapper::TriangulateAll(double max_error_px) {

@@ -67,7 +67,6 @@ class PartMapper {
   void KeepSteps(const std::vector<Way>& steps);
   std::vector<Way> AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const;
   void PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways);
-  bool IsTorn() const;
   void PositionAgain();
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);

@@ -237,5 +237,52 @@ TEST(ImageWays, SameForAnyNumberOfThreads) {
   for (size_t k = 0; k < one.size(); ++k) EXPECT_EQ(one[k].way, seven[k].way);
 }
 
+// Along x, one step after the other.
+std::vector<Eigen::Vector3d> PlacesAlong(const std::vector<double>& lengths) {
+  std::vector<Eigen::Vector3d> places = {Eigen::Vector3d::Zero()};
+  for (const double length : lengths) places.emplace_back(places.back().x() + length, 0, 0);
+  return places;
+}
+
+std::vector<std::pair<int, int>> StepsOf(const std::vector<double>& lengths) {
+  std::vector<std::pair<int, int>> steps;
+  for (int i = 0; i < std::ssize(lengths); ++i) steps.emplace_back(i, i + 1);
+  return steps;
+}
+
+TEST(IsTorn, WhereOneStepIsMuchLongerThanMost) {
+  // The camera turns on the spot in most of them.
+  std::vector<double> lengths = {0, 0, 0, 0.01, 0, 0, 2, 2, 2, 2, 2, 9.9};
+  EXPECT_FALSE(IsTorn(PlacesAlong(lengths), StepsOf(lengths)));
+  lengths.back() = 10.1;
+  EXPECT_TRUE(IsTorn(PlacesAlong(lengths), StepsOf(lengths)));
+  EXPECT_FALSE(IsTorn({Eigen::Vector3d::Zero()}, {}));
+}
+
+// Images 3 to 5 hang on 2 by a step alone; the others' ways are twice as long as the places have them.
+TEST(WithStepsOf, HoldWhatNoWayJoinsInTheUnitOfTheWays) {
+  const std::vector<double> lengths = {1, 1, 1.5, 1, 1};
+  std::vector<Way> ways;
+  for (const int i : {0, 1, 3, 4}) ways.push_back({i, i + 1, {2, 0, 0}, 0.1});
+  ways.push_back({2, 3, Eigen::Vector3d::Zero(), 2});  // a step of which nothing is known
+  const std::vector<Way> with = WithStepsOf(PlacesAlong(lengths), StepsOf(lengths), ways);
+  ASSERT_EQ(with.size(), ways.size() + 5);
+  EXPECT_EQ(with[7].from, 2);
+  EXPECT_EQ(with[7].to, 3);
+  EXPECT_NEAR(with[7].way.x(), 3, 1e-12);
+  EXPECT_NEAR(with[7].sigma, 0.1 + 0.3 * 3, 1e-12);
+  const std::vector<Eigen::Vector3d> centers = CentersAlong(6, with);
+  EXPECT_NEAR(centers[3].x() - centers[2].x(), 3, 0.6);
+  EXPECT_NEAR(centers[5].x() - centers[3].x(), 4, 0.1);
+}
+
+TEST(WithStepsOf, AreNoneWhereNoWayHasALength) {
+  const std::vector<double> lengths = {1, 1};
+  const std::vector<Way> ways = {{0, 1, Eigen::Vector3d::Zero(), 0.5}, {1, 2, {1, 0, 0}, 0.1}};
+  EXPECT_EQ(WithStepsOf(PlacesAlong({0, 0}), StepsOf(lengths), ways).size(), 2u);
+  EXPECT_EQ(WithStepsOf(PlacesAlong(lengths), StepsOf(lengths), {ways[0]}).size(), 1u);
+  EXPECT_EQ(WithStepsOf(PlacesAlong(lengths), StepsOf(lengths), ways).size(), 4u);
+}
+
 }  // namespace
 }  // namespace cairn::reconstruct
