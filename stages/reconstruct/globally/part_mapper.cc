@@ -38,7 +38,7 @@ struct Round {
   double max_error_px;  // of what is triangulated
   int num_keypoints;    // of an image that decide; 0: as many as the budget allows
   bool adjust_cameras;
-  bool position_again;
+  bool mends;  // a drive that is torn
 };
 constexpr Round kRounds[] = {{0, 24, 100, false, false},  {0, 12, 120, true, false},
                              {0.2, 12, 120, true, true},  {0.2, 12, 120, true, true},
@@ -130,7 +130,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
         continue;
       }
       if (num_changed > 0) {
-        if (round.position_again && is_drive_ && problem_.motions.empty()) PositionAgain();
+        if (round.mends && is_drive_ && problem_.motions.empty() && IsTorn(Centers(), steps_)) MendDrive();
         MakeTracks();
         TriangulateAll(round.max_error_px);
       }
@@ -254,16 +254,21 @@ void PartMapper::PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, co
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * centers[i])});
 }
 
-// Of a drive that is torn, by the ways of all pairs that agree with the map so far.  What was lost where the
-// camera turned on the spot in front of little, the scale of all that follows, no adjustment finds again: a
-// track is triangulated where most of it agrees, and images that see it from elsewhere have no say.
-void PartMapper::PositionAgain() {
+std::vector<Eigen::Vector3d> PartMapper::Centers() const {
   std::vector<Eigen::Vector3d> centers;
   for (const Pose& pose : problem_.cam_from_world) centers.push_back(pose.Center());
-  if (!IsTorn(centers, steps_)) return;
+  return centers;
+}
+
+// What look-alikes hold elsewhere is moved; where there is no such part, all images are positioned again by
+// the ways of all pairs that agree with the map so far.  What was lost where the camera turned on the spot in
+// front of little, the scale of all that follows, no adjustment finds again: a track is triangulated where
+// most of it agrees, and images that see it from elsewhere have no say.
+void PartMapper::MendDrive() {
+  if (MoveMisplacedPart()) return;
+  spdlog::debug("reconstruct: the drive is torn, finding places anew");
   const std::vector<Eigen::Quaterniond> rotations = Rotations();
-  PlaceAlong(rotations, WithStepsOf(centers, steps_, AcceptedWays(rotations)));
-  spdlog::debug("reconstruct: the drive was torn, and has places anew");
+  PlaceAlong(rotations, WithStepsOf(Centers(), steps_, AcceptedWays(rotations)));
 }
 
 void PartMapper::TriangulateAll(double max_error_px) {

@@ -67,7 +67,8 @@ class PartMapper {
   void KeepSteps(const std::vector<Way>& steps);
   std::vector<Way> AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const;
   void PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways);
-  void PositionAgain();
+  std::vector<Eigen::Vector3d> Centers() const;
+  void MendDrive();
   void TriangulateAll(double max_error_px);
   int AcceptPairs(double max_error_rad);
   std::vector<Eigen::Quaterniond> Rotations() const;
