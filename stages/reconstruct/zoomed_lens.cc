@@ -31,7 +31,9 @@ constexpr double kOutlierFactor = 3;
 // Images that follow each other: as many, every so many, with at least so many pairs of which at most so many
 // are asked.
 constexpr int kRunLength = 16, kRunStep = 8;
-constexpr size_t kMinNumPairs = 20, kMaxNumAsked = 80;
+constexpr size_t kMinNumPairs = 20, kMaxNumAsked = 40;
+// Of the ladder of focal lengths every other one.
+constexpr int kNumCosts = (kNumFocals + 1) / 2;
 constexpr double kMinFocalFactor = 1.2, kMinCostDifference = 0.6;
 
 enum class PairMotion { kNone, kZoom, kOther };
@@ -106,10 +108,11 @@ PairMotion MotionOf(const Points& points, double longer_side) {
 // Images of a camera that follow each other, and the mean cost of their pairs by each focal length.
 struct Run {
   int first = 0, last = 0;  // in the order of names
-  std::array<double, kNumFocals> cost = {};
-
-  int Best() const { return static_cast<int>(std::min_element(cost.begin(), cost.end()) - cost.begin()); }
+  std::array<double, kNumCosts> cost = {};
+  int best = 0;  // of the costs
 };
+
+double FocalOf(const Camera& camera, int i) { return FocalOfLadder(camera, 2 * i); }
 
 // Pairs within a run, of one camera.
 std::optional<Run> RunOf(const Camera& camera, int first, int last,
@@ -121,12 +124,13 @@ std::optional<Run> RunOf(const Camera& camera, int first, int last,
   for (size_t p = 0; p < pairs.size(); p += stride) {
     const double of_pair = std::sqrt(static_cast<double>(pairs[p]->inliers.size()));
     weight += of_pair;
-    for (int i = 0; i < kNumFocals; ++i) {
-      const double focal = FocalOfLadder(camera, i);
+    for (int i = 0; i < kNumCosts; ++i) {
+      const double focal = FocalOf(camera, i);
       run.cost[i] += of_pair * FocalCost(pairs[p]->F, camera, focal, camera, focal);
     }
   }
   for (double& cost : run.cost) cost /= weight;
+  run.best = static_cast<int>(std::min_element(run.cost.begin(), run.cost.end()) - run.cost.begin());
   return run;
 }
 
@@ -157,27 +161,25 @@ std::vector<Run> RunsOf(const MapperInput& input, const Camera& camera, size_t n
 
 // By how much two runs contradict each other; 0 where their focal lengths are nearly the same.
 double CostDifference(const Camera& camera, const Run& a, const Run& b) {
-  const int best_a = a.Best(), best_b = b.Best();
-  const double longer = FocalOfLadder(camera, std::max(best_a, best_b)),
-               shorter = FocalOfLadder(camera, std::min(best_a, best_b));
+  const double longer = FocalOf(camera, std::max(a.best, b.best)),
+               shorter = FocalOf(camera, std::min(a.best, b.best));
   if (longer < kMinFocalFactor * shorter) return 0;
-  return std::min(a.cost[best_b] - a.cost[best_a], b.cost[best_a] - b.cost[best_b]);
+  return std::min(a.cost[b.best] - a.cost[a.best], b.cost[a.best] - b.cost[b.best]);
 }
 
 }  // namespace
 
 std::string ZoomedPart(const MapperInput& input) {
-  for (const auto& [camera_id, camera] : input.cameras) {
+  std::map<CameraId, std::vector<const DatabaseImage*>> of_cameras;
+  for (const DatabaseImage& image : input.images) of_cameras[image.camera_id].push_back(&image);
+  for (const auto& [camera_id, images] : of_cameras) {
+    if (images.size() < kRunLength) continue;
     std::vector<std::string> names;
-    std::vector<ImageId> ids;
-    for (const DatabaseImage& image : input.images) {
-      if (image.camera_id != camera_id) continue;
-      names.push_back(image.name);
-      ids.push_back(image.image_id);
-    }
+    for (const DatabaseImage* image : images) names.push_back(image->name);
     const std::vector<int> order = NaturalOrder(names);
     std::map<ImageId, int> place;
-    for (size_t i = 0; i < order.size(); ++i) place[ids[order[i]]] = static_cast<int>(i);
+    for (size_t i = 0; i < order.size(); ++i) place[images[order[i]]->image_id] = static_cast<int>(i);
+    const Camera& camera = input.cameras.at(camera_id);
     const std::vector<Run> runs = RunsOf(input, camera, names.size(), place);
     double most = kMinCostDifference;
     const Run *one = nullptr, *other = nullptr;
@@ -193,7 +195,7 @@ std::string ZoomedPart(const MapperInput& input) {
     if (one == nullptr) continue;
     const auto said = [&](const Run& run) {
       return fmt::format("from {} to {} about {:.0f} px", names[order[run.first]], names[order[run.last]],
-                         FocalOfLadder(camera, run.Best()));
+                         FocalOf(camera, run.best));
     };
     return fmt::format(
         "images differ in focal length, {}, {}: the lens zoomed, or they are of several cameras; a map takes "

@@ -20,7 +20,7 @@ std::string ZoomedLens(const MapperInput& input);
 // every 16 that follow each other the fundamental matrices have a cost by focal length (FocalCost); the lens
 // zoomed where two sixteens have their least costs a fifth apart or more, and the mean cost of each would be
 // higher by 0.6 or more with the other's.  Rendered and real captures that do not zoom have at most 0.3
-// there.  Nothing where fewer than 20 pairs are within sixteen images.  O(images).
+// there.  Nothing where fewer than 20 pairs are within sixteen images.  O(pairs + images^2 / 64).
 std::string ZoomedPart(const MapperInput& input);
 
 }  // namespace cairn::reconstruct
