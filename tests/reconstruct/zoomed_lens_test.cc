@@ -33,7 +33,8 @@ MapperInput FilmOf(int num_images, bool is_flat, const Shown& shown) {
   film.cameras.emplace(1, GuessCamera(1, 640, 480));
   film.cameras.emplace(2, GuessCamera(2, 640, 480));
   Random random(5);
-  std::vector<Eigen::Vector3d> points;
+  // The first stays where it is when the lens zooms.
+  std::vector<Eigen::Vector3d> points = {{0, 0, 8}};
   for (int p = 0; p < 200; ++p) {
     const double depth = is_flat ? 8 : random.Uniform(4, 12);
     points.emplace_back(depth * random.Uniform(-0.5, 0.5), depth * random.Uniform(-0.4, 0.4), depth);
