@@ -170,8 +170,7 @@ std::string PromisesText(const MapRows& rows, StationIdx station) {
   const PromiseTerms& terms = promise.terms;
   if (text.empty()) return "promise: no place or heading of the survey's views is here\n";
   return fmt::format("promise: an image is localized within {:.3g} {}, {:.3g} deg by {} landmarks at least\n",
-                     terms.max_error_m, LengthUnit(rows.frame), terms.max_error_deg,
-                     terms.min_matches) +
+                     terms.max_error_m, LengthUnit(rows.frame), terms.max_error_deg, terms.min_matches) +
          text;
 }
 
