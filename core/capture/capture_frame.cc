@@ -15,15 +15,15 @@ constexpr int kNumDigits = 3;  // that say something, of a length in an arbitrar
 
 }  // namespace
 
-const char* LengthUnit(const CaptureFrame& frame) { return frame.unit == "metre" ? "m" : "units"; }
+const char* LengthUnit(const CaptureFrame& frame) { return IsMetric(frame) ? "m" : "units"; }
 
 std::string ShortLength(const CaptureFrame& frame, double length, int digits) {
-  if (frame.unit == "metre") return fmt::format("{:.{}f} cm", 100 * length, digits);
+  if (IsMetric(frame)) return fmt::format("{:.{}f} cm", 100 * length, digits);
   return fmt::format("{:.{}g} units", length, kNumDigits);
 }
 
 Status CheckCaptureFrame(const CaptureFrame& frame) {
-  if (frame.unit != "metre" && frame.unit != "arbitrary") {
+  if (!IsMetric(frame) && frame.unit != "arbitrary") {
     return MakeError(ErrorCode::kInvalidArgument, "unit '{}': expected 'metre' or 'arbitrary'", frame.unit);
   }
   const bool is_scale_valid = frame.scale_sigma_ratio >= 0 && frame.scale_sigma_ratio < 1 &&
@@ -37,7 +37,7 @@ Status CheckCaptureFrame(const CaptureFrame& frame) {
         frame.scale_sigma_ratio, frame.scale_centre.x(), frame.scale_centre.y(), frame.scale_centre.z(),
         kMaxCoordinateM);
   }
-  if (frame.unit != "metre" && frame.scale_sigma_ratio > 0) {
+  if (!IsMetric(frame) && frame.scale_sigma_ratio > 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "a frame of arbitrary unit says how well its scale is known: expected the unit metre");
   }
@@ -51,7 +51,7 @@ Status CheckCaptureFrame(const CaptureFrame& frame) {
                      "altitude in metres",
                      a.latitude_deg, a.longitude_deg, a.altitude_m);
   }
-  if (frame.unit != "metre") {
+  if (!IsMetric(frame)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "a frame of arbitrary unit has an anchor: expected the unit metre");
   }

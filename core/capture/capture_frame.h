@@ -34,6 +34,8 @@ inline Eigen::Vector3d ScaleSigmaAt(const CaptureFrame& frame, const Eigen::Vect
   return frame.scale_sigma_ratio * (point - frame.scale_centre);
 }
 
+inline bool IsMetric(const CaptureFrame& frame) { return frame.unit == "metre"; }
+
 // Lengths of the world frame for people: "m", or "units" where the unit is arbitrary; and a short one in
 // centimetres, "1.25 cm", there "0.0125 units".
 const char* LengthUnit(const CaptureFrame& frame);

@@ -151,7 +151,7 @@ Result<CaptureFrame> JoinFrames(const std::vector<CaptureSession>& sessions,
           AnchorText(*frames[i].anchor));
     }
   }
-  if (joined.unit != "metre" && sessions.size() > 1) {
+  if (!IsMetric(joined) && sessions.size() > 1) {
     warnings->push_back("the captures have no scale; they are taken to be parts of one reconstruction");
   }
   return joined;

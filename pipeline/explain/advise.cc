@@ -280,7 +280,7 @@ void AddOptions(const MapRows& rows, std::vector<Advice>* advice) {
              std::sqrt(nees->second / 6), nees->second, nees_high->second, TriedWord(rows))});
   }
   const auto within = rows.self_test.find("within_10cm_5deg_ratio");
-  if (rows.frame.unit == "metre" && localized != rows.self_test.end() && within != rows.self_test.end() &&
+  if (IsMetric(rows.frame) && localized != rows.self_test.end() && within != rows.self_test.end() &&
       within->second < kManyWithin * localized->second) {
     advice->push_back(
         {.text = fmt::format(

@@ -312,8 +312,7 @@ void AddCheckAdvice(const Json& check, const MapRows& rows, std::vector<Advice>*
   }
   AddFailedImages(rows, failed, advice);
   // The poses of left-out images are the map's own.
-  if (rows.frame.unit == "metre" && !rows.self_test.contains(kLeftOutRunsFigure))
-    AddMisalignment(placed, advice);
+  if (IsMetric(rows.frame) && !rows.self_test.contains(kLeftOutRunsFigure)) AddMisalignment(placed, advice);
 }
 
 // The map in other sizes, small to large: bytes, part localized, part within 10 cm and 5 degrees,

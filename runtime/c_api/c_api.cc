@@ -130,7 +130,7 @@ int32_t cairn_map_describe(const cairn_map* map, cairn_map_description* descript
     said.num_images = open->num_images();
     said.num_regions = open->num_regions();
     said.has_visual_map = open->has_visual_map();
-    said.is_metric = open->head().frame.unit == "metre";
+    said.is_metric = IsMetric(open->head().frame);
     CopyText(open->head().name, said.name);
     said.epoch = open->head().epoch;
     said.scale_sigma_ratio = open->head().frame.scale_sigma_ratio;

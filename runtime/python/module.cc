@@ -141,8 +141,7 @@ void BindMap(py::module_& module) {
       .def_property_readonly("num_landmarks", [](const PyMap& self) { return self.map->num_landmarks(); })
       .def_property_readonly("num_images", [](const PyMap& self) { return self.map->num_images(); })
       .def_property_readonly("num_regions", [](const PyMap& self) { return self.map->num_regions(); })
-      .def_property_readonly("is_metric",
-                             [](const PyMap& self) { return self.map->head().frame.unit == "metre"; })
+      .def_property_readonly("is_metric", [](const PyMap& self) { return IsMetric(self.map->head().frame); })
       .def_property_readonly("scale_sigma_ratio",
                              [](const PyMap& self) { return self.map->head().frame.scale_sigma_ratio; })
       .def_property_readonly(

@@ -237,7 +237,7 @@ std::string SelfTestRegionsText(const std::vector<RegionSelfTest>& regions, int 
     };
     return key(a) < key(b);
   });
-  const int width = frame.unit == "metre" ? 19 : 26;
+  const int width = IsMetric(frame) ? 19 : 26;
   std::string text =
       fmt::format("{:<22} {:>6} {:>9} {:>9} {:>{}} {:>{}}\n", "by region, worst first", "images", "localized",
                   "precision", "median error", width, "90th percentile", width);

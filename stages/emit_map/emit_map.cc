@@ -478,7 +478,7 @@ Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world
 }
 
 Status AddViews(Views views, MapRows* rows) {
-  if (rows->frame.unit != "metre") {
+  if (!IsMetric(rows->frame)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "map '{}' has no scale (unit = {}), and floor plans are in metres; give the scale to "
                      "[reconstruct] (distances, control_points), or take floor_plan out of the recipe",
