@@ -241,7 +241,7 @@ Verdict JudgeModels(const std::vector<ColmapModel>& models, const Similarity& wo
   JudgedModels judged{.models = &models,
                       .cam_from_world = {},
                       .rejects = result.rejects,
-                      .is_metric = result.frame.unit == "metre"};
+                      .is_metric = IsMetric(result.frame)};
   for (const ModelImage& image : models[0].images)
     judged.cam_from_world.push_back(TransformPose(world_from_model, image.cam_from_world));
   return Judge(judged, {});
@@ -400,14 +400,13 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
   ReconstructResult result;
   const Result<std::vector<ColmapModel>> mapped =
       MapImages(input, capture, options, work_folder, num_threads, progress, &result);
-  const std::string zoomed = ZoomedLens(input);
+  std::string zoomed = ZoomedLens(input);
+  if (zoomed.empty()) zoomed = ZoomedPart(input);
   if (!mapped.ok()) {
     if (mapped.error().code != ErrorCode::kNoData || zoomed.empty()) return mapped.error();
     return MakeError(ErrorCode::kNoData, "{}; {}", mapped.error().message, zoomed);
   }
-  for (const std::string& warning : {zoomed, zoomed.empty() ? ZoomedPart(input) : ""}) {
-    if (!warning.empty()) result.warnings.push_back(fmt::format("{}: {}", capture.root, warning));
-  }
+  if (!zoomed.empty()) result.warnings.push_back(fmt::format("{}: {}", capture.root, zoomed));
   const std::vector<ColmapModel>& models = *mapped;
   const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;

@@ -33,7 +33,7 @@ constexpr double kOutlierFactor = 3;
 constexpr int kRunLength = 16, kRunStep = 8;
 constexpr size_t kMinNumPairs = 20, kMaxNumAsked = 40;
 // Of the ladder of focal lengths every other one.
-constexpr int kNumCosts = (kNumFocals + 1) / 2;
+constexpr int kNumCosts = (kNumLadderFocals + 1) / 2;
 constexpr double kMinFocalFactor = 1.2, kMinCostDifference = 0.6;
 
 enum class PairMotion { kNone, kZoom, kOther };

@@ -19,7 +19,7 @@ constexpr double kSigmaRatio = 0.05, kLeastSigma = 0.02, kShortSigma = 0.5, kSte
 constexpr double kTypicalNumMatches = 200;
 // Of the logarithm of a step's length about the unit, and of one that a motion tells.
 constexpr double kLogStepSigma = 0.7, kLogMotionSigma = 0.05;
-// A step that tears a drive, over one that is longer than so many of them.
+// A step that tears a drive, over a typical one; and how many of them are not longer than that.
 constexpr double kTornStep = 5, kTypicalQuantile = 0.75;
 // Standard deviation of a step as it is, as a part of it and of the unit.
 constexpr double kSameStepRatio = 0.3, kLeastSameStep = 0.1;
@@ -105,11 +105,19 @@ std::vector<Eigen::Vector3d> CentersAlong(int num_images, const std::vector<Way>
   return centers;
 }
 
-bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::pair<int, int>>& steps) {
+std::vector<double> StepLengths(const std::vector<Eigen::Vector3d>& centers,
+                                const std::vector<std::pair<int, int>>& steps) {
   std::vector<double> lengths;
   for (const auto& [from, to] : steps) lengths.push_back((centers[to] - centers[from]).norm());
+  return lengths;
+}
+
+double TypicalLength(const std::vector<double>& lengths) { return Quantile(lengths, kTypicalQuantile); }
+
+bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::pair<int, int>>& steps) {
+  const std::vector<double> lengths = StepLengths(centers, steps);
   return !lengths.empty() &&
-         *std::max_element(lengths.begin(), lengths.end()) > kTornStep * Quantile(lengths, kTypicalQuantile);
+         *std::max_element(lengths.begin(), lengths.end()) > kTornStep * TypicalLength(lengths);
 }
 
 std::vector<Way> WithStepsOf(const std::vector<Eigen::Vector3d>& centers,

@@ -38,9 +38,15 @@ std::vector<Way> WaysBy(const std::vector<Eigen::Quaterniond>& rotations, const 
 // images
 std::vector<Eigen::Vector3d> CentersAlong(int num_images, const std::vector<Way>& ways);
 
+// How long steps are at these places.
+std::vector<double> StepLengths(const std::vector<Eigen::Vector3d>& centers,
+                                const std::vector<std::pair<int, int>>& steps);
+
+// One that three quarters are not longer than: images may turn on the spot in many.  REQUIRES: a length
+double TypicalLength(const std::vector<double>& lengths);
+
 // Whether a drive that has come to these places is torn: a step is more than five times as long as a typical
-// one, that which is longer than three quarters of them.  Right maps of drives and films have steps of at
-// most 3.8 typical ones, torn ones of 6 to 24.
+// one.  Right maps of drives and films have steps of at most 3.8 typical ones, torn ones of 6 to 24.
 bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::pair<int, int>>& steps);
 
 // The ways, and the steps as they are at these places, in the unit of the ways: they hold what few ways join,

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "stages/reconstruct/globally/agreeing_pieces.h"
 #include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/globally/pair_evidence.h"
+#include "stages/reconstruct/globally/part_model.h"
 #include "stages/reconstruct/view_graph/average_rotations.h"
 
 namespace cairn::reconstruct {
@@ -24,7 +24,6 @@ namespace {
 
 constexpr int kMinTrackLength = 3;
 constexpr double kMinAngleDeg = 1;
-constexpr int kMinNumSeen = 15;  // points of an image that stays
 constexpr double kGuessedFocalSigma = 0.3, kStatedFocalSigma = 0.03, kDistortionSigma = 0.1;
 // Images of a drive that follow each other: a rotation by so many matches, from which the average differs by
 // so little, is sure.
@@ -44,7 +43,6 @@ constexpr Round kRounds[] = {{0, 24, 100, false, false},  {0, 12, 120, true, fal
                              {0.2, 12, 120, true, true},  {0.2, 12, 120, true, true},
                              {0.2, 12, 120, true, false}, {0.1, 6, 150, true, false},
                              {0.05, 4, 0, true, false}};
-constexpr double kTypicalQuantile = 0.75;
 // Rounds up to this one take in no pairs.
 constexpr int kLastStartingRound = 1;
 // A round that takes in as far as the one before is left out if it would change fewer than this part of the
@@ -143,7 +141,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
     if (&round == &kRounds[kLastStartingRound] && FocalChange() > max_focal_change_ratio) return std::nullopt;
   }
   TriangulateAll(std::end(kRounds)[-1].max_error_px);
-  return MakeModel();
+  return ModelOfPart(input_, images_, problem_, tracks_, triangulations_);
 }
 
 void PartMapper::KeepRotations(const std::vector<Eigen::Quaterniond>& rotations) {
@@ -221,15 +219,12 @@ std::vector<PartMapper::Chosen> PartMapper::ChooseTracks(
   return chosen;
 }
 
-// A typical one is as long as one of those that are longer than most: images may turn on the spot in many.
-void PartMapper::KeepSteps(const std::vector<Way>& steps) {
+void PartMapper::KeepSteps(const std::vector<Eigen::Vector3d>& centers) {
   problem_.steps.clear();
-  std::vector<double> lengths;
-  for (const Way& step : steps) lengths.push_back(step.way.norm());
-  const double typical = lengths.empty() ? 0 : Quantile(lengths, kTypicalQuantile);
-  for (const Way& step : steps) {
-    if (typical > 0) problem_.steps.push_back({step.from, step.to, step.way.norm() / typical});
-  }
+  const std::vector<double> lengths = StepLengths(centers, steps_);
+  const double typical = lengths.empty() ? 0 : TypicalLength(lengths);
+  for (size_t s = 0; s < steps_.size() && typical > 0; ++s)
+    problem_.steps.push_back({steps_[s].first, steps_[s].second, lengths[s] / typical});
 }
 
 std::vector<Way> PartMapper::AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const {
@@ -246,9 +241,7 @@ std::vector<Way> PartMapper::AcceptedWays(const std::vector<Eigen::Quaterniond>&
 
 void PartMapper::PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways) {
   const std::vector<Eigen::Vector3d> centers = CentersAlong(static_cast<int>(images_.size()), ways);
-  std::vector<Way> steps;
-  for (const auto& [from, to] : steps_) steps.push_back({from, to, centers[to] - centers[from]});
-  KeepSteps(steps);
+  KeepSteps(centers);
   problem_.cam_from_world.clear();
   for (size_t i = 0; i < images_.size(); ++i)
     problem_.cam_from_world.push_back({rotations[i], -(rotations[i] * centers[i])});
@@ -420,49 +413,6 @@ void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progre
   AdjustModel({.adjust_cameras = adjust_cameras, .progress = &progress}, &problem_);
   spdlog::debug("reconstruct: {} points and {} observations adjusted", problem_.points.size(),
                 problem_.observations.size());
-}
-
-ColmapModel PartMapper::MakeModel() const {
-  ColmapModel model;
-  std::vector<int> num_seen(images_.size(), 0);
-  for (size_t t = 0; t < tracks_.size(); ++t) {
-    for (const int e : triangulations_[t].inliers) ++num_seen[tracks_[t][e].image_idx];
-  }
-  std::vector<int> place(images_.size(), -1), order(images_.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return images_[a] < images_[b]; });
-  for (const int i : order) {
-    if (num_seen[i] < kMinNumSeen) continue;
-    const DatabaseImage& listed = input_.images[images_[i]];
-    place[i] = static_cast<int>(model.images.size());
-    ModelImage image{.image_id = listed.image_id,
-                     .name = listed.name,
-                     .camera_id = listed.camera_id,
-                     .cam_from_world = problem_.cam_from_world[i],
-                     .keypoints = {}};
-    for (const Keypoint& keypoint : input_.keypoints[images_[i]])
-      image.keypoints.push_back({{keypoint.x, keypoint.y}, kNoPoint});
-    model.images.push_back(std::move(image));
-    model.cameras.emplace(listed.camera_id, CameraOf(i));
-  }
-  for (size_t t = 0; t < tracks_.size(); ++t) {
-    std::vector<TrackElement> seen;
-    for (const int e : triangulations_[t].inliers) {
-      if (place[tracks_[t][e].image_idx] >= 0) seen.push_back(tracks_[t][e]);
-    }
-    if (seen.size() < 2) continue;
-    ModelPoint point{.point_id = model.points.size() + 1,
-                     .position = triangulations_[t].position,
-                     .error_px = triangulations_[t].rms_error_px,
-                     .track = {}};
-    for (const TrackElement& element : seen) {
-      ModelImage& image = model.images[place[element.image_idx]];
-      image.keypoints[element.keypoint_idx].point_id = point.point_id;
-      point.track.emplace_back(image.image_id, element.keypoint_idx);
-    }
-    model.points.push_back(std::move(point));
-  }
-  return model;
 }
 
 }  // namespace cairn::reconstruct

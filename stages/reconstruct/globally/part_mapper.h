@@ -64,7 +64,7 @@ class PartMapper {
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);
   void MakeTracks();
   std::vector<Chosen> ChooseTracks(int num_keypoints, const std::vector<std::vector<int>>& elements) const;
-  void KeepSteps(const std::vector<Way>& steps);
+  void KeepSteps(const std::vector<Eigen::Vector3d>& centers);
   std::vector<Way> AcceptedWays(const std::vector<Eigen::Quaterniond>& rotations) const;
   void PlaceAlong(const std::vector<Eigen::Quaterniond>& rotations, const std::vector<Way>& ways);
   std::vector<Eigen::Vector3d> Centers() const;
@@ -78,7 +78,6 @@ class PartMapper {
   bool MoveMisplacedPart();
   void AgreeAgain(Progress& progress);
   void Adjust(int num_keypoints, bool adjust_cameras, Progress& progress);
-  ColmapModel MakeModel() const;
 
   const MapperInput& input_;
   const MapGloballyOptions& options_;

@@ -22,14 +22,6 @@ constexpr double kGoodDifference = 0.02;
 // the same everywhere.
 constexpr double kLikelyFocalRatio = 0.8, kLogSigma = 0.35, kWeightOfLikely = 0.2;
 
-Eigen::Matrix3d CalibrationMatrix(double focal, const Eigen::Vector2d& centre) {
-  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-  K(0, 0) = K(1, 1) = focal;
-  K(0, 2) = centre.x();
-  K(1, 2) = centre.y();
-  return K;
-}
-
 // A pair with a fundamental matrix, of two cameras.
 struct FocalPair {
   const Eigen::Matrix3d* F;
@@ -87,7 +79,7 @@ class FocalSearch {
   bool SearchCamera(CameraId camera_id, const Camera& camera) {
     const auto focal_at = [&](double i) { return FocalOfLadder(camera, i); };
     double best = -1, least = 0;
-    for (int i = 0; i < kNumFocals; ++i) {
+    for (int i = 0; i < kNumLadderFocals; ++i) {
       const double cost = Cost(camera_id, focal_at(i));
       if (best >= 0 && !(cost < least)) continue;
       best = i, least = cost;
@@ -111,6 +103,14 @@ class FocalSearch {
 
 }  // namespace
 
+Eigen::Matrix3d CalibrationMatrix(double focal, const Eigen::Vector2d& centre) {
+  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
+  K(0, 0) = K(1, 1) = focal;
+  K(0, 2) = centre.x();
+  K(1, 2) = centre.y();
+  return K;
+}
+
 double FocalCost(const Eigen::Matrix3d& F, const Camera& camera1, double focal1, const Camera& camera2,
                  double focal2) {
   const Eigen::Matrix3d E = CalibrationMatrix(focal2, camera2.PrincipalPoint()).transpose() * F *
@@ -126,7 +126,7 @@ bool TellsFocalLengths(const TwoViewGeometry& geometry) {
 
 double FocalOfLadder(const Camera& camera, double i) {
   const double side = std::max(camera.width, camera.height);
-  const double step = std::log(kMaxFocalRatio / kMinFocalRatio) / (kNumFocals - 1);
+  const double step = std::log(kMaxFocalRatio / kMinFocalRatio) / (kNumLadderFocals - 1);
   return side * kMinFocalRatio * std::exp(step * i);
 }
 

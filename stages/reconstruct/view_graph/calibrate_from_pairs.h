@@ -9,6 +9,9 @@
 
 namespace cairn::reconstruct {
 
+// Of a focal length and a principal point, pixels.
+Eigen::Matrix3d CalibrationMatrix(double focal, const Eigen::Vector2d& centre);
+
 // How badly two focal lengths, pixels, fit a fundamental matrix of pixels of two cameras: 0 where the two
 // singular values of the essential matrix are equal, and hardly more for what is far off than for what is
 // off.
@@ -18,9 +21,9 @@ double FocalCost(const Eigen::Matrix3d& F, const Camera& camera1, double focal1,
 // Whether a pair's fundamental matrix says anything about focal lengths.
 bool TellsFocalLengths(const TwoViewGeometry& geometry);
 
-// The `i`-th of kNumFocals focal lengths from 0.3 to 4 times the image's longer side, evenly in the
+// The `i`-th of kNumLadderFocals focal lengths from 0.3 to 4 times the image's longer side, evenly in the
 // logarithm, pixels; also between two of them.
-inline constexpr int kNumFocals = 81;
+inline constexpr int kNumLadderFocals = 81;
 double FocalOfLadder(const Camera& camera, double i);
 
 // Focal lengths of cameras that have none but a guess, from fundamental matrices: with the right ones an

@@ -9,6 +9,7 @@
 #include "core/base/parallel.h"
 #include "core/geometry/estimate_two_view.h"
 #include "core/geometry/relative_pose.h"
+#include "stages/reconstruct/view_graph/calibrate_from_pairs.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -26,10 +27,7 @@ double CauchyCost(const Eigen::Matrix3d& E, const Correspondences& c, double sca
 }
 
 Eigen::Matrix3d CalibrationOf(const Camera& camera) {
-  Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-  K(0, 0) = K(1, 1) = camera.MeanFocal();
-  K.topRightCorner<2, 1>() = camera.PrincipalPoint();
-  return K;
+  return CalibrationMatrix(camera.MeanFocal(), camera.PrincipalPoint());
 }
 
 double TurnOf(const Pose& pose) { return pose.rotation.angularDistance(Eigen::Quaterniond::Identity()); }
