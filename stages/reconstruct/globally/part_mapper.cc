@@ -111,11 +111,13 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
   KeepRotations(rotations);
   PlaceAlong(rotations, AcceptedWays(rotations));
   MakeTracks();
+  // Odometry says where the images of a drive belong.
+  const bool may_move = !is_drive_ || problem_.motions.empty();
   for (const Round& round : kRounds) {
     if (progress.Cancelled()) return ColmapModel();
     TriangulateAll(round.max_error_px);
     const bool is_last = &round == std::end(kRounds) - 1;
-    for (int k = 0; is_last && k < kMaxNumMoved && MoveMisplacedPart(); ++k) {
+    for (int k = 0; is_last && may_move && k < kMaxNumMoved && MoveMisplacedPart(); ++k) {
       AgreeAgain(progress);
       if (progress.Cancelled()) return ColmapModel();
       TriangulateAll(round.max_error_px);
@@ -128,7 +130,7 @@ std::optional<ColmapModel> PartMapper::Map(const std::vector<Eigen::Quaterniond>
         continue;
       }
       if (num_changed > 0) {
-        if (round.mends && is_drive_ && problem_.motions.empty() && IsTorn(Centers(), steps_)) MendDrive();
+        if (round.mends && is_drive_ && may_move && IsTorn(Centers(), steps_)) MendDrive();
         MakeTracks();
         TriangulateAll(round.max_error_px);
       }
