@@ -16,8 +16,6 @@
 namespace cairn::group_classes {
 namespace {
 
-// A turn by a radian lets a tracker drift as a metre of way does; between surveys it starts anew.
-constexpr double kMetresPerRadian = 1, kMetresBetweenSurveys = 10, kMinWayM = 1e-4;
 // Fewest residuals of a component that keypoints must determine before it is learnt, as a part of all.
 constexpr double kMinDeterminedRatio = 0.02, kMinDetermined = 3;
 constexpr double kOverRelaxation = 1.5;
@@ -217,7 +215,7 @@ class SurveyAdjuster {
       BundleProblem::Image image;
       image.camera_idx = posed_.camera_idx[i];
       image.stated = image.cam_from_world = image.drifted = posed_.stated[i];
-      if (i > 0) image.way_m = Way(i - 1, i);
+      image.way_m = posed_.way_m[i];
       problem_.images.push_back(image);
     }
     problem_.is_offset_free = findings_.has_offset;
@@ -242,16 +240,6 @@ class SurveyAdjuster {
   const std::string& NameOf(int i) const { return matched_.images[posed_.feature_idx[i]].name; }
   const Keypoint& KeypointOf(const TrackElement& element) const {
     return matched_.features[posed_.feature_idx[element.image_idx]].keypoints[element.keypoint_idx];
-  }
-
-  double Way(int a, int b) const {
-    const auto view_a = ParsePanoramaViewName(NameOf(a)), view_b = ParsePanoramaViewName(NameOf(b));
-    if (view_a && view_b && view_a->panorama_name == view_b->panorama_name) return kMinWayM;
-    const auto folder = [](const std::string& name) { return name.substr(0, name.find('/') + 1); };
-    const double way = CenterErrorM(posed_.stated[a], posed_.stated[b]) +
-                       kMetresPerRadian * RadFromDeg(RotationErrorDeg(posed_.stated[a], posed_.stated[b])) +
-                       (folder(NameOf(a)) == folder(NameOf(b)) ? 0 : kMetresBetweenSurveys);
-    return std::max(kMinWayM, way);
   }
 
   // The longest tracks with which every image has enough keypoints.

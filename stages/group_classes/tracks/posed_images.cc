@@ -1,5 +1,6 @@
 #include "stages/group_classes/tracks/posed_images.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -7,6 +8,27 @@
 #include "core/camera/panorama.h"
 
 namespace cairn::group_classes {
+namespace {
+
+// A turn by a radian lets a tracker drift as a metre of way does; between surveys it starts anew.
+constexpr double kMetresPerRadian = 1, kMetresBetweenSurveys = 10, kMinWayM = 1e-4;
+
+struct NamedPose {
+  std::string name;
+  Pose pose;
+};
+
+double Way(const NamedPose& a, const NamedPose& b) {
+  const auto view_a = ParsePanoramaViewName(a.name), view_b = ParsePanoramaViewName(b.name);
+  if (view_a && view_b && view_a->panorama_name == view_b->panorama_name) return kMinWayM;
+  const auto folder = [](const std::string& name) { return name.substr(0, name.find('/') + 1); };
+  const double way = CenterErrorM(a.pose, b.pose) +
+                     kMetresPerRadian * RadFromDeg(RotationErrorDeg(a.pose, b.pose)) +
+                     (folder(a.name) == folder(b.name) ? 0 : kMetresBetweenSurveys);
+  return std::max(kMinWayM, way);
+}
+
+}  // namespace
 
 PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& capture) {
   std::map<std::string, Pose> poses;
@@ -19,12 +41,16 @@ PosedImages CollectPosedImages(const MatchedFeatures& matched, const Capture& ca
     camera_idx.emplace(camera_id, static_cast<int>(posed.cameras.size()));
     posed.cameras.push_back(camera);
   }
+  std::optional<NamedPose> before;
   for (size_t i = 0; i < matched.images.size(); ++i) {
     const std::optional<Pose> pose = FindPose(poses, matched.images[i].name);
     if (!pose) continue;
     posed.feature_idx.push_back(static_cast<int>(i));
     posed.camera_idx.push_back(camera_idx.at(matched.images[i].camera_id));
     posed.stated.push_back(*pose);
+    const NamedPose here = {matched.images[i].name, *pose};
+    posed.way_m.push_back(before ? Way(*before, here) : 0);
+    before = here;
   }
   posed.poses = posed.stated;
   return posed;

@@ -27,6 +27,7 @@ struct PosedImages {
   std::vector<int> camera_idx;
   std::vector<Camera> cameras;  // ascending camera_id; of images without a pose too
   std::vector<Pose> stated;
+  std::vector<double> way_m;  // that a tracker drifts on from the image before; 0 for the first
   std::vector<Pose> poses;
   Pose camera_from_given;
   int num_images() const { return static_cast<int>(stated.size()); }

@@ -1,6 +1,7 @@
 #include "stages/group_classes/tracks/sub_survey.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace cairn::group_classes {
 namespace {
@@ -14,7 +15,11 @@ PosedImages SelectImages(const PosedImages& all, const std::vector<int>& images)
   PosedImages selected;
   selected.cameras = all.cameras;
   selected.camera_from_given = all.camera_from_given;
-  for (const int i : images) {
+  for (size_t k = 0; k < images.size(); ++k) {
+    const int i = images[k];
+    // What lies between was driven, too: two images of one place may be a whole loop apart.
+    const auto before = all.way_m.begin() + (k == 0 ? i : images[k - 1]) + 1;
+    selected.way_m.push_back(k == 0 ? 0 : std::accumulate(before, all.way_m.begin() + i + 1, 0.0));
     selected.feature_idx.push_back(all.feature_idx[i]);
     selected.camera_idx.push_back(all.camera_idx[i]);
     selected.stated.push_back(all.stated[i]);

@@ -12,7 +12,7 @@ struct SubSurvey {
   std::vector<Track> tracks;
 };
 
-// `images`: indices into all.stated, ascending.  The offset is kept.
+// `images`: indices into all.stated, ascending.  The offset is kept; ways between them add up.
 PosedImages SelectImages(const PosedImages& all, const std::vector<int>& images);
 
 // `images`: indices into all.stated, ascending.
