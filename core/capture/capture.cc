@@ -267,6 +267,19 @@ void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
   });
 }
 
+// What looks like odometry, under a name that is not read.
+void WarnOfUnreadOdometry(Capture* capture) {
+  for (const char* name : {"odometry.csv", "odometry.tum", "odom.csv", "odom.txt"}) {
+    const std::string path = capture->root + "/" + name;
+    if (!IsThere(path) || IsThere(capture->root + "/" + kOdometryFile)) continue;
+    capture->warnings.push_back(
+        fmt::format("{}: not read; if it says where the camera was, call it {}: IMAGE, or a time, TX TY TZ "
+                    "QX QY QZ QW a line, "
+                    "metres",
+                    path, kOdometryFile));
+  }
+}
+
 }  // namespace
 
 std::string SessionCamerasPath(const std::string& root, const std::string& session) {
@@ -369,6 +382,7 @@ Result<Capture> ReadCapture(const std::string& root) {
                                         " rejected: " + capture.rejects[0].reason;
     return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);
   }
+  if (!capture.has_poses) WarnOfUnreadOdometry(&capture);
   return capture;
 }
 

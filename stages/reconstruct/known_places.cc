@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "core/base/quantiles.h"
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "core/geometry/trajectory.h"
+#include "stages/reconstruct/inertial/image_times.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -54,6 +60,73 @@ Status SplitNames(const std::vector<std::string>& words, size_t last, const std:
 }
 
 constexpr double kMaxNormError = 0.01;  // of a quaternion
+constexpr size_t kNumPoseNumbers = 7;
+// Odometry by time says where an image was if it says so at most this long before and after it.
+constexpr double kMaxTimeGapS = 0.2;
+
+// Of odometry: separated by spaces, or by commas.
+std::vector<std::string> SplitOdometry(const std::vector<std::string>& words) {
+  const auto first = words.end() - static_cast<std::ptrdiff_t>(std::min(words.size(), kNumPoseNumbers));
+  const auto has_comma = [](const std::string& word) { return word.find(',') != std::string::npos; };
+  if (std::none_of(first, words.end(), has_comma)) return words;
+  std::string line = Join(words, 0, words.size());
+  std::replace(line.begin(), line.end(), ',', ' ');
+  return SplitWords(line);
+}
+
+// "time,x,y,z,qx,qy,qz,qw": where a pose should be there is no number.
+bool IsHeader(const std::vector<std::string>& words) {
+  double number = 0;
+  return words.size() > kNumPoseNumbers &&
+         std::none_of(words.end() - kNumPoseNumbers, words.end(),
+                      [&](const std::string& word) { return ParseNumber(word, &number); });
+}
+
+// world_from_cam of the last words.
+Result<Pose> ParseOdometry(const std::vector<std::string>& words) {
+  std::array<double, kNumPoseNumbers> numbers{};
+  bool is_valid = words.size() > kNumPoseNumbers;
+  for (size_t i = 0; is_valid && i < kNumPoseNumbers; ++i)
+    is_valid =
+        ParseNumber(words[words.size() - kNumPoseNumbers + i], &numbers[i]) && std::isfinite(numbers[i]);
+  if (!is_valid) {
+    return MakeError(ErrorCode::kCorrupt,
+                     "expected IMAGE TX TY TZ QX QY QZ QW, or TIME in place of IMAGE: the camera's place, "
+                     "metres, and its rotation, world from camera, as a quaternion");
+  }
+  const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (!(std::abs(rotation.norm() - 1) <= kMaxNormError))
+    return MakeError(ErrorCode::kCorrupt, "a quaternion of length {:.3g}, not 1", rotation.norm());
+  return Pose{rotation.normalized(), {numbers[0], numbers[1], numbers[2]}};
+}
+
+// "cam0/" of "cam0/17.25": sessions that were joined have theirs in front of a time, too.
+std::string FolderAndSlash(const std::string& name) { return name.substr(0, name.rfind('/') + 1); }
+
+// Of a time in seconds or, from 1e14 on, nanoseconds; by TUM's trajectories and EuRoC's.
+std::optional<int64_t> TimeOfNs(const std::string& name) {
+  constexpr double kLeastNs = 1e14, kMostNs = 9e18;
+  double time = 0;
+  if (!ParseNumber(name.substr(FolderAndSlash(name).size()), &time) || !std::isfinite(time)) return {};
+  const double time_ns = std::abs(time) < kLeastNs ? 1e9 * time : time;
+  return std::abs(time_ns) < kMostNs ? std::optional<int64_t>(std::llround(time_ns)) : std::nullopt;
+}
+
+// Those of the images below a folder, in the order of their times.
+void AddPosesAt(const std::set<std::string>& names, const std::string& folder, Trajectory* trajectory,
+                std::vector<OdometryPose>* poses) {
+  trajectory->Sort();
+  std::vector<std::pair<int64_t, std::string>> images;
+  for (const std::string& name : names) {
+    if (!name.starts_with(folder)) continue;
+    if (const auto time_ns = TimeOfImageNs(name)) images.emplace_back(*time_ns, name);
+  }
+  std::sort(images.begin(), images.end());
+  for (const auto& [time_ns, name] : images) {
+    if (const Result<Pose> pose = trajectory->At(time_ns, kMaxTimeGapS); pose.ok())
+      poses->push_back({name, *pose});
+  }
+}
 
 double WrapLongitude(double longitude_deg) { return std::remainder(longitude_deg, 360.0); }
 
@@ -132,37 +205,36 @@ Result<std::map<std::string, Eigen::Vector3d>> ReadControlPoints(const std::stri
 }
 
 Result<std::vector<OdometryPose>> ReadOdometry(const std::string& path, const Capture& capture) {
-  std::set<std::string> names, listed;
-  for (const CaptureImage& image : capture.images) names.insert(image.name);
+  const std::set<std::string> names = NamesOf(capture);
+  std::set<std::string> listed;
   std::vector<OdometryPose> poses;
-  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& words) -> Status {
-    std::array<double, 7> numbers{};
-    bool is_valid = words.size() > numbers.size();
-    for (size_t i = 0; is_valid && i < numbers.size(); ++i) {
-      is_valid =
-          ParseNumber(words[words.size() - numbers.size() + i], &numbers[i]) && std::isfinite(numbers[i]);
+  std::map<std::string, Trajectory> by_time;  // of each folder
+  CAIRN_RETURN_IF_ERROR(ReadLines(path, [&](const std::vector<std::string>& given) -> Status {
+    const std::vector<std::string> words = SplitOdometry(given);
+    if (IsHeader(words)) return Ok();
+    CAIRN_ASSIGN_OR_RETURN(const Pose world_from_cam, ParseOdometry(words));
+    const std::string name = Join(words, 0, words.size() - kNumPoseNumbers);
+    if (!listed.insert(name).second) return MakeError(ErrorCode::kCorrupt, "'{}' is listed twice", name);
+    if (names.contains(name)) {
+      poses.push_back({name, world_from_cam});
+    } else if (const std::optional<int64_t> time_ns = TimeOfNs(name)) {
+      by_time[FolderAndSlash(name)].Add(*time_ns, world_from_cam);
     }
-    if (!is_valid) {
-      return MakeError(ErrorCode::kCorrupt,
-                       "expected IMAGE TX TY TZ QX QY QZ QW: the camera's place, metres, and its rotation, "
-                       "world from camera, as a quaternion");
-    }
-    OdometryPose pose;
-    pose.name = Join(words, 0, words.size() - numbers.size());
-    if (!listed.insert(pose.name).second)
-      return MakeError(ErrorCode::kCorrupt, "image '{}' is listed twice", pose.name);
-    const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
-    if (!(std::abs(rotation.norm() - 1) <= kMaxNormError))
-      return MakeError(ErrorCode::kCorrupt, "a quaternion of length {:.3g}, not 1", rotation.norm());
-    pose.world_from_cam = {rotation.normalized(), {numbers[0], numbers[1], numbers[2]}};
-    if (names.contains(pose.name)) poses.push_back(pose);
     return Ok();
   }));
-  if (poses.empty()) {
-    return MakeError(ErrorCode::kNoData, "{}: names none of the {} images of the capture", path,
-                     capture.images.size());
+  if (!poses.empty()) return poses;
+  for (auto& [folder, trajectory] : by_time) AddPosesAt(names, folder, &trajectory, &poses);
+  if (!poses.empty()) return poses;
+  if (!by_time.empty()) {
+    return MakeError(
+        ErrorCode::kNoData,
+        "{}: its lines begin with times, and no image of the capture has for its name a time (in "
+        "seconds, milli-, micro- or nanoseconds) between two of them that are at most {} s off; "
+        "begin each line with the name of an image, or name images by their times",
+        path, kMaxTimeGapS);
   }
-  return poses;
+  return MakeError(ErrorCode::kNoData, "{}: names none of the {} images of the capture", path,
+                   capture.images.size());
 }
 
 std::map<std::string, ExifTags> ReadGpsTags(const Capture& capture) {

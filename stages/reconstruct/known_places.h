@@ -45,10 +45,13 @@ struct OdometryPose {
   Pose world_from_cam;  // the world is the odometry's own: metres, z up; camera axes as everywhere
 };
 
-// "IMAGE TX TY TZ QX QY QZ QW" a line, the pose of TUM's trajectories, in the order in which the images were
-// taken; empty lines and lines that begin with '#' are skipped.  Errors: NotFound, Io; Corrupt, with the line
-// (not seven finite numbers, a quaternion that is not of length 1 to 0.01, an image listed twice); NoData (no
-// line names an image of the capture).  Images that the capture lacks are left out.
+// "IMAGE TX TY TZ QX QY QZ QW" a line, separated by spaces or commas, in the order in which the images were
+// taken; or, where no line names an image, the lines of TUM's trajectories, a time in place of IMAGE
+// (seconds, milli-, micro- or nanoseconds): then images whose names are times have the pose between the two
+// stated ones around it that are at most 0.2 s off.  Empty lines, those that begin with '#' and headers are
+// skipped. Errors: NotFound, Io; Corrupt, with the line (not seven finite numbers, a quaternion that is not
+// of length 1 to 0.01, an image or a time listed twice); NoData (no line tells of an image of the capture).
+// Images that the capture lacks are left out.
 Result<std::vector<OdometryPose>> ReadOdometry(const std::string& path, const Capture& capture);
 
 // GPS tags of the images that have them, by name.

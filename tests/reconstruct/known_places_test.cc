@@ -1,5 +1,8 @@
 #include "stages/reconstruct/known_places.h"
 
+#include <cmath>
+#include <cstdint>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -93,6 +96,76 @@ TEST_F(KnownPlacesTest, ReadsOdometryInItsOrderAndLeavesOutImagesThatTheCaptureL
   ASSERT_FALSE(none.ok());
   EXPECT_EQ(none.error().code, ErrorCode::kNoData);
   EXPECT_THAT(none.error().message, HasSubstr("names none of the 3 images"));
+}
+
+// A table of a spreadsheet; names may have commas where spaces separate.
+TEST_F(KnownPlacesTest, ReadsOdometryWithCommasAndAHeader) {
+  const auto odometry = ReadOdometry(
+      Write("image,x,y,z,qx,qy,qz,qw\na.jpg,1,2,3,0,0,0,1\nb c.jpg, 4, 5, 6, 0, 0, 0, 1\n"), capture_);
+  ASSERT_TRUE(odometry.ok()) << odometry.error().message;
+  ASSERT_EQ(odometry->size(), 2u);
+  EXPECT_EQ((*odometry)[0].world_from_cam.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ((*odometry)[1].name, "b c.jpg");
+  EXPECT_EQ((*odometry)[1].world_from_cam.translation, Eigen::Vector3d(4, 5, 6));
+  capture_.images.push_back({.name = "x,y.jpg"});
+  EXPECT_EQ(ReadOdometry(Write("x,y.jpg 1 2 3 0 0 0 1\n"), capture_)->front().name, "x,y.jpg");
+}
+
+// A drive of 1 m/s along x, stated 0.1 s apart images by seconds or nanoseconds.
+TEST_F(KnownPlacesTest, ReadsOdometryByTime) {
+  const double start_s = 1.7e9;
+  std::string text = "timestamp tx ty tz qx qy qz qw\n";
+  for (int i = 0; i <= 10; ++i)
+    text += fmt::format("{:.1f} {:.1f} 0 0 0 0 0 1\n", start_s + 0.1 * i, 0.1 * i);
+  text += fmt::format("{:.0f} 1.5 0 0 0 0 0 1\n", 1e9 * (start_s + 1.5));  // 0.5 s later, in nanoseconds
+  for (const bool is_in_ns : {false, true}) {
+    const auto name = [&](double seconds) {
+      if (!is_in_ns) return fmt::format("cam/{:.2f}.png", start_s + seconds);
+      return fmt::format("cam/{}.png", std::llround(1e9 * start_s) + std::llround(1e9 * seconds));
+    };
+    capture_.images.clear();
+    for (const double seconds : {0.75, 0.25, 1.2, 0.0}) capture_.images.push_back({.name = name(seconds)});
+    const auto odometry = ReadOdometry(Write(text), capture_);
+    ASSERT_TRUE(odometry.ok()) << is_in_ns << ": " << odometry.error().message;
+    // In the order of time; not the one in the gap.
+    ASSERT_EQ(odometry->size(), 3u) << is_in_ns;
+    EXPECT_NEAR((*odometry)[0].world_from_cam.translation.x(), 0, 1e-6);
+    EXPECT_NEAR((*odometry)[1].world_from_cam.translation.x(), 0.25, 1e-6);
+    EXPECT_NEAR((*odometry)[2].world_from_cam.translation.x(), 0.75, 1e-6);
+    EXPECT_EQ((*odometry)[2].name, capture_.images[0].name);
+  }
+}
+
+// Two sessions that were joined: each has a clock and a world of its own.
+TEST_F(KnownPlacesTest, OdometryByTimeIsThatOfTheImagesFolder) {
+  capture_.images = {{.name = "one/5.50.jpg"}, {.name = "two/5.50.jpg"}};
+  const auto odometry =
+      ReadOdometry(Write("one/5 1 0 0 0 0 0 1\none/5.6 1 0 0 0 0 0 1\none/5.4 1 0 0 0 0 0 1\n"
+                         "two/5.5 2 0 0 0 0 0 1\n"),
+                   capture_);
+  ASSERT_TRUE(odometry.ok()) << odometry.error().message;
+  ASSERT_EQ(odometry->size(), 2u);
+  EXPECT_EQ((*odometry)[0].world_from_cam.translation.x(), 1);
+  EXPECT_EQ((*odometry)[1].world_from_cam.translation.x(), 2);
+}
+
+// Numbers that count images are no times.
+TEST_F(KnownPlacesTest, OdometryByTimeNeedsNamesThatAreTimes) {
+  const std::string path = Write("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n3 0 0 0 0 0 0 1\n");
+  for (const char* name : {"0002.jpg", "a.jpg", "nan.0.jpg", "9.0.jpg"}) {
+    capture_.images = {{.name = name}};
+    const auto odometry = ReadOdometry(path, capture_);
+    ASSERT_FALSE(odometry.ok()) << name;
+    EXPECT_EQ(odometry.error().code, ErrorCode::kNoData);
+    EXPECT_THAT(odometry.error().message, HasSubstr("begin with times"));
+  }
+  capture_.images = {{.name = "2.0.jpg"}};
+  EXPECT_TRUE(ReadOdometry(path, capture_).ok());
+  // Nor is what no clock says.
+  EXPECT_EQ(ReadOdometry(Write("1e10 0 0 0 0 0 0 1\nnan 0 0 0 0 0 0 1\n9e18 0 0 0 0 0 0 1\n"), capture_)
+                .error()
+                .code,
+            ErrorCode::kNoData);
 }
 
 TEST_F(KnownPlacesTest, WrongOdometryNamesTheLine) {

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "core/geometry/trajectory.h"
 #include "pipeline/exchange/bags/bag_images.h"
 #include "pipeline/exchange/bags/bag_options.h"
 #include "pipeline/exchange/bags/bag_plan.h"

@@ -7,8 +7,8 @@
 
 #include "core/base/error.h"
 #include "core/geometry/pose.h"
+#include "core/geometry/trajectory.h"
 #include "pipeline/exchange/bags/messages.h"
-#include "pipeline/exchange/import/parts.h"
 
 namespace cairn::pipeline {
 

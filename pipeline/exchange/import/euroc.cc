@@ -7,6 +7,7 @@
 
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "core/geometry/trajectory.h"
 #include "pipeline/exchange/import/layouts.h"
 #include "pipeline/exchange/import/parts.h"
 

@@ -322,6 +322,21 @@ TEST_F(CaptureWithoutPoses, ListsThatOnlyPosesGiveAMeaningAreNotReadSilently) {
   EXPECT_THAT(capture.error().message, HasSubstr("held-out images are given with their poses"));
 }
 
+// Odometry under another name was ignored without a word.
+TEST_F(CaptureWithoutPoses, WhatLooksLikeOdometryAndIsNotReadIsSaid) {
+  Write("cameras.txt", "7 PINHOLE 3 2 9 8 1.5 1\n4 PINHOLE 2 3 6 7 1 1.5\n");
+  for (const char* name : {"odometry.csv", "odometry.tum", "odom.csv", "odom.txt"}) {
+    Write(name, "1,2,3,4,0,0,0,1\n");
+    EXPECT_THAT(
+        ReadCapture(root_)->warnings,
+        testing::ElementsAre(AllOf(HasSubstr(name), HasSubstr("not read"), HasSubstr("odometry.txt"))));
+    fs::remove(root_ + "/" + name);
+  }
+  Write("odom.csv", "");
+  Write("odometry.txt", "");
+  EXPECT_THAT(ReadCapture(root_)->warnings, testing::IsEmpty());
+}
+
 TEST_F(CaptureWithoutPoses, ALostImageListIsNoMissingOne) {
   fs::create_symlink("nowhere", root_ + "/images.txt");
   EXPECT_THAT(ReadCapture(root_).error().message,
