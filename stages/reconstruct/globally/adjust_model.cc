@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <spdlog/spdlog.h>
+
 #include "core/base/quantiles.h"
 #include "core/camera/pixel_ray.h"
 #include "core/structure/bundle_blocks.h"
@@ -207,7 +209,12 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
-  SolveOnOneThread(solver, &ceres_problem, options.progress);
+  const ceres::Solver::Summary summary = SolveOnOneThread(solver, &ceres_problem, options.progress);
+  spdlog::debug(
+      "reconstruct: {} points and {} observations adjusted in {} steps: cost {:.6g} -> {:.6g}; {:.1f} s",
+      problem->points.size(), problem->observations.size(),
+      summary.num_successful_steps + summary.num_unsuccessful_steps, summary.initial_cost, summary.final_cost,
+      summary.total_time_in_seconds);
   for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
     problem->cam_from_world[i] = LoadPose(pose_of(i));
   for (size_t c = 0; c < problem->cameras.size(); ++c) {

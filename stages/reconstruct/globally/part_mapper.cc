@@ -413,8 +413,6 @@ void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progre
     problem_.points.push_back(triangulations_[chosen.track].position);
   }
   AdjustModel({.adjust_cameras = adjust_cameras, .progress = &progress}, &problem_);
-  spdlog::debug("reconstruct: {} points and {} observations adjusted", problem_.points.size(),
-                problem_.observations.size());
 }
 
 }  // namespace cairn::reconstruct
