@@ -2,8 +2,12 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 namespace cairn {
 namespace {
+
+constexpr int64_t kMostNamed = 3;
 
 // The reason without "PATH/NAME: " before it.
 std::string PlainReason(const Reject& reject) {
@@ -28,6 +32,22 @@ void AddRejects(const std::string& what, const std::vector<Reject>& rejects, Sta
     group->count++;
     group->names.push_back(reject.name);
   }
+}
+
+std::vector<std::string> RejectLines(const std::string& what, const std::vector<Reject>& rejects) {
+  StageReport report;
+  AddRejects(what, rejects, &report);
+  std::vector<std::string> lines;
+  for (const StageReport::Rejected& group : report.rejected) {
+    if (group.count > kMostNamed) {
+      lines.push_back(fmt::format("rejected {} {}, {} to {}: {}", group.count, what, group.names.front(),
+                                  group.names.back(), group.reason));
+      continue;
+    }
+    for (const std::string& name : group.names)
+      lines.push_back(fmt::format("rejected {}: {}", name, group.reason));
+  }
+  return lines;
 }
 
 void AddDropped(const std::string& what, const DropCounts& dropped, StageReport* report) {

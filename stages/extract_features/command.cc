@@ -56,7 +56,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                          ExtractFeatures(capture, arguments.options, arguments.output, num_threads,
                                          *environment.progress, reuse));
   for (const std::string& message : summary.not_reused) spdlog::debug("nothing taken over: {}", message);
-  for (const Reject& reject : summary.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
+  for (const std::string& line : RejectLines("images", summary.rejects)) spdlog::warn("{}", line);
   if (!arguments.depfile.empty()) {
     CAIRN_RETURN_IF_ERROR(WriteDependencyFile(arguments.depfile, capture, summary.inputs));
   }

@@ -155,7 +155,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
         return Ok();
       }));
   for (const std::string& warning : result.warnings) spdlog::warn("{}", warning);
-  for (const Reject& reject : result.rejects) spdlog::warn("rejected {}: {}", reject.name, reject.reason);
+  for (const std::string& line : RejectLines("images", result.rejects)) spdlog::warn("{}", line);
   const auto num_posed = static_cast<int64_t>(result.images.size() + result.queries.size());
   environment.report->in = {{"images", num_posed + static_cast<int64_t>(result.rejects.size())}};
   environment.report->out = {{"images", static_cast<int64_t>(result.images.size())},

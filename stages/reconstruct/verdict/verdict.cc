@@ -47,6 +47,17 @@ std::vector<std::vector<ListedImage>> ListByFolder(const ColmapModel& model,
   return folders;
 }
 
+// Beside long ones, steps this much shorter are none: frames are repeated, the camera stands or turns.
+constexpr double kMovesRatio = 0.05;
+
+// 0 where there is no step.
+double MedianThatMoves(std::vector<double> steps) {
+  if (steps.empty()) return 0;
+  const double least = kMovesRatio * Decile(steps, 9);
+  std::erase_if(steps, [&](double step) { return step < least; });
+  return UpperMedian(std::move(steps));
+}
+
 void Round(double* length) { *length = std::round(1e5 * *length) / 1e5; }
 
 class Judgement {
@@ -173,7 +184,7 @@ class Judgement {
     std::vector<double> steps;
     for (const ImageLink& link : verdict_.links) steps.push_back(link.length);
     verdict_.way = std::accumulate(steps.begin(), steps.end(), 0.0);
-    verdict_.median_step = UpperMedian(steps);
+    verdict_.median_step = MedianThatMoves(std::move(steps));
     for (size_t w = 0; w + 1 < first_.size(); ++w) {
       std::vector<double> way = {0};
       for (int i = first_[w] + 1; i < first_[w + 1]; ++i) way.push_back(way.back() + Distance(i - 1, i));

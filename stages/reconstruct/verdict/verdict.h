@@ -81,8 +81,8 @@ struct Verdict {
   std::vector<SeparatePart> parts;  // besides the one that is kept, the largest first
   std::vector<Walk> walks;
   // Of a drive:
-  double way = 0;  // length of its steps
-  double median_step = 0;
+  double way = 0;                           // length of its steps
+  double median_step = 0;                   // of those on which the camera moves
   std::vector<LoopPair> loops, loop_pairs;  // find_loops.h
   std::vector<OpenStretch> open_stretches;  // the longest first
   // Where it is weak, the weakest first; indices of links, and of images.

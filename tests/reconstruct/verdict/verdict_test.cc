@@ -45,6 +45,21 @@ TEST(Judge, ADriveWithoutALoopIsWholeAndSaysThatItsEndIsFree) {
             "nothing bounds how far its end is off");
 }
 
+// Each frame three times, as films of another rate have them: most steps are none, and all others would be
+// long.
+TEST(Judge, RepeatedFramesAreNoSteps) {
+  std::vector<Eigen::Vector3d> places;
+  for (int i = 0; i < 12; ++i) places.emplace_back(i / 3, 1e-4 * (i % 3), 0);
+  const Verdict verdict = JudgeModels({ModelOfSights(NumberedNames(12), places, SightsOfNext(12, 100))});
+  EXPECT_NEAR(verdict.median_step, 1, 1e-3);
+  EXPECT_THAT(verdict.long_steps, IsEmpty());
+  // Nothing moves at all.
+  const Verdict standing = JudgeModels(
+      {ModelOfSights(NumberedNames(4), std::vector<Eigen::Vector3d>(4, {1, 2, 3}), SightsOfNext(4, 100))});
+  EXPECT_EQ(standing.median_step, 0);
+  EXPECT_THAT(standing.long_steps, IsEmpty());
+}
+
 TEST(Judge, LoopsHoldADriveTogether) {
   const Verdict verdict = JudgeModels({Drive(30, {{{0, 15}, 60}, {{2, 29}, 80}})});
   ASSERT_THAT(verdict.loops, SizeIs(2));
