@@ -7,7 +7,7 @@
 namespace cairn {
 namespace {
 
-constexpr int64_t kMostNamed = 3;
+constexpr int64_t kMostNamed = 10;
 
 // The reason without "PATH/NAME: " before it.
 std::string PlainReason(const Reject& reject) {

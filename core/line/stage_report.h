@@ -33,7 +33,7 @@ struct StageReport {
 // Adds rejects grouped by reason, in the order of the first of each.  A reason that starts with the thing's
 // own name or path ("PATH/NAME: ") is shown without it.
 void AddRejects(const std::string& what, const std::vector<Reject>& rejects, StageReport* report);
-// The same to be read on a terminal: "rejected NAME: REASON" where a reason has three or fewer, else
+// The same to be read on a terminal: "rejected NAME: REASON" where a reason has ten or fewer, else
 // "rejected 30 images, FIRST to LAST: REASON".  `what`: plural.
 std::vector<std::string> RejectLines(const std::string& what, const std::vector<Reject>& rejects);
 void AddDropped(const std::string& what, const DropCounts& dropped, StageReport* report);

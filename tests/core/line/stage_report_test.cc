@@ -28,12 +28,17 @@ TEST(AddRejects, OfOneReasonAreTogether) {
   EXPECT_EQ(report.rejected.size(), 4u);
 }
 
-TEST(RejectLines, ManyOfOneReasonAreOneLine) {
+TEST(RejectLines, MoreThanTenOfOneReasonAreOneLine) {
   EXPECT_THAT(RejectLines("images", kRejects),
-              ElementsAre("rejected 4 images, a.jpg to h.jpg: is black", "rejected b.jpg: cut off",
-                          "rejected d.jpg: cut off", "rejected f.jpg: g.jpg: cut off"));
-  EXPECT_THAT(RejectLines("images", {{"a", "x"}, {"b", "x"}, {"c", "x"}}),
-              ElementsAre("rejected a: x", "rejected b: x", "rejected c: x"));
+              ElementsAre("rejected a.jpg: is black", "rejected c.jpg: is black", "rejected e.jpg: is black",
+                          "rejected h.jpg: is black", "rejected b.jpg: cut off", "rejected d.jpg: cut off",
+                          "rejected f.jpg: g.jpg: cut off"));
+  std::vector<Reject> many;
+  for (char name = 'a'; name <= 'j'; ++name) many.push_back({std::string(1, name), "x"});
+  EXPECT_EQ(RejectLines("images", many).size(), 10u);
+  many.push_back({"z", "y"});
+  many.push_back({"k", "x"});
+  EXPECT_THAT(RejectLines("images", many), ElementsAre("rejected 11 images, a to k: x", "rejected z: y"));
   EXPECT_THAT(RejectLines("images", {}), ElementsAre());
 }
 
