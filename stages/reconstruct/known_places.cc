@@ -103,13 +103,21 @@ Result<Pose> ParseOdometry(const std::vector<std::string>& words) {
 // "cam0/" of "cam0/17.25": sessions that were joined have theirs in front of a time, too.
 std::string FolderAndSlash(const std::string& name) { return name.substr(0, name.rfind('/') + 1); }
 
-// Of a time in seconds or, from 1e14 on, nanoseconds; by TUM's trajectories and EuRoC's.
+// Of a time in seconds or, from 1e14 on, nanoseconds; by TUM's trajectories and EuRoC's.  To the nanosecond
+// where digits say it, as images' names do (an odometry of keyframes has no other pose near), else, 1.7e+09,
+// to the microsecond, which is what such a number holds.
 std::optional<int64_t> TimeOfNs(const std::string& name) {
   constexpr double kLeastNs = 1e14, kMostNs = 9e18;
+  const std::string text = name.substr(FolderAndSlash(name).size());
   double time = 0;
-  if (!ParseNumber(name.substr(FolderAndSlash(name).size()), &time) || !std::isfinite(time)) return {};
-  const double time_ns = std::abs(time) < kLeastNs ? 1e9 * time : time;
-  return std::abs(time_ns) < kMostNs ? std::optional<int64_t>(std::llround(time_ns)) : std::nullopt;
+  if (!ParseNumber(text, &time) || !std::isfinite(time)) return {};
+  const bool is_in_ns = std::abs(time) >= kLeastNs;
+  if (text.find('.') != std::string::npos || is_in_ns) {
+    if (const auto exact_ns = TimeOfImageNs(text + ".")) return exact_ns;
+  }
+  const double time_us = is_in_ns ? time / 1e3 : 1e6 * time;
+  if (!(std::abs(time_us) < kMostNs / 1e3)) return {};
+  return 1000 * std::llround(time_us);
 }
 
 // Those of the images below a folder, in the order of their times.
@@ -226,12 +234,13 @@ Result<std::vector<OdometryPose>> ReadOdometry(const std::string& path, const Ca
   for (auto& [folder, trajectory] : by_time) AddPosesAt(names, folder, &trajectory, &poses);
   if (!poses.empty()) return poses;
   if (!by_time.empty()) {
-    return MakeError(
-        ErrorCode::kNoData,
-        "{}: its lines begin with times, and no image of the capture has for its name a time (in "
-        "seconds, milli-, micro- or nanoseconds) between two of them that are at most {} s off; "
-        "begin each line with the name of an image, or name images by their times",
-        path, kMaxTimeGapS);
+    return MakeError(ErrorCode::kNoData,
+                     "{}: its lines begin with times, and no image of the capture is named by a time "
+                     "(seconds with a point, "
+                     "1700000000.250000000.jpg, or nanoseconds) between two of them that are at most {} s "
+                     "off; begin each line "
+                     "with the name of an image, or name images by their times",
+                     path, kMaxTimeGapS);
   }
   return MakeError(ErrorCode::kNoData, "{}: names none of the {} images of the capture", path,
                    capture.images.size());

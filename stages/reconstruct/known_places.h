@@ -46,8 +46,8 @@ struct OdometryPose {
 };
 
 // "IMAGE TX TY TZ QX QY QZ QW" a line, separated by spaces or commas, in the order in which the images were
-// taken; or, where no line names an image, the lines of TUM's trajectories, a time in place of IMAGE
-// (seconds, milli-, micro- or nanoseconds): then images whose names are times have the pose between the two
+// taken; or, where no line names an image, the lines of TUM's trajectories, a time in place of IMAGE (seconds
+// or nanoseconds): then images whose names are times (inertial/image_times.h) have the pose between the two
 // stated ones around it that are at most 0.2 s off.  Empty lines, those that begin with '#' and headers are
 // skipped. Errors: NotFound, Io; Corrupt, with the line (not seven finite numbers, a quaternion that is not
 // of length 1 to 0.01, an image or a time listed twice); NoData (no line tells of an image of the capture).

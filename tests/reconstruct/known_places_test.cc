@@ -136,6 +136,26 @@ TEST_F(KnownPlacesTest, ReadsOdometryByTime) {
   }
 }
 
+// Poses of keyframes, seconds apart, at the images' own times and however these are written: no other is
+// near.
+TEST_F(KnownPlacesTest, OdometryByTimeOfKeyframesIsThatOfTheirImages) {
+  capture_.images = {{.name = "1305031102.175304.png"}, {.name = "1305031105.843310001.png"}};
+  const auto exact =
+      ReadOdometry(Write("1305031102.175304 1 0 0 0 0 0 1\n1305031105.843310001 2 0 0 0 0 0 1\n"), capture_);
+  ASSERT_TRUE(exact.ok()) << exact.error().message;
+  EXPECT_EQ(exact->size(), 2u);
+  capture_.images[1].name = "1305031105.843311.png";
+  const auto exponents = ReadOdometry(
+      Write("1.305031102175304000e+09 1 0 0 0 0 0 1\n1.305031105843311000e+09 2 0 0 0 0 0 1\n"), capture_);
+  ASSERT_TRUE(exponents.ok()) << exponents.error().message;
+  EXPECT_EQ(exponents->size(), 2u);
+  capture_.images = {{.name = "1403636579763555585.png"}};
+  EXPECT_TRUE(ReadOdometry(Write("1403636579763555585 1 0 0 0 0 0 1\n"), capture_).ok());
+  // Whole seconds of ten digits are no nanoseconds.
+  capture_.images = {{.name = "1305031102.000.png"}};
+  EXPECT_TRUE(ReadOdometry(Write("1305031102 1 0 0 0 0 0 1\n"), capture_).ok());
+}
+
 // Two sessions that were joined: each has a clock and a world of its own.
 TEST_F(KnownPlacesTest, OdometryByTimeIsThatOfTheImagesFolder) {
   capture_.images = {{.name = "one/5.50.jpg"}, {.name = "two/5.50.jpg"}};
