@@ -269,13 +269,13 @@ void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
 
 // What looks like odometry, under a name that is not read.
 void WarnOfUnreadOdometry(Capture* capture) {
+  if (IsThere(capture->root + "/" + kOdometryFile)) return;
   for (const char* name : {"odometry.csv", "odometry.tum", "odom.csv", "odom.txt"}) {
     const std::string path = capture->root + "/" + name;
-    if (!IsThere(path) || IsThere(capture->root + "/" + kOdometryFile)) continue;
+    if (!IsThere(path)) continue;
     capture->warnings.push_back(
-        fmt::format("{}: not read; if it says where the camera was, call it {}: IMAGE, or a time, TX TY TZ "
-                    "QX QY QZ QW a line, "
-                    "metres",
+        fmt::format("{}: not read; if it says where the camera was, call it {}: IMAGE, or a time, "
+                    "TX TY TZ QX QY QZ QW a line, metres",
                     path, kOdometryFile));
   }
 }

@@ -1,8 +1,5 @@
 #include "pipeline/exchange/import/parts.h"
 
-#include <algorithm>
-#include <array>
-
 #include "core/base/text.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/colmap_model.h"
