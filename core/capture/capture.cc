@@ -67,9 +67,11 @@ struct KnownCameras {
   }
 };
 
-Result<KnownCameras> ReadKnownCameras(const std::string& root, const std::vector<std::string>& sessions) {
+// `are_of_all`: cameras.txt is of images without poses, too.
+Result<KnownCameras> ReadKnownCameras(const std::string& root, const std::vector<std::string>& sessions,
+                                      bool are_of_all) {
   KnownCameras known;
-  if (const std::string path = root + "/cameras.txt"; IsThere(path)) {
+  if (const std::string path = root + "/cameras.txt"; are_of_all && IsThere(path)) {
     CAIRN_ASSIGN_OR_RETURN(auto cameras, ReadCamerasText(path));
     known.of_all = {path, std::move(cameras)};
   }
@@ -207,6 +209,20 @@ size_t NumImagesBeside(const Capture& capture) {
   return num_beside;
 }
 
+// Adds an image without a pose to those of the capture, or to its rejects.
+Status AddUnposed(const std::string& name, int session, FlatFolderCameras* cameras, Capture* capture) {
+  if (HasControlCharacter(name)) {
+    capture->rejects.push_back({name, "its name has a control character, such as a line's end; rename it"});
+    return Ok();
+  }
+  const Result<cv::Mat> image = ReadGreyImage(capture->images_folder + "/" + name);
+  if (!image.ok()) {
+    capture->rejects.push_back({name, image.error().message});
+    return Ok();
+  }
+  return cameras->Add(name, session, *image);
+}
+
 // A capture without image lists.
 Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
   const std::string queries = capture->root + "/queries.txt";
@@ -228,21 +244,50 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
     capture->warnings.push_back(
         fmt::format("{}: {} images beside the folder images/ are left out", capture->root, num_beside));
   }
-  CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions));
+  CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions, true));
   FlatFolderCameras cameras(std::move(known), capture);
-  for (const std::string& name : ListImages(capture->images_folder, sessions)) {
-    if (HasControlCharacter(name)) {
-      capture->rejects.push_back({name, "its name has a control character, such as a line's end; rename it"});
-      continue;
+  for (const std::string& name : ListImages(capture->images_folder, sessions))
+    CAIRN_RETURN_IF_ERROR(AddUnposed(name, SessionOfImage(sessions, name), &cameras, capture));
+  cameras.Finish();
+  return Ok();
+}
+
+// Images of sessions that have no pose in the frame of the others.
+Status ReadRegistered(const std::vector<std::string>& names, Capture* capture) {
+  for (const auto* list : {&capture->images, &capture->queries}) {
+    for (const CaptureImage& image : *list) {
+      const int session = SessionOfImage(capture->registered, image.name);
+      if (session < 0) continue;
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}/{} names {}, whose image {} has a pose beside it: take the session out of one of "
+                       "the two lists",
+                       capture->root, kRegisterFile, capture->registered[session], image.name);
     }
-    const Result<cv::Mat> image = ReadGreyImage(capture->images_folder + "/" + name);
-    if (!image.ok()) {
-      capture->rejects.push_back({name, image.error().message});
-      continue;
+  }
+  KnownCameras known;
+  CAIRN_ASSIGN_OR_RETURN(known, ReadKnownCameras(capture->root, capture->registered, false));
+  FlatFolderCameras cameras(std::move(known), capture);
+  for (const std::string& session : capture->registered) {
+    const std::string path = SessionPosesPath(capture->root, session);
+    if (!IsThere(path)) continue;
+    CAIRN_ASSIGN_OR_RETURN(std::vector<CaptureImage> posed, ReadImagesText(path, &capture->rejects));
+    for (CaptureImage& image : posed) {
+      if (!image.name.starts_with(session + "/")) {
+        return MakeError(ErrorCode::kCorrupt, "{}: '{}' is no image of the session", path, image.name);
+      }
+      capture->own_poses.emplace(image.name, *image.cam_from_world);
+      image.cam_from_world.reset();
+      capture->images.push_back(std::move(image));
     }
-    CAIRN_RETURN_IF_ERROR(cameras.Add(name, SessionOfImage(sessions, name), *image));
+  }
+  for (const std::string& name : names) {
+    const int session = SessionOfImage(capture->registered, name);
+    if (session < 0 || IsThere(SessionPosesPath(capture->root, capture->registered[session]))) continue;
+    CAIRN_RETURN_IF_ERROR(AddUnposed(name, session, &cameras, capture));
   }
   cameras.Finish();
+  std::sort(capture->images.begin(), capture->images.end(),
+            [](const CaptureImage& a, const CaptureImage& b) { return a.name < b.name; });
   return Ok();
 }
 
@@ -267,6 +312,37 @@ void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
   });
 }
 
+// The lists of a capture with poses.
+Status ReadLists(const std::vector<std::string>& sessions, Capture* capture) {
+  const std::string& root = capture->root;
+  capture->images_folder = root + "/images";
+  CAIRN_ASSIGN_OR_RETURN(capture->cameras, ReadCamerasText(root + "/cameras.txt"));
+  CAIRN_ASSIGN_OR_RETURN(capture->images, ReadImagesText(root + "/images.txt", &capture->rejects));
+  if (IsThere(root + "/queries.txt")) {
+    CAIRN_ASSIGN_OR_RETURN(capture->queries, ReadImagesText(root + "/queries.txt", &capture->rejects));
+  }
+  if (const std::string frame = root + "/" + kCaptureFrameFile; IsThere(frame)) {
+    CAIRN_ASSIGN_OR_RETURN(capture->frame, ReadCaptureFrame(frame));
+  }
+  const std::vector<std::string> names = ListImages(capture->images_folder, sessions);
+  if (const std::string path = root + "/" + kRegisterFile; IsThere(path)) {
+    CAIRN_ASSIGN_OR_RETURN(capture->registered, ReadSessionsText(path));
+    CAIRN_RETURN_IF_ERROR(ReadRegistered(names, capture));
+  }
+  capture->has_poses = capture->registered.empty();
+  std::set<std::string> unlisted(names.begin(), names.end());
+  for (const CaptureImage& image : capture->images) unlisted.erase(image.name);
+  for (const CaptureImage& image : capture->queries) unlisted.erase(image.name);
+  for (const Reject& reject : capture->rejects) unlisted.erase(reject.name);
+  for (const std::string& name : unlisted) {
+    capture->warnings.push_back(
+        fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture->images_folder, name));
+  }
+  RejectUnusable(capture, &capture->images);
+  RejectUnusable(capture, &capture->queries);
+  return Ok();
+}
+
 // What looks like odometry, under a name that is not read.
 void WarnOfUnreadOdometry(Capture* capture) {
   if (IsThere(capture->root + "/" + kOdometryFile)) return;
@@ -288,6 +364,10 @@ std::string SessionCamerasPath(const std::string& root, const std::string& sessi
 
 std::string SessionImuPath(const std::string& root, const std::string& session) {
   return fmt::format("{}/imu/{}.csv", root, session);
+}
+
+std::string SessionPosesPath(const std::string& root, const std::string& session) {
+  return fmt::format("{}/poses/{}.txt", root, session);
 }
 
 Result<std::vector<CaptureImage>> ReadImagesText(const std::string& path, std::vector<Reject>* rejects) {
@@ -353,31 +433,11 @@ Result<Capture> ReadCapture(const std::string& root) {
                        "images.txt: the capture then has no poses, and its cameras come from EXIF",
                        root);
     }
-    capture.has_poses = true;
-    capture.images_folder = root + "/images";
-    CAIRN_ASSIGN_OR_RETURN(capture.cameras, ReadCamerasText(root + "/cameras.txt"));
-    CAIRN_ASSIGN_OR_RETURN(capture.images, ReadImagesText(root + "/images.txt", &capture.rejects));
-    if (IsThere(root + "/queries.txt")) {
-      CAIRN_ASSIGN_OR_RETURN(capture.queries, ReadImagesText(root + "/queries.txt", &capture.rejects));
-    }
-    if (const std::string frame = root + "/" + kCaptureFrameFile; IsThere(frame)) {
-      CAIRN_ASSIGN_OR_RETURN(capture.frame, ReadCaptureFrame(frame));
-    }
-    const std::vector<std::string> names = ListImages(capture.images_folder, sessions);
-    std::set<std::string> unlisted(names.begin(), names.end());
-    for (const CaptureImage& image : capture.images) unlisted.erase(image.name);
-    for (const CaptureImage& image : capture.queries) unlisted.erase(image.name);
-    for (const Reject& reject : capture.rejects) unlisted.erase(reject.name);
-    for (const std::string& name : unlisted) {
-      capture.warnings.push_back(
-          fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture.images_folder, name));
-    }
-    RejectUnusable(&capture, &capture.images);
-    RejectUnusable(&capture, &capture.queries);
+    CAIRN_RETURN_IF_ERROR(ReadLists(sessions, &capture));
   }
   if (capture.images.empty()) {
     const std::string first = capture.rejects.empty()
-                                  ? capture.has_poses ? "; images.txt lists none" : ""
+                                  ? IsThere(root + "/images.txt") ? "; images.txt lists none" : ""
                                   : "; the first of " + std::to_string(capture.rejects.size()) +
                                         " rejected: " + capture.rejects[0].reason;
     return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);

@@ -35,8 +35,12 @@ struct Capture {
   std::vector<Reject> rejects;        // named in images.txt, but missing or with an invalid pose
   std::vector<std::string> warnings;  // e.g. image files that neither list names
   std::vector<std::string> notes;     // what was found and is no fault: where focal lengths come from
-  bool has_poses = false;
+  bool has_poses = false;             // of all images
   std::optional<CaptureFrame> frame;  // of frame.json, if there is one
+  // Sessions that are to be registered to the others (register.txt): their images have no pose in the frame.
+  std::vector<std::string> registered;
+  // Of those of their images that are posed in a frame of the session's own: cam_from_session, by name.
+  std::map<std::string, Pose> own_poses;
 
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
 };
@@ -45,10 +49,17 @@ struct Capture {
 // files are looked for, not decoded.  Without images.txt the capture has no poses: its images are those of
 // images/, else of the folder itself.  Each then has the camera of cameras.txt that has its size; without
 // cameras.txt cameras come from EXIF, else f = 1.2 max(w, h), said in `warnings`.
-// Errors: NotFound (no such folder; images.txt without cameras.txt), NoData (no image), Corrupt (a list that
-// cannot be parsed; file and line), Unsupported (camera model), InvalidArgument (without images.txt:
-// queries.txt, or different cameras of one image size).
+// Beside images.txt, register.txt may name folders of images (a session's each) that images.txt leaves out:
+// they are registered to the others later (stages/reconstruct/registration).  Such a session has the poses of
+// poses/SESSION.txt, which are in a frame of its own, or none; then its cameras come from
+// cameras/SESSION.txt, or as above. Errors: NotFound (no such folder; images.txt without cameras.txt), NoData
+// (no image), Corrupt (a list that cannot be parsed; file and line), Unsupported (camera model),
+// InvalidArgument (without images.txt: queries.txt, or different cameras of one image size; with it: a pose
+// of a session that register.txt names).
 Result<Capture> ReadCapture(const std::string& root);
+
+// In a folder with images.txt: which sessions have no pose there, a name a line.
+inline constexpr const char* kRegisterFile = "register.txt";
 
 // In the folder of a capture without poses: what wheels or a tracker say of its images
 // (stages/reconstruct/known_places.h).
@@ -60,6 +71,8 @@ inline constexpr const char* kImuFile = "imu.csv";
 std::string SessionCamerasPath(const std::string& root, const std::string& session);
 // The same of a session's IMU.
 std::string SessionImuPath(const std::string& root, const std::string& session);
+// And of its poses, where it is to be registered and has some: in images.txt's form, cam_from_session.
+std::string SessionPosesPath(const std::string& root, const std::string& session);
 
 // One image list in COLMAP's images.txt form: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line that
 // may be empty.  Poses with NaN or a quaternion whose norm differs from 1 by more than 0.01 go to `rejects`;

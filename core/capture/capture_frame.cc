@@ -61,6 +61,7 @@ Status CheckCaptureFrame(const CaptureFrame& frame) {
 std::string CaptureFrameJson(const CaptureFrame& frame) {
   nlohmann::ordered_json document = {
       {"unit", frame.unit}, {"source", frame.source}, {"is_reconstructed", frame.is_reconstructed}};
+  if (frame.has_refined_cameras) document["has_refined_cameras"] = true;
   if (frame.anchor) {
     document["anchor"] = {{"latitude_deg", frame.anchor->latitude_deg},
                           {"longitude_deg", frame.anchor->longitude_deg},
@@ -86,7 +87,8 @@ Result<CaptureFrame> ReadCaptureFrame(const std::string& path) {
   }
   CaptureFrame frame{.unit = document["unit"].get<std::string>(),
                      .source = document["source"].get<std::string>(),
-                     .is_reconstructed = document.value("is_reconstructed", nlohmann::json()) == true};
+                     .is_reconstructed = document.value("is_reconstructed", nlohmann::json()) == true,
+                     .has_refined_cameras = document.value("has_refined_cameras", nlohmann::json()) == true};
   if (document.contains("anchor")) {
     const nlohmann::json& anchor = document["anchor"];
     for (const char* key : {"latitude_deg", "longitude_deg", "altitude_m"}) {

@@ -21,6 +21,9 @@ struct CaptureFrame {
   std::string source = "survey";
   // The poses come from the images themselves: they already fit them best and are not refined again.
   bool is_reconstructed = false;
+  // The cameras of these poses were refined from the images along with some of them: they are better than
+  // those that features were found with.
+  bool has_refined_cameras = false;
   // Standard deviation of the scale, as a part of it, and the place in the world frame, metres, about which
   // all grows or shrinks with it: what was held there when the frame was found.  0: of stated poses, or the
   // unit is arbitrary.

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -57,17 +60,6 @@ Status CheckSessions(const std::vector<CaptureSession>& sessions) {
                      "leave the list out: [reconstruct] hold_out_every holds images out",
                      session.name, QueriesOf(session), session.root);
   }
-  const CaptureSession& first = sessions.front();
-  for (const CaptureSession& session : sessions) {
-    if (HasPoses(session) == HasPoses(first)) continue;
-    const CaptureSession& posed = HasPoses(first) ? first : session;
-    const CaptureSession& unposed = HasPoses(first) ? session : first;
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "'{}' ({}) has poses (images.txt), '{}' ({}) has none: give '{}' poses in the frame of "
-                     "'{}', or use folders of images without images.txt for all, so that all are "
-                     "reconstructed together",
-                     posed.name, posed.root, unposed.name, unposed.root, unposed.name, posed.name);
-  }
   return Ok();
 }
 
@@ -105,56 +97,46 @@ Status AppendImageList(const std::string& path, const CaptureSession& session, c
   });
 }
 
+Result<CaptureFrame> FrameOf(const CaptureSession& session) {
+  const std::string path = session.root + "/" + kCaptureFrameFile;
+  if (!fs::exists(path)) return CaptureFrame();
+  return ReadCaptureFrame(path);
+}
+
 std::string AnchorText(const GeodeticPosition& anchor) {
   return fmt::format("{:.7f}, {:.7f}, {:.2f} m", anchor.latitude_deg, anchor.longitude_deg,
                      anchor.altitude_m);
 }
 
-// The frame that all sessions share.
+// How the frame of `other` differs from that of `first`; empty: nothing that is stated does.
+std::string FrameDifference(const CaptureFrame& first, const CaptureFrame& other) {
+  if (first.unit != other.unit) return fmt::format("is in the unit {}, not {}", other.unit, first.unit);
+  if (!first.anchor || !other.anchor || AnchorText(*first.anchor) == AnchorText(*other.anchor)) return "";
+  return fmt::format("has its origin at {}, not {}", AnchorText(*other.anchor), AnchorText(*first.anchor));
+}
+
+// The frame that these sessions share.
 Result<CaptureFrame> JoinFrames(const std::vector<CaptureSession>& sessions,
                                 std::vector<std::string>* warnings) {
-  std::vector<CaptureFrame> frames;
+  std::optional<CaptureFrame> joined;
   for (const CaptureSession& session : sessions) {
-    CaptureFrame& frame = frames.emplace_back();
-    const std::string path = session.root + "/" + kCaptureFrameFile;
-    if (!fs::exists(path)) continue;
-    CAIRN_ASSIGN_OR_RETURN(frame, ReadCaptureFrame(path));
-  }
-  const CaptureSession* anchored = nullptr;
-  CaptureFrame joined = frames.front();
-  for (size_t i = 0; i < sessions.size(); ++i) {
-    if (frames[i].unit != joined.unit) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "'{}' ({}) is in the unit {}, '{}' ({}) in the unit {}: all captures of a map share one frame; "
-          "transform the poses of one",
-          sessions[0].name, sessions[0].root, joined.unit, sessions[i].name, sessions[i].root,
-          frames[i].unit);
+    CAIRN_ASSIGN_OR_RETURN(const CaptureFrame frame, FrameOf(session));
+    if (!joined) {
+      joined = frame;
+      continue;
     }
-    if (frames[i].source != joined.source) joined.source = "mixed";
-    joined.is_reconstructed &= frames[i].is_reconstructed;
+    if (frame.source != joined->source) joined->source = "mixed";
+    joined->is_reconstructed &= frame.is_reconstructed;
     // The map is as exact as the worst of them.
-    if (frames[i].scale_sigma_ratio > joined.scale_sigma_ratio) {
-      joined.scale_sigma_ratio = frames[i].scale_sigma_ratio;
-      joined.scale_centre = frames[i].scale_centre;
+    if (frame.scale_sigma_ratio > joined->scale_sigma_ratio) {
+      joined->scale_sigma_ratio = frame.scale_sigma_ratio;
+      joined->scale_centre = frame.scale_centre;
     }
-    if (!frames[i].anchor) continue;
-    if (anchored == nullptr) {
-      anchored = &sessions[i];
-      joined.anchor = frames[i].anchor;
-    } else if (AnchorText(*frames[i].anchor) != AnchorText(*joined.anchor)) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "the origin of '{}' ({}) is at {}, that of '{}' ({}) at {}: all captures of a map share one "
-          "frame; transform the poses of one",
-          anchored->name, anchored->root, AnchorText(*joined.anchor), sessions[i].name, sessions[i].root,
-          AnchorText(*frames[i].anchor));
-    }
+    if (frame.anchor) joined->anchor = frame.anchor;
   }
-  if (!IsMetric(joined) && sessions.size() > 1) {
+  if (!IsMetric(*joined) && sessions.size() > 1)
     warnings->push_back("the captures have no scale; they are taken to be parts of one reconstruction");
-  }
-  return joined;
+  return *joined;
 }
 
 // Writes the cameras.txt of sessions without poses that have one.
@@ -221,35 +203,115 @@ Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string
   return Ok();
 }
 
+Error QueriesOfAnotherFrame(const CaptureSession& session) {
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "'{}': {}: held-out images are given with poses in the map's frame, and those of '{}' are in its own: "
+      "it is registered to the other captures; leave the list out: [reconstruct] hold_out_every holds "
+      "images out",
+      session.name, session.queries_path, session.name);
+}
+
+// Why sessions are registered that nobody asked to.
+Status NoteRegistered(const std::vector<CaptureSession>& sessions, const std::vector<bool>& are_registered,
+                      const CaptureFrame& frame, std::vector<std::string>* warnings) {
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    if (!are_registered[i] || sessions[i].is_registered || !HasPoses(sessions[i])) continue;
+    CAIRN_ASSIGN_OR_RETURN(const CaptureFrame own, FrameOf(sessions[i]));
+    warnings->push_back(fmt::format("'{}' ({}) {}: it is registered to the other captures by its images",
+                                    sessions[i].name, sessions[i].root, FrameDifference(frame, own)));
+  }
+  return Ok();
+}
+
+// What sessions without poses have besides their images.
+Status WriteUnposedSessions(const std::vector<CaptureSession>& sessions, const std::string& folder) {
+  std::vector<CaptureSession> unposed;
+  std::copy_if(sessions.begin(), sessions.end(), std::back_inserter(unposed), std::not_fn(HasPoses));
+  CAIRN_RETURN_IF_ERROR(WriteSessionCameras(unposed, folder));
+  CAIRN_RETURN_IF_ERROR(WriteSessionImus(unposed, folder));
+  return WriteSessionOdometry(unposed, folder);
+}
+
+// The lists of a joined capture.
+struct SessionLists {
+  std::map<CameraId, Camera> cameras;
+  std::string images, queries, frame;            // texts; empty: no session has such
+  std::map<std::string, std::string> own_poses;  // of sessions that are registered
+};
+
+Status CollectLists(const std::vector<CaptureSession>& sessions, const std::vector<bool>& are_registered,
+                    SessionLists* lists, JoinedCapture* joined) {
+  std::vector<CameraIds> camera_ids(sessions.size());
+  std::vector<CaptureSession> in_frame;
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    joined->num_registered += are_registered[i];
+    if (!HasPoses(sessions[i])) continue;
+    CAIRN_ASSIGN_OR_RETURN(camera_ids[i], AddCameras(sessions[i], &lists->cameras));
+    if (!are_registered[i]) in_frame.push_back(sessions[i]);
+  }
+  joined->num_cameras = static_cast<int>(lists->cameras.size());
+  if (in_frame.empty()) return Ok();
+  const auto no_camera = static_cast<CameraId>(lists->cameras.size() + 1);
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    const CaptureSession& session = sessions[i];
+    if (!HasPoses(session)) continue;
+    int num_own = 0;
+    std::string* text = are_registered[i] ? &lists->own_poses[session.name] : &lists->images;
+    CAIRN_RETURN_IF_ERROR(AppendImageList(session.root + "/images.txt", session, camera_ids[i], no_camera,
+                                          are_registered[i] ? &num_own : &joined->num_images, text));
+    const std::string list = QueriesOf(session);
+    if (list.empty()) continue;
+    if (are_registered[i]) {
+      if (!session.queries_path.empty()) return QueriesOfAnotherFrame(session);
+      joined->warnings.push_back(
+          fmt::format("{}: not read: '{}' is registered to the other captures, and its held-out images are "
+                      "posed in its own frame",
+                      list, session.name));
+      continue;
+    }
+    CAIRN_RETURN_IF_ERROR(
+        AppendImageList(list, session, camera_ids[i], no_camera, &joined->num_queries, &lists->queries));
+  }
+  if (lists->images.empty()) lists->images = "# no image\n";
+  CAIRN_ASSIGN_OR_RETURN(const CaptureFrame frame, JoinFrames(in_frame, &joined->warnings));
+  lists->frame = CaptureFrameJson(frame);
+  return NoteRegistered(sessions, are_registered, frame, &joined->warnings);
+}
+
 }  // namespace
+
+Result<std::vector<bool>> SessionsToRegister(const std::vector<CaptureSession>& sessions) {
+  std::vector<bool> are_registered(sessions.size(), false);
+  if (std::none_of(sessions.begin(), sessions.end(), HasPoses)) return are_registered;
+  std::optional<CaptureFrame> first;
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    are_registered[i] = sessions[i].is_registered || !HasPoses(sessions[i]);
+    if (are_registered[i]) continue;
+    CAIRN_ASSIGN_OR_RETURN(const CaptureFrame frame, FrameOf(sessions[i]));
+    if (!first) first = frame;
+    if (!first->anchor && first->unit == frame.unit) first->anchor = frame.anchor;
+    are_registered[i] = !FrameDifference(*first, frame).empty();
+  }
+  if (first) return are_registered;
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "every capture with poses is to be registered (frame = \"register\"): to which? leave the key "
+      "out for the one in whose frame the map shall be");
+}
 
 Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, const std::string& folder) {
   CAIRN_RETURN_IF_ERROR(CheckSessions(sessions));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<bool> are_registered, SessionsToRegister(sessions));
   JoinedCapture joined;
-  std::map<CameraId, Camera> cameras;
-  std::string images, queries, frame_text;
-  if (HasPoses(sessions.front())) {
-    std::vector<CameraIds> camera_ids;
-    for (const CaptureSession& session : sessions) {
-      CAIRN_ASSIGN_OR_RETURN(camera_ids.emplace_back(), AddCameras(session, &cameras));
-    }
-    const auto no_camera = static_cast<CameraId>(cameras.size() + 1);
-    for (size_t i = 0; i < sessions.size(); ++i) {
-      CAIRN_RETURN_IF_ERROR(AppendImageList(sessions[i].root + "/images.txt", sessions[i], camera_ids[i],
-                                            no_camera, &joined.num_images, &images));
-      const std::string list = QueriesOf(sessions[i]);
-      if (list.empty()) continue;
-      CAIRN_RETURN_IF_ERROR(
-          AppendImageList(list, sessions[i], camera_ids[i], no_camera, &joined.num_queries, &queries));
-    }
-    CAIRN_ASSIGN_OR_RETURN(const CaptureFrame frame, JoinFrames(sessions, &joined.warnings));
-    frame_text = CaptureFrameJson(frame);
-    if (images.empty()) images = "# no image\n";
+  SessionLists lists;
+  CAIRN_RETURN_IF_ERROR(CollectLists(sessions, are_registered, &lists, &joined));
+  std::string names, registered;
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    names +=
+        fmt::format("{} {}\n", sessions[i].name, fs::absolute(sessions[i].root).lexically_normal().string());
+    if (are_registered[i]) registered += sessions[i].name + "\n";
   }
-  joined.num_cameras = static_cast<int>(cameras.size());
-  std::string names;
-  for (const CaptureSession& session : sessions)
-    names += fmt::format("{} {}\n", session.name, fs::absolute(session.root).lexically_normal().string());
 
   std::error_code error;
   fs::create_directories(FolderOf(folder), error);
@@ -257,16 +319,20 @@ Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, 
       ReplaceFolderAtomically(folder, "joined captures", [&](const std::string& written) -> Status {
         CAIRN_RETURN_IF_ERROR(LinkImages(sessions, written + "/images"));
         CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + kSessionsFile, names));
-        if (!HasPoses(sessions.front())) {
-          CAIRN_RETURN_IF_ERROR(WriteSessionCameras(sessions, written));
-          CAIRN_RETURN_IF_ERROR(WriteSessionImus(sessions, written));
-          return WriteSessionOdometry(sessions, written);
-        }
-        if (!cameras.empty()) CAIRN_RETURN_IF_ERROR(WriteCamerasText(written + "/cameras.txt", cameras));
-        for (const auto& [name, text] : {std::pair<const char*, const std::string&>("images.txt", images),
-                                         {"queries.txt", queries},
-                                         {kCaptureFrameFile, frame_text}}) {
+        CAIRN_RETURN_IF_ERROR(WriteUnposedSessions(sessions, written));
+        if (!lists.cameras.empty())
+          CAIRN_RETURN_IF_ERROR(WriteCamerasText(written + "/cameras.txt", lists.cameras));
+        for (const auto& [name, text] :
+             {std::pair<const char*, const std::string&>("images.txt", lists.images),
+              {"queries.txt", lists.queries},
+              {kCaptureFrameFile, lists.frame},
+              {kRegisterFile, registered}}) {
           if (!text.empty()) CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + name, text));
+        }
+        for (const auto& [session, text] : lists.own_poses) {
+          const std::string path = SessionPosesPath(written, session);
+          fs::create_directories(FolderOf(path), error);
+          CAIRN_RETURN_IF_ERROR(WriteFileAtomically(path, text));
         }
         return Ok();
       }));

@@ -8,6 +8,7 @@
 
 #include "core/capture/bag_file.h"
 #include "core/capture/capture.h"
+#include "core/capture/join_captures.h"
 #include "core/files/file.h"
 #include "pipeline/build/make_words.h"
 
@@ -152,6 +153,7 @@ std::string OdometryLines(const Recipe& recipe) {
 // What a joined capture is made of: NAME=FOLDER, and NAME=FILE where the recipe gives queries.
 struct SessionWords {
   WordPairs folders, queries;
+  std::vector<std::string> registered;  // names of those that the recipe says are in a frame of their own
 };
 
 SessionWords JoinedSessions(const Recipe& recipe, const std::string& build_dir) {
@@ -161,6 +163,7 @@ SessionWords JoinedSessions(const Recipe& recipe, const std::string& build_dir) 
     words.folders.emplace_back(capture.name, FolderOf(capture, build_dir));
     if (!capture.queries_path.empty())
       words.queries.emplace_back(capture.name, Absolute(capture.queries_path));
+    if (capture.is_registered) words.registered.push_back(capture.name);
   }
   return words;
 }
@@ -170,6 +173,12 @@ std::string PairsLine(const WordPairs& pairs) {
   for (const auto& [first, second] : pairs)
     line += fmt::format("{}{}={}", line.empty() ? "" : " ", first, second);
   return line + "\n";
+}
+
+// Where none is registered by the recipe, nothing: build folders of before stay valid.
+std::string RegisteredLine(const SessionWords& sessions) {
+  return sessions.registered.empty() ? ""
+                                     : fmt::format("registered {}\n", fmt::join(sessions.registered, " "));
 }
 
 // Whether a list of images has a line that is none of its comments.  What is there and no file is not read: a
@@ -192,9 +201,12 @@ std::string QueriesPath(const Recipe& recipe, const std::string& capture, const 
   };
   if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
     return Absolute(recipe.captures.front().queries_path);
-  if (IsReconstructed(recipe))
-    return OptionText(recipe, "reconstruct", "hold_out_every") == "0" ? "" : build_dir + "/poses/queries.txt";
   const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
+  if (IsReconstructed(recipe)) {
+    // Those of captures with poses are kept where the others are registered to them.
+    const bool holds_out = OptionText(recipe, "reconstruct", "hold_out_every") != "0";
+    return holds_out || is_any ? build_dir + "/poses/queries.txt" : "";
+  }
   const bool are_rendered = recipe.simulated && OptionText(recipe, "simulate", "num_queries") != "0";
   return are_rendered || is_any ? capture + "/queries.txt" : "";
 }
@@ -217,7 +229,27 @@ std::string FootageFolderName(const RecipeCapture& capture) {
 bool HasFloorPlan(const Recipe& recipe) { return !FloorPlanPath(recipe, "").empty(); }
 
 bool IsReconstructed(const Recipe& recipe) {
-  return !recipe.simulated && !fs::exists(recipe.captures.front().path + "/images.txt");
+  if (recipe.simulated) return false;
+  const std::string& path = recipe.captures.front().path;
+  if (!IsJoined(recipe)) return !fs::exists(path + "/images.txt") || fs::exists(path + "/" + kRegisterFile);
+  const Result<bool> is_registered = IsRegistered(recipe);
+  return !fs::exists(path + "/images.txt") || !is_registered.ok() || *is_registered;
+}
+
+Result<bool> IsRegistered(const Recipe& recipe) {
+  if (recipe.simulated) return false;
+  if (!IsJoined(recipe)) {
+    const std::string& path = recipe.captures.front().path;
+    return fs::exists(path + "/images.txt") && fs::exists(path + "/" + kRegisterFile);
+  }
+  std::vector<CaptureSession> sessions;
+  for (const RecipeCapture& capture : recipe.captures)
+    sessions.push_back({.name = capture.name,
+                        .root = capture.path,
+                        .queries_path = capture.queries_path,
+                        .is_registered = capture.is_registered});
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<bool> are_registered, SessionsToRegister(sessions));
+  return std::find(are_registered.begin(), are_registered.end(), true) != are_registered.end();
 }
 
 bool HasQueries(const Recipe& recipe) { return !QueriesPath(recipe, "", "").empty(); }
@@ -227,6 +259,7 @@ bool LeavesOut(const Recipe& recipe) {
 }
 
 Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
+  CAIRN_ASSIGN_OR_RETURN(const bool is_registered, IsRegistered(recipe));
   const std::string capture = CaptureFolder(recipe, paths.build_dir);
   const std::string queries = QueriesPath(recipe, capture, paths.build_dir);
   const std::string floor_plan = FloorPlanPath(recipe, capture);
@@ -246,6 +279,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("CAPTURE", "the capture", {capture}));
   CAIRN_RETURN_IF_ERROR(config.Set("SIMULATED", "", {recipe.simulated ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(config.Set("RECONSTRUCTED", "", {IsReconstructed(recipe) ? "yes" : "no"}));
+  CAIRN_RETURN_IF_ERROR(config.Set("REGISTERED", "", {is_registered ? "yes" : "no"}));
   CAIRN_RETURN_IF_ERROR(
       config.Set("KNOWN_PLACES", "[reconstruct] control_points, distances or rig_baselines", known_places));
   CAIRN_RETURN_IF_ERROR(config.Set("QUERIES", "the list of queries", {queries}));
@@ -258,9 +292,10 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.SetPairs("FOOTAGE_OPTIONS", "the option of a film or bag", footage.options));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSIONS", "the capture", sessions.folders));
   CAIRN_RETURN_IF_ERROR(config.SetPairs("SESSION_QUERIES", "the list of queries", sessions.queries));
+  CAIRN_RETURN_IF_ERROR(config.Set("SESSIONS_REGISTERED", "", sessions.registered));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
   CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
-  if (IsReconstructed(recipe) && !recipe.captures.front().queries_path.empty()) {
+  if (IsReconstructed(recipe) && !is_registered && !recipe.captures.front().queries_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "queries = \"{}\": held-out images are given with their poses, but {} has none (no "
                      "images.txt); leave it out: [reconstruct] hold_out_every holds images out",
@@ -277,7 +312,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(options + "/name", recipe.name + "\n"));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
       options + "/capture",
-      IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) : capture + "\n"));
+      IsJoined(recipe) ? PairsLine(sessions.folders) + PairsLine(sessions.queries) + RegisteredLine(sessions)
+                       : capture + "\n"));
   for (const auto& [name, source] : footage.sources) {
     CAIRN_RETURN_IF_ERROR(WriteFileAtomically(
         options + "/" + name,

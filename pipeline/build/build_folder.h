@@ -18,8 +18,10 @@ struct BuildPaths {
 // What a film or bag is called in the build folder, once it is imported: "film-NAME", "bag-NAME".
 std::string FootageFolderName(const RecipeCapture& capture);
 
-// Whether the captures have no poses of their own: then `reconstruct` finds them.
+// Whether captures have no poses, or none in the frame of the others: then `reconstruct` finds them.
 bool IsReconstructed(const Recipe& recipe);
+// Whether only some have none: then these are registered to the others.  Errors: those of SessionsToRegister.
+Result<bool> IsRegistered(const Recipe& recipe);
 // Whether the recipe names a floor plan: then `decompose_views` divides it.
 bool HasFloorPlan(const Recipe& recipe);
 // Whether images are held out of the survey: listed, rendered, or by `reconstruct`.
@@ -35,6 +37,7 @@ bool LeavesOut(const Recipe& recipe);
 //   options/odometry      whose odometry or IMU gives poses their scale, and how bags' is read
 //   options/program       hash of the program: another program redoes every stage, whatever its date
 //   config.mk             MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES,
+//   SESSIONS_REGISTERED,
 //                         SIMULATED, RECONSTRUCTED, KNOWN_PLACES, QUERIES, LEFT_OUT, FLOOR_PLAN, NAME, SEED,
 //                         PROGRAM and VOCABULARY_TREE for map.mk
 //   recipe                path of the recipe, for people and for `cairn clean`; not part of a Makefile

@@ -21,7 +21,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 	touch $@
 endif
 
-# Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SIMULATED, RECONSTRUCTED, KNOWN_PLACES,
+# Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SESSIONS_REGISTERED, SIMULATED, RECONSTRUCTED, REGISTERED, KNOWN_PLACES,
 # QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
@@ -51,11 +51,15 @@ $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
 CAPTURE_LISTS := $(wildcard $(addprefix $(CAPTURE)/,cameras.txt images.txt frame.json sessions.txt odometry.txt imu.csv))
 ifneq ($(SESSIONS),)
 # The files of the joined capture, whether they exist yet or not.
-ODOMETRY := $(wildcard $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session)))/odometry.txt))
-IMUS := $(foreach session,$(SESSIONS),$(if $(wildcard $(lastword $(subst =, ,$(session)))/imu.csv),imu/$(firstword $(subst =, ,$(session))).csv))
-CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(filter yes,$(RECONSTRUCTED)), \
-    $(if $(ODOMETRY),odometry.txt) $(IMUS),cameras.txt images.txt frame.json $(if $(QUERIES),queries.txt)))
+SESSIONS_WITHOUT_POSES := $(foreach session,$(SESSIONS),$(if $(wildcard $(lastword $(subst =, ,$(session)))/images.txt),,$(session)))
+ODOMETRY := $(wildcard $(foreach session,$(SESSIONS_WITHOUT_POSES),$(lastword $(subst =, ,$(session)))/odometry.txt))
+IMUS := $(foreach session,$(SESSIONS_WITHOUT_POSES),$(if $(wildcard $(lastword $(subst =, ,$(session)))/imu.csv),imu/$(firstword $(subst =, ,$(session))).csv))
+CAPTURE_LISTS := $(addprefix $(CAPTURE)/,sessions.txt $(if $(ODOMETRY),odometry.txt) $(IMUS) \
+    $(if $(filter yes,$(REGISTERED)),cameras.txt images.txt frame.json register.txt) \
+    $(if $(filter yes,$(RECONSTRUCTED)),,cameras.txt images.txt frame.json $(if $(QUERIES),queries.txt)))
 endif
+# Of a capture some of whose sessions are registered to the others: what the registration reads.
+POSED_LISTS := $(if $(filter yes,$(REGISTERED)),$(CAPTURE_LISTS) $(wildcard $(CAPTURE)/register.txt $(CAPTURE)/queries.txt $(CAPTURE)/poses/*.txt))
 # The images of the last run and their folders, from the dependency file that extract-features writes: a new or a
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
@@ -197,7 +201,7 @@ SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(sessio
 SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt imu.csv,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
 $(BUILD)/capture.stamp: $(FOOTAGE_STAMPS)
-$(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES))
+$(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES)) $(addprefix --register ,$(SESSIONS_REGISTERED))
 endif
 # Where the stages after matching read poses.
 POSES_READY := $(if $(filter yes,$(RECONSTRUCTED)),$(BUILD)/poses,$(CAPTURE_STAMP) $(CAPTURE_LISTS))

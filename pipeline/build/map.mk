@@ -97,10 +97,10 @@ $(BUILD)/matches.db.stamp: $(MATCHES_INPUTS) $(MATCHES_SHARDS)
 	$(CAIRN_LAUNCH) $(CAIRN) $(CAIRN_MATCH) $(CAIRN_REUSE_SHARDS) -o $(@:.stamp=) $(CAIRN_FLAGS)
 	$(CAIRN_REMOVE_SHARDS)
 
-# Stage 2b: poses, for captures that have none.  The folder's date is that of its last change.  The hash of each image, and so of
+# Stage 2b: poses, for captures that have none, or none in the frame of others.  The folder's date is that of its last change.  The hash of each image, and so of
 # its GPS tags, is in features.db; odometry and IMU are not.
 $(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/features.db $(call CAIRN_OPTIONS,reconstruct) $(SEED_FILE) $(KNOWN_PLACES) \
-    $(BUILD)/options/odometry $(filter %/odometry.txt %.csv,$(CAPTURE_LISTS))
+    $(BUILD)/options/odometry $(filter %/odometry.txt %.csv,$(CAPTURE_LISTS)) $(POSED_LISTS)
 	$(call CAIRN_RUN,reconstruct,stage reconstruct $(@D)/matches.db --capture $(CAPTURE))
 
 # Stage 3: matches that show the same point become feature classes.

@@ -33,6 +33,12 @@ constexpr Key kCaptureKeys[] = {
     {"queries", "text",
      "Held-out images for the self-test, in the form of images.txt, relative to the recipe. Default: the "
      "capture's queries.txt, if there is one."},
+    {"frame", "text",
+     "Where there are several captures: \"shared\" (its poses are in the frame of the others; without poses "
+     "it is "
+     "registered to those that have some) or \"register\" (its poses are in a frame of its own, which is "
+     "found from "
+     "its images). Default \"shared\"."},
     {"floor_plan", "text",
      "Floor plan of the place (GeoJSON polygons, or lines x0,y0,x1,y1 of walls; metres), relative to the "
      "recipe: the map then has its view-invariant regions ([floor plans](views.md)). One plan serves all "
@@ -224,6 +230,11 @@ class RecipeReader {
         CAIRN_RETURN_IF_ERROR(CheckName(path_, node, capture.name));
       } else if (name == "queries") {
         CAIRN_ASSIGN_OR_RETURN(capture.queries_path, ExistingPath(name, node));
+      } else if (name == "frame") {
+        CAIRN_ASSIGN_OR_RETURN(const std::string frame, Text(name, node));
+        if (frame != "shared" && frame != "register")
+          return WrongType(path_, node, "frame", "\"shared\" or \"register\"");
+        capture.is_registered = frame == "register";
       } else if (name == "floor_plan") {
         CAIRN_ASSIGN_OR_RETURN(capture.floor_plan_path, ExistingPath(name, node));
       } else if (name == "up") {
@@ -410,8 +421,9 @@ std::string RecipeReference(const std::vector<StageOptions>& stages) {
       "## Top of the file\n";
   AppendKeys(&page, kTopKeys);
   page +=
-      "\n## `[[capture]]`\n\nOne survey. Several of these tables are several sessions (cameras, days), all "
-      "in one frame ([captures](captures.md)). A recipe has either this or `[simulate]`.\n";
+      "\n## `[[capture]]`\n\nOne survey. Several of these tables are several sessions (cameras, days), in "
+      "one "
+      "frame or brought into one ([captures](captures.md)). A recipe has either this or `[simulate]`.\n";
   AppendKeys(&page, kCaptureKeys);
   for (const FootageKey& key : FootageKeys())
     page += fmt::format("| `{}` | {} | {} |\n", key.name, key.type, key.help);

@@ -20,6 +20,8 @@ struct RecipeCapture {
   // Held-out images for the self-test; empty = the capture's queries.txt, if it has one.
   std::string queries_path;
   std::string floor_plan_path;  // empty = none
+  // frame = "register": its poses, if it has any, are in a frame of its own.
+  bool is_registered = false;
 
   // Films and bags are imported into the build folder first.
   bool IsFootage() const { return kind != CaptureKind::kFolder; }
@@ -30,7 +32,7 @@ struct RecipeCapture {
 struct Recipe {
   std::string name;   // becomes the map's name: letters, digits, '-', '_' and '.'
   uint64_t seed = 0;  // of everything random in the compile
-  // In the order of the recipe, all in one frame, with different names; none where the capture is simulated.
+  // In the order of the recipe, with different names; none where the capture is simulated.
   std::vector<RecipeCapture> captures;
   // "auto", or the up direction in the captures' frame as "x,y,z".
   std::string up = "auto";

@@ -192,6 +192,15 @@ void WarnOfUnreadKeys(const Recipe& recipe) {
   if (!HasFloorPlan(recipe)) skipped.emplace_back("decompose_views", "the recipe names no floor plan");
   if (HasQueries(recipe)) skipped.emplace_back("leave_out", "the capture has held-out images of its own");
   for (const std::string& line : UnreadKeys(recipe, skipped)) spdlog::warn("{}", line);
+  const Result<bool> is_registered = IsRegistered(recipe);
+  if (!is_registered.ok() || !*is_registered) return;
+  for (const Recipe::Key& key : recipe.stage_keys) {
+    static const std::set<std::string> kRead = {"refine_focal_length", "refine_distortion", "hold_out_every"};
+    if (key.stage != "reconstruct" || kRead.contains(key.name)) continue;
+    spdlog::warn(
+        "{}: [reconstruct] {} is not read: captures without poses are registered to those that have some",
+        key.place, key.name);
+  }
 }
 
 Status Compile(CompileArguments arguments, const CommandEnvironment& environment) {

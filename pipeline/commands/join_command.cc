@@ -1,6 +1,5 @@
 #include "pipeline/commands/commands.h"
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <utility>
@@ -16,6 +15,7 @@ namespace {
 struct JoinArguments {
   std::vector<std::string> captures;  // "NAME=FOLDER"
   std::vector<std::string> queries;   // "NAME=FILE"
+  std::vector<std::string> registered;
   std::string output;
 };
 
@@ -32,14 +32,20 @@ Status RunJoin(const JoinArguments& arguments, const CommandEnvironment& environ
     CAIRN_ASSIGN_OR_RETURN(const auto session, SplitAtEquals(text, "NAME=FOLDER"));
     sessions.push_back({.name = session.first, .root = session.second});
   }
+  const auto find = [&](const std::string& option, const std::string& name) -> Result<CaptureSession*> {
+    for (CaptureSession& session : sessions) {
+      if (session.name == name) return &session;
+    }
+    return MakeError(ErrorCode::kInvalidArgument, "{}: no capture is named '{}'", option, name);
+  };
   for (const std::string& text : arguments.queries) {
     CAIRN_ASSIGN_OR_RETURN(const auto queries, SplitAtEquals(text, "NAME=FILE"));
-    const auto session = std::find_if(sessions.begin(), sessions.end(),
-                                      [&](const CaptureSession& s) { return s.name == queries.first; });
-    if (session == sessions.end())
-      return MakeError(ErrorCode::kInvalidArgument, "--queries {}: no capture is named '{}'", text,
-                       queries.first);
+    CAIRN_ASSIGN_OR_RETURN(CaptureSession* const session, find("--queries " + text, queries.first));
     session->queries_path = queries.second;
+  }
+  for (const std::string& name : arguments.registered) {
+    CAIRN_ASSIGN_OR_RETURN(CaptureSession* const session, find("--register " + name, name));
+    session->is_registered = true;
   }
   CAIRN_ASSIGN_OR_RETURN(const JoinedCapture joined, JoinCaptures(sessions, arguments.output));
   for (const std::string& warning : joined.warnings) spdlog::warn("{}", warning);
@@ -50,6 +56,8 @@ Status RunJoin(const JoinArguments& arguments, const CommandEnvironment& environ
     counts = fmt::format("{} images, {} queries, {} cameras", joined.num_images, joined.num_queries,
                          joined.num_cameras);
   }
+  if (joined.num_registered > 0)
+    counts += fmt::format("; {} to be registered to the others", joined.num_registered);
   *environment.out << fmt::format("join_captures: {} sessions, {}\n", sessions.size(), counts);
   return Ok();
 }
@@ -60,7 +68,7 @@ Command JoinCommand() {
   const auto arguments = std::make_shared<JoinArguments>();
   return {
       .name = "join",
-      .summary = "Join surveys that share a frame into one capture, without copying images",
+      .summary = "Join surveys of a place into one capture, without copying images",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             parser.Add("captures", arguments->captures, "Session's name and capture folder, once per session")
@@ -70,6 +78,12 @@ Command JoinCommand() {
                 .Add("--queries", arguments->queries,
                      "Held-out images of a session [its capture's queries.txt]")
                 .Type("NAME=FILE");
+            parser
+                .Add("--register", arguments->registered,
+                     "Session whose poses are in a frame of its own; those without poses, beside others that "
+                     "have some, "
+                     "are registered anyway")
+                .Type("NAME");
             parser.Add("-o,--output", arguments->output, "Capture folder to write").Required().Type("FOLDER");
           },
       .run = [arguments](const CommandEnvironment& environment) { return RunJoin(*arguments, environment); },

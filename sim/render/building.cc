@@ -14,6 +14,9 @@ namespace {
 // Brightness of a box's faces, -x to +z: light comes from above and from the side of -y.
 constexpr float kBrightness[6] = {0.84f, 0.92f, 1.0f, 0.88f, 0.7f, 1.0f};
 
+// Faces of a piece of furniture that is no pillar: all but the one below.
+constexpr size_t kNumFurnitureFaces = 5;
+
 enum class Painter { kTrim, kWallPanel, kLintel, kFurniture };
 
 // A texture to be painted.
@@ -32,8 +35,9 @@ class BuildingMaker {
     building_.height_m = options_.height_m;
     jobs_.push_back({Painter::kTrim});
     for (size_t w = 0; w < building_.layout.walls.size(); ++w) AddWall(static_cast<int>(w));
-    for (const Furniture& piece : building_.layout.furniture) AddFurniture(piece);
+    FurnishRooms();
     AssignPanels();
+    ChangePanels();
     Paint(num_threads);
     BuildGrid();
     return std::move(building_);
@@ -163,6 +167,61 @@ class BuildingMaker {
     building_.num_repeated_panels = num_repeated;
   }
 
+  // All pieces but those that a change took away.  These leave their textures' numbers unused: whatever else
+  // there is is painted as before.
+  void FurnishRooms() {
+    std::vector<Furniture> left;
+    for (const Furniture& piece : building_.layout.furniture) {
+      Random random(
+          MixSeed(MixSeed(MixSeed(seed_, 7), options_.change), left.size() + building_.changed.size()));
+      const bool is_gone =
+          options_.change > 0 && !piece.is_pillar && random.Uniform() < options_.removed_furniture_ratio;
+      if (!is_gone) {
+        AddFurniture(piece);
+        left.push_back(piece);
+        continue;
+      }
+      jobs_.resize(jobs_.size() + kNumFurnitureFaces, {Painter::kTrim});
+      const Rect& rect = piece.rect;
+      building_.changed.push_back(
+          {ChangedSurface::Kind::kFurniture, {rect.x0, rect.y0, 0}, {rect.x1, rect.y1, piece.height_m}});
+    }
+    building_.layout.furniture = std::move(left);
+  }
+
+  // A texture of its own, painted for this change, for some of the panels.
+  void ChangePanels() {
+    if (options_.change == 0) return;
+    Random random(MixSeed(MixSeed(seed_, 6), options_.change));
+    std::vector<int> order(panels_.size());
+    for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
+    for (size_t i = order.size(); i > 1; --i)
+      std::swap(order[i - 1], order[random.UniformInt(0, static_cast<int64_t>(i) - 1)]);
+    order.resize(std::lround(options_.changed_panel_ratio * static_cast<double>(panels_.size())));
+    std::sort(order.begin(), order.end());
+    first_changed_job_ = static_cast<int>(jobs_.size());
+    for (const int i : order) {
+      const Panel& panel = panels_[i];
+      Box& box = building_.boxes[panel.face / 6];
+      const int face = panel.face % 6;
+      const int job = AddJob({Painter::kWallPanel, panel.width_m, options_.height_m, panel.material});
+      box.faces[face] = FaceSurface(box, face, job);
+      ChangedSurface changed{ChangedSurface::Kind::kPanel, box.min, box.max};
+      const int axis = face / 2;
+      (face % 2 == 0 ? changed.max : changed.min)[axis] = (face % 2 == 0 ? box.min : box.max)[axis];
+      building_.changed.push_back(changed);
+    }
+  }
+
+  // What texture is painted by: those of before a change are painted alike after it.
+  uint64_t PaintSeed(int texture) const {
+    const int num_jobs = static_cast<int>(jobs_.size());
+    const int num_changed = first_changed_job_ < 0 ? 0 : num_jobs - first_changed_job_;
+    if (texture >= num_jobs) return MixSeed(MixSeed(seed_, 5), texture - num_changed);
+    if (texture < num_jobs - num_changed) return MixSeed(MixSeed(seed_, 5), texture);
+    return MixSeed(MixSeed(MixSeed(seed_, 8), options_.change), texture);
+  }
+
   // Panels of the second twin take the textures of the first, except those that are to differ.
   void PairTwins() {
     const Twins& twins = *building_.layout.twins;
@@ -217,7 +276,7 @@ class BuildingMaker {
     ParallelFor(ceiling + 1, num_threads, [&](int64_t i) {
       // The largest first: the floor and the ceiling.
       const int texture = i == 0 ? floor : i == 1 ? ceiling : static_cast<int>(i - 2);
-      const uint64_t seed = MixSeed(MixSeed(seed_, 5), texture);
+      const uint64_t seed = PaintSeed(texture);
       cv::Mat picture;
       if (texture == floor) {
         picture = PaintFloor(bounds, building_.layout.rooms, coarse_texel_m, seed);
@@ -298,6 +357,7 @@ class BuildingMaker {
   Building building_;
   std::vector<PaintJob> jobs_;  // job i paints texture i
   std::vector<Panel> panels_;
+  int first_changed_job_ = -1;  // those from here on are of what changed; -1: none
 };
 
 }  // namespace

@@ -30,6 +30,13 @@ struct Box {
   std::array<Surface, 6> faces;  // -x, +x, -y, +y, -z, +z
 };
 
+// A piece of a building's surface that shows something else than when it was built, or a piece of furniture
+// that is gone: what lay on it has vanished.
+struct ChangedSurface {
+  enum class Kind { kPanel, kFurniture } kind = Kind::kPanel;
+  Eigen::Vector3d min, max;  // of the panel flat
+};
+
 // Where a ray ends.
 struct RayHit {
   double distance = 0;  // in units of the ray's direction
@@ -48,6 +55,7 @@ struct Building {
   std::vector<Texture> textures;
   int num_wall_panels = 0;      // faces that carry a panel
   int num_repeated_panels = 0;  // of these, with a texture of the shared set
+  std::vector<ChangedSurface> changed;
 
   // Boxes by cells of a square grid, as intervals of `cell_boxes`.
   double cell_m = 0.5;

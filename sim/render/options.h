@@ -51,6 +51,13 @@ struct SimulateOptions {
   // Wall panels of the second of twin wings that differ from the first's, those near its middle first.
   // REQUIRES: >= 0
   int num_different_panels = 1;
+  // What is otherwise than when the building was built: places change between surveys.  0: nothing; another
+  // number: another choice of what.  REQUIRES: >= 0
+  int change = 0;
+  // Share of wall panels that show something else then, and of pieces of furniture that were taken away.
+  // REQUIRES: in [0, 1]
+  double changed_panel_ratio = 0.3;
+  double removed_furniture_ratio = 0;
   // Edge of a wall texel; floor and ceiling have twice that.  REQUIRES: in [0.001, 0.05]
   double texel_m = 0.003;
 

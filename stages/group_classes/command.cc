@@ -75,9 +75,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(CheckMemoryForFile("grouping the matches", arguments.matches, kMemoryPerFileByte,
                                            environment.memory_mib));
   CAIRN_ASSIGN_OR_RETURN(MatchedFeatures matched, ReadMatchedFeatures(arguments.matches));
-  // A reconstruction refines the database's cameras, with the same numbers, along with the poses.
-  if (capture.frame && capture.frame->is_reconstructed) {
-    for (const auto& [camera_id, camera] : capture.cameras) matched.cameras[camera_id] = camera;
+  // A reconstruction refines the database's cameras, with the same numbers, along with the poses.  Of
+  // panoramas the database has views.
+  if (capture.frame && (capture.frame->is_reconstructed || capture.frame->has_refined_cameras)) {
+    for (const auto& [camera_id, camera] : capture.cameras) {
+      if (camera.model != CameraModel::kEquirectangular) matched.cameras[camera_id] = camera;
+    }
   }
   SolvedFile solved(SolvedPath(arguments.output));
   const auto group_and_write = [&]() -> Result<GroupClassesResult> {

@@ -48,6 +48,13 @@ std::string ReportJson(const ReconstructResult& result) {
     report["residuals"].push_back(
         {{"name", residual.name}, {"residual_m", residual.residual_m}, {"is_off", residual.is_off}});
   }
+  if (!result.sessions.empty()) report["sessions"] = nlohmann::ordered_json::array();
+  for (const RegisteredSession& session : result.sessions) {
+    report["sessions"].push_back({{"name", session.name},
+                                  {"num_images", session.num_images},
+                                  {"num_joined", session.num_joined},
+                                  {"num_supported", session.num_supported}});
+  }
   report["rejects"] = nlohmann::ordered_json::array();
   for (const Reject& reject : result.rejects)
     report["rejects"].push_back({{"name", reject.name}, {"reason", reject.reason}});
@@ -107,9 +114,15 @@ std::string ResultText(const ReconstructResult& result) {
     text += fmt::format("reconstruct: camera {}: {} {:.2f}\n", camera_id, CameraModelName(camera.model),
                         fmt::join(camera.params, " "));
   }
+  for (const RegisteredSession& session : result.sessions) {
+    text += fmt::format(
+        "reconstruct: {} of {} images of {} are joined to the other captures, {} of them by what they see of "
+        "these\n",
+        session.num_joined, session.num_images, session.name, session.num_supported);
+  }
   if (result.frame.unit == "arbitrary") {
     text += "reconstruct: no scale: the unit is arbitrary\n";
-  } else {
+  } else if (result.sessions.empty()) {
     text += fmt::format("reconstruct: scale from {} (+- {:.1f} %), {}\n", result.frame.source,
                         100 * result.frame.scale_sigma_ratio, ResidualText(result));
     for (const ScaleFound& scale : result.scales) {

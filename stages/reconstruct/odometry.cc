@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -143,6 +144,15 @@ std::vector<ImageMotion> MotionsOf(const std::vector<OdometryPose>& odometry, co
                        pose.world_from_cam.Inverse() * before->world_from_cam});
   }
   return motions;
+}
+
+Result<std::vector<ImageMotion>> OdometryMotions(const MapperInput& input, const Capture& capture) {
+  const std::string path = capture.root + "/" + kOdometryFile;
+  if (!std::filesystem::exists(path)) return std::vector<ImageMotion>();
+  const Result<std::vector<OdometryPose>> odometry = ReadOdometry(path, capture);
+  if (odometry.ok()) return MotionsOf(*odometry, input);
+  if (odometry.error().code == ErrorCode::kNoData) return std::vector<ImageMotion>();
+  return odometry.error();
 }
 
 }  // namespace cairn::reconstruct

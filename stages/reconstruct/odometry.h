@@ -45,4 +45,7 @@ Result<OdometryAlignment> AlignToOdometry(const std::vector<OdometryPose>& odome
 // it lacks are skipped.
 std::vector<ImageMotion> MotionsOf(const std::vector<OdometryPose>& odometry, const MapperInput& input);
 
+// What the capture's odometry says, if it has any.  Errors: those of ReadOdometry but NoData.
+Result<std::vector<ImageMotion>> OdometryMotions(const MapperInput& input, const Capture& capture);
+
 }  // namespace cairn::reconstruct

@@ -10,8 +10,8 @@
 #include "core/files/write_error.h"
 #include "stages/reconstruct/find_frame.h"
 #include "stages/reconstruct/globally/map_globally.h"
-#include "stages/reconstruct/known_places.h"
 #include "stages/reconstruct/odometry.h"
+#include "stages/reconstruct/register_to_others.h"
 #include "stages/reconstruct/uneven_steps.h"
 #include "stages/reconstruct/zoomed_lens.h"
 
@@ -94,16 +94,6 @@ Result<std::vector<ColmapModel>> MapByColmap(const MapperInput& input, const Cap
   }
   warnings->push_back(fmt::format("{}; the reconstruction is the one {}", counts, taken->name));
   return best;
-}
-
-// What the capture's odometry says, if it has any.
-Result<std::vector<ImageMotion>> OdometryMotions(const MapperInput& input, const Capture& capture) {
-  const std::string path = capture.root + "/" + kOdometryFile;
-  if (!std::filesystem::exists(path)) return std::vector<ImageMotion>();
-  const Result<std::vector<OdometryPose>> odometry = ReadOdometry(path, capture);
-  if (odometry.ok()) return MotionsOf(*odometry, input);
-  if (odometry.error().code == ErrorCode::kNoData) return std::vector<ImageMotion>();
-  return odometry.error();
 }
 
 // By the mapper that the options name, or that suits the images.
@@ -397,6 +387,7 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       int num_threads, Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
+  if (!capture.registered.empty()) return RegisterToOthers(input, capture, options, num_threads, progress);
   ReconstructResult result;
   const Result<std::vector<ColmapModel>> mapped =
       MapImages(input, capture, options, work_folder, num_threads, progress, &result);

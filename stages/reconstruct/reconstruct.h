@@ -10,8 +10,9 @@
 #include "core/capture/capture.h"
 #include "core/capture/capture_frame.h"
 #include "core/options/options.h"
+#include "stages/reconstruct/by_colmap/mapper.h"
 #include "stages/reconstruct/inertial/preintegration.h"
-#include "stages/reconstruct/mapper.h"
+#include "stages/reconstruct/registration/register_sessions.h"
 #include "stages/reconstruct/verdict/verdict.h"
 
 namespace cairn::reconstruct {
@@ -19,8 +20,8 @@ namespace cairn::reconstruct {
 // Finds the poses of a capture that has none, from its matches: of all images at once
 // (globally/map_globally.h), up to a similarity, which odometry, GPS, known positions or known distances then
 // determine (align.h).  Where too few images are registered, and by default where they are no drive, COLMAP's
-// mapper runs (mapper.h): with the cameras' distortion refined, without, and then from a start of any motion.
-// Before: match_features.  After: group_classes and all stages that read poses.
+// mapper runs (by_colmap/mapper.h): with the cameras' distortion refined, without, and then from a start of
+// any motion. Before: match_features.  After: group_classes and all stages that read poses.
 struct ReconstructOptions {
   MapperOptions mapper;
   // Smallest part of the capture's images that the largest model must have; with fewer there is no
@@ -89,16 +90,19 @@ struct ReconstructResult {
   std::vector<ScaleFound> scales;  // all that know one, most trusted first; frame.source names the one taken
   std::vector<Reject> rejects;     // images that are in neither list, and why
   std::vector<std::string> warnings;
-  std::vector<int> model_sizes;  // images of each model, the kept one first
-  int num_points = 0;            // of the model kept
-  double mean_error_px = 0;      // its mean reprojection error
-  Verdict verdict;               // is it whole, and where is it weak?  Held-out images are in it
+  std::vector<int> model_sizes;             // images of each model, the kept one first
+  int num_points = 0;                       // of the model kept
+  double mean_error_px = 0;                 // its mean reprojection error
+  std::vector<RegisteredSession> sessions;  // of a capture some of whose sessions have poses in its frame
+  Verdict verdict;                          // is it whole, and where is it weak?  Held-out images are in it
 };
 
-// Maps the images and puts the largest model into a frame.  `work_folder` is an empty folder, for COLMAP.
-// Same result on every run and any number of threads where options.mapper.deterministic.  Errors:
-// InvalidArgument (options); NoData (too few images registered, the requested scale is not available, no
-// image of the database in the capture); those of RunMapper and of the files.
+// Maps the images and puts the largest model into a frame.  Of a capture some of whose sessions have poses in
+// its frame the others are registered to these (registration/register_sessions.h): stated poses stay as they
+// are.  `work_folder` is an empty folder, for COLMAP. Same result on every run and any number of threads
+// where options.mapper.deterministic.  Errors: InvalidArgument (options); NoData (too few images registered,
+// the requested scale is not available, no image of the database in the capture); those of RunMapper and of
+// the files.
 Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& capture,
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       int num_threads, Progress& progress);

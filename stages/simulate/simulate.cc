@@ -7,12 +7,14 @@
 #include <optional>
 #include <vector>
 
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/capture/capture.h"
 #include "core/colmap/cameras_text.h"
+#include "core/files/file.h"
 #include "core/files/folder.h"
 #include "core/files/write_error.h"
 #include "sim/render/building.h"
@@ -72,6 +74,17 @@ std::vector<CaptureImage> StatedImages(const std::vector<sim::PlannedImage>& pla
   return images;
 }
 
+// What of the building is otherwise than when it was built: boxes, flat ones of panels, metres.
+std::string ChangesJson(const sim::Building& building) {
+  nlohmann::ordered_json changes = nlohmann::ordered_json::array();
+  for (const sim::ChangedSurface& changed : building.changed) {
+    changes.push_back({{"kind", changed.kind == sim::ChangedSurface::Kind::kPanel ? "panel" : "furniture"},
+                       {"min", {changed.min.x(), changed.min.y(), changed.min.z()}},
+                       {"max", {changed.max.x(), changed.max.y(), changed.max.z()}}});
+  }
+  return nlohmann::ordered_json{{"changed", changes}}.dump(1) + "\n";
+}
+
 }  // namespace
 
 Result<SimulateResult> SimulateCapture(const sim::SimulateOptions& options, const std::string& path,
@@ -94,6 +107,8 @@ Result<SimulateResult> SimulateCapture(const sim::SimulateOptions& options, cons
         WriteImagesText(folder + "/images.txt", StatedImages(survey.images, survey.camera.camera_id)));
     CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/queries.txt",
                                           StatedImages(survey.queries, survey.query_camera.camera_id)));
+    if (options.change > 0)
+      CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/changes.json", ChangesJson(building)));
     return sim::WriteFloorPlan(building.layout, building.obstacles, folder + "/floor_plan.geojson");
   }));
   return SimulateResult{static_cast<int>(survey.stations.size()), static_cast<int>(survey.images.size()),

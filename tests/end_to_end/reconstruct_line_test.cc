@@ -217,6 +217,54 @@ TEST_F(ReconstructLine, CamerasThatAreGivenAreTaken) {
   EXPECT_THAT(run.err, testing::Not(HasSubstr("assumed")));
 }
 
+// Every second image is of a second session, which has no poses.
+TEST_F(ReconstructLine, ASessionWithoutPosesJoinsOneThatHasSome) {
+  std::vector<Reject> rejects;
+  std::vector<CaptureImage> all = *ReadImagesText(Path("posed/images.txt"), &rejects), old;
+  for (const char* folder : {"old/images", "new"}) fs::create_directories(Path(folder));
+  for (int i = 0; i < kNumImages; ++i) {
+    const CaptureImage& image = all[kFirstImage + i];
+    const bool is_old = i % 2 == 0;
+    fs::copy_file(Path("posed/images/" + image.name), Path((is_old ? "old/images/" : "new/") + image.name));
+    if (is_old) old.push_back(image);
+  }
+  ASSERT_TRUE(WriteImagesText(Path("old/images.txt"), old).ok());
+  fs::copy_file(Path("posed/cameras.txt"), Path("old/cameras.txt"));
+  std::ofstream(Path("both.toml"))
+      << "name = \"both\"\n[[capture]]\npath = \"old\"\n[[capture]]\npath = \"new\"\n"
+      << TinyStageOptions();
+  ReplaceInFile(Path("both.toml"), "max_num_features = 300",
+                "max_num_features = 600\ncontrast_threshold = 0.01");
+  const auto compile = [&](const std::string& map, const std::string& more) {
+    return RunShell("cairn compile " + Path("both.toml") + " -o " + Path(map) + " --progress none " + more);
+  };
+  const ProgramRun run = compile("both.cairn", "--threads 2");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("6 of 6 images of new are joined to the other captures"));
+  const auto poses = ReadCapture(Path("both.build/poses"));
+  ASSERT_TRUE(poses.ok()) << poses.error().message;
+  ASSERT_EQ(poses->images.size(), static_cast<size_t>(kNumImages));
+  for (const CaptureImage& image : poses->images) {
+    const bool is_old = image.name.starts_with("old/");
+    const Pose& truth = truth_.at(image.name.substr(4));
+    EXPECT_LT(CenterErrorM(*image.cam_from_world, truth), is_old ? 1e-5 : 0.05) << image.name;
+    EXPECT_LT(RotationErrorDeg(*image.cam_from_world, truth), is_old ? 1e-3 : 0.5) << image.name;
+  }
+  const auto json = nlohmann::json::parse(RunShell("cairn inspect --json " + Path("both.cairn")).out);
+  EXPECT_EQ(json["unit"], "metre");
+  EXPECT_EQ(json["frame_source"], "survey");
+  ASSERT_EQ(json["sessions"].size(), 2u);
+  EXPECT_GT(json["sessions"][1]["num_landmarks"].get<int>(), 20);
+
+  // The same map by any number of threads; again, nothing; with another pose of an old image, the poses anew.
+  ASSERT_EQ(compile("again.cairn", "--threads 1").exit_code, 0);
+  EXPECT_EQ(HashFile(Path("again.cairn")).value(), HashFile(Path("both.cairn")).value());
+  EXPECT_THAT(compile("both.cairn", "").out, HasSubstr("up to date"));
+  old[0].cam_from_world->translation.x() += 0.001;
+  ASSERT_TRUE(WriteImagesText(Path("old/images.txt"), old).ok());
+  EXPECT_THAT(compile("both.cairn", "").out, HasSubstr("6 of 6 images of new are joined"));
+}
+
 TEST_F(ReconstructLine, FailingColmapFailsTheCompileWithItsLastLines) {
   fs::create_directories(Path("fake"));
   std::ofstream(Path("fake/colmap")) << "#!/bin/sh\necho out of luck\nexit 9\n";

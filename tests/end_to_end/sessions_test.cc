@@ -137,14 +137,16 @@ TEST_F(Sessions, RemovedSessionLeavesNothingBehind) {
   EXPECT_EQ(Hash("shrunk.build/features.db"), Hash("one.build/features.db"));
 }
 
-TEST_F(Sessions, CapturesWithAndWithoutPosesAreRefused) {
+// Nothing is forced: the map is that of the others.
+TEST_F(Sessions, ImagesOfAnotherPlaceAreLeftOutWithTheirReason) {
   fs::create_directories(Path("flat"));
-  fs::copy_file(Path("day1/images/s000_h0.jpg"), Path("flat/a.jpg"));
+  std::ofstream(Path("flat/a.pgm")) << "P5\n64 48\n255\n" << std::string(64 * 48, 'x');
   WriteRecipe("mixed.toml", {"day1", "flat"});
-  const ProgramRun run = Compile("mixed", "mixed");
-  EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.err,
-              HasSubstr("'flat' (" + Path("flat") + ") has none: give 'flat' poses in the frame of 'day1'"));
+  const ProgramRun run = Compile("mixed", "mixed", "--until reconstruct");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("none of the 0 images of session 'flat' were joined to the other captures"));
+  const size_t num_old = ReadCapture(Path("day1"))->images.size();
+  EXPECT_EQ(ReadCapture(Path("mixed.build/poses"))->images.size(), num_old);
 }
 
 // The survey of a real kitchen, every second image on another day with another camera.

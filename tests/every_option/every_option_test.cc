@@ -187,6 +187,12 @@ std::vector<Kind> Kinds() {
        SmallStages({{"reconstruct", {{"min_registered_ratio", "0.4"}}}}),
        {"reconstruct"},
        8},
+      // Poses for the first alone: the other is registered to it.
+      {"Registered",
+       OneCapture("drive", "[[capture]]\npath = \"folder2\"\n"),
+       SmallStages(),
+       {"extract_features", "match_features", "reconstruct", "group_classes", "leave_out"},
+       12},
       // Imported first: their images have names that the option's user has not seen.
       {"Film",
        OneCapture("walk.mp4", "keyframes = \"all\"\n"),

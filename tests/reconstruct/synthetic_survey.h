@@ -5,7 +5,7 @@
 
 #include "core/base/random.h"
 #include "core/capture/capture.h"
-#include "stages/reconstruct/mapper.h"
+#include "stages/reconstruct/by_colmap/mapper.h"
 
 namespace cairn::reconstruct {
 

@@ -21,11 +21,18 @@ constexpr double kMaxChangeSigmas = 0.5;
 // In typical steps.
 constexpr double kSmoothLength = 0.1, kHalfAStep = 0.5;
 
-// Changes of a camera, about what is stated.
+// Standard deviation of the ratio of a camera's two focal lengths: pixels are square, or were calibrated.
+constexpr double kAspectSigma = 0.001;
+
+// Changes of a camera, about what is stated; and of the ratio of its focal lengths, where it has two.  A
+// level camera that moves on a flat floor sees none of that ratio: heights grow with it.
 class CameraPriorCost : public ceres::CostFunction {
  public:
-  explicit CameraPriorCost(const FreeCamera& camera) : camera_(camera) {
-    set_num_residuals(static_cast<int>(camera.free.size()));
+  explicit CameraPriorCost(const FreeCamera& camera)
+      : camera_(camera),
+        has_aspect_(NumFocals(camera.stated.model) == 2 && camera.free.size() >= 2 && camera.free[0] == 0 &&
+                    camera.free[1] == 1) {
+    set_num_residuals(static_cast<int>(camera.free.size()) + has_aspect_);
     mutable_parameter_block_sizes()->push_back(static_cast<int>(camera.free.size()));
   }
 
@@ -36,15 +43,28 @@ class CameraPriorCost : public ceres::CostFunction {
       residuals[i] =
           (camera_.camera.params[p] + parameters[0][i] - camera_.stated.params[p]) / camera_.sigma[i];
     }
+    // To first order.
+    const std::vector<double>& stated = camera_.stated.params;
+    if (has_aspect_) {
+      residuals[n] = ((camera_.camera.params[0] + parameters[0][0]) / stated[0] -
+                      (camera_.camera.params[1] + parameters[0][1]) / stated[1]) /
+                     kAspectSigma;
+    }
     if (jacobians == nullptr || jacobians[0] == nullptr) return true;
     for (size_t i = 0; i < n; ++i) {
       for (size_t k = 0; k < n; ++k) jacobians[0][i * n + k] = i == k ? 1 / camera_.sigma[i] : 0;
+    }
+    if (has_aspect_) {
+      std::fill_n(jacobians[0] + n * n, n, 0.0);
+      jacobians[0][n * n] = 1 / (stated[0] * kAspectSigma);
+      jacobians[0][n * n + 1] = -1 / (stated[1] * kAspectSigma);
     }
     return true;
   }
 
  private:
   const FreeCamera& camera_;
+  bool has_aspect_;
 };
 
 struct RelativeRotationCost {
@@ -111,6 +131,15 @@ size_t HoldingFrame(const ModelProblem& problem) {
   std::vector<int> count(problem.cam_from_world.size(), 0);
   for (const ModelObservation& observation : problem.observations) ++count[observation.image];
   return std::max_element(count.begin(), count.end()) - count.begin();
+}
+
+std::vector<size_t> HeldImages(const ModelProblem& problem) {
+  std::vector<size_t> held;
+  for (size_t i = 0; i < problem.is_held.size(); ++i) {
+    if (problem.is_held[i]) held.push_back(i);
+  }
+  if (held.empty() && !problem.observations.empty()) held.push_back(HoldingFrame(problem));
+  return held;
 }
 
 struct Seen {
@@ -185,9 +214,8 @@ void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
   for (Eigen::Vector3d& point : problem->points) {
     if (ceres_problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
   }
-  if (!problem->observations.empty()) {
-    double* held = pose_of(HoldingFrame(*problem));
-    if (ceres_problem.HasParameterBlock(held)) ceres_problem.SetParameterBlockConstant(held);
+  for (const size_t i : HeldImages(*problem)) {
+    if (ceres_problem.HasParameterBlock(pose_of(i))) ceres_problem.SetParameterBlockConstant(pose_of(i));
   }
   for (size_t i = 0; i < problem->cam_from_world.size(); ++i) {
     if (!ceres_problem.HasParameterBlock(pose_of(i))) continue;

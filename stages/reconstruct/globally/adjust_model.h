@@ -9,17 +9,10 @@
 #include "core/base/progress.h"
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
+#include "stages/reconstruct/globally/free_camera.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 
 namespace cairn::reconstruct {
-
-// A camera's parameters that an adjustment may change, and by how much they are likely to.
-struct FreeCamera {
-  Camera camera;              // refined
-  Camera stated;              // what the deviations are about
-  std::vector<int> free;      // indices of parameters, ascending
-  std::vector<double> sigma;  // per free one
-};
 
 struct ModelObservation {
   int image = 0, point = 0;
@@ -44,6 +37,7 @@ struct ModelStep {
 struct ModelProblem {
   std::vector<Pose> cam_from_world;  // refined
   std::vector<int> camera_idx;       // per image
+  std::vector<bool> is_held;         // per image: its pose does not change; empty: of none
   std::vector<FreeCamera> cameras;
   std::vector<Eigen::Vector3d> points;  // refined
   std::vector<ModelObservation> observations;
@@ -75,7 +69,8 @@ struct AdjustModelOptions {
 
 // Minimises the reprojection errors over poses, points and cameras, as group_classes does where poses are
 // stated (Ceres, points eliminated, one thread: bit-stable).  Cameras change by their sensitivities at the
-// start (core/structure/camera_sensitivity.h): call it again after larger changes.  The frame is free.
+// start (core/structure/camera_sensitivity.h): call it again after larger changes.  The frame is free
+// where no image is held.
 void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem);
 
 }  // namespace cairn::reconstruct

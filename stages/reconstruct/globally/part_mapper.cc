@@ -12,8 +12,8 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
-#include "core/structure/camera_sensitivity.h"
 #include "stages/reconstruct/globally/agreeing_pieces.h"
+#include "stages/reconstruct/globally/free_camera.h"
 #include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/globally/pair_evidence.h"
 #include "stages/reconstruct/globally/part_model.h"
@@ -24,7 +24,6 @@ namespace {
 
 constexpr int kMinTrackLength = 3;
 constexpr double kMinAngleDeg = 1;
-constexpr double kGuessedFocalSigma = 0.3, kStatedFocalSigma = 0.03, kDistortionSigma = 0.1;
 // Images of a drive that follow each other: a rotation by so many matches, from which the average differs by
 // so little, is sure.
 constexpr int kMaxSureDistance = 2, kMinSureMatches = 50;
@@ -83,7 +82,7 @@ PartMapper::PartMapper(const MapperInput& input, const std::map<CameraId, Camera
   std::map<CameraId, int> index;
   for (const auto& [camera_id, camera] : cameras) {
     index.emplace(camera_id, static_cast<int>(problem_.cameras.size()));
-    problem_.cameras.push_back(FreeOf(camera));
+    problem_.cameras.push_back(FreeOf(camera, options));
   }
   for (const int image : images_) problem_.camera_idx.push_back(index.at(input.images[image].camera_id));
 }
@@ -155,27 +154,6 @@ void PartMapper::KeepRotations(const std::vector<Eigen::Quaterniond>& rotations)
                                   is_next && static_cast<int>(pair.matches.size()) >= kMinSureMatches &&
                                       RotationErrorDeg(pair, rotations) <= kMaxSureErrorDeg});
   }
-}
-
-FreeCamera PartMapper::FreeOf(const Camera& stated) const {
-  FreeCamera camera{.camera = stated, .stated = stated, .free = {}, .sigma = {}};
-  if (options_.refine_distortion && stated.model == CameraModel::kSimplePinhole) {
-    camera.camera.model = CameraModel::kSimpleRadial;
-    camera.camera.params.push_back(0);
-    camera.stated = camera.camera;
-  }
-  if (stated.model == CameraModel::kEquirectangular) return camera;
-  const int num_focals = NumFocals(camera.stated.model);
-  const std::vector<double>& params = camera.stated.params;
-  for (int p = 0; p < num_focals && options_.refine_focal_length; ++p) {
-    camera.free.push_back(p);
-    camera.sigma.push_back(params[p] * (stated.has_focal_prior ? kStatedFocalSigma : kGuessedFocalSigma));
-  }
-  for (int p = num_focals + 2; p < static_cast<int>(params.size()) && options_.refine_distortion; ++p) {
-    camera.free.push_back(p);
-    camera.sigma.push_back(kDistortionSigma);
-  }
-  return camera;
 }
 
 Eigen::Vector2d PartMapper::PixelOf(const TrackElement& element) const {

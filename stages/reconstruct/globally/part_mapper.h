@@ -13,18 +13,12 @@
 #include "core/structure/union_matches.h"
 #include "stages/reconstruct/globally/adjust_model.h"
 #include "stages/reconstruct/globally/agreeing_pieces.h"
+#include "stages/reconstruct/globally/free_camera.h"
 #include "stages/reconstruct/globally/image_ways.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 
 namespace cairn::reconstruct {
-
-struct MapGloballyOptions {
-  // Whether the cameras' focal lengths and distortion, which come from EXIF or a guess, are refined.  One
-  // radial parameter for cameras that are given without any.
-  bool refine_focal_length = true;
-  bool refine_distortion = true;
-};
 
 // Maps images that pairs join, from their rotations: places by the ways of the backbone's pairs, then rounds,
 // each of which takes in the pairs that agree with the map so far, makes tracks of their matches,
@@ -58,7 +52,6 @@ class PartMapper {
   };
 
   double FocalChange() const;
-  FreeCamera FreeOf(const Camera& stated) const;
   Eigen::Vector2d PixelOf(const TrackElement& element) const;
   const Camera& CameraOf(int image) const { return problem_.cameras[problem_.camera_idx[image]].camera; }
   void KeepRotations(const std::vector<Eigen::Quaterniond>& rotations);

@@ -200,7 +200,7 @@ TEST_F(JoinCapturesTest, SecondJoinTouchesOnlyWhatChanged) {
   EXPECT_TRUE(fs::exists(Path("moved/images/1.png")));
 }
 
-TEST_F(JoinCapturesTest, FramesMustAgree) {
+TEST_F(JoinCapturesTest, FramesAreJoinedAndOthersRegistered) {
   for (const char* name : {"day1", "day2", "day3"})
     WriteCapture(name, "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
   const auto frame = [&](const std::string& name, const CaptureFrame& f) {
@@ -226,22 +226,72 @@ TEST_F(JoinCapturesTest, FramesMustAgree) {
   GeodeticPosition there = here;
   there.longitude_deg = 8.001;
   frame("day3", {.anchor = there});
-  EXPECT_THAT(Refusal({Session("day1"), Session("day2"), Session("day3")}),
-              HasSubstr("the origin of 'day2' (" + Path("day2") +
-                        ") is at 50.0000000, 8.0000000, 100.00 m, that of 'day3'"));
+  const auto other_origin = Join({Session("day1"), Session("day2"), Session("day3")});
+  ASSERT_TRUE(other_origin.ok());
+  EXPECT_EQ(other_origin->num_registered, 1);
+  EXPECT_THAT(
+      other_origin->warnings,
+      ElementsAre(HasSubstr("'day3' (" + Path("day3") +
+                            ") has its origin at 50.0000000, 8.0010000, 100.00 m, not 50.0000000, 8.0000000, "
+                            "100.00 m: it is registered")));
   frame("day3", {.unit = "arbitrary", .source = "none"});
-  EXPECT_THAT(Refusal({Session("day1"), Session("day3")}),
-              HasSubstr("'day3' (" + Path("day3") + ") in the unit arbitrary"));
+  const auto other_unit = Join({Session("day1"), Session("day3")});
+  ASSERT_TRUE(other_unit.ok());
+  EXPECT_THAT(other_unit->warnings, ElementsAre(HasSubstr("is in the unit arbitrary, not metre")));
+  EXPECT_EQ(Text("joined/register.txt"), "day3\n");
+}
+
+TEST_F(JoinCapturesTest, SessionsThatAreNotInTheFrameAreListedForRegistration) {
+  WriteCapture("old", "1 PINHOLE 1 1 5 5 4 3\n", Line(1, 1, "1.png"));
+  Write("bare/images/1.pgm", "P5\n1 1\n255\nx");
+  Write("bare/cameras.txt", "3 PINHOLE 1 1 6 6 0.5 0.5\n");
+  Write("bare/odometry.txt", "1.pgm 1 2 3 0 0 0 1\n");
+  WriteCapture("own", "1 PINHOLE 1 1 7 7 4 3\n", Line(1, 1, "1.png"));
+  Write("own/queries.txt", Line(1, 1, "a b.png"));
+  CaptureSession own = Session("own");
+  own.is_registered = true;
+  const auto joined = Join({Session("bare"), Session("old"), own});
+  ASSERT_TRUE(joined.ok()) << joined.error().message;
+  EXPECT_EQ(joined->num_registered, 2);
+  EXPECT_EQ(joined->num_images, 1);
+  EXPECT_EQ(joined->num_queries, 0);
+  EXPECT_THAT(joined->warnings, ElementsAre(HasSubstr("own/queries.txt: not read: 'own' is registered")));
+  EXPECT_EQ(Text("joined/register.txt"), "bare\nown\n");
+  EXPECT_EQ(Text("joined/images.txt"), fmt::format("1 {} 1 old/1.png\n\n", kPose));
+  EXPECT_EQ(Text("joined/poses/own.txt"), fmt::format("1 {} 2 own/1.png\n\n", kPose));
+  EXPECT_EQ(Text("joined/odometry.txt"), "bare/1.pgm 1 2 3 0 0 0 1\n");
+
+  const auto capture = ReadCapture(Path("joined"));
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_FALSE(capture->has_poses);
+  EXPECT_THAT(capture->registered, ElementsAre("bare", "own"));
+  ASSERT_EQ(capture->images.size(), 3u);
+  EXPECT_EQ(capture->images[0].name, "bare/1.pgm");
+  EXPECT_FALSE(capture->images[0].cam_from_world);
+  EXPECT_EQ(capture->cameras.at(capture->images[0].camera_id).FocalX(), 6);
+  EXPECT_EQ(capture->images[1].name, "old/1.png");
+  EXPECT_TRUE(capture->images[1].cam_from_world);
+  EXPECT_EQ(capture->cameras.at(capture->images[1].camera_id).FocalX(), 5);
+  EXPECT_FALSE(capture->images[2].cam_from_world);
+  EXPECT_EQ(capture->cameras.at(capture->images[2].camera_id).FocalX(), 7);
+  ASSERT_EQ(capture->own_poses.size(), 1u);
+  EXPECT_EQ(capture->own_poses.at("own/1.png").translation.x(), 0.35);
+  EXPECT_EQ(capture->rejects.size(), 0u);
+
+  own.queries_path = Path("own/queries.txt");
+  EXPECT_THAT(Refusal({Session("old"), own}), HasSubstr("those of 'own' are in its own"));
+  own.queries_path.clear();
+  EXPECT_THAT(Refusal({Session("bare"), own}), HasSubstr("every capture with poses is to be registered"));
+
+  Write("joined/poses/own.txt", Line(1, 2, "old/1.png"));
+  EXPECT_EQ(ReadCapture(Path("joined")).error().code, ErrorCode::kCorrupt);
+  Write("joined/register.txt", "old\n");
+  EXPECT_THAT(ReadCapture(Path("joined")).error().message,
+              HasSubstr("register.txt names old, whose image old/1.png"));
 }
 
 TEST_F(JoinCapturesTest, WhatCannotBeJoinedIsRefusedWithTheRemedy) {
   WriteCapture("posed", "1 PINHOLE 8 6 5 5 4 3\n", Line(1, 1, "1.png"));
-  Write("flat/1.png", "");
-  EXPECT_THAT(
-      Refusal({Session("flat"), Session("posed")}),
-      HasSubstr("'posed' (" + Path("posed") + ") has poses (images.txt), 'flat' (" + Path("flat") +
-                ") has none: give 'flat' poses in the frame of 'posed', or use folders of images without "
-                "images.txt for all, so that all are reconstructed together"));
   EXPECT_THAT(Refusal({Session("posed"), Session("posed")}), HasSubstr("two captures are named 'posed'"));
   EXPECT_THAT(Refusal({{.name = "a/b", .root = Path("posed")}}), HasSubstr("session 'a/b'"));
   EXPECT_THAT(Refusal({{.name = "a", .root = Path("none")}}, ErrorCode::kNotFound),

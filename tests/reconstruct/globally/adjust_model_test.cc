@@ -64,6 +64,28 @@ double LargestTurnDeg(const Scene& scene) {
   return largest;
 }
 
+// A level camera on a flat floor sees none of the ratio of its focal lengths: without what is likely of it,
+// it would stay where it happened to get.
+TEST(AdjustModel, OfALevelCameraPixelsStaySquare) {
+  Scene scene = MakeScene(0);
+  ModelProblem& problem = scene.problem;
+  Camera stated = TrueCamera();
+  stated.model = CameraModel::kPinhole;
+  stated.params = {500, 500, 320, 240};
+  for (ModelObservation& observation : problem.observations)
+    observation.pixel =
+        *ImageFromCamera(stated, scene.truth[observation.image] * problem.points[observation.point]);
+  Camera off = stated;
+  off.params[1] = 485;
+  for (Pose& pose : problem.cam_from_world) pose.translation.y() *= 500.0 / 485;
+  for (Eigen::Vector3d& point : problem.points) point.y() *= 500.0 / 485;
+  problem.cameras = {{.camera = off, .stated = stated, .free = {0, 1}, .sigma = {15, 15}}};
+  // A camera changes by so much at a time.
+  for (int k = 0; k < 3; ++k) AdjustModel({.max_num_iterations = 50, .function_tolerance = 1e-10}, &problem);
+  const std::vector<double>& found = problem.cameras[0].camera.params;
+  EXPECT_NEAR(found[0] / found[1], 1, 2e-3);
+}
+
 TEST(AdjustModel, MovedPosesAndPointsReturn) {
   Scene scene = MakeScene(0.3);
   Random random(1);

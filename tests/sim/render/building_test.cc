@@ -1,5 +1,7 @@
 #include "sim/render/building.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -168,6 +170,80 @@ double TwinDifference(const Building& building, double x, double y, double headi
   const double offset = building.layout.twins->offset_m;
   return cv::norm(renderer.Render(MakePose({x, y, 1.0}, heading_rad)),
                   renderer.Render(MakePose({x + offset, y, 1.0}, heading_rad)), cv::NORM_INF);
+}
+
+// Faces of the first building's boxes that show something else in the second, by where their boxes are; boxes
+// that the second lacks are left out.
+std::vector<std::pair<Eigen::Vector3d, int>> DifferentFaces(const Building& before, const Building& after) {
+  std::vector<std::pair<Eigen::Vector3d, int>> different;
+  for (const Box& box : before.boxes) {
+    const auto same = std::find_if(after.boxes.begin(), after.boxes.end(),
+                                   [&](const Box& b) { return b.min == box.min && b.max == box.max; });
+    if (same == after.boxes.end()) continue;
+    for (int face = 0; face < 6; ++face) {
+      const auto picture = [&](const Building& building, const Box& b) {
+        return building.textures[b.faces[face].texture].base();
+      };
+      if (!SamePicture(picture(before, box), picture(after, *same))) different.emplace_back(box.min, face);
+    }
+  }
+  return different;
+}
+
+TEST(ChangedBuilding, ShowsSomethingElseOnSomePanelsAndTheSameElsewhere) {
+  SimulateOptions options = QuickOptions();
+  const Building before = Make(options);
+  EXPECT_TRUE(before.changed.empty());
+  options.change = 1;
+  options.changed_panel_ratio = 0.3;
+  const Building after = Make(options);
+  const size_t num_changed = std::lround(0.3 * before.num_wall_panels);
+  ASSERT_EQ(after.changed.size(), num_changed);
+  const auto different = DifferentFaces(before, after);
+  EXPECT_EQ(different.size(), num_changed);
+  for (const ChangedSurface& changed : after.changed) {
+    EXPECT_EQ(changed.kind, ChangedSurface::Kind::kPanel);
+    // Flat, on a face that differs.
+    const Eigen::Vector3d size = changed.max - changed.min;
+    int axis = -1;
+    EXPECT_EQ(size.minCoeff(&axis), 0);
+    EXPECT_NEAR(size.z(), options.height_m, 1e-12);
+    EXPECT_TRUE(std::any_of(different.begin(), different.end(), [&](const auto& face) {
+      const Box& box = *std::find_if(before.boxes.begin(), before.boxes.end(),
+                                     [&](const Box& b) { return b.min == face.first; });
+      const double plane = (face.second % 2 == 0 ? box.min : box.max)[axis];
+      return face.second / 2 == axis && plane == changed.min[axis];
+    }));
+  }
+  EXPECT_TRUE(
+      SamePicture(before.textures[before.floor.texture].base(), after.textures[after.floor.texture].base()));
+  EXPECT_TRUE(SamePicture(before.textures[before.ceiling.texture].base(),
+                          after.textures[after.ceiling.texture].base()));
+
+  options.change = 2;
+  EXPECT_NE(DifferentFaces(before, Make(options)), different);
+  EXPECT_GT(DifferentFaces(after, Make(options)).size(), different.size());
+}
+
+TEST(ChangedBuilding, LacksSomeFurniture) {
+  SimulateOptions options = QuickOptions();
+  const Building before = Make(options);
+  options.change = 1;
+  options.changed_panel_ratio = 0;
+  options.removed_furniture_ratio = 0.5;
+  const Building after = Make(options);
+  EXPECT_GT(after.changed.size(), 0u);
+  EXPECT_EQ(after.layout.furniture.size() + after.changed.size(), before.layout.furniture.size());
+  EXPECT_EQ(after.boxes.size() + after.changed.size(), before.boxes.size());
+  EXPECT_EQ(DifferentFaces(before, after).size(), 0u);
+  for (const ChangedSurface& gone : after.changed) {
+    EXPECT_EQ(gone.kind, ChangedSurface::Kind::kFurniture);
+    const double x = 0.5 * (gone.min.x() + gone.max.x()), y = 0.5 * (gone.min.y() + gone.max.y());
+    EXPECT_EQ(ClearanceM(before, x, y), 0);
+    EXPECT_GT(ClearanceM(after, x, y), 0);
+  }
+  options.removed_furniture_ratio = 1;
+  for (const Furniture& piece : Make(options).layout.furniture) EXPECT_TRUE(piece.is_pillar);
 }
 
 SimulateOptions TwinOptions() {

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/mapper.h"
+#include "stages/reconstruct/by_colmap/mapper.h"
 
 #include <cstdlib>
 #include <filesystem>

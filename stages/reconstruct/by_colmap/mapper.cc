@@ -1,11 +1,11 @@
-#include "stages/reconstruct/mapper.h"
+#include "stages/reconstruct/by_colmap/mapper.h"
 
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
 
 #include "core/files/write_error.h"
-#include "stages/reconstruct/run_program.h"
+#include "stages/reconstruct/by_colmap/run_program.h"
 
 namespace cairn::reconstruct {
 namespace {

@@ -1,4 +1,4 @@
-#include "stages/reconstruct/run_program.h"
+#include "stages/reconstruct/by_colmap/run_program.h"
 
 #include <chrono>
 #include <thread>
