@@ -25,6 +25,8 @@ class BlockCholesky {
 
   int num_blocks() const { return static_cast<int>(block_of_.size()); }
   int num_rows() const { return row_begin_.back(); }
+  // Groups of columns that are factorised together.
+  int num_supernodes() const { return static_cast<int>(supernodes_.size()); }
   int block_of(int position) const { return block_of_[position]; }
   int position_of(int block) const { return position_of_[block]; }
   // Of the block at a position: its first row, and the number of its rows.

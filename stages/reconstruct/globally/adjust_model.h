@@ -66,7 +66,8 @@ struct AdjustModelOptions {
   double way_sigma_ratio = 0.05, least_way_sigma_ratio = 0.02;
   double turn_sigma_deg = 0.5, turn_sigma_ratio = 0.05;
   int max_num_iterations = 25;
-  double function_tolerance = 1e-4;
+  // Groups of images that few points join to the others still move where the cost hardly does.
+  double function_tolerance = 1e-5;
   // Whether the cameras' free parameters change, too.
   bool adjust_cameras = true;
   // The result does not depend on it.

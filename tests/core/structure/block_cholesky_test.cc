@@ -152,13 +152,36 @@ TEST(BlockCholesky, LittleOfAChainIsFilled) {
   for (int p = 0; p < 200; ++p) EXPECT_LE(cholesky.RowsOf(p).size(), 3u) << p;
 }
 
-TEST(BlockCholesky, ColumnsOfLikeStructureShareTheirRows) {
-  // All share entries: one supernode, as wide as is allowed, whose columns have the later ones' rows.
+TEST(BlockCholesky, ColumnsOfLikeStructureAreFactorisedTogether) {
+  // All share entries: one supernode, whose columns have the later ones' rows.
   const BlockMatrix matrix = RandomMatrix(std::vector<int>(5, 6), 1, 1);
   const BlockCholesky cholesky(matrix.sizes, matrix.neighbours);
+  EXPECT_EQ(cholesky.num_supernodes(), 1);
   for (int p = 0; p < 5; ++p) {
     ASSERT_EQ(cholesky.RowsOf(p).size(), 5u - p);
     for (int k = p; k < 5; ++k) EXPECT_EQ(cholesky.RowsOf(p)[k - p], k);
+  }
+  // Of 192 columns at most: 32 blocks.
+  const BlockMatrix wide = RandomMatrix(std::vector<int>(100, 6), 1, 5);
+  EXPECT_EQ(BlockCholesky(wide.sizes, wide.neighbours).num_supernodes(), 4);
+  // Nothing in common.
+  EXPECT_EQ(BlockCholesky({6, 6, 6}, {{}, {}, {}}).num_supernodes(), 3);
+}
+
+TEST(BlockCholesky, AColumnIsFactorisedWithOthersWhereThatStoresFewZeros) {
+  // A block of 2 hangs on one of a clique of 6 x 6: with the clique's other m blocks its column has 2 x 6 m
+  // zeros of (2 + 6) x (8 + 6 m) entries.
+  for (const int m : {0, 1, 3, 5}) {
+    std::vector<int> sizes(m + 1, 6);
+    sizes.push_back(2);
+    std::vector<std::vector<int>> neighbours(m + 2);
+    for (int i = 0; i <= m; ++i) {
+      for (int j = 0; j < i; ++j) neighbours[i].push_back(j);
+    }
+    neighbours.back() = {0};
+    const BlockCholesky cholesky(sizes, neighbours);
+    EXPECT_EQ(cholesky.position_of(m + 1), 0);
+    EXPECT_EQ(cholesky.num_supernodes(), m <= 1 ? 1 : 2) << m;  // 0, 11 %; 17, 20 %
   }
 }
 

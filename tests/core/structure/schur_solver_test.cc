@@ -1,5 +1,7 @@
 #include "core/structure/schur_solver.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -206,6 +208,35 @@ TEST(SchurSolver, FiveStepsThatPromiseNothingAreEnough) {
   EXPECT_EQ(solution.summary.num_steps, 5);
   EXPECT_FALSE(solution.summary.has_converged);
   EXPECT_EQ(solution.x, 0);
+}
+
+// The residual x + y + z - 1 of three parameters.
+class Sum : public ceres::SizedCostFunction<1, 3> {
+ public:
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = parameters[0][0] + parameters[0][1] + parameters[0][2] - 1;
+    if (jacobians != nullptr && jacobians[0] != nullptr) std::fill_n(jacobians[0], 3, 1.0);
+    return true;
+  }
+};
+
+TEST(SchurSolver, WhatIsNotDeterminedIsDamped) {
+  const Sum sum;
+  for (const bool is_point : {false, true}) {
+    std::array<double, 3> values = {0, 0, 0};
+    SchurProblem problem;
+    const int block = is_point ? problem.AddPoint(values.data()) : problem.AddBlock(values.data(), 3);
+    problem.AddResidual(&sum, nullptr, {block});
+    EXPECT_TRUE(SolveSchur(problem, {}).has_converged);
+    for (const double value : values) EXPECT_NEAR(value, 1.0 / 3, 1e-6);
+    // So little damping is none, once it is rounded: there is no step, five times.
+    values = {0, 0, 0};
+    const SchurSummary summary = SolveSchur(problem, {.initial_trust_region_radius = 1e25});
+    EXPECT_FALSE(summary.has_converged);
+    EXPECT_EQ(summary.num_steps, 5);
+    EXPECT_EQ(summary.trust_region_radius, 1e25 / (2 * 4 * 8 * 16));
+    EXPECT_EQ(values[0], 0);
+  }
 }
 
 TEST(SchurSolver, ASlopeThatIsNoNumberIsNotGoneAlong) {
