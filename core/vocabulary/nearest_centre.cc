@@ -3,12 +3,10 @@
 #include <algorithm>
 
 #include "core/features/descriptor_distance.h"
+#include "core/features/wide_clones.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>
-#define CAIRN_WIDE_CLONES __attribute__((target_clones("avx2", "default")))
-#else
-#define CAIRN_WIDE_CLONES
 #endif
 
 namespace cairn {

@@ -1,17 +1,19 @@
 #include "stages/reconstruct/globally/adjust_model.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include <spdlog/spdlog.h>
 
+#include "core/base/parallel.h"
 #include "core/base/quantiles.h"
 #include "core/camera/pixel_ray.h"
 #include "core/structure/bundle_blocks.h"
 #include "core/structure/camera_sensitivity.h"
+#include "core/structure/schur_solver.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -133,122 +135,118 @@ size_t HoldingFrame(const ModelProblem& problem) {
   return std::max_element(count.begin(), count.end()) - count.begin();
 }
 
-std::vector<size_t> HeldImages(const ModelProblem& problem) {
-  std::vector<size_t> held;
+std::vector<int> HeldImages(const ModelProblem& problem) {
+  std::vector<int> held;
   for (size_t i = 0; i < problem.is_held.size(); ++i) {
-    if (problem.is_held[i]) held.push_back(i);
+    if (problem.is_held[i]) held.push_back(static_cast<int>(i));
   }
-  if (held.empty() && !problem.observations.empty()) held.push_back(HoldingFrame(problem));
+  if (held.empty() && !problem.observations.empty()) held.push_back(static_cast<int>(HoldingFrame(problem)));
   return held;
 }
 
 struct Seen {
-  PixelRay ray;
+  std::optional<PixelRay> ray;
   CameraSensitivity sensitivity;
 };
+
+std::vector<Seen> SeeAll(const AdjustModelOptions& options, const ModelProblem& problem) {
+  std::vector<Seen> seen(problem.observations.size());
+  ParallelFor(std::ssize(seen), options.num_threads, [&](int64_t k) {
+    const ModelObservation& observation = problem.observations[k];
+    const FreeCamera& camera = problem.cameras[problem.camera_idx[observation.image]];
+    seen[k].ray = MakePixelRay(camera.camera, observation.pixel);
+    if (seen[k].ray && options.adjust_cameras)
+      seen[k].sensitivity = SensitivityOf(camera.camera, observation.pixel, camera.free);
+  });
+  return seen;
+}
 
 }  // namespace
 
 void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem) {
-  // Poses, then changes of cameras, in one piece: Ceres orders blocks by their addresses, and another order
-  // is another rounding.
-  size_t num_values = kPoseBlockSize * problem->cam_from_world.size();
-  std::vector<size_t> first_change;
-  for (const FreeCamera& camera : problem->cameras) {
-    first_change.push_back(num_values);
-    num_values += camera.free.size();
-  }
-  std::vector<double> values(num_values, 0);
-  const auto pose_of = [&](size_t image) { return &values[kPoseBlockSize * image]; };
-  for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
-    StorePose(problem->cam_from_world[i], pose_of(i));
-
-  std::vector<Seen> seen(problem->observations.size());
+  const size_t num_images = problem->cam_from_world.size();
+  const std::vector<Seen> seen = SeeAll(options, *problem);
   PoseManifold manifold;
+  SchurProblem schur;
+  std::vector<double> poses(kPoseBlockSize * num_images);
+  for (size_t i = 0; i < num_images; ++i) {
+    StorePose(problem->cam_from_world[i], &poses[kPoseBlockSize * i]);
+    schur.AddBlock(&poses[kPoseBlockSize * i], kPoseBlockSize, &manifold);
+  }
+  const auto point_block = [&](int point) { return static_cast<int>(num_images) + point; };
+  for (Eigen::Vector3d& point : problem->points) schur.AddPoint(point.data());
+  std::vector<std::vector<double>> changes;  // per camera
+  std::vector<int> camera_block;
+  for (const FreeCamera& camera : problem->cameras) {
+    changes.emplace_back(camera.free.size(), 0);
+    camera_block.push_back(schur.AddBlock(changes.back().data(), static_cast<int>(camera.free.size())));
+  }
+
   ceres::CauchyLoss loss(options.loss_scale_px);
   BundleCosts costs;
-  ceres::Problem ceres_problem(UncheckedProblem());
-  std::vector<bool> is_camera_used(problem->cameras.size(), false);
-  const std::vector<int> none;
-  for (size_t k = 0; k < problem->observations.size(); ++k) {
+  std::vector<bool> is_camera_used(problem->cameras.size(), false), is_known(num_images, false);
+  for (size_t k = 0; k < seen.size(); ++k) {
+    if (!seen[k].ray) continue;
     const ModelObservation& observation = problem->observations[k];
-    const int c = problem->camera_idx[observation.image];
-    const FreeCamera& camera = problem->cameras[c];
-    const std::optional<PixelRay> ray = MakePixelRay(camera.camera, observation.pixel);
-    if (!ray) continue;
-    seen[k] = {*ray,
-               SensitivityOf(camera.camera, observation.pixel, options.adjust_cameras ? camera.free : none)};
-    std::vector<double*> blocks = {pose_of(observation.image), problem->points[observation.point].data()};
-    if (!seen[k].sensitivity.empty()) {
-      blocks.push_back(&values[first_change[c]]);
+    const int point = point_block(observation.point);
+    const ceres::CostFunction* cost = costs.AddReprojection(*seen[k].ray, seen[k].sensitivity, 1);
+    is_known[observation.image] = true;
+    if (seen[k].sensitivity.empty()) {
+      schur.AddResidual(cost, &loss, {observation.image, point});
+    } else {
+      const int c = problem->camera_idx[observation.image];
       is_camera_used[c] = true;
+      schur.AddResidual(cost, &loss, {observation.image, point, camera_block[c]});
     }
-    ceres_problem.AddResidualBlock(costs.AddReprojection(seen[k].ray, seen[k].sensitivity, 1), &loss, blocks);
   }
   ceres::CauchyLoss weak_loss(1);
-  const auto are_known = [&](size_t a, size_t b) {
-    return ceres_problem.HasParameterBlock(pose_of(a)) && ceres_problem.HasParameterBlock(pose_of(b));
-  };
   for (const RelativeRotation& rotation : problem->rotations) {
-    if (!are_known(rotation.image1, rotation.image2)) continue;
-    ceres_problem.AddResidualBlock(
+    if (!is_known[rotation.image1] || !is_known[rotation.image2]) continue;
+    schur.AddResidual(
         costs.Add(new ceres::AutoDiffCostFunction<RelativeRotationCost, 3, kPoseBlockSize, kPoseBlockSize>(
             new RelativeRotationCost{rotation.cam2_from_cam1, RadFromDeg(options.rotation_sigma_deg)})),
-        rotation.is_sure ? nullptr : &weak_loss, pose_of(rotation.image1), pose_of(rotation.image2));
+        rotation.is_sure ? nullptr : &weak_loss, {rotation.image1, rotation.image2});
   }
   const double typical_step = TypicalStep(*problem);
   for (const ModelStep& step : problem->steps) {
-    if (!(typical_step > 0) || !are_known(step.from, step.to)) continue;
-    ceres_problem.AddResidualBlock(
+    if (!(typical_step > 0) || !is_known[step.from] || !is_known[step.to]) continue;
+    schur.AddResidual(
         costs.Add(new ceres::AutoDiffCostFunction<StepLengthCost, 1, kPoseBlockSize, kPoseBlockSize>(
             new StepLengthCost{typical_step, step.length, options.step_sigma})),
-        &weak_loss, pose_of(step.from), pose_of(step.to));
+        &weak_loss, {step.from, step.to});
   }
   const double median_way_m = MedianWayM(problem->motions);
   for (const ImageMotion& motion : problem->motions) {
-    if (!(median_way_m > 0) || !are_known(motion.image1, motion.image2)) continue;
-    ceres_problem.AddResidualBlock(costs.Add(MakeMotionCost(options, motion, median_way_m)), &weak_loss,
-                                   pose_of(motion.image1), pose_of(motion.image2));
+    if (!(median_way_m > 0) || !is_known[motion.image1] || !is_known[motion.image2]) continue;
+    schur.AddResidual(costs.Add(MakeMotionCost(options, motion, median_way_m)), &weak_loss,
+                      {motion.image1, motion.image2});
   }
-  const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (Eigen::Vector3d& point : problem->points) {
-    if (ceres_problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
-  }
-  for (const size_t i : HeldImages(*problem)) {
-    if (ceres_problem.HasParameterBlock(pose_of(i))) ceres_problem.SetParameterBlockConstant(pose_of(i));
-  }
-  for (size_t i = 0; i < problem->cam_from_world.size(); ++i) {
-    if (!ceres_problem.HasParameterBlock(pose_of(i))) continue;
-    ceres_problem.SetManifold(pose_of(i), &manifold);
-    ordering->AddElementToGroup(pose_of(i), 1);
-  }
+  for (const int i : HeldImages(*problem)) schur.SetConstant(i);
   for (size_t c = 0; c < problem->cameras.size(); ++c) {
-    if (!is_camera_used[c]) continue;
-    ceres_problem.AddResidualBlock(costs.Add(new CameraPriorCost(problem->cameras[c])), nullptr,
-                                   &values[first_change[c]]);
-    ordering->AddElementToGroup(&values[first_change[c]], 1);
-    for (size_t k = 0; k < problem->cameras[c].free.size(); ++k) {
-      const double most = kMaxChangeSigmas * problem->cameras[c].sigma[k];
-      ceres_problem.SetParameterLowerBound(&values[first_change[c]], static_cast<int>(k), -most);
-      ceres_problem.SetParameterUpperBound(&values[first_change[c]], static_cast<int>(k), most);
+    const FreeCamera& camera = problem->cameras[c];
+    if (!is_camera_used[c]) {
+      schur.SetConstant(camera_block[c]);
+      continue;
+    }
+    schur.AddResidual(costs.Add(new CameraPriorCost(camera)), nullptr, {camera_block[c]});
+    for (size_t k = 0; k < camera.free.size(); ++k) {
+      const double most = kMaxChangeSigmas * camera.sigma[k];
+      schur.SetBounds(camera_block[c], static_cast<int>(k), -most, most);
     }
   }
-  ceres::Solver::Options solver;
-  solver.linear_solver_ordering = ordering;
-  solver.max_num_iterations = options.max_num_iterations;
-  solver.function_tolerance = options.function_tolerance;
-  const ceres::Solver::Summary summary = SolveOnOneThread(solver, &ceres_problem, options.progress);
+  const auto start = std::chrono::steady_clock::now();
+  const SchurSummary summary = SolveSchur(schur, {.max_num_iterations = options.max_num_iterations,
+                                                  .function_tolerance = options.function_tolerance,
+                                                  .num_threads = options.num_threads,
+                                                  .progress = options.progress});
   spdlog::debug(
       "reconstruct: {} points and {} observations adjusted in {} steps: cost {:.6g} -> {:.6g}; {:.1f} s",
-      problem->points.size(), problem->observations.size(),
-      summary.num_successful_steps + summary.num_unsuccessful_steps, summary.initial_cost, summary.final_cost,
-      summary.total_time_in_seconds);
-  for (size_t i = 0; i < problem->cam_from_world.size(); ++i)
-    problem->cam_from_world[i] = LoadPose(pose_of(i));
+      problem->points.size(), problem->observations.size(), summary.num_steps, summary.initial_cost,
+      summary.final_cost, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  for (size_t i = 0; i < num_images; ++i) problem->cam_from_world[i] = LoadPose(&poses[kPoseBlockSize * i]);
   for (size_t c = 0; c < problem->cameras.size(); ++c) {
     FreeCamera& camera = problem->cameras[c];
-    for (size_t k = 0; k < camera.free.size(); ++k)
-      camera.camera.params[camera.free[k]] += values[first_change[c] + k];
+    for (size_t k = 0; k < camera.free.size(); ++k) camera.camera.params[camera.free[k]] += changes[c][k];
   }
 }
 

@@ -60,15 +60,18 @@ struct AdjustModelOptions {
   double way_sigma_ratio = 0.05, least_way_sigma_ratio = 0.02;
   double turn_sigma_deg = 0.5, turn_sigma_ratio = 0.05;
   int max_num_iterations = 25;
-  double function_tolerance = 1e-4;
+  // Groups of images that few points join to the others still move where the cost hardly does.
+  double function_tolerance = 1e-5;
   // Whether the cameras' free parameters change, too.
   bool adjust_cameras = true;
+  // The result does not depend on it.
+  int num_threads = 0;
   // Advanced by max_num_iterations, little by little; an adjustment ends when it is cancelled.
   Progress* progress = nullptr;
 };
 
 // Minimises the reprojection errors over poses, points and cameras, as group_classes does where poses are
-// stated (Ceres, points eliminated, one thread: bit-stable).  Cameras change by their sensitivities at the
+// stated (core/structure/schur_solver.h: bit-stable).  Cameras change by their sensitivities at the
 // start (core/structure/camera_sensitivity.h): call it again after larger changes.  The frame is free
 // where no image is held.
 void AdjustModel(const AdjustModelOptions& options, ModelProblem* problem);

@@ -390,7 +390,8 @@ void PartMapper::Adjust(int num_keypoints, bool adjust_cameras, Progress& progre
     }
     problem_.points.push_back(triangulations_[chosen.track].position);
   }
-  AdjustModel({.adjust_cameras = adjust_cameras, .progress = &progress}, &problem_);
+  AdjustModel({.adjust_cameras = adjust_cameras, .num_threads = num_threads_, .progress = &progress},
+              &problem_);
 }
 
 }  // namespace cairn::reconstruct

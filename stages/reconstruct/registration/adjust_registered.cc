@@ -77,7 +77,8 @@ SeenPoints AdjustRegistered(const std::vector<bool>& is_held, const MapGloballyO
     problem.observations.clear();
     AddObservations(*posed, seen, is_held, &problem);
     if (problem.observations.empty()) return seen;
-    AdjustModel({.adjust_cameras = round.adjust_cameras, .progress = &progress}, &problem);
+    AdjustModel({.adjust_cameras = round.adjust_cameras, .num_threads = num_threads, .progress = &progress},
+                &problem);
     for (size_t i = 0; i < is_held.size(); ++i) {
       if (posed->cam_from_world[i] && !is_held[i]) posed->cam_from_world[i] = problem.cam_from_world[i];
     }
