@@ -75,6 +75,8 @@ class Registrar {
     for (const std::string& name : capture.registered)
       result_.sessions.push_back({.name = name, .num_images = 0, .num_joined = 0, .num_supported = 0});
     images_of_.resize(capture.registered.size());
+    has_large_piece_.resize(capture.registered.size(), false);
+    is_large_piece_joined_ = has_large_piece_;
     for (size_t i = 0; i < input.images.size(); ++i) {
       const int session = SessionOfImage(capture.registered, input.images[i].name);
       session_of_.push_back(session);
@@ -123,6 +125,7 @@ class Registrar {
     std::set<int> alone(images_of_[session].begin(), images_of_[session].end());
     const auto add = [&](Piece piece) {
       if (piece.images.empty()) return;
+      if (!IsSmall(piece)) has_large_piece_[session] = true;
       for (const int i : piece.images) alone.erase(i);
       pieces_.push_back(std::move(piece));
     };
@@ -173,7 +176,13 @@ class Registrar {
       std::vector<ImageFix> fixes;
       for (const int i : piece.images) fixes.push_back(fix_of.at(i));
       const std::optional<PiecePlace> place = PlacePiece(piece, fixes, {.max_error_px = kMaxErrorPx});
-      const std::string reason = WhyNot(piece, fixes, place);
+      const int session = session_of_[piece.images[0]];
+      std::string reason = WhyNot(piece, fixes, place);
+      if (reason.empty() && IsSmall(piece) && has_large_piece_[session] && !is_large_piece_joined_[session])
+        reason =
+            "the images of its session that are joined with each other are not registered: it alone says "
+            "less";
+      if (reason.empty() && !IsSmall(piece)) is_large_piece_joined_[session] = true;
       if (place) {
         spdlog::debug(
             "reconstruct: a piece of {} images from {}: {} agree with a place, by {} matches, {} with "
@@ -192,6 +201,10 @@ class Registrar {
     const bool has_placed = left.size() < pieces_.size();
     pieces_ = std::move(left);
     return has_placed;
+  }
+
+  static bool IsSmall(const Piece& piece) {
+    return static_cast<int>(piece.images.size()) < kMinNumImagesTogether;
   }
 
   // Why a piece is not joined at this place; empty: it is.
@@ -280,7 +293,8 @@ class Registrar {
   std::vector<bool> is_held_;                // per image: its pose is stated
   std::vector<int> session_of_;              // per image; -1: of none that is registered
   std::vector<std::vector<int>> images_of_;  // per session
-  std::vector<Piece> pieces_;                // not joined yet
+  std::vector<Piece> pieces_;                // not joined yet; of a session the largest first
+  std::vector<bool> has_large_piece_, is_large_piece_joined_;  // per session: of three images or more
   Registration result_;
 };
 

@@ -178,6 +178,25 @@ TEST(RegisterSessions, AnImageThatIsAloneNeedsMore) {
   EXPECT_THAT(found.reasons[11], HasSubstr("points of the other captures, of 40 needed"));
 }
 
+// Where the session as a whole may be in two places, an image of it that sees enough of one is no better.
+TEST(RegisterSessions, AnImageAloneIsNotJoinedWhereItsSessionIsNot) {
+  TwoSessions sessions = SessionOfOneOfTwoPlaces();
+  const int alone = sessions.tonight[3];
+  std::erase_if(sessions.survey.input.geometries, [&](const TwoViewGeometry& pair) {
+    const auto is = [&](ImageId id) { return id == sessions.survey.input.images[alone].image_id; };
+    const auto is_there = [](ImageId id) { return id > 24; };
+    const auto is_tonight = [&](ImageId id) {
+      return id <= 24 && sessions.IsTonight(sessions.IndexOfId(id));
+    };
+    const ImageId other = is(pair.image_id1) ? pair.image_id2 : pair.image_id1;
+    return (is(pair.image_id1) || is(pair.image_id2)) && (is_there(other) || is_tonight(other));
+  });
+  sessions.survey.input.cameras[kTonightsCamera] = sessions.survey.camera;
+  const Registration found = sessions.Register();
+  EXPECT_EQ(found.sessions[0].num_joined, 0);
+  EXPECT_THAT(found.reasons[alone], HasSubstr("that are joined with each other are not registered"));
+}
+
 TEST(RegisterSessions, TheSameForAnyNumberOfThreads) {
   const TwoSessions sessions(16, IsOdd);
   const Registration one = sessions.Register(1), seven = sessions.Register(7);
