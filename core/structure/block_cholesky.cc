@@ -86,7 +86,7 @@ std::vector<int> OrderByMinimumDegree(const std::vector<std::vector<int>>& neigh
   Eigen::SparseMatrix<double> graph(n, n);
   graph.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
-  if (n > 0) Eigen::AMDOrdering<int>()(graph, order);
+  Eigen::AMDOrdering<int>()(graph, order);
   return {order.indices().data(), order.indices().data() + order.size()};
 }
 

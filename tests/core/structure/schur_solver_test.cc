@@ -14,7 +14,7 @@ namespace cairn {
 namespace {
 
 TEST(SchurSolver, NothingIsSolved) {
-  const SchurSummary summary = SolveSchur(SchurProblem(), {});
+  const SchurSummary summary = SolveSchur(SchurProblem(), {.gradient_tolerance = 0});
   EXPECT_TRUE(summary.has_converged);
   EXPECT_EQ(summary.num_steps, 0);
   EXPECT_EQ(summary.final_cost, 0);
