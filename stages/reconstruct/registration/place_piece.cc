@@ -192,19 +192,20 @@ double MedianDistance(const std::vector<std::vector<PointMatch>>& matches, const
   return distances.empty() ? 0 : Median(distances);
 }
 
-// Whether most images that support one of two placements are elsewhere by the other.
-bool AreElsewhere(const Piece& piece, const std::vector<int>& counts, const PiecePlacement& here,
-                  const PiecePlacement& there, double distance, const PlacePieceOptions& options) {
-  int num_elsewhere = 0, num = 0;
+// Matches that agree with another placement, of images that support one and are elsewhere by the other.
+int NumMatchesElsewhere(const Piece& piece, const std::vector<int>& counts_here,
+                        const std::vector<int>& counts_there, const PiecePlacement& here,
+                        const PiecePlacement& there, double distance, const PlacePieceOptions& options) {
+  int num_matches = 0;
   for (size_t i = 0; i < piece.images.size(); ++i) {
-    if (counts[i] < options.min_num_inliers) continue;
+    if (counts_here[i] < options.min_num_inliers) continue;
     const Pose a = here.CamFromWorld(piece.cam_from_piece[i]),
                b = there.CamFromWorld(piece.cam_from_piece[i]);
-    ++num;
-    num_elsewhere += CenterErrorM(a, b) > options.min_shift_ratio * distance ||
-                     RotationErrorDeg(a, b) > options.min_turn_deg;
+    if (CenterErrorM(a, b) > options.min_shift_ratio * distance ||
+        RotationErrorDeg(a, b) > options.min_turn_deg)
+      num_matches += std::min(counts_there[i], kMaxCounted);
   }
-  return 2 * num_elsewhere > num;
+  return num_matches;
 }
 
 }  // namespace
@@ -230,13 +231,14 @@ std::optional<PiecePlace> PlacePiece(const Piece& piece, const std::vector<Image
   PiecePlace place{.world_from_piece = placement.WorldFromPiece(),
                    .num_inliers = CountInliers(piece, matches, placement, options.max_error_px)};
   place.num_supported = NumSupported(place.num_inliers, options.min_num_inliers);
-  place.num_matches = PlaceScore(CountInliers(piece, tried, placement, options.max_error_px));
+  const std::vector<int> here = CountInliers(piece, tried, placement, options.max_error_px);
+  for (const int count : here)
+    if (count >= options.min_num_inliers) place.num_matches += std::min(count, kMaxCounted);
   const double distance = MedianDistance(matches, piece, placement, options.max_error_px);
   for (size_t h = 0; h < hypotheses.size(); ++h) {
-    const int num_matches = PlaceScore(counts[h]);
-    if (num_matches <= place.num_matches_elsewhere) continue;
-    if (AreElsewhere(piece, counts[h], placement, hypotheses[h], distance, options))
-      place.num_matches_elsewhere = num_matches;
+    place.num_matches_elsewhere =
+        std::max(place.num_matches_elsewhere,
+                 NumMatchesElsewhere(piece, here, counts[h], placement, hypotheses[h], distance, options));
   }
   return place;
 }

@@ -19,8 +19,10 @@ struct PiecePlace {
   Similarity world_from_piece;
   std::vector<int> num_inliers;  // per image: its point matches that agree
   int num_supported = 0;         // images with enough of them
-  // Agreeing matches of all images, of each at most 50 among 100 of its matches that are evenly spread; and
-  // the same of the best of all places elsewhere.  As many as here: the piece looks like two places.
+  // Agreeing matches of the images that support the place, of each at most 50 among 100 that are evenly
+  // spread; and how many matches of the same images agree with another place, the best of all elsewhere.  As
+  // many as here: what these images see is there twice.  Images that agree with another place alone do not
+  // count: they are no part of what is placed here.
   int num_matches = 0, num_matches_elsewhere = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "stages/reconstruct/registration/register_sessions.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -172,6 +173,7 @@ class Registrar {
       fix_of.emplace(image, std::move(fix));
     }
     std::vector<Piece> left;
+    bool has_placed = false;
     for (Piece& piece : pieces_) {
       std::vector<ImageFix> fixes;
       for (const int i : piece.images) fixes.push_back(fix_of.at(i));
@@ -190,17 +192,47 @@ class Registrar {
             piece.images.size(), input_.images[piece.images[0]].name, place->num_supported,
             place->num_matches, place->num_matches_elsewhere, reason.empty() ? "" : ": ", reason);
       }
+      Piece other = reason.empty() ? PartElsewhere(&piece, fixes, *place) : Piece();
       for (size_t k = 0; k < piece.images.size(); ++k) {
         result_.reasons[piece.images[k]] = reason;
         if (reason.empty())
           posed_.cam_from_world[piece.images[k]] =
               TransformPose(place->world_from_piece, piece.cam_from_piece[k]);
       }
+      has_placed |= reason.empty();
       if (!reason.empty()) left.push_back(std::move(piece));
+      if (!other.images.empty()) left.push_back(std::move(other));
     }
-    const bool has_placed = left.size() < pieces_.size();
     pieces_ = std::move(left);
     return has_placed;
+  }
+
+  // Takes out of a piece what is elsewhere: a drive's piece may be torn where the camera turned on the spot.
+  // Images that see enough, but not from here, and those that see nothing and are nearer to them.
+  static Piece PartElsewhere(Piece* piece, const std::vector<ImageFix>& fixes, const PiecePlace& place) {
+    const int min_num_inliers = PlacePieceOptions().min_num_inliers;
+    std::vector<size_t> here, there;
+    for (size_t k = 0; k < fixes.size(); ++k) {
+      if (place.num_inliers[k] >= min_num_inliers) {
+        here.push_back(k);
+      } else if (fixes[k].num_inliers() >= min_num_inliers) {
+        there.push_back(k);
+      }
+    }
+    const auto distance_to = [&](size_t k, const std::vector<size_t>& others) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const size_t other : others)
+        nearest = std::min(nearest, CenterErrorM(piece->cam_from_piece[k], piece->cam_from_piece[other]));
+      return nearest;
+    };
+    Piece kept, part;
+    for (size_t k = 0; k < fixes.size(); ++k) {
+      Piece& to = distance_to(k, there) < distance_to(k, here) ? part : kept;
+      to.images.push_back(piece->images[k]);
+      to.cam_from_piece.push_back(piece->cam_from_piece[k]);
+    }
+    *piece = std::move(kept);
+    return part;
   }
 
   static bool IsSmall(const Piece& piece) {

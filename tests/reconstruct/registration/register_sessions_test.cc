@@ -101,6 +101,20 @@ TEST(RegisterSessions, PosesInAFrameOfTheirOwnAreBroughtOver) {
   sessions.ExpectNear(found, 0.03, 0.1);
 }
 
+// A session whose own frame is torn in two is not torn in the others' frame.
+TEST(RegisterSessions, HalvesOfAPieceAreEachPutWhereTheyAre) {
+  TwoSessions sessions(30, IsOdd);
+  for (const int i : sessions.tonight) {
+    Pose pose = sessions.survey.cams_from_world[i];
+    if (i > 18) pose.translation -= pose.rotation * Eigen::Vector3d(3, 1, 0);
+    sessions.survey.capture.own_poses[sessions.survey.input.images[i].name] = pose;
+  }
+  sessions.survey.input.cameras[kTonightsCamera] = sessions.survey.camera;
+  const Registration found = sessions.Register();
+  EXPECT_EQ(found.sessions[0].num_joined, 15);
+  sessions.ExpectNear(found, 0.03, 0.1);
+}
+
 // They are where those are that they are joined with.
 TEST(RegisterSessions, ImagesThatSeeNothingOfTheOthersAreBridged) {
   TwoSessions sessions(24, [](int i) { return i >= 10; });
