@@ -194,6 +194,17 @@ bool HasLines(const std::string& path) {
   return false;
 }
 
+// Which captures of a joined one are registered to the others.
+Result<std::vector<bool>> RegisteredCaptures(const Recipe& recipe) {
+  std::vector<CaptureSession> sessions;
+  for (const RecipeCapture& capture : recipe.captures)
+    sessions.push_back({.name = capture.name,
+                        .root = capture.path,
+                        .queries_path = capture.queries_path,
+                        .is_registered = capture.is_registered});
+  return SessionsToRegister(sessions);
+}
+
 // The held-out images that check_map localizes; empty = none are given.
 std::string QueriesPath(const Recipe& recipe, const std::string& capture, const std::string& build_dir) {
   const auto has_queries = [](const RecipeCapture& c) {
@@ -201,9 +212,12 @@ std::string QueriesPath(const Recipe& recipe, const std::string& capture, const 
   };
   if (!recipe.simulated && !IsJoined(recipe) && !recipe.captures.front().queries_path.empty())
     return Absolute(recipe.captures.front().queries_path);
-  const bool is_any = std::any_of(recipe.captures.begin(), recipe.captures.end(), has_queries);
+  // Those of captures with poses are kept where others are registered to them, whose own are not.
+  const Result<std::vector<bool>> are_registered = RegisteredCaptures(recipe);
+  bool is_any = false;
+  for (size_t i = 0; i < recipe.captures.size(); ++i)
+    is_any |= has_queries(recipe.captures[i]) && !(are_registered.ok() && (*are_registered)[i]);
   if (IsReconstructed(recipe)) {
-    // Those of captures with poses are kept where the others are registered to them.
     const bool holds_out = OptionText(recipe, "reconstruct", "hold_out_every") != "0";
     return holds_out || is_any ? build_dir + "/poses/queries.txt" : "";
   }
@@ -242,13 +256,7 @@ Result<bool> IsRegistered(const Recipe& recipe) {
     const std::string& path = recipe.captures.front().path;
     return fs::exists(path + "/images.txt") && fs::exists(path + "/" + kRegisterFile);
   }
-  std::vector<CaptureSession> sessions;
-  for (const RecipeCapture& capture : recipe.captures)
-    sessions.push_back({.name = capture.name,
-                        .root = capture.path,
-                        .queries_path = capture.queries_path,
-                        .is_registered = capture.is_registered});
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<bool> are_registered, SessionsToRegister(sessions));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<bool> are_registered, RegisteredCaptures(recipe));
   return std::find(are_registered.begin(), are_registered.end(), true) != are_registered.end();
 }
 

@@ -159,7 +159,10 @@ class Registrar {
       piece.images.push_back(index.at(image.image_id));
       piece.cam_from_piece.push_back(image.cam_from_world);
     }
-    for (const auto& [camera_id, camera] : model.cameras) posed_.cameras.insert_or_assign(camera_id, camera);
+    // Of a session's pieces the largest, which is the first, knows its camera best.
+    for (const auto& [camera_id, camera] : model.cameras) {
+      if (refined_.insert(camera_id).second) posed_.cameras.insert_or_assign(camera_id, camera);
+    }
     return piece;
   }
 
@@ -326,6 +329,7 @@ class Registrar {
   std::vector<int> session_of_;              // per image; -1: of none that is registered
   std::vector<std::vector<int>> images_of_;  // per session
   std::vector<Piece> pieces_;                // not joined yet; of a session the largest first
+  std::set<CameraId> refined_;               // cameras that a session's own map has
   std::vector<bool> has_large_piece_, is_large_piece_joined_;  // per session: of three images or more
   Registration result_;
 };

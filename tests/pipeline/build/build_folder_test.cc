@@ -157,6 +157,54 @@ TEST_F(BuildFolderTest, ConfigurationNamesCaptureAndQueries) {
   EXPECT_EQ(Text("options/queries"), list + "\n");
 }
 
+TEST_F(BuildFolderTest, CapturesWithoutPosesInTheFrameOfOthersAreRegistered) {
+  const auto add = [&](const std::string& name, bool has_poses) {
+    const std::string path = (folder_ / name).string();
+    fs::create_directories(path);
+    if (has_poses) ASSERT_TRUE(WriteFileAtomically(path + "/images.txt", "").ok());
+    recipe_.captures.push_back({.name = name, .path = path});
+  };
+  int hold_out_every = 0;
+  recipe_.stages.push_back({.stage = "reconstruct",
+                            .table = {{.name = "hold_out_every", .value = &hold_out_every, .help = ""}},
+                            .options = nullptr});
+  recipe_.captures.clear();
+  add("old", true);
+  add("robot2", true);
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_FALSE(IsReconstructed(recipe_));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nRECONSTRUCTED := no\nREGISTERED := no\n"));
+  const std::string without = Text("options/capture");
+  // Of another frame, as the recipe says; its own held-out images are no queries of the map.
+  recipe_.captures[1].is_registered = true;
+  ASSERT_TRUE(
+      WriteFileAtomically(recipe_.captures[1].path + "/queries.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n").ok());
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_TRUE(IsReconstructed(recipe_));
+  EXPECT_TRUE(IsRegistered(recipe_).value());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nRECONSTRUCTED := yes\nREGISTERED := yes\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nSESSIONS_REGISTERED := robot2\n"));
+  EXPECT_EQ(Text("options/capture"), without + "registered robot2\n");
+  EXPECT_EQ(Text("options/queries"), "left_out\n");
+  // Without poses: so or so.  Those of the posed one are kept.
+  add("tonight", false);
+  recipe_.captures[1].is_registered = false;
+  ASSERT_TRUE(WriteBuildFolder(recipe_, paths_).ok());
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nREGISTERED := yes\n"));
+  EXPECT_THAT(Text("config.mk"), HasSubstr("\nSESSIONS_REGISTERED := \n"));
+  EXPECT_EQ(Text("options/queries"), paths_.build_dir + "/poses/queries.txt\n");
+  // None has the frame.
+  recipe_.captures[0].is_registered = recipe_.captures[1].is_registered = true;
+  EXPECT_THAT(WriteBuildFolder(recipe_, paths_).error().message,
+              HasSubstr("every capture with poses is to be registered"));
+  // A capture that was joined before says it itself.
+  recipe_.captures.resize(1);
+  EXPECT_FALSE(IsRegistered(recipe_).value());
+  ASSERT_TRUE(WriteFileAtomically(recipe_.captures[0].path + "/register.txt", "tonight\n").ok());
+  EXPECT_TRUE(IsRegistered(recipe_).value());
+  EXPECT_TRUE(IsReconstructed(recipe_));
+}
+
 TEST_F(BuildFolderTest, SimulatedCaptureLiesInTheBuildFolder) {
   recipe_.captures.clear();
   recipe_.simulated = true;
