@@ -22,6 +22,9 @@ constexpr double kMaxErrorPx = 8;
 constexpr int kMinNumImagesTogether = 3, kMinNumInliersAlone = 40;
 // Of those images of a piece that have a fix of their own, so many agree with its place.
 constexpr double kMinAgreeingRatio = 0.5;
+// Matches that agree of an image that supports a place, on average of at most 50: doors and lamps of another
+// floor have 18, the same place 44 to 50, also in half the light.
+constexpr int kMinMatchesAnImage = 25;
 // Where half as many matches agree with another place, the piece may be there as well.
 constexpr double kMaxRivalRatio = 0.5;
 // Points that an image must see in the end.
@@ -271,6 +274,13 @@ class Registrar {
           "the {} images that are joined with it contradict each other: {} see the other captures, {} of "
           "them from one place",
           num_images, fixed, place->num_supported);
+    }
+    if (place->num_matches < kMinMatchesAnImage * place->num_supported) {
+      return fmt::format(
+          "the {} images that are joined with it see little of the other captures: {} of them {} points "
+          "each, of {} "
+          "needed",
+          num_images, place->num_supported, place->num_matches / place->num_supported, kMinMatchesAnImage);
     }
     if (place->num_matches_elsewhere >= kMaxRivalRatio * place->num_matches) {
       return fmt::format(

@@ -140,6 +140,19 @@ TEST(RegisterSessions, AnotherPlaceIsNotJoinedByMatchesThatAreNone) {
   }
 }
 
+// As of another floor: some doors and lamps.
+TEST(RegisterSessions, AFewPointsAnImageAreNotEnough) {
+  TwoSessions sessions(24, IsOdd);
+  for (TwoViewGeometry& pair : sessions.survey.input.geometries) {
+    // The first keypoints of all images show the same few points.
+    if (sessions.IsAcross(pair))
+      std::erase_if(pair.inliers, [](const Match& match) { return match.idx1 > 22 || match.idx2 > 22; });
+  }
+  const Registration found = sessions.Register();
+  EXPECT_EQ(found.sessions[0].num_joined, 0);
+  EXPECT_THAT(found.reasons[sessions.tonight[0]], HasSubstr("see little of the other captures"));
+}
+
 // The old survey has two places that look alike, and tonight's is one of them.
 TwoSessions SessionOfOneOfTwoPlaces() {
   TwoSessions sessions(24, IsOdd);
