@@ -264,8 +264,7 @@ Status ReadRegistered(const std::vector<std::string>& names, Capture* capture) {
                        capture->root, kRegisterFile, capture->registered[session], image.name);
     }
   }
-  KnownCameras known;
-  CAIRN_ASSIGN_OR_RETURN(known, ReadKnownCameras(capture->root, capture->registered, false));
+  CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, capture->registered, false));
   FlatFolderCameras cameras(std::move(known), capture);
   for (const std::string& session : capture->registered) {
     const std::string path = SessionPosesPath(capture->root, session);

@@ -52,10 +52,11 @@ struct Capture {
 // Beside images.txt, register.txt may name folders of images (a session's each) that images.txt leaves out:
 // they are registered to the others later (stages/reconstruct/registration).  Such a session has the poses of
 // poses/SESSION.txt, which are in a frame of its own, or none; then its cameras come from
-// cameras/SESSION.txt, or as above. Errors: NotFound (no such folder; images.txt without cameras.txt), NoData
-// (no image), Corrupt (a list that cannot be parsed; file and line), Unsupported (camera model),
-// InvalidArgument (without images.txt: queries.txt, or different cameras of one image size; with it: a pose
-// of a session that register.txt names).
+// cameras/SESSION.txt, or as above.
+//
+// Errors: NotFound (no such folder; images.txt without cameras.txt), NoData (no image), Corrupt (a list that
+// cannot be parsed; file and line), Unsupported (camera model), InvalidArgument (without images.txt:
+// queries.txt, or different cameras of one image size; with it: a pose of a session that register.txt names).
 Result<Capture> ReadCapture(const std::string& root);
 
 // In a folder with images.txt: which sessions have no pose there, a name a line.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -25,6 +26,14 @@ struct PaintJob {
   double width_m = 0, height_m = 0;
   Material material = Material::kPlaster;
 };
+
+// 0 to num_items - 1 in a random order.
+std::vector<int> RandomOrder(int num_items, Random* random) {
+  std::vector<int> order(num_items);
+  std::iota(order.begin(), order.end(), 0);
+  for (int i = num_items - 1; i > 0; --i) std::swap(order[i], order[random->UniformInt(0, i)]);
+  return order;
+}
 
 class BuildingMaker {
  public:
@@ -141,9 +150,7 @@ class BuildingMaker {
     Random random(MixSeed(seed_, 4));
     const int num_panels = static_cast<int>(panels_.size());
     const int num_repeated = static_cast<int>(std::lround(options_.repetition_ratio * num_panels));
-    std::vector<int> order(num_panels);
-    for (int i = 0; i < num_panels; ++i) order[i] = i;
-    for (int i = num_panels - 1; i > 0; --i) std::swap(order[i], order[random.UniformInt(0, i)]);
+    const std::vector<int> order = RandomOrder(num_panels, &random);
     std::vector<int> shared(num_panels, -1);
     std::vector<int> shared_jobs;
     for (int i = 0; i < num_repeated; ++i) {
@@ -171,9 +178,10 @@ class BuildingMaker {
   // there is is painted as before.
   void FurnishRooms() {
     std::vector<Furniture> left;
-    for (const Furniture& piece : building_.layout.furniture) {
-      Random random(
-          MixSeed(MixSeed(MixSeed(seed_, 7), options_.change), left.size() + building_.changed.size()));
+    const std::vector<Furniture>& all = building_.layout.furniture;
+    for (size_t i = 0; i < all.size(); ++i) {
+      const Furniture& piece = all[i];
+      Random random(MixSeed(MixSeed(MixSeed(seed_, 7), options_.change), i));
       const bool is_gone =
           options_.change > 0 && !piece.is_pillar && random.Uniform() < options_.removed_furniture_ratio;
       if (!is_gone) {
@@ -193,10 +201,7 @@ class BuildingMaker {
   void ChangePanels() {
     if (options_.change == 0) return;
     Random random(MixSeed(MixSeed(seed_, 6), options_.change));
-    std::vector<int> order(panels_.size());
-    for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-    for (size_t i = order.size(); i > 1; --i)
-      std::swap(order[i - 1], order[random.UniformInt(0, static_cast<int64_t>(i) - 1)]);
+    std::vector<int> order = RandomOrder(static_cast<int>(panels_.size()), &random);
     order.resize(std::lround(options_.changed_panel_ratio * static_cast<double>(panels_.size())));
     std::sort(order.begin(), order.end());
     first_changed_job_ = static_cast<int>(jobs_.size());
@@ -213,7 +218,7 @@ class BuildingMaker {
     }
   }
 
-  // What texture is painted by: those of before a change are painted alike after it.
+  // What a texture is painted by: those of before a change are painted alike after it.
   uint64_t PaintSeed(int texture) const {
     const int num_jobs = static_cast<int>(jobs_.size());
     const int num_changed = first_changed_job_ < 0 ? 0 : num_jobs - first_changed_job_;

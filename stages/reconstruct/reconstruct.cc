@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "core/base/text.h"
 #include "core/files/write_error.h"
@@ -226,6 +227,15 @@ void CollectImages(const ColmapModel& model, const Similarity& world_from_model,
   }
 }
 
+// How much there is of the models, the kept one first.
+void CountModels(const std::vector<ColmapModel>& models, ReconstructResult* result) {
+  for (const ColmapModel& m : models) result->model_sizes.push_back(static_cast<int>(m.images.size()));
+  const std::vector<ModelPoint>& points = models[0].points;
+  result->num_points = static_cast<int>(points.size());
+  for (const ModelPoint& point : points)
+    result->mean_error_px += point.error_px / static_cast<double>(points.size());
+}
+
 Verdict JudgeModels(const std::vector<ColmapModel>& models, const Similarity& world_from_model,
                     const ReconstructResult& result) {
   JudgedModels judged{.models = &models,
@@ -387,8 +397,15 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
                                       const ReconstructOptions& options, const std::string& work_folder,
                                       int num_threads, Progress& progress) {
   CAIRN_RETURN_IF_ERROR(CheckReconstructOptions(options));
-  if (!capture.registered.empty()) return RegisterToOthers(input, capture, options, num_threads, progress);
   ReconstructResult result;
+  if (!capture.registered.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(ColmapModel joined,
+                           RegisterToOthers(input, capture, options, num_threads, progress, &result));
+    const std::vector<ColmapModel> models = {std::move(joined)};
+    CountModels(models, &result);
+    if (!models[0].images.empty()) result.verdict = JudgeModels(models, Similarity(), result);
+    return result;
+  }
   const Result<std::vector<ColmapModel>> mapped =
       MapImages(input, capture, options, work_folder, num_threads, progress, &result);
   std::string zoomed = ZoomedLens(input);
@@ -401,10 +418,7 @@ Result<ReconstructResult> Reconstruct(const MapperInput& input, const Capture& c
   const std::vector<ColmapModel>& models = *mapped;
   const ColmapModel& model = models[0];
   result.frame.is_reconstructed = true;
-  for (const ColmapModel& m : models) result.model_sizes.push_back(static_cast<int>(m.images.size()));
-  result.num_points = static_cast<int>(model.points.size());
-  for (const ModelPoint& point : model.points)
-    result.mean_error_px += point.error_px / static_cast<double>(model.points.size());
+  CountModels(models, &result);
   CollectRejects(input, models, &result);
   CAIRN_RETURN_IF_ERROR(CheckRegistered(input, models, options, &result));
   CAIRN_ASSIGN_OR_RETURN(const Similarity world_from_model, FindFrame(model, capture, options, &result));

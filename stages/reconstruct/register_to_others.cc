@@ -58,40 +58,27 @@ void CollectRegistered(const MapperInput& input, const Capture& capture, const R
 
 }  // namespace
 
-Result<ReconstructResult> RegisterToOthers(const MapperInput& input, const Capture& capture,
-                                           const ReconstructOptions& options, int num_threads,
-                                           Progress& progress) {
+Result<ColmapModel> RegisterToOthers(const MapperInput& input, const Capture& capture,
+                                     const ReconstructOptions& options, int num_threads, Progress& progress,
+                                     ReconstructResult* result) {
   CAIRN_ASSIGN_OR_RETURN(const std::vector<ImageMotion> motions, OdometryMotions(input, capture));
   CAIRN_ASSIGN_OR_RETURN(const Registration found,
                          RegisterSessions(input, capture, motions,
                                           {.refine_focal_length = options.mapper.refine_focal_length,
                                            .refine_distortion = options.mapper.refine_distortion},
                                           num_threads, progress));
-  ReconstructResult result;
-  result.sessions = found.sessions;
-  result.frame = capture.frame.value_or(CaptureFrame());
-  result.frame.is_reconstructed = false;
-  result.frame.has_refined_cameras = true;
-  CollectRegistered(input, capture, found, options.hold_out_every, &result);
+  result->sessions = found.sessions;
+  result->frame = capture.frame.value_or(CaptureFrame());
+  result->frame.is_reconstructed = false;
+  result->frame.has_refined_cameras = true;
+  CollectRegistered(input, capture, found, options.hold_out_every, result);
   for (const RegisteredSession& session : found.sessions) {
     if (session.num_joined > 0) continue;
-    result.warnings.push_back(fmt::format(
+    result->warnings.push_back(fmt::format(
         "{}: none of the {} images of session '{}' were joined to the other captures: it is not in the map",
         capture.root, session.num_images, session.name));
   }
-  const std::vector<ColmapModel> models = {ModelOfRegistered(input, found)};
-  result.model_sizes = {static_cast<int>(models[0].images.size())};
-  result.num_points = static_cast<int>(models[0].points.size());
-  for (const ModelPoint& point : models[0].points)
-    result.mean_error_px += point.error_px / static_cast<double>(models[0].points.size());
-  if (models[0].images.empty()) return result;
-  JudgedModels judged{.models = &models,
-                      .cam_from_world = {},
-                      .rejects = result.rejects,
-                      .is_metric = IsMetric(result.frame)};
-  for (const ModelImage& image : models[0].images) judged.cam_from_world.push_back(image.cam_from_world);
-  result.verdict = Judge(judged, {});
-  return result;
+  return ModelOfRegistered(input, found);
 }
 
 }  // namespace cairn::reconstruct

@@ -45,7 +45,6 @@ class CameraPriorCost : public ceres::CostFunction {
       residuals[i] =
           (camera_.camera.params[p] + parameters[0][i] - camera_.stated.params[p]) / camera_.sigma[i];
     }
-    // To first order.
     const std::vector<double>& stated = camera_.stated.params;
     if (has_aspect_) {
       residuals[n] = ((camera_.camera.params[0] + parameters[0][0]) / stated[0] -

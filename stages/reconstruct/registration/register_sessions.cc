@@ -207,6 +207,8 @@ class Registrar {
       }
       has_placed |= reason.empty();
       if (!reason.empty()) left.push_back(std::move(piece));
+      for (const int i : other.images)
+        result_.reasons[i] = "is elsewhere than the images that are joined with it";
       if (!other.images.empty()) left.push_back(std::move(other));
     }
     pieces_ = std::move(left);

@@ -18,8 +18,8 @@ struct RegisteredSession {
   std::string name;
   int num_images = 0;  // with features
   int num_joined = 0;
-  int num_supported =
-      0;  // of these: that see enough of what other sessions' images see; the others are bridged
+  // Of these: that see enough of what other sessions' images see.  The others are bridged.
+  int num_supported = 0;
 };
 
 struct Registration {
