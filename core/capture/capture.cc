@@ -116,16 +116,20 @@ class FlatFolderCameras {
       AddGuessed(name, session, image);
       return Ok();
     }
-    CAIRN_ASSIGN_OR_RETURN(const Camera* camera, CameraOfSize(*list, name, image.cols, image.rows));
-    if (camera == nullptr) {
-      capture_.rejects.push_back({name, fmt::format("the image has {} x {} pixels, as no camera of {} has",
-                                                    image.cols, image.rows, list->path)});
-      return Ok();
+    return AddKnown(*list, name, session, image.cols, image.rows);
+  }
+
+  // The same for an image without a file; `row` goes to the capture's features.
+  Status Add(const std::string& name, int session, const FeaturesRow& row) {
+    const KnownCameras::List* list = known_.Of(session);
+    if (list == nullptr) {
+      const CameraId camera_id =
+          NewCamera(features_ids_, std::pair(row.path, row.camera.camera_id), [&] { return row.camera; });
+      capture_.images.push_back({name, camera_id, std::nullopt});
+    } else {
+      CAIRN_RETURN_IF_ERROR(AddKnown(*list, name, session, row.camera.width, row.camera.height));
     }
-    CameraId camera_id = camera->camera_id;
-    if (list != (known_.of_all ? &*known_.of_all : nullptr))
-      camera_id = NewCamera(known_ids_, std::pair(session, camera_id), [&] { return *camera; });
-    capture_.images.push_back({name, camera_id, std::nullopt});
+    capture_.features.emplace(name, row);
     return Ok();
   }
 
@@ -141,6 +145,22 @@ class FlatFolderCameras {
   }
 
  private:
+  // The camera of the list that has this size.
+  Status AddKnown(const KnownCameras::List& list, const std::string& name, int session, int width,
+                  int height) {
+    CAIRN_ASSIGN_OR_RETURN(const Camera* camera, CameraOfSize(list, name, width, height));
+    if (camera == nullptr) {
+      capture_.rejects.push_back({name, fmt::format("the image has {} x {} pixels, as no camera of {} has",
+                                                    width, height, list.path)});
+      return Ok();
+    }
+    CameraId camera_id = camera->camera_id;
+    if (&list != (known_.of_all ? &*known_.of_all : nullptr))
+      camera_id = NewCamera(known_ids_, std::pair(session, camera_id), [&] { return *camera; });
+    capture_.images.push_back({name, camera_id, std::nullopt});
+    return Ok();
+  }
+
   // One camera for each session, image size and focal length in EXIF.
   void AddGuessed(const std::string& name, int session, const cv::Mat& image) {
     const ExifTags tags = ReadExif(capture_.images_folder + "/" + name);
@@ -196,6 +216,7 @@ class FlatFolderCameras {
   Capture& capture_;
   std::map<FocalSource, FocalRange> focal_ranges_;
   std::map<std::pair<int, CameraId>, CameraId> known_ids_;
+  std::map<std::pair<std::string, CameraId>, CameraId> features_ids_;
   std::map<std::tuple<int, int, int, double>, CameraId> guessed_ids_;
 };
 
@@ -223,6 +244,25 @@ Status AddUnposed(const std::string& name, int session, FlatFolderCameras* camer
   return cameras->Add(name, session, *image);
 }
 
+// The images that a database of features has, where no file is of its session ("": of any): they are the
+// session's.
+Status AddUnposedFeatures(const std::vector<std::string>& names, const std::vector<std::string>& sessions,
+                          const std::string& session, CaptureFeatures* features, FlatFolderCameras* cameras) {
+  const bool has_files = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return session.empty() || name.starts_with(session + "/");
+  });
+  if (has_files) return Ok();
+  CAIRN_ASSIGN_OR_RETURN(const auto* rows, features->List(session));
+  for (const auto& [name, row] : *rows)
+    CAIRN_RETURN_IF_ERROR(cameras->Add(name, SessionOfImage(sessions, name), row));
+  return Ok();
+}
+
+void SortByName(std::vector<CaptureImage>* images) {
+  std::sort(images->begin(), images->end(),
+            [](const CaptureImage& a, const CaptureImage& b) { return a.name < b.name; });
+}
+
 // A capture without image lists.
 Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
   const std::string queries = capture->root + "/queries.txt";
@@ -246,14 +286,20 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
   }
   CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, sessions, true));
   FlatFolderCameras cameras(std::move(known), capture);
-  for (const std::string& name : ListImages(capture->images_folder, sessions))
+  const std::vector<std::string> names = ListImages(capture->images_folder, sessions);
+  for (const std::string& name : names)
     CAIRN_RETURN_IF_ERROR(AddUnposed(name, SessionOfImage(sessions, name), &cameras, capture));
+  CaptureFeatures features(capture->root);
+  CAIRN_RETURN_IF_ERROR(AddUnposedFeatures(names, sessions, "", &features, &cameras));
+  for (const std::string& session : sessions)
+    CAIRN_RETURN_IF_ERROR(AddUnposedFeatures(names, sessions, session, &features, &cameras));
+  SortByName(&capture->images);
   cameras.Finish();
   return Ok();
 }
 
 // Images of sessions that have no pose in the frame of the others.
-Status ReadRegistered(const std::vector<std::string>& names, Capture* capture) {
+Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* features, Capture* capture) {
   for (const auto* list : {&capture->images, &capture->queries}) {
     for (const CaptureImage& image : *list) {
       const int session = SessionOfImage(capture->registered, image.name);
@@ -284,19 +330,39 @@ Status ReadRegistered(const std::vector<std::string>& names, Capture* capture) {
     if (session < 0 || IsThere(SessionPosesPath(capture->root, capture->registered[session]))) continue;
     CAIRN_RETURN_IF_ERROR(AddUnposed(name, session, &cameras, capture));
   }
+  for (const std::string& session : capture->registered) {
+    if (IsThere(SessionPosesPath(capture->root, session))) continue;
+    CAIRN_RETURN_IF_ERROR(AddUnposedFeatures(names, capture->registered, session, features, &cameras));
+  }
   cameras.Finish();
-  std::sort(capture->images.begin(), capture->images.end(),
-            [](const CaptureImage& a, const CaptureImage& b) { return a.name < b.name; });
+  SortByName(&capture->images);
   return Ok();
 }
 
-// Moves images without a file, or with a camera that cameras.txt lacks, to the rejects.
-void RejectUnusable(Capture* capture, std::vector<CaptureImage>* images) {
+// Where the features of images without a file are.
+Status FindFeatures(const std::vector<CaptureImage>& images, CaptureFeatures* features, Capture* capture) {
+  for (const CaptureImage& image : images) {
+    std::error_code error;
+    if (fs::exists(capture->ImagePath(image), error) || capture->features.contains(image.name)) continue;
+    CAIRN_ASSIGN_OR_RETURN(const FeaturesRow* row, features->Find(image.name));
+    if (row != nullptr) capture->features.emplace(image.name, *row);
+  }
+  return Ok();
+}
+
+// Moves images without file and features, or with a camera that cameras.txt lacks, to the rejects.
+void RejectUnusable(const CaptureFeatures& features, Capture* capture, std::vector<CaptureImage>* images) {
   std::erase_if(*images, [&](const CaptureImage& image) {
     std::string reason;
     std::error_code error;
     const std::string path = capture->ImagePath(image);
-    if (!fs::exists(path, error)) {
+    const std::string database = features.PathFor(image.name);
+    if (capture->FeaturesOf(image) != nullptr) {
+      if (capture->cameras.count(image.camera_id) == 0)
+        reason = fmt::format("camera {} is not in {}/cameras.txt", image.camera_id, capture->root);
+    } else if (!fs::exists(path, error) && !database.empty()) {
+      reason = fmt::format("{}: no such file, and no such image in {}", path, database);
+    } else if (!fs::exists(path, error)) {
       reason = fs::is_symlink(fs::symlink_status(path, error))
                    ? fmt::format("{}: a link to a file that does not exist", path)
                    : fmt::format("{}: no such file, but the image list names it", path);
@@ -324,10 +390,13 @@ Status ReadLists(const std::vector<std::string>& sessions, Capture* capture) {
     CAIRN_ASSIGN_OR_RETURN(capture->frame, ReadCaptureFrame(frame));
   }
   const std::vector<std::string> names = ListImages(capture->images_folder, sessions);
+  CaptureFeatures features(root);
   if (const std::string path = root + "/" + kRegisterFile; IsThere(path)) {
     CAIRN_ASSIGN_OR_RETURN(capture->registered, ReadSessionsText(path));
-    CAIRN_RETURN_IF_ERROR(ReadRegistered(names, capture));
+    CAIRN_RETURN_IF_ERROR(ReadRegistered(names, &features, capture));
   }
+  CAIRN_RETURN_IF_ERROR(FindFeatures(capture->images, &features, capture));
+  CAIRN_RETURN_IF_ERROR(FindFeatures(capture->queries, &features, capture));
   capture->has_poses = capture->registered.empty();
   std::set<std::string> unlisted(names.begin(), names.end());
   for (const CaptureImage& image : capture->images) unlisted.erase(image.name);
@@ -337,8 +406,8 @@ Status ReadLists(const std::vector<std::string>& sessions, Capture* capture) {
     capture->warnings.push_back(
         fmt::format("{}/{}: in neither images.txt nor queries.txt; left out", capture->images_folder, name));
   }
-  RejectUnusable(capture, &capture->images);
-  RejectUnusable(capture, &capture->queries);
+  RejectUnusable(features, capture, &capture->images);
+  RejectUnusable(features, capture, &capture->queries);
   return Ok();
 }
 

@@ -7,12 +7,14 @@
 
 #include "core/base/error.h"
 #include "core/camera/camera.h"
+#include "core/capture/capture_features.h"
 #include "core/capture/capture_frame.h"
 #include "core/geometry/pose.h"
 
 namespace cairn {
 
-// An image of a capture: its file is ROOT/images/NAME (in a flat folder ROOT/NAME).
+// An image of a capture: its file is ROOT/images/NAME (in a flat folder ROOT/NAME), or it has features
+// instead.
 struct CaptureImage {
   std::string name;
   CameraId camera_id = 0;
@@ -41,8 +43,15 @@ struct Capture {
   std::vector<std::string> registered;
   // Of those of their images that are posed in a frame of the session's own: cam_from_session, by name.
   std::map<std::string, Pose> own_poses;
+  // Of images (and queries) that have no file: where their features are, by name (capture_features.h).
+  std::map<std::string, FeaturesRow> features;
 
   std::string ImagePath(const CaptureImage& image) const { return images_folder + "/" + image.name; }
+  // Null: the image has a file.
+  const FeaturesRow* FeaturesOf(const CaptureImage& image) const {
+    const auto found = features.find(image.name);
+    return found == features.end() ? nullptr : &found->second;
+  }
 };
 
 // Reads the COLMAP text layout (images/, cameras.txt, images.txt, optional queries.txt and frame.json); image
@@ -53,10 +62,14 @@ struct Capture {
 // they are registered to the others later (stages/reconstruct/registration).  Such a session has the poses of
 // poses/SESSION.txt, which are in a frame of its own, or none; then its cameras come from
 // cameras/SESSION.txt, or as above.
+// A listed image without a file is one of the features that features.db has of it (of a joined capture
+// features/SESSION.db); without a list images are those of that database where there is no image file, with
+// the cameras that it has for them.
 //
 // Errors: NotFound (no such folder; images.txt without cameras.txt), NoData (no image), Corrupt (a list that
 // cannot be parsed; file and line), Unsupported (camera model), InvalidArgument (without images.txt:
-// queries.txt, or different cameras of one image size; with it: a pose of a session that register.txt names).
+// queries.txt, or different cameras of one image size; with it: a pose of a session that register.txt names);
+// those of CaptureFeatures.
 Result<Capture> ReadCapture(const std::string& root);
 
 // In a folder with images.txt: which sessions have no pose there, a name a line.

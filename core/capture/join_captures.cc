@@ -203,6 +203,23 @@ Status LinkImages(const std::vector<CaptureSession>& sessions, const std::string
   return Ok();
 }
 
+// features/SESSION.db -> the session's features, where it has any.
+Status LinkFeatures(const std::vector<CaptureSession>& sessions, const std::string& folder) {
+  for (const CaptureSession& session : sessions) {
+    const std::string given = session.root + "/" + kFeaturesFile;
+    std::error_code error;
+    if (!fs::exists(given, error)) continue;
+    const std::string link = SessionFeaturesPath(folder, session.name);
+    fs::create_directories(FolderOf(link), error);
+    const fs::path target = fs::absolute(given).lexically_normal();
+    fs::create_symlink(target, link, error);
+    if (error) {
+      return WriteError(link, fmt::format("the link to {} cannot be made", target.string()), error.value());
+    }
+  }
+  return Ok();
+}
+
 Error QueriesOfAnotherFrame(const CaptureSession& session) {
   return MakeError(
       ErrorCode::kInvalidArgument,
@@ -318,6 +335,7 @@ Result<JoinedCapture> JoinCaptures(const std::vector<CaptureSession>& sessions, 
   CAIRN_RETURN_IF_ERROR(
       ReplaceFolderAtomically(folder, "joined captures", [&](const std::string& written) -> Status {
         CAIRN_RETURN_IF_ERROR(LinkImages(sessions, written + "/images"));
+        CAIRN_RETURN_IF_ERROR(LinkFeatures(sessions, written));
         CAIRN_RETURN_IF_ERROR(WriteFileAtomically(written + "/" + kSessionsFile, names));
         CAIRN_RETURN_IF_ERROR(WriteUnposedSessions(sessions, written));
         if (!lists.cameras.empty())

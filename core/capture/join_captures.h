@@ -33,6 +33,7 @@ struct JoinedCapture {
 
 // Writes a capture that holds all `sessions`, in their order, and copies no image:
 //   images/SESSION             link to the images of each
+//   features/SESSION.db        link to the features.db of each that has one
 //   cameras.txt                renumbered 1, 2, ...; cameras that are equal in all become one
 //   images.txt, queries.txt    the lines of each with the name SESSION/NAME; poses as they are written
 //   frame.json                 what all coordinates mean (CaptureFrame)

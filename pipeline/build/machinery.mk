@@ -64,6 +64,8 @@ POSED_LISTS := $(if $(filter yes,$(REGISTERED)),$(CAPTURE_LISTS) $(wildcard $(CA
 # removed image changes its folder's date.
 CAPTURE_IMAGES :=
 -include $(BUILD)/images.d
+# Features of images that have no file: they stand for held-out images, too.
+GIVEN_FEATURES := $(wildcard $(CAPTURE)/features.db $(CAPTURE)/features/*.db)
 # Held-out images that exist, with a backslash before each character that is special to Make.  Only regular files are
 # read: a pipe would block.  Names with backslashes or control characters are left out, because no way of escaping them
 # works everywhere in Make.
@@ -198,7 +200,7 @@ ifneq ($(SESSIONS),)
 $(if $(filter-out $(wildcard $(CAPTURE_LISTS)),$(CAPTURE_LISTS)),$(eval $(BUILD)/capture.stamp: cairn-missing))
 $(eval $(call CAIRN_MADE_LISTS,$(BUILD)/capture.stamp,$(CAPTURE_LISTS)))
 SESSION_FOLDERS := $(foreach session,$(SESSIONS),$(lastword $(subst =, ,$(session))))
-SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt imu.csv,$(SESSION_FOLDERS:%=%/$(list)))) \
+SESSION_LISTS := $(wildcard $(foreach list,cameras.txt images.txt queries.txt frame.json odometry.txt imu.csv features.db,$(SESSION_FOLDERS:%=%/$(list)))) \
     $(foreach session,$(SESSION_QUERIES),$(lastword $(subst =, ,$(session))))
 $(BUILD)/capture.stamp: $(FOOTAGE_STAMPS)
 $(BUILD)/capture.stamp: SESSIONS := $(SESSIONS) $(addprefix --queries ,$(SESSION_QUERIES)) $(addprefix --register ,$(SESSIONS_REGISTERED))

@@ -163,7 +163,7 @@ endif
 
 # Stage 10: held-out or left-out images are localized, and the map is sealed.
 $(BUILD)/map.stamp: $(BUILD)/unsealed.cairn $(LEFT_OUT_FOLDER) $(call CAIRN_OPTIONS,check_map) $(SEED_FILE) \
-    $(BUILD)/options/queries $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES)
+    $(BUILD)/options/queries $(POSES_READY) $(QUERY_LIST) $(QUERY_IMAGES) $(if $(QUERIES),$(GIVEN_FEATURES))
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) check $(@D)/unsealed.cairn $(if $(QUERIES),--queries $(QUERIES) --capture $(POSES)) \
 	    $(if $(LEFT_OUT_FOLDER),--left-out $(LEFT_OUT_FOLDER) --capture $(POSES)) --options $(@D)/options/check_map.toml --details $(@D)/check.json -o $(MAP) $(CAIRN_FLAGS)

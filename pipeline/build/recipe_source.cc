@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "core/capture/capture_features.h"
 #include "core/capture/film_file.h"
 #include "core/capture/image_file.h"
 #include "core/files/database.h"
@@ -38,6 +39,7 @@ Status CheckIsCapture(const std::string& folder) {
   }
   // images/ may be a link to a folder.
   if (HoldsImages(folder) || HoldsImages(folder + "/images")) return Ok();
+  if (fs::exists(folder + "/" + kFeaturesFile, error)) return Ok();
   std::string hint = "are the images in another folder?";
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() == ".toml")
@@ -113,17 +115,37 @@ Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map
   // A relative path: recipe and capture can be moved together.
   const fs::path beside = fs::absolute(recipe).lexically_normal().parent_path();
   const std::string text = DefaultRecipe(name, folder.lexically_relative(beside).string());
+  CAIRN_ASSIGN_OR_RETURN(
+      source.was_written,
+      WriteNewRecipe(source.recipe, text, fmt::format("compiles {} with defaults", given), source.map));
+  return source;
+}
+
+Status CheckIsSurvey(const std::string& given) {
+  std::error_code error;
+  if (KindOfCapture(given) == CaptureKind::kBag || IsFilm(given)) return Ok();
+  if (fs::is_directory(given, error)) return CheckIsCapture(given);
+  CAIRN_RETURN_IF_ERROR(CheckIsText(given));
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{}: neither the folder of a capture nor a film or a ROS bag; a recipe says itself what it "
+      "is made of: add a [[capture]] to it and compile it",
+      given);
+}
+
+Result<bool> WriteNewRecipe(const std::string& recipe, const std::string& text, const std::string& what,
+                            const std::string& map) {
+  std::error_code error;
   if (!fs::exists(fs::symlink_status(recipe, error))) {
-    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(source.recipe, text));
-    source.was_written = true;
-    return source;
+    CAIRN_RETURN_IF_ERROR(WriteFileAtomically(recipe, text));
+    return true;
   }
-  const auto there = ReadFile(source.recipe);
-  if (there.ok() && *there == text) return source;
+  const auto there = ReadFile(recipe);
+  if (there.ok() && *there == text) return false;
   return MakeError(ErrorCode::kInvalidArgument,
-                   "{}: exists and is not the recipe that compiles {} with defaults; compile it (cairn "
-                   "compile {} -o {}), or give another -o",
-                   source.recipe, given, source.recipe, source.map);
+                   "{}: exists and is not the recipe that {}; compile it (cairn compile {} -o {}), or give "
+                   "another -o",
+                   recipe, what, recipe, map);
 }
 
 }  // namespace cairn::pipeline

@@ -21,4 +21,13 @@ struct RecipeSource {
 // file that is an image, a map or another database, another NAME.toml, a name that Make cannot handle; Io.
 Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map);
 
+// Errors: NotFound, InvalidArgument, each with what it is instead, where `given` is not the folder of a
+// capture, a film or a bag.
+Status CheckIsSurvey(const std::string& given);
+
+// Writes a recipe for `map` where none is beside it.  Returns whether it is new.  Errors: InvalidArgument
+// (one with other content is there, which is never overwritten; `what`: "compiles hall with defaults"), Io.
+Result<bool> WriteNewRecipe(const std::string& recipe, const std::string& text, const std::string& what,
+                            const std::string& map);
+
 }  // namespace cairn::pipeline

@@ -24,9 +24,8 @@ double MillisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// Localizes in two steps so that SIFT's time is known.
-Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
-                                   const LocalizerOptions& options, HeldOutResult* result) {
+// Pixels of a held-out image.
+Result<cv::Mat> ReadPixels(const HeldOutImage& image) {
   CAIRN_ASSIGN_OR_RETURN(cv::Mat grey, ReadGreyImage(image.path));
   if (image.view)
     grey = CutPanoramaView(grey, image.view->camera, image.view->of.view, image.view->of.num_views);
@@ -34,8 +33,23 @@ Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const 
     return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} px, but its camera takes {} x {} px",
                      image.path, grey.cols, grey.rows, image.camera.width, image.camera.height);
   }
+  return grey;
+}
+
+// Localizes in two steps so that SIFT's time is known.
+Result<Localization> LocalizeTimed(const std::shared_ptr<const Map>& map, const HeldOutImage& image,
+                                   const LocalizerOptions& options, HeldOutResult* result) {
+  Features features;
+  cv::Mat grey;
+  if (image.features) {
+    CAIRN_ASSIGN_OR_RETURN(features, ReadCaptureFeatures(*image.features, image.camera));
+  } else {
+    CAIRN_ASSIGN_OR_RETURN(grey, ReadPixels(image));
+  }
   const Clock::time_point start = Clock::now();
-  CAIRN_ASSIGN_OR_RETURN(Features features, ExtractSift(grey, options.sift));
+  if (!image.features) {
+    CAIRN_ASSIGN_OR_RETURN(features, ExtractSift(grey, options.sift));
+  }
   result->sift_ms = MillisecondsSince(start);
   Result<Localization> localization =
       Localizer(map, options).LocalizeFeatures(std::move(features), image.camera);

@@ -11,6 +11,7 @@
 #include "core/blocks/map_findings.h"
 #include "core/camera/camera.h"
 #include "core/camera/panorama.h"
+#include "core/capture/capture_features.h"
 #include "core/geometry/pose.h"
 #include "core/options/options.h"
 #include "runtime/localize/localizer.h"
@@ -70,6 +71,8 @@ struct HeldOutImage {
     Camera camera;  // by which the view was cut when the survey was compiled
   };
   std::optional<View> view = std::nullopt;
+  // Of an image without a file: where its features are.
+  std::optional<FeaturesRow> features = std::nullopt;
 };
 
 struct HeldOutResult {

@@ -65,6 +65,13 @@ Result<Camera> CameraOf(const CaptureImage& image, const Capture& capture, const
   return given->second;
 }
 
+// An image of a capture: its file, or its features.
+HeldOutImage ImageOf(const CaptureImage& image, const Capture& capture, Camera camera) {
+  HeldOutImage held_out{image.name, capture.ImagePath(image), std::move(camera), image.cam_from_world};
+  if (const FeaturesRow* row = capture.FeaturesOf(image); row != nullptr) held_out.features = *row;
+  return held_out;
+}
+
 Result<std::vector<HeldOutImage>> ReadHeldOutImages(const std::string& list, const Capture& capture,
                                                     const MapHead& rows) {
   std::vector<Reject> rejects;
@@ -73,7 +80,7 @@ Result<std::vector<HeldOutImage>> ReadHeldOutImages(const std::string& list, con
   std::vector<HeldOutImage> images;
   for (const CaptureImage& query : queries) {
     CAIRN_ASSIGN_OR_RETURN(Camera camera, CameraOf(query, capture, rows));
-    images.push_back({query.name, capture.ImagePath(query), std::move(camera), query.cam_from_world});
+    images.push_back(ImageOf(query, capture, std::move(camera)));
   }
   return images;
 }
@@ -94,7 +101,7 @@ Result<std::vector<HeldOutImage>> ReadLeftOutImages(const std::string& list, con
       return MakeError(ErrorCode::kCorrupt, "{}: image {} has camera {}, which the map beside it lacks", list,
                        row.name, row.camera_id);
     }
-    HeldOutImage image{row.name, capture.ImagePath(row), *camera, row.cam_from_world};
+    HeldOutImage image = ImageOf(row, capture, *camera);
     if (const std::optional<PanoramaView> view = ParsePanoramaViewName(row.name)) {
       const auto stated = find(head.stated_cameras, row.camera_id);
       image.path = capture.ImagePath({.name = view->panorama_name});
@@ -181,7 +188,8 @@ Result<std::vector<HeldOutImage>> ReadForeignImages(const std::vector<std::strin
       for (const CaptureImage& image : *list) {
         const auto camera = capture.cameras.find(image.camera_id);
         if (camera == capture.cameras.end()) continue;  // ReadCapture has said so
-        images.push_back({image.name, capture.ImagePath(image), camera->second, std::nullopt});
+        images.push_back(ImageOf(image, capture, camera->second));
+        images.back().cam_from_world.reset();
       }
     }
   }

@@ -29,7 +29,10 @@ struct Arguments {
 
 Status WriteDependencyFile(const std::string& path, const Capture& capture, std::vector<std::string> inputs) {
   std::vector<std::string> roots = {capture.root};
-  for (std::string& folder : FoldersOf(inputs, capture.images_folder)) inputs.push_back(std::move(folder));
+  std::error_code error;
+  if (fs::is_directory(capture.images_folder, error)) {
+    for (std::string& folder : FoldersOf(inputs, capture.images_folder)) inputs.push_back(std::move(folder));
+  }
   for (const std::string& input : inputs) {
     if (!input.starts_with(capture.root + "/")) roots.push_back(fs::path(input).parent_path());
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include <opencv2/core/utility.hpp>
 
@@ -63,6 +64,18 @@ void WriteRejects(std::vector<Reject>* rejects, SQLite::Database& database) {
   }
 }
 
+// Which images show landmarks of a map alone, for those that try maps; no table where there are none.
+void WriteLandmarkImages(const std::vector<ImageId>& images, SQLite::Database& database) {
+  if (images.empty()) return;
+  database.exec(kLandmarkFeaturesSchema);
+  SQLite::Statement row(database, "INSERT INTO cairn_landmark_images VALUES (?)");
+  for (const ImageId image_id : images) {
+    row.bind(1, image_id);
+    row.exec();
+    row.reset();
+  }
+}
+
 Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite::Database& database) {
   for (const auto& [camera_id, camera] : run->capture.cameras) {
     const bool is_panorama = camera.model == CameraModel::kEquirectangular;
@@ -72,6 +85,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
   SQLite::Statement hash_row(database, "INSERT INTO cairn_images VALUES (?, ?)");
   ExtractFeaturesSummary& summary = run->summary;
   ImageId next_id = 1;
+  std::vector<ImageId> of_landmarks;
   for (int64_t begin = 0; begin < static_cast<int64_t>(run->images.size()); begin += kNumImagesPerBatch) {
     CAIRN_ASSIGN_OR_RETURN(const std::vector<Extraction> batch,
                            ExtractBatch(begin, num_threads, progress, run));
@@ -91,6 +105,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
         hash_row.bind(2, batch[i].content_hash);
         hash_row.exec();
         hash_row.reset();
+        if (batch[i].are_landmarks) of_landmarks.push_back(image_id);
         summary.num_views++;
         summary.num_keypoints += static_cast<int64_t>(view.features.keypoints.size());
       }
@@ -99,6 +114,7 @@ Status WriteAll(int num_threads, Progress& progress, ExtractionRun* run, SQLite:
     }
   }
   WriteRejects(&summary.rejects, database);
+  WriteLandmarkImages(of_landmarks, database);
   return Ok();
 }
 
@@ -118,10 +134,16 @@ std::vector<std::string> ListInputs(const ExtractionRun& run) {
     const std::string path = run.capture.root + "/" + list;
     if (fs::exists(path, error)) inputs.push_back(path);
   }
+  std::set<std::string> databases;
   for (const CaptureImage& image : run.images) {
+    if (const FeaturesRow* row = run.capture.FeaturesOf(image); row != nullptr) {
+      databases.insert(row->path);
+      continue;
+    }
     inputs.push_back(run.capture.ImagePath(image));
     if (const std::string mask = FindMask(run.masks, image.name); !mask.empty()) inputs.push_back(mask);
   }
+  inputs.insert(inputs.end(), databases.begin(), databases.end());
   return inputs;
 }
 

@@ -22,6 +22,9 @@ namespace cairn::extract_features {
 //
 // A panorama (camera EQUIRECTANGULAR) becomes pinhole views with the names NAME#0of6, NAME#1of6, ... and one
 // camera with the panorama's id; each keypoint is in the one view whose axis is nearest.
+//
+// An image without a file has the features that the capture's database has of it (core/capture/
+// capture_features.h): they are checked and taken as they are, whatever the options say.
 struct ExtractFeaturesOptions {
   SiftOptions sift;
   PanoramaOptions panorama;
@@ -41,14 +44,14 @@ struct ExtractFeaturesSummary {
   std::vector<std::string> not_reused;  // why earlier outputs gave nothing
 };
 
-// Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file),
-// cairn_rejects; and its ReuseFile (core/line/reuse.h).  An image's features are taken over from `reuse`
-// where an earlier run of this program found them in the same image file, with the same mask, camera size and
-// options (the name may differ): same bytes as without.  A shard has every n-th of the images that
-// `reuse.files` lack; it may have none.  Memory: features of all images of one batch (64 images), and for
-// each thread a pyramid of SiftOptions::max_image_side_px.  Same bytes for any number of threads.  Errors:
-// InvalidArgument for options, NoData when no image is left; Io; Cancelled; of `reuse.files`
-// NotFound, Corrupt.
+// Writes `features_path`: COLMAP's tables, and ours: cairn_images (content hash of each image file, or of
+// the features that stand for it), cairn_rejects, where there are such images cairn_landmark_images; and its
+// ReuseFile (core/line/reuse.h).  An image's features are taken over from `reuse` where an earlier run of
+// this program found them in the same image file, with the same mask, camera size and options (the name may
+// differ): same bytes as without.  A shard has every n-th of the images that `reuse.files` lack; it may have
+// none.  Memory: features of all images of one batch (64 images), and for each thread a pyramid of
+// SiftOptions::max_image_side_px.  Same bytes for any number of threads.  Errors: InvalidArgument for
+// options, NoData when no image is left; Io; Cancelled; of `reuse.files` NotFound, Corrupt.
 Result<ExtractFeaturesSummary> ExtractFeatures(const Capture& capture, const ExtractFeaturesOptions& options,
                                                const std::string& features_path, int num_threads,
                                                Progress& progress, const ReuseOptions& reuse = {});

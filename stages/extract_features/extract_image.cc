@@ -103,6 +103,29 @@ Result<std::vector<View>> ExtractViews(const std::string& path, const std::strin
   return std::vector<View>{{names.front(), std::move(features)}};
 }
 
+// The features that the capture has of an image without a file: they are the image's contents.
+Result<Extraction> TakeGivenFeatures(const FeaturesRow& row, const CaptureImage& image, const Camera& camera,
+                                     EarlierExtractions* earlier) {
+  if (camera.model == CameraModel::kEquirectangular) {
+    return MakeError(ErrorCode::kUnsupported,
+                     "{}: features of a panorama, which has views; give the views and their PINHOLE camera",
+                     row.path);
+  }
+  Extraction extraction;
+  CAIRN_ASSIGN_OR_RETURN(Features features, ReadCaptureFeatures(row, camera));
+  const ContentHash contents = HashFeatures(features.keypoints, features.descriptors);
+  extraction.content_hash = fmt::format("{:016x}{:016x}", contents.high, contents.low);
+  extraction.key = ContentHasher().Text("given features").Hash(contents).Finish();
+  extraction.are_landmarks = row.are_landmarks;
+  if (FindViews(extraction.key, {image.name}, &earlier->to_leave)) {
+    extraction.is_elsewhere = true;
+    return extraction;
+  }
+  extraction.is_taken_over = FindViews(extraction.key, {image.name}, &earlier->to_take_over).has_value();
+  extraction.views.push_back({image.name, std::move(features)});
+  return extraction;
+}
+
 }  // namespace
 
 std::string FindMask(const std::string& masks, const std::string& name) {
@@ -118,6 +141,8 @@ std::string FindMask(const std::string& masks, const std::string& name) {
 Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
                                 const ExtractFeaturesOptions& options, const std::string& mask_path,
                                 EarlierExtractions* earlier) {
+  if (const FeaturesRow* row = capture.FeaturesOf(image); row != nullptr)
+    return TakeGivenFeatures(*row, image, capture.cameras.at(image.camera_id), earlier);
   Extraction extraction;
   const std::string path = capture.ImagePath(image);
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));

@@ -22,6 +22,7 @@ struct Extraction {
   std::string content_hash;
   ContentHash key;  // of everything that the views' features depend on
   std::vector<View> views;
+  bool are_landmarks = false;  // given features that are landmarks of a map
   bool is_taken_over = false;
   bool is_elsewhere = false;  // a file of ReuseOptions::files has it, so a shard leaves it out: no views
   std::optional<std::string> reject_reason;
@@ -36,7 +37,8 @@ struct EarlierExtractions {
 // The mask of an image, if the folder `masks` has one; "" if not, or if `masks` is "".
 std::string FindMask(const std::string& masks, const std::string& name);
 
-// The features of one image file, taken over where an earlier run has them.  May be called from any thread.
+// The features of one image file, taken over where an earlier run has them; of an image without a file those
+// that the capture has, without its mask.  May be called from any thread.
 // Errors: those of the image and its mask, which make it a reject.
 Result<Extraction> ExtractImage(const Capture& capture, const CaptureImage& image,
                                 const ExtractFeaturesOptions& options, const std::string& mask_path,

@@ -69,7 +69,17 @@ std::string TitleOf(const Capture& capture) {
   return root.filename().string();
 }
 
-// Writes the result as a capture: the image lists, and a link to the images.
+// A link to what the capture has, if it is there.
+Status LinkTo(const std::string& given, const std::string& name, const std::string& folder) {
+  std::error_code error;
+  if (!fs::exists(given, error)) return Ok();
+  const fs::path target = fs::canonical(given, error);
+  if (!error) fs::create_symlink(target, folder + "/" + name, error);
+  if (!error) return Ok();
+  return WriteError(folder + "/" + name, fmt::format("the link to {} cannot be made", given), error.value());
+}
+
+// Writes the result as a capture: the image lists, and links to the images and features.
 Status WritePosesFolder(const ReconstructResult& result, const Capture& capture, const std::string& folder) {
   CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder + "/cameras.txt", result.cameras));
   CAIRN_RETURN_IF_ERROR(WriteImagesText(folder + "/images.txt", result.images));
@@ -80,12 +90,11 @@ Status WritePosesFolder(const ReconstructResult& result, const Capture& capture,
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + kReportFile, ReportJson(result)));
   CAIRN_RETURN_IF_ERROR(
       WriteFileAtomically(folder + "/" + kPictureFile, DrawVerdict(result.verdict, TitleOf(capture))));
-  std::error_code error;
-  const fs::path images = fs::canonical(capture.images_folder, error);
-  if (!error) fs::create_directory_symlink(images, folder + "/images", error);
-  if (!error) return Ok();
-  return WriteError(folder + "/images", fmt::format("the link to {} cannot be made", capture.images_folder),
-                    error.value());
+  CAIRN_RETURN_IF_ERROR(LinkTo(capture.images_folder, "images", folder));
+  if (capture.features.empty()) return Ok();
+  for (const char* name : {kFeaturesFile, kFeaturesFolder})
+    CAIRN_RETURN_IF_ERROR(LinkTo(capture.root + "/" + name, name, folder));
+  return Ok();
 }
 
 std::string ResidualText(const ReconstructResult& result) {

@@ -105,6 +105,16 @@ TEST(ChooseLeftOut, ImagesOfTheTriedOnesViewGoWithThem) {
                                                  69, 70, 71, 72, 88, 89, 90, 91, 92));
 }
 
+TEST(ChooseLeftOut, ImagesThatAreNoRobotsAreOnlyLeftOut) {
+  std::set<size_t> never_tried;
+  for (size_t i = 0; i < 90; ++i) never_tried.insert(i);
+  const auto rounds = ChooseLeftOut(Row(100, 0.1, 2.5), 2, never_tried);
+  ASSERT_TRUE(rounds.ok());
+  ASSERT_EQ(rounds->size(), 1U);
+  EXPECT_THAT((*rounds)[0].tried, ElementsAre(92, 97));
+  EXPECT_THAT((*rounds)[0].left_out, ElementsAre(90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
+}
+
 TEST(ChooseLeftOut, OneImageInFourAtATimeInAtMostSixRounds) {
   const auto rounds = ChooseLeftOut(Row(40, 0.1, 4.95), 40);  // nine images a view, ten at a time
   ASSERT_TRUE(rounds.ok());

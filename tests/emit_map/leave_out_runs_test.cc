@@ -39,6 +39,26 @@ TEST(ChooseRuns, ImagesOfARunsViewsGoWithItAndOneInFourAtATime) {
   EXPECT_THAT(runs->rounds[2].tried, ElementsAre(88, 89, 90, 91, 92));
 }
 
+// Images 0 to 59 are those of a map that was updated: two runs of the others, with whose views also they go.
+TEST(ChooseRuns, LandmarksOfAnEarlierMapAreNotTriedAndGoWithOthers) {
+  std::set<size_t> of_map;
+  for (size_t i = 0; i < 100; ++i) {
+    if (i < 60 || i % 2 == 1) of_map.insert(i);
+  }
+  const auto runs = ChooseRuns(Row(100, 0.1, 2.5), {.hold_out = 0.2}, of_map);
+  ASSERT_TRUE(runs.ok()) << runs.error().message;
+  EXPECT_EQ(NumTried(*runs), 4);
+  EXPECT_EQ(runs->num_runs, 2);
+  EXPECT_THAT(runs->rounds[0].tried, ElementsAre(68, 70, 88, 90));
+  EXPECT_THAT(runs->rounds[0].left_out, ElementsAre(66, 67, 68, 69, 70, 71, 72, 86, 87, 88, 89, 90, 91, 92));
+  for (size_t i = 0; i < 98; ++i) of_map.insert(i);
+  const auto none = ChooseRuns(Row(100, 0.1, 2.5), {}, of_map);
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, ErrorCode::kNoData);
+  EXPECT_THAT(none.error().message,
+              HasSubstr("99 of the survey's 100 images are landmarks of an earlier map"));
+}
+
 TEST(ChooseRuns, ATenthIsTriedOfManyAndAtLeast24AndAtMost200) {
   const auto of = [](int num_images) {
     const auto runs = ChooseRuns(Row(num_images, 1, 2), {});

@@ -8,6 +8,7 @@
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_database.h"
 #include "core/files/file.h"
+#include "tests/core/capture/features_database.h"
 #include "tests/extract_features/capture_fixture.h"
 
 namespace cairn::extract_features {
@@ -92,6 +93,62 @@ TEST_F(ExtractFeaturesTest, MaskSwitchesPixelsOff) {
   const auto keypoints = ReadDatabaseKeypoints(*database, 1);
   ASSERT_GT(keypoints->size(), 10u);
   for (const Keypoint& keypoint : *keypoints) EXPECT_GE(keypoint.x, 159);
+}
+
+TEST_F(ExtractFeaturesTest, FeaturesOfImagesWithoutAFileAreTakenAsTheyAre) {
+  AddImage("a.png", BlobImage(1));
+  List("b.png");
+  List("c.png");
+  const Features given = RandomFeatures(1, 30);
+  Features outside = RandomFeatures(2, 30);
+  outside.keypoints[7].x = 900;
+  const Camera camera = FeaturesCamera(4);
+  ASSERT_TRUE(WriteCamerasText(root_ + "/cameras.txt", {{1, camera}}).ok());
+  cv::imwrite(root_ + "/images/a.png", BlobImage(1, 640, 480));
+  ASSERT_TRUE(WriteFeaturesDatabase(
+                  root_ + "/features.db", camera, {{"c.png", outside}, {"b.png", given}},
+                  std::string(kLandmarkFeaturesSchema) + "INSERT INTO cairn_landmark_images VALUES (2);")
+                  .ok());
+  ExtractFeaturesOptions options;
+  options.sift.max_num_features = 10;
+  const auto summary = ExtractTo("out.db", {}, 2, options);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_EQ(summary->num_images, 2);
+  ASSERT_EQ(summary->rejects.size(), 1u);
+  EXPECT_EQ(summary->rejects[0].name, "c.png");
+  EXPECT_THAT(summary->rejects[0].reason, HasSubstr("keypoint 7 at (900, "));
+  EXPECT_THAT(summary->inputs, testing::Contains(root_ + "/features.db"));
+  EXPECT_THAT(summary->inputs, testing::Not(testing::Contains(root_ + "/images/b.png")));
+  auto database = OpenDatabaseReadOnly(root_ + "/out.db");
+  const auto keypoints = ReadDatabaseKeypoints(*database, 2);
+  ASSERT_EQ(keypoints->size(), 30u);  // whatever the options say
+  EXPECT_EQ(keypoints->at(29).x, given.keypoints[29].x);
+  EXPECT_EQ(*ReadDatabaseDescriptors(*database, 2), given.descriptors);
+  EXPECT_EQ(database->execAndGet("SELECT group_concat(image_id) FROM cairn_landmark_images").getString(),
+            "2");
+}
+
+TEST_F(ExtractFeaturesTest, GivenFeaturesOfAPanoramaAreRejected) {
+  List("b.png");
+  AddImage("a.png", BlobImage(1));
+  Camera camera;
+  camera.model = CameraModel::kEquirectangular;
+  camera.width = 640;
+  camera.height = 480;
+  camera.params = {640, 480};
+  Camera small = FeaturesCamera(2);
+  small.width = 320;
+  small.height = 240;
+  images_[1].camera_id = 2;
+  ASSERT_TRUE(WriteImagesText(root_ + "/images.txt", images_).ok());
+  ASSERT_TRUE(WriteCamerasText(root_ + "/cameras.txt", {{1, camera}, {2, small}}).ok());
+  ASSERT_TRUE(
+      WriteFeaturesDatabase(root_ + "/features.db", FeaturesCamera(1), {{"b.png", RandomFeatures(1, 3)}})
+          .ok());
+  const auto summary = ExtractTo("out.db", {});
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  ASSERT_EQ(summary->rejects.size(), 1u);
+  EXPECT_THAT(summary->rejects[0].reason, HasSubstr("features of a panorama"));
 }
 
 TEST_F(ExtractFeaturesTest, BlankImageHasNoFeaturesButIsKept) {

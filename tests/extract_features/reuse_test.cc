@@ -8,6 +8,7 @@
 #include "core/colmap/colmap_database.h"
 #include "core/files/file.h"
 #include "core/line/program_identity.h"
+#include "tests/core/capture/features_database.h"
 #include "tests/extract_features/capture_fixture.h"
 
 namespace cairn::extract_features {
@@ -59,6 +60,32 @@ TEST_F(ExtractFeaturesReuse, AddedAndRemovedImagesLeaveTheOthersAlone) {
   images_.erase(images_.begin() + 1);
   ListAgain();
   EXPECT_EQ(TakenOver(), 4);
+}
+
+TEST_F(ExtractFeaturesReuse, GivenFeaturesAreKnownByTheirContents) {
+  Camera camera = FeaturesCamera(2);
+  camera.width = 640;
+  camera.height = 480;
+  ASSERT_TRUE(
+      WriteCamerasText(root_ + "/cameras.txt", {{1, ReadCapture(root_)->cameras.at(1)}, {2, camera}}).ok());
+  images_.push_back({"log/1.png", 2, Pose()});
+  images_.push_back({"log/2.png", 2, Pose()});
+  ListAgain();
+  fs::create_directories(root_ + "/features");
+  const std::string path = SessionFeaturesPath(root_, "log");
+  ASSERT_TRUE(
+      WriteFeaturesDatabase(path, camera, {{"1.png", RandomFeatures(1, 9)}, {"2.png", RandomFeatures(2, 9)}})
+          .ok());
+  EXPECT_EQ(TakenOver(), 4);
+  EXPECT_EQ(TakenOver(), 6);
+  ASSERT_TRUE(
+      WriteFeaturesDatabase(path, camera, {{"1.png", RandomFeatures(1, 9)}, {"2.png", RandomFeatures(3, 9)}})
+          .ok());
+  EXPECT_EQ(TakenOver(), 5);
+  // A shard leaves out what an earlier output has.
+  const auto shard = ExtractTo("shard.db", {.files = {root_ + "/features.db"}, .shard = Shard{1, 1}});
+  ASSERT_TRUE(shard.ok()) << shard.error().message;
+  EXPECT_EQ(shard->num_images, 0);
 }
 
 TEST_F(ExtractFeaturesReuse, ARenamedImageIsTheSameImage) {

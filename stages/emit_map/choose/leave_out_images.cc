@@ -140,7 +140,8 @@ std::vector<LeftOutImages> LeftOutRounds::Rounds() const {
   return rounds;
 }
 
-Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images) {
+Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images,
+                                                 const std::set<size_t>& never_tried) {
   const size_t num_images = classes.images.size();
   if (num_images < kMinNumSurveyImages) {
     return MakeError(ErrorCode::kNoData,
@@ -149,9 +150,14 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
                      num_images, kMinNumSurveyImages);
   }
   const ViewDistance distance(classes, {});
-  const size_t step = (num_images + max_num_images - 1) / max_num_images;
+  std::vector<size_t> may_be_tried;
+  for (size_t image = 0; image < num_images; ++image) {
+    if (!never_tried.contains(image)) may_be_tried.push_back(image);
+  }
+  const size_t step = (may_be_tried.size() + max_num_images - 1) / max_num_images;
   LeftOutRounds rounds(num_images);
-  for (size_t tried = step / 2; tried < num_images; tried += step) {
+  for (size_t i = step / 2; i < may_be_tried.size(); i += step) {
+    const size_t tried = may_be_tried[i];
     std::set<size_t> view;
     for (size_t image = 0; image < num_images; ++image) {
       if (image == tried || distance.Squared(tried, image) < 1) view.insert(image);
@@ -159,6 +165,21 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
     rounds.Add({tried}, view);
   }
   return rounds.Rounds();
+}
+
+Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::string& matches_path) {
+  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
+  return WithDatabaseErrors(matches_path, [&]() -> Result<std::set<size_t>> {
+    std::set<size_t> positions;
+    if (!HasTable(database, "cairn_landmark_images")) return positions;
+    std::set<int64_t> image_ids;
+    SQLite::Statement query(database, "SELECT image_id FROM cairn_landmark_images");
+    while (query.executeStep()) image_ids.insert(query.getColumn(0).getInt64());
+    for (size_t i = 0; i < classes.images.size(); ++i) {
+      if (image_ids.contains(classes.images[i].image_id)) positions.insert(i);
+    }
+    return positions;
+  });
 }
 
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,

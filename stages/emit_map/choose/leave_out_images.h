@@ -36,7 +36,13 @@ struct LeftOutImages {
 // Errors: NoData (fewer than twelve survey images).
 inline constexpr size_t kMinNumSurveyImages = 12;
 inline constexpr size_t kMaxNumRounds = 6;
-Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images);
+// `never_tried`: positions of images that are no robot's (LandmarkImages); they are left out with others.
+Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t max_num_images,
+                                                 const std::set<size_t>& never_tried = {});
+
+// Positions of the images whose features are landmarks of an earlier map (core/capture/capture_features.h): a
+// map recognises itself.  `matches_path`: matches.db.  Errors: those of OpenColmapDatabase.
+Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::string& matches_path);
 
 // Shares out images among the rounds in which they are left out, first fit.
 class LeftOutRounds {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 #include <string>
 
@@ -37,11 +36,11 @@ std::vector<size_t> FirstOfPanorama(const std::vector<SurveyImage>& images) {
   return result;
 }
 
-// The images of the views of images [begin, begin + length), and of the panoramas that these are of.
-std::set<size_t> ViewsOf(const ViewDistance& distance, const std::vector<size_t>& panorama, size_t begin,
-                         size_t length) {
+// The images of the views of these images, and of the panoramas that these are of.
+std::set<size_t> ViewsOf(const ViewDistance& distance, const std::vector<size_t>& panorama,
+                         const std::vector<size_t>& run) {
   std::set<size_t> views;
-  for (size_t tried = begin; tried < begin + length; ++tried) {
+  for (const size_t tried : run) {
     for (size_t image = 0; image < panorama.size(); ++image) {
       if (panorama[image] == panorama[tried] || distance.Squared(tried, image) < 1) views.insert(image);
     }
@@ -61,13 +60,26 @@ OptionTable DescribeOptions(LeaveOutOptions* options) {
            .words = {{"auto", LeaveOutOptions::kAutoHoldOut}}}};
 }
 
-Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& options) {
-  const size_t num_images = classes.images.size();
-  if (num_images < kMinNumSurveyImages) {
+Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& options,
+                               const std::set<size_t>& never_tried) {
+  const size_t num_survey_images = classes.images.size();
+  if (num_survey_images < kMinNumSurveyImages) {
     return MakeError(ErrorCode::kNoData,
                      "the survey has {} images with poses, and runs are left out of {} at least; take more, "
                      "or hold some out yourself (queries.txt)",
-                     num_images, kMinNumSurveyImages);
+                     num_survey_images, kMinNumSurveyImages);
+  }
+  std::vector<size_t> may_be_tried;
+  for (size_t image = 0; image < num_survey_images; ++image) {
+    if (!never_tried.contains(image)) may_be_tried.push_back(image);
+  }
+  const size_t num_images = may_be_tried.size();
+  if (num_images < kMinRunLength) {
+    return MakeError(
+        ErrorCode::kNoData,
+        "{} of the survey's {} images are landmarks of an earlier map, in which it would recognise "
+        "itself, and a run has {} images at least; hold some out yourself (queries.txt)",
+        num_survey_images - num_images, num_survey_images, kMinRunLength);
   }
   const size_t num_wanted = NumWanted(num_images, options);
   const size_t length =
@@ -76,15 +88,15 @@ Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& op
   const ViewDistance distance(classes, {});
   const std::vector<size_t> panorama = FirstOfPanorama(classes.images);
   LeftOutRuns runs;
-  LeftOutRounds rounds(num_images);
+  LeftOutRounds rounds(num_survey_images);
   for (size_t run = 0; run < num_runs; ++run) {
     const size_t middle = (2 * run + 1) * num_images / (2 * num_runs);
     for (size_t shorter = length; shorter > 0; shorter /= 2) {
       const size_t begin = std::min(middle - std::min(middle, shorter / 2), num_images - shorter);
-      const std::set<size_t> views = ViewsOf(distance, panorama, begin, shorter);
+      const std::vector<size_t> tried(may_be_tried.begin() + static_cast<std::ptrdiff_t>(begin),
+                                      may_be_tried.begin() + static_cast<std::ptrdiff_t>(begin + shorter));
+      const std::set<size_t> views = ViewsOf(distance, panorama, tried);
       if (!rounds.MayLeaveOut(views)) continue;
-      std::vector<size_t> tried(shorter);
-      std::iota(tried.begin(), tried.end(), begin);
       if (rounds.Add(tried, views)) ++runs.num_runs;
       break;
     }
@@ -94,7 +106,7 @@ Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& op
                      "each of the survey's {} images has more than a quarter of the others in its view, so "
                      "that a map without these is another one; survey more places, or hold some out yourself "
                      "(queries.txt)",
-                     num_images);
+                     num_survey_images);
   }
   runs.rounds = rounds.Rounds();
   return runs;

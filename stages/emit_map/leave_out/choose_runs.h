@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <vector>
 
 #include "core/base/error.h"
@@ -31,8 +32,10 @@ struct LeftOutRuns {
 // at a time: the runs share as many rounds as that takes, at most kMaxNumRounds.  A run whose views are more
 // than a quarter of the survey is made shorter; if one image's view alone is, the run is not tried.  Pure.
 // O(tried images * images).
-// Errors: NoData, with a sentence that says why: fewer than twelve images; every view is more than a quarter.
-// REQUIRES: hold_out is not 0
-Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& options);
+// Errors: NoData, with a sentence that says why: fewer than twelve images, or than two to try; every view is
+// more than a quarter. REQUIRES: hold_out is not 0 `never_tried`: positions of images that are in no run
+// (LandmarkImages).
+Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& options,
+                               const std::set<size_t>& never_tried = {});
 
 }  // namespace cairn::emit_map
