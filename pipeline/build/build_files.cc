@@ -6,6 +6,7 @@
 #include <regex>
 #include <set>
 
+#include "core/files/folder_manifest.h"
 #include "core/files/temporary.h"
 #include "pipeline/build/build_folder.h"
 #include "pipeline/build/line.h"
@@ -24,7 +25,7 @@ std::string WithoutTemporaryMark(const std::string& name) {
 
 bool IsBuildFileName(const std::string& name) {
   static const std::regex kStageFile = [] {
-    std::string stems = "images|(film|bag)-[-A-Za-z0-9_.]+";
+    std::string stems = "images|(film|bag|map)-[-A-Za-z0-9_.]+";
     for (const LineStage& stage : kLine) stems += "|" + fs::path(stage.file).stem().string();
     return std::regex("(" + stems +
                       ")([-.][0-9]+(of[0-9]+)?)*(\\.db|\\.cairn)?(\\.d|\\.stamp|\\.begun|\\.reuse|\\.solved|"
@@ -51,7 +52,8 @@ Status CheckBuildFolder(const std::string& build_dir) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(build_dir, error)) {
     const std::string name = entry.path().filename().string();
-    if (name == "lock") continue;  // the only file of a build that was killed before it wrote config.mk
+    // All there is of a build that was killed before it wrote config.mk.
+    if (name == "lock" || (name.starts_with("map-") && !OwnFiles(entry.path().string()).empty())) continue;
     if (IsBuildFileName(name)) theirs.insert(name);
   }
   if (theirs.empty()) return Ok();

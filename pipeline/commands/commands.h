@@ -16,6 +16,8 @@ Command JoinCommand();
 // cairn compile RECIPE.toml -o NAME.cairn: splits the recipe into a build folder and lets GNU Make run
 // map.mk there
 Command CompileCommand();
+// cairn update-map OLD.cairn FOLDER|FILM|BAG -o NEW.cairn: a map and tonight's images as a recipe, compiled
+Command UpdateMapCommand();
 // cairn stage configure RECIPE.toml -o NAME.cairn --build-dir DIR: only splits the recipe, for Makefiles that
 // include map.mk
 Command ConfigureCommand();

@@ -1,4 +1,4 @@
-#include "pipeline/commands/commands.h"
+#include "pipeline/commands/compile.h"
 
 #include <sys/wait.h>
 
@@ -23,44 +23,13 @@
 #include "pipeline/build/recipe.h"
 #include "pipeline/build/recipe_source.h"
 #include "pipeline/build/run_make.h"
+#include "pipeline/commands/commands.h"
 #include "pipeline/program/stop_signal.h"
 
 namespace cairn::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct CompileArguments {
-  std::string recipe;
-  std::string output;
-  std::string build_dir;
-  std::string until;
-  int num_shards = 1;
-  int num_jobs = 0;  // 0: as many as shards
-  std::string launcher;
-  bool no_space_check = false;
-};
-
-Result<BuildPaths> ResolvePaths(const CompileArguments& arguments) {
-  const fs::path map = fs::absolute(arguments.output).lexically_normal();
-  if (map.extension() != ".cairn") {
-    return MakeError(ErrorCode::kInvalidArgument, "-o {}: a map's name ends in .cairn", arguments.output);
-  }
-  std::error_code error;
-  if (!fs::is_directory(map.parent_path(), error)) {
-    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", arguments.output,
-                     map.parent_path().string());
-  }
-  fs::path build_dir = fs::path(map).replace_extension(".build");
-  if (!arguments.build_dir.empty()) build_dir = fs::absolute(arguments.build_dir).lexically_normal();
-  if (!build_dir.has_filename()) build_dir = build_dir.parent_path();  // a trailing '/'
-  CAIRN_RETURN_IF_ERROR(CheckBuildFolder(build_dir.string()));
-  CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
-  return BuildPaths{.build_dir = build_dir.string(),
-                    .map = map.string(),
-                    .program = program,
-                    .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
-}
 
 // Fills in what was not given: the recipe of a folder, the map's name.
 Result<Recipe> ReadRecipeWithSeed(const CommandEnvironment& environment, CompileArguments* arguments) {
@@ -203,6 +172,52 @@ void WarnOfUnreadKeys(const Recipe& recipe) {
   }
 }
 
+Status Configure(CompileArguments arguments, const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
+  CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
+  WarnOfUnreadKeys(recipe);
+  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, BuildSession()));
+  return WriteBuildFolder(recipe, paths);
+}
+
+void AddRecipeArguments(ArgumentParser& parser, CompileArguments* arguments) {
+  parser
+      .Add("recipe", arguments->recipe,
+           "Recipe of the map (docs/recipe.md), or a film, a ROS bag or the folder of a capture: then it is "
+           "compiled with defaults, by the recipe NAME.toml that is written beside the map")
+      .Required()
+      .Type("RECIPE.toml|FILM|BAG|FOLDER");
+  parser
+      .Add("-o,--output", arguments->output,
+           "Map to write [by the name of the recipe, film, bag or folder, in the current folder]")
+      .Type("NAME.cairn");
+  parser.Add("--build-dir", arguments->build_dir, "Folder for the stages' files [NAME.build beside the map]")
+      .Type("FOLDER");
+}
+
+}  // namespace
+
+Result<BuildPaths> ResolvePaths(const CompileArguments& arguments) {
+  const fs::path map = fs::absolute(arguments.output).lexically_normal();
+  if (map.extension() != ".cairn") {
+    return MakeError(ErrorCode::kInvalidArgument, "-o {}: a map's name ends in .cairn", arguments.output);
+  }
+  std::error_code error;
+  if (!fs::is_directory(map.parent_path(), error)) {
+    return MakeError(ErrorCode::kIo, "{}: the folder {} does not exist; create it first", arguments.output,
+                     map.parent_path().string());
+  }
+  fs::path build_dir = fs::path(map).replace_extension(".build");
+  if (!arguments.build_dir.empty()) build_dir = fs::absolute(arguments.build_dir).lexically_normal();
+  if (!build_dir.has_filename()) build_dir = build_dir.parent_path();  // a trailing '/'
+  CAIRN_RETURN_IF_ERROR(CheckBuildFolder(build_dir.string()));
+  CAIRN_ASSIGN_OR_RETURN(const std::string program, ProgramPath());
+  return BuildPaths{.build_dir = build_dir.string(),
+                    .map = map.string(),
+                    .program = program,
+                    .recipe = fs::absolute(arguments.recipe).lexically_normal().string()};
+}
+
 Status Compile(CompileArguments arguments, const CommandEnvironment& environment) {
   LiftStopDeadline();
   const auto begin = std::chrono::steady_clock::now();
@@ -258,30 +273,23 @@ Status Compile(CompileArguments arguments, const CommandEnvironment& environment
   return Ok();
 }
 
-Status Configure(CompileArguments arguments, const CommandEnvironment& environment) {
-  CAIRN_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipeWithSeed(environment, &arguments));
-  CAIRN_ASSIGN_OR_RETURN(const BuildPaths paths, ResolvePaths(arguments));
-  WarnOfUnreadKeys(recipe);
-  CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, BuildSession()));
-  return WriteBuildFolder(recipe, paths);
-}
-
-void AddRecipeArguments(ArgumentParser& parser, CompileArguments* arguments) {
+void AddRunArguments(ArgumentParser& parser, CompileArguments* arguments) {
+  parser.Add("--until", arguments->until, "Stop after this stage").Type("STAGE");
   parser
-      .Add("recipe", arguments->recipe,
-           "Recipe of the map (docs/recipe.md), or a film, a ROS bag or the folder of a capture: then it is "
-           "compiled with defaults, by the recipe NAME.toml that is written beside the map")
-      .Required()
-      .Type("RECIPE.toml|FILM|BAG|FOLDER");
+      .Add("--shards", arguments->num_shards,
+           "Parts in which features and matches are made, each by a process of its own [1]")
+      .Range(1, 100000)
+      .Type("N");
   parser
-      .Add("-o,--output", arguments->output,
-           "Map to write [by the name of the recipe, film, bag or folder, in the current folder]")
-      .Type("NAME.cairn");
-  parser.Add("--build-dir", arguments->build_dir, "Folder for the stages' files [NAME.build beside the map]")
-      .Type("FOLDER");
+      .Add("--launch", arguments->launcher,
+           "Words put before every stage's command, for a cluster: 'srun -n1 -c2' (docs/cluster.md)")
+      .Type("WORDS");
+  parser.Add("-j,--jobs", arguments->num_jobs, "Stages or shards to run side by side [as many as --shards]")
+      .Range(1, 100000)
+      .Type("N");
+  parser.AddFlag("--no-space-check", arguments->no_space_check,
+                 "Begin even if the disk seems too full for the stages' files");
 }
-
-}  // namespace
 
 Command CompileCommand() {
   const auto arguments = std::make_shared<CompileArguments>();
@@ -292,24 +300,7 @@ Command CompileCommand() {
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             AddRecipeArguments(parser, arguments.get());
-            parser.Add("--until", arguments->until, "Stop after this stage").Type("STAGE");
-            parser
-                .Add("--shards", arguments->num_shards,
-                     "Parts in which features and matches are made, each by a process of its own [1]")
-                .Range(1, 100000)
-                .Type("N");
-            parser
-                .Add("--launch", arguments->launcher,
-                     "Words put before every stage's command, for a cluster: 'srun -n1 -c2' "
-                     "(docs/cluster.md)")
-                .Type("WORDS");
-            parser
-                .Add("-j,--jobs", arguments->num_jobs,
-                     "Stages or shards to run side by side [as many as --shards]")
-                .Range(1, 100000)
-                .Type("N");
-            parser.AddFlag("--no-space-check", arguments->no_space_check,
-                           "Begin even if the disk seems too full for the stages' files");
+            AddRunArguments(parser, arguments.get());
           },
       .run = [arguments](const CommandEnvironment& environment) { return Compile(*arguments, environment); }};
 }
