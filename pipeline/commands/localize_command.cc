@@ -23,6 +23,7 @@
 #include "pipeline/commands/odometry.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
+#include "pipeline/robot_log/robot_log.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 
@@ -39,6 +40,9 @@ struct LocalizeArguments {
   bool is_sequence = false;
   std::string odometry_path;
   std::string estimator = "pnp";
+  std::string log_folder;
+  double log_mb_per_day = 0;  // 0: the default
+  bool log_images = false;
   LocalizerOptions options;
   VisualMapOptions visual_options;
   VisualEstimateOptions estimate_options;
@@ -55,6 +59,7 @@ struct Answer {
   Result<Localization> localization = Error{};
   std::optional<Result<TrackedVisualPose>> visual;
   std::optional<Disagreement> disagreement;  // where both have a fix
+  std::optional<Query> query;                // where frames are logged
 };
 
 // The camera to use for an image size: given on the command line, else the map's.
@@ -147,6 +152,17 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
                      "-o writes poses in space, and --estimator visual-map finds places on the floor; use "
                      "--estimator both");
   }
+  if (arguments.estimator == "visual-map" && !arguments.log_folder.empty()) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--log keeps frames with their poses in space, and --estimator visual-map finds places on "
+        "the floor; use --estimator both");
+  }
+  if (arguments.log_folder.empty() && (arguments.log_mb_per_day > 0 || arguments.log_images)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} says what a log keeps; give --log FOLDER, or leave it out",
+                     arguments.log_mb_per_day > 0 ? "--log-max-mb-per-day" : "--log-images");
+  }
   return Ok();
 }
 
@@ -187,6 +203,7 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
     answer.camera_id = camera.camera_id;
     const Localizer localizer(map, arguments.options);
     CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
+    if (!arguments.log_folder.empty()) answer.query = query;
     if (trackers->in_space) {
       CAIRN_ASSIGN_OR_RETURN(answer.localization, trackers->in_space->TrackFeatures(query.features, camera));
     } else if (arguments.estimator == "both") {
@@ -210,25 +227,31 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
 }
 
 Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>& map,
-                     const CameraChoice& cameras, const LocalizerOptions& options) {
+                     const CameraChoice& cameras, const LocalizeArguments& arguments) {
   Answer answer{.image = image};
   answer.localization = [&]() -> Result<Localization> {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
-    return Localizer(map, options).Localize(grey, camera);
+    Localizer localizer(map, arguments.options);
+    if (arguments.log_folder.empty()) return localizer.Localize(grey, camera);
+    CAIRN_ASSIGN_OR_RETURN(answer.query, localizer.QueryFromImage(grey, camera));
+    return localizer.LocalizeQuery(*answer.query, std::nullopt);
   }();
   return answer;
 }
 
 // The same for the next frame of a sequence.
-Answer TrackImage(const std::string& image, const CameraChoice& cameras, RegionTracker* tracker) {
+Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& map,
+                  const CameraChoice& cameras, const LocalizeArguments& arguments, RegionTracker* tracker) {
   Answer answer{.image = image};
   answer.localization = [&]() -> Result<Localization> {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
-    return tracker->Track(grey, camera);
+    if (arguments.log_folder.empty()) return tracker->Track(grey, camera);
+    CAIRN_ASSIGN_OR_RETURN(answer.query, Localizer(map, arguments.options).QueryFromImage(grey, camera));
+    return tracker->TrackFeatures(answer.query->features, camera);
   }();
   return answer;
 }
@@ -324,6 +347,31 @@ class ImageNames {
   size_t position_ = 0;
 };
 
+// The log, where one is written.
+Result<std::optional<RobotLog>> OpenLog(const LocalizeArguments& arguments, const Map& map) {
+  std::optional<RobotLog> log;
+  if (arguments.log_folder.empty()) return log;
+  RobotLogOptions options{.keep_images = arguments.log_images};
+  if (arguments.log_mb_per_day > 0) options.max_mb_per_day = arguments.log_mb_per_day;
+  CAIRN_ASSIGN_OR_RETURN(RobotLog opened,
+                         RobotLog::Open(arguments.log_folder, map.head(), options, ReadMachineClocks()));
+  log.emplace(std::move(opened));
+  return log;
+}
+
+// A log that can no longer be written does not keep a robot from knowing where it is.
+void OfferToLog(const Answer& answer, std::optional<RobotLog>* log) {
+  if (!*log || !answer.query || !answer.localization.ok() || !answer.localization->has_fix()) return;
+  const Result<bool> kept = (*log)->Offer({.features = &answer.query->features,
+                                           .camera = &answer.query->camera,
+                                           .cam_from_world = answer.localization->cam_from_world,
+                                           .image_path = answer.image},
+                                          ReadMachineClocks());
+  if (kept.ok()) return;
+  spdlog::warn("nothing is logged from here on: {}", kept.error().message);
+  log->reset();
+}
+
 Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
@@ -341,17 +389,20 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   std::optional<Error> first_error;
   int num_images = 0, num_failed = 0, num_places = 0;
   CAIRN_ASSIGN_OR_RETURN(Trackers trackers, Trackers::Make(arguments, map));
+  CAIRN_ASSIGN_OR_RETURN(std::optional<RobotLog> log, OpenLog(arguments, *map));
   const size_t batch_size =
       arguments.is_sequence ? 1 : 4 * static_cast<size_t>(NumThreads(environment.num_threads));
   for (std::vector<std::string> batch; !(batch = names.Next(batch_size)).empty();) {
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
       answers[i] = visual ? LocateByViews(batch[i], map, *visual, cameras, arguments, &trackers)
-                   : arguments.is_sequence ? TrackImage(batch[i], cameras, &*trackers.in_space)
-                                           : LocalizeImage(batch[i], map, cameras, arguments.options);
+                   : arguments.is_sequence
+                       ? TrackImage(batch[i], map, cameras, arguments, &*trackers.in_space)
+                       : LocalizeImage(batch[i], map, cameras, arguments);
     });
     for (const Answer& answer : answers) {
       *environment.out << JsonText(AnswerJson(answer, arguments)) << "\n" << std::flush;
+      OfferToLog(answer, &log);
       ++num_images;
       if (answer.visual && answer.visual->ok() && (*answer.visual)->pose.flag == VisualFlag::kNone)
         ++num_places;
@@ -376,6 +427,7 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   if (arguments.estimator != "visual-map")
     spdlog::info("{} of {} images localized", poses.size(), num_images);
   if (visual) spdlog::info("{} of {} images localized by the visual map", num_places, num_images);
+  if (log) spdlog::info("{} frames were added to the log {}", log->num_kept(), arguments.log_folder);
   if (!first_error) return trackers.odometry ? trackers.odometry->CheckAllRead() : Ok();
   return MakeError(first_error->code, "{} of {} images could not be tried; the first: {}", num_failed,
                    num_images, first_error->message);
@@ -414,6 +466,19 @@ Command LocalizeCommand() {
                      "how landmarks look from each place (the map needs a visual map); both: and how far "
                      "they disagree [pnp]")
                 .OneOf({"pnp", "visual-map", "both"});
+            parser
+                .Add(
+                    "--log", arguments->log_folder,
+                    "Add frames with a fix to this folder, a capture that a recipe may name: their features, "
+                    "poses and cameras, of places that differ (docs/robots.md)")
+                .Type("FOLDER");
+            parser
+                .Add("--log-max-mb-per-day", arguments->log_mb_per_day,
+                     "With --log: largest growth in any 24 hours, 10^6 bytes [50]")
+                .Range(1.0, 1e6)
+                .Type("MB");
+            parser.AddFlag("--log-images", arguments->log_images,
+                           "With --log: keep the images of these frames, too");
             OptionTable options = DescribeOptions(&arguments->options);
             for (const OptionTable& more :
                  {DescribeOptions(&arguments->tracker_options),

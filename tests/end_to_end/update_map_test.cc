@@ -212,6 +212,44 @@ TEST_F(UpdateMap, WhatIsNoMapOrNoSurveyIsRefusedBeforeAnythingIsWritten) {
   EXPECT_EQ(ReadFile(Path("taken.toml")).value(), "name = \"mine\"\n");
 }
 
+// A robot drives by the old map, is killed on the way, drives on, and brings its log home.
+TEST_F(UpdateMap, RobotsLogIsASession) {
+  std::ofstream names(Path("names.txt"));
+  for (const auto& entry : fs::directory_iterator(Path("tonight"))) names << entry.path().string() << "\n";
+  names.close();
+  const std::string localize = "cairn localize " + OldMap() + " --log " + Path("robot") + " --progress none ";
+  // After its fifth answer.
+  EXPECT_EQ(RunShell(localize + "- < " + Path("names.txt") + " > " + Path("answers") +
+                     " & pid=$!; until [ \"$(wc -l < " + Path("answers") +
+                     ")\" -ge 5 ]; do sleep 0.02; done; kill -9 $pid; wait $pid")
+                .exit_code,
+            137);
+  const auto cut = ReadCapture(Path("robot"));
+  ASSERT_TRUE(cut.ok()) << cut.error().message;
+  EXPECT_GE(cut->images.size(), 1u);
+  const ProgramRun run = RunShell(localize + "--list " + Path("names.txt"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, ContainsRegex("[0-9]+ frames were added to the log "));
+  const auto log = ReadCapture(Path("robot"));
+  ASSERT_TRUE(log.ok()) << log.error().message;
+  EXPECT_GT(log->images.size(), cut->images.size());
+  EXPECT_LT(log->images.size(), static_cast<size_t>(num_new_));  // those of a place are kept once
+  EXPECT_EQ(log->features.size(), log->images.size());
+  const ProgramRun update = RunShell("cairn update-map " + OldMap() + " " + Path("robot") + " -o " +
+                                     Path("by_robot.cairn") + " --progress none --until group_classes");
+  ASSERT_EQ(update.exit_code, 0) << update.err;
+  EXPECT_THAT(ReadFile(Path("by_robot.toml")).value(), HasSubstr("name = \"robot\"\nframe = \"register\""));
+  EXPECT_THAT(update.out,
+              HasSubstr(fmt::format("{0} of {0} images of robot are joined", log->images.size())));
+  // With the map's own captures, as stated poses.
+  std::ofstream(Path("stated.toml")) << "name = \"stated\"\n[[capture]]\npath = \"robot\"\n"
+                                     << TinyStageOptions();
+  EXPECT_EQ(RunShell("cairn compile " + Path("stated.toml") + " -o " + Path("stated.cairn") +
+                     " --progress none --until match_features")
+                .exit_code,
+            0);
+}
+
 // Nothing is forced: the map is the old one's landmarks alone.
 TEST_F(UpdateMap, ImagesOfAnotherPlaceAreLeftOut) {
   fs::create_directories(Path("other"));

@@ -32,7 +32,7 @@ stages/decompose_views/plan stages/decompose_views
 stages/emit_map/choose stages/emit_map stages/emit_map/leave_out
 stages/check_map
 pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film
-pipeline/exchange/bags/files pipeline/exchange/bags
+pipeline/exchange/bags/files pipeline/exchange/bags pipeline/robot_log
 pipeline/commands pipeline
 """.split()
 # What robots' authors write, and Python's module: nobody includes them.
