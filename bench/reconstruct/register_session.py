@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """A session without poses beside one that has them: how much of it joins, how exactly, and does another place stay out?
 
-usage: register_session.py [--cairn PROGRAM] [--work FOLDER] [kitchen] [rendered] [foreign] [twins]
+usage: register_session.py [--cairn PROGRAM] [--work FOLDER] [kitchen] [rendered] [foreign] [twins] [update]
 
 Each case is a recipe of two captures, compiled to its poses by `cairn compile --until reconstruct` with defaults; the second capture is
 a folder of images.  kitchen: the real kitchen's survey (../shared/data/redkitchen_sfm), every second image or the second half
 without poses and with an unknown camera.  rendered: a drive through a building, and another one in half the light after 30 % of its wall
 panels were exchanged.  foreign: kitchen, corridor and demo offered to each other.  twins: of a building with two wings that look alike
-but for one panel, or none, images of one wing offered to maps of both.  Errors are of the joined images' stated frame: nothing is fitted.
+but for one panel, or none, images of one wing offered to maps of both.  update: the kitchen's halves again, where only the first one's
+map is left (`cairn update-map`), and how the held-out images fare in the old map, in the new one and in one of all images.  Errors are of the joined images' stated frame: nothing is fitted.
 What is there is not made again.  Needs NumPy.
 """
 import argparse
+import json
 import pathlib
 import re
 import subprocess
@@ -53,25 +55,27 @@ def part_of(capture, folder, lines, is_posed):
     return folder
 
 
+def joined_cells(name, poses, new):
+    found = {re.sub("^new/", "", key): pose for key, pose in read_poses(poses / "images.txt").items() if key.startswith("new/")}
+    truth_list = new.with_name(new.name + ".truth.txt")
+    num_images = len(list(new.rglob("*.jpg"))) + len(list(new.rglob("*.png")))
+    cells = [name, f"{len(found)} of {num_images}"]
+    if not truth_list.exists() or not found:
+        return cells + ["", "", "0" if not found else "?"]
+    truth = read_poses(truth_list)
+    distances = np.array([100 * np.linalg.norm(found[key][1] - truth[key][1]) for key in found])
+    angles = np.array([np.degrees(np.arccos(np.clip((np.trace(truth[key][0] @ found[key][0].T) - 1) / 2, -1, 1))) for key in found])
+    return cells + [f"{np.median(distances):.2f} cm, {np.median(angles):.3f}°", f"{distances.max():.2f} cm, {angles.max():.3f}°",
+                    f"{(distances > 50).sum()}"]
+
+
 def join(cairn, work, name, old, new):
     recipe, poses = work / f"{name}.toml", work / f"{name}.build/poses"
     recipe.write_text(f'name = "{name}"\n[[capture]]\npath = "{old}"\nname = "old"\n[[capture]]\npath = "{new}"\nname = "new"\n')
     if not poses.exists():
         subprocess.run([cairn, "compile", recipe, "-o", work / f"{name}.cairn", "--until", "reconstruct", "--progress", "none",
                         "--log-level", "error"], check=True, stdout=subprocess.DEVNULL)
-    found = {re.sub("^new/", "", key): pose for key, pose in read_poses(poses / "images.txt").items() if key.startswith("new/")}
-    truth_list = new.with_name(new.name + ".truth.txt")
-    num_images = len(list(new.rglob("*.jpg"))) + len(list(new.rglob("*.png")))
-    cells = [name, f"{len(found)} of {num_images}"]
-    if truth_list.exists() and found:
-        truth = read_poses(truth_list)
-        distances = np.array([100 * np.linalg.norm(found[key][1] - truth[key][1]) for key in found])
-        angles = np.array([np.degrees(np.arccos(np.clip((np.trace(truth[key][0] @ found[key][0].T) - 1) / 2, -1, 1))) for key in found])
-        cells += [f"{np.median(distances):.2f} cm, {np.median(angles):.3f}°", f"{distances.max():.2f} cm, {angles.max():.3f}°",
-                  f"{(distances > 50).sum()}"]
-    else:
-        cells += ["", "", "0" if not found else "?"]
-    print("| " + " | ".join(cells) + " |", flush=True)
+    print("| " + " | ".join(joined_cells(name, poses, new)) + " |", flush=True)
 
 
 def kitchen(cairn, work):
@@ -115,11 +119,39 @@ def twins(cairn, work):
             join(cairn, work, f"twins_{num_different}_different_{name}_wing", old, new)
 
 
+def compiled(cairn, map_path, *words):
+    if not map_path.exists():
+        subprocess.run([cairn, *words, "-o", map_path, "--progress", "none", "--log-level", "error"], check=True, stdout=subprocess.DEVNULL)
+    return map_path
+
+
+def update(cairn, work):
+    capture = DATA / "redkitchen_sfm"
+    lines = image_lines(capture)
+    whole = compiled(cairn, work / "update_whole.cairn", "compile", part_of(capture, work / "update_whole", lines, True))
+    rows = []
+    for name, is_old in (("alternating", lambda i: i % 2 == 0), ("halves", lambda i: i < len(lines) // 2)):
+        folder = work / f"update_{name}"
+        old = part_of(capture, folder / "kitchen", [line for i, line in enumerate(lines) if is_old(i)], True)
+        new = part_of(capture, folder / "new", [line for i, line in enumerate(lines) if not is_old(i)], False)
+        old_map = compiled(cairn, folder / "old.cairn", "compile", old)
+        new_map = compiled(cairn, folder / "updated.cairn", "update-map", old_map, new)
+        print("| " + " | ".join(joined_cells(f"update_{name}", folder / "updated.build/poses", new)) + " |", flush=True)
+        rows += [(f"{name}, old map", old_map), (f"{name}, updated", new_map)]
+    print("\n| map | held-out images localized | median error | landmarks, kB |\n|---|---|---|---|")
+    for name, path in rows + [("of all images, posed", whole)]:
+        answer = json.loads(subprocess.run([cairn, "check", path, "--queries", capture / "queries.txt", "--capture", capture, "--json",
+                                            "--progress", "none"], check=True, capture_output=True).stdout)
+        num_held_out = round(answer["num_held_out"])
+        print(f"| {name} | {round(num_held_out * answer['localized_ratio'])} of {num_held_out} | {100 * answer['median_error_m']:.2f} cm, "
+              f"{answer['median_error_deg']:.3f}° | {answer['num_landmarks']}, {answer['map_bytes'] / 1000:.0f} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cairn", type=pathlib.Path, default=ROOT / "build/release/cairn")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build/bench/register_session")
-    cases = {"kitchen": kitchen, "rendered": rendered, "foreign": foreign, "twins": twins}
+    cases = {"kitchen": kitchen, "rendered": rendered, "foreign": foreign, "twins": twins, "update": update}
     parser.add_argument("cases", nargs="*", help=", ".join(cases))
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
