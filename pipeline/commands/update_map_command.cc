@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,8 +53,11 @@ Result<std::string> RecipeOfUpdate(const MapRows& rows, const std::vector<MapCap
   std::string text = fmt::format(
       "# {}, each of its sessions as a capture of its landmarks, and what is new.  Every key that is not "
       "here "
-      "has its\n# default; docs/recipe.md lists them.\nname = \"{}\"\nseed = {}\n",
-      fs::path(arguments.map).filename().string(), rows.name, rows.seed);
+      "has its\n# default; docs/recipe.md lists them.\nname = \"{}\"\n",
+      NameOfFolder(fs::path(arguments.map).filename().string()), NameOfMap(rows));
+  // Larger ones are no recipe's.
+  if (rows.seed > 0 && rows.seed <= static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
+    text += fmt::format("seed = {}\n", rows.seed);
   const Eigen::Vector3d up = UpOfMap(rows);
   for (const MapCapture& capture : captures) {
     text += fmt::format("\n[[capture]]\npath = \"{}\"\nname = \"{}\"\nup = [{}, {}, {}]\n",

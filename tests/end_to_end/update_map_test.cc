@@ -63,6 +63,10 @@ num_queries = 0
     const ProgramRun run =
         RunShell("cairn compile " + Path("old.toml") + " -o " + Path("old.cairn") + " --progress none");
     ASSERT_EQ(run.exit_code, 0) << run.err;
+    fs::create_directories(Path("without_pixels"));
+    for (const char* file : {"old/images.txt", "old/cameras.txt", "old.build/features.db"})
+      fs::copy_file(Path(file), Path("without_pixels") / fs::path(file).filename());
+    classes_hash_ = HashFile(Path("old.build/classes.db")).value();
     fs::create_directories(Path("elsewhere"));
     fs::rename(Path("old.cairn"), Path("elsewhere/yesterday.cairn"));
     fs::remove_all(Path("old"));
@@ -101,11 +105,37 @@ num_queries = 0
   static ProgramRun* first_run_;
   static std::map<std::string, Pose> truth_;
   static int num_new_;
+  static std::string classes_hash_;
 };
 TemporaryFolder* UpdateMap::folder_ = nullptr;
 ProgramRun* UpdateMap::first_run_ = nullptr;
 std::map<std::string, Pose> UpdateMap::truth_;
 int UpdateMap::num_new_ = 0;
+std::string UpdateMap::classes_hash_;
+
+// What extract_features found stands for the images.
+TEST_F(UpdateMap, FeaturesAloneGiveTheClassesOfTheirImages) {
+  WriteCaptureRecipe(Path("bare.toml"), {"without_pixels"});
+  const auto compile = [&] {
+    return RunShell("cairn compile " + Path("bare.toml") + " -o " + Path("bare.cairn") + " --progress none");
+  };
+  const ProgramRun run = compile();
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(HashFile(Path("bare.build/classes.db")).value(), classes_hash_);
+  EXPECT_GT(
+      nlohmann::json::parse(ReadFile(Path("bare.build/check.json")).value())["localized_ratio"].get<double>(),
+      0.5);
+  EXPECT_THAT(compile().out, HasSubstr("up to date"));
+  // One image's features are damaged: it is left out with the reason, and the others are not done again.
+  ASSERT_EQ(RunShell("sqlite3 " + Path("without_pixels/features.db") +
+                     " 'UPDATE keypoints SET data = zeroblob(length(data)) WHERE image_id = 7'")
+                .exit_code,
+            0);
+  const ProgramRun again = compile();
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.err, HasSubstr("image 7: keypoint 0 has the scale 0"));
+  EXPECT_THAT(again.out, HasSubstr("1 rejected, 29 taken over"));
+}
 
 TEST_F(UpdateMap, NewImagesAreJoinedToTheLandmarksOfTheMap) {
   ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;

@@ -1,6 +1,7 @@
 #include "pipeline/exchange/export/map_capture.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -21,6 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMaxSessionNameBytes = 100;
 // Of landmarks whose size is not known.
 constexpr double kUnknownScalePx = 2;
 // How far above a landmark its orientation is taken, as a part of its depth.
@@ -139,6 +141,17 @@ bool IsOfSurveyImages(const std::string& stage, const std::string& option) {
 
 }  // namespace
 
+std::string NameOfMap(const MapHead& head) {
+  std::string name = head.name.substr(0, kMaxSessionNameBytes);
+  for (char& c : name) {
+    const bool is_valid = std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';
+    if (!is_valid) c = '_';
+  }
+  if (name.empty()) return "map";
+  if (!IsSessionName(name)) name.front() = '_';
+  return name;
+}
+
 Eigen::Vector3d UpOfMap(const MapHead& head) {
   return head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
 }
@@ -149,11 +162,11 @@ Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std:
   std::map<std::string, std::vector<const LandmarkImage*>> of_session;
   for (const LandmarkImage& image : images) {
     const int session = SessionOfImage(rows.sessions, image.listed.name);
-    of_session[session < 0 ? rows.name : rows.sessions[session]].push_back(&image);
+    of_session[session < 0 ? NameOfMap(rows) : rows.sessions[session]].push_back(&image);
   }
   std::vector<MapCapture> captures;
   for (const std::string& session :
-       rows.sessions.empty() ? std::vector<std::string>{rows.name} : rows.sessions) {
+       rows.sessions.empty() ? std::vector<std::string>{NameOfMap(rows)} : rows.sessions) {
     if (!of_session.contains(session)) continue;
     MapCapture capture{session, folder + "/" + session, static_cast<int>(of_session[session].size())};
     for (const LandmarkImage* image : of_session[session])

@@ -18,7 +18,7 @@ namespace cairn::pipeline {
 // landmark's own, but keypoints of a pair turn alike.  Poses are as the map's surveys stated them, up to
 // their noise, and the frame is the map's.
 struct MapCapture {
-  std::string session;  // the map's name, where it has no sessions
+  std::string session;  // NameOfMap, where it has no sessions
   std::string folder;   // of the capture, below the folder that was given
   int num_images = 0;
   int64_t num_keypoints = 0;
@@ -29,6 +29,10 @@ struct MapCapture {
 // bytes. Errors: NoData (no landmark is seen by two images), InvalidArgument (the folder holds something
 // else), Io.
 Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std::string& folder);
+
+// What a recipe and a session may be called that are of this map: its name, characters that they must not
+// have became '_'.  (Whoever made the map chose its name.)
+std::string NameOfMap(const MapHead& head);
 
 // The direction that the map's floor has for up, in the world frame.
 Eigen::Vector3d UpOfMap(const MapHead& head);

@@ -129,6 +129,19 @@ TEST_F(MapCaptureTest, MapOfWhichNothingIsSeenTwiceIsRefused) {
   EXPECT_FALSE(fs::exists(folder_));
 }
 
+TEST_F(MapCaptureTest, NameOfAMapLeadsToNoOtherFolder) {
+  MapRows rows = SmallMap();
+  rows.name = "../../hall\" two\n";
+  const auto captures = WriteMapCaptures(rows, folder_);
+  ASSERT_TRUE(captures.ok()) << captures.error().message;
+  EXPECT_EQ(captures->front().folder, folder_ + "/_._.._hall__two_");
+  EXPECT_TRUE(fs::exists(folder_ + "/_._.._hall__two_/features.db"));
+  rows.name = "";
+  EXPECT_EQ(NameOfMap(rows), "map");
+  rows.name = std::string(200, 'x');
+  EXPECT_EQ(NameOfMap(rows), std::string(100, 'x'));
+}
+
 TEST(OptionsOfMap, AreThoseThatDifferAndSayNothingOfItsSurvey) {
   int num_features = 2000, radius = 3;
   std::string pairs = "auto", choice = "regions";
