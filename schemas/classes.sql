@@ -1,7 +1,7 @@
 -- classes.db: the feature classes of a capture with refined poses, output of group_classes.
 -- Blobs are little-endian; class and image ids are the opaque ids of the capture's COLMAP database.
 PRAGMA application_id = 0x6372636c;  -- 'crcl'
-PRAGMA user_version = 2;
+PRAGMA user_version = 3;
 
 CREATE TABLE cameras (
   camera_id INTEGER PRIMARY KEY,
@@ -36,7 +36,27 @@ CREATE TABLE classes (
   covariance   BLOB NOT NULL,  -- float64[6]: xx xy xz yy yz zz, m^2
   reprojection_error_px REAL NOT NULL,  -- root mean square
   descriptor   BLOB NOT NULL,  -- uint8[128]
-  observations BLOB NOT NULL   -- n x 24 bytes: image_id u32, keypoint_idx u32, x f32, y f32, scale f32, orientation f32
+  observations BLOB NOT NULL,  -- n x 24 bytes: image_id u32, keypoint_idx u32, x f32, y f32, scale f32, orientation f32
+  presence     REAL NOT NULL,  -- probability that it is there now; 1 for a survey of one session
+  sightings    BLOB NOT NULL   -- per session 12 bytes: expected f32, num_seen i32, there f32; empty: one session
+);
+
+-- Classes that are probably gone, in the same form: no id is in both tables.
+CREATE TABLE vanished (
+  class_id     INTEGER PRIMARY KEY,
+  position     BLOB NOT NULL,
+  covariance   BLOB NOT NULL,
+  reprojection_error_px REAL NOT NULL,
+  descriptor   BLOB NOT NULL,
+  observations BLOB NOT NULL,
+  presence     REAL NOT NULL,
+  sightings    BLOB NOT NULL
+);
+
+-- The sessions of the survey, where there are several, in the order of time.
+CREATE TABLE sessions (
+  session_idx INTEGER PRIMARY KEY,
+  name        TEXT NOT NULL
 );
 
 CREATE TABLE alignment (

@@ -30,6 +30,8 @@ constexpr DropReasonEntry kReasons[] = {
      "a look-alike with more keypoints within max_duplicate_distance_m stands for it"},
     {DropReason::kOutlier, "group_classes", DropKind::kKeypoint, "outlier",
      "its ray misses the class's point by more than max_reprojection_error_px"},
+    {DropReason::kVanished, "group_classes", DropKind::kFeature, "vanished",
+     "later sessions should have seen it and did not: it is there with less than min_presence"},
     {DropReason::kFewStations, "filter_visibility", DropKind::kFeature, "few_stations",
      "fewer stations see it than min_num_stations or min_num_stations_driven"},
     {DropReason::kHoles, "filter_visibility", DropKind::kFeature, "holes",

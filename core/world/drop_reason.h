@@ -24,6 +24,7 @@ enum class DropReason : int {
   kAmbiguous = 25,
   kDuplicate = 26,
   kOutlier = 27,
+  kVanished = 28,
   // filter_visibility
   kFewStations = 30,
   kHoles = 31,

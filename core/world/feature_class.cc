@@ -23,6 +23,7 @@ Pose PoseFromArray(const PoseArray& a) {
 
 // What an observation looks like in its blob: the struct itself has no padding.
 static_assert(sizeof(Observation) == 24 && std::is_trivially_copyable_v<Observation>);
+static_assert(sizeof(SessionSightings) == 12 && std::is_trivially_copyable_v<SessionSightings>);
 
 template <size_t N>
 void BindArray(SQLite::Statement& statement, int index, const std::array<double, N>& values) {
@@ -41,7 +42,7 @@ Result<std::array<double, N>> ArrayFromColumn(const SQLite::Column& column, cons
 }
 
 Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& path,
-                                  const std::set<ImageId>& image_ids) {
+                                  const std::set<ImageId>& image_ids, size_t num_sessions) {
   FeatureClass feature_class;
   feature_class.class_id = row.getColumn(0).getUInt();
   const std::string what = fmt::format("{}: class {}", path, feature_class.class_id);
@@ -63,7 +64,51 @@ Result<FeatureClass> ClassFromRow(SQLite::Statement& row, const std::string& pat
                        observation.image_id);
     }
   }
+  feature_class.age.presence = static_cast<float>(row.getColumn(6).getDouble());
+  CAIRN_ASSIGN_OR_RETURN(feature_class.age.sessions, BlobToVector<SessionSightings>(row.getColumn(7), what));
+  if (!feature_class.age.sessions.empty() && feature_class.age.sessions.size() != num_sessions) {
+    return MakeError(ErrorCode::kCorrupt, "{}: sightings of {} sessions, expected {}", what,
+                     feature_class.age.sessions.size(), num_sessions);
+  }
   return feature_class;
+}
+
+Result<std::vector<FeatureClass>> SelectClasses(SQLite::Database& database, const std::string& table,
+                                                const std::string& path, const std::set<ImageId>& image_ids,
+                                                size_t num_sessions) {
+  std::vector<FeatureClass> classes;
+  SQLite::Statement row(database,
+                        "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
+                        "observations, presence, sightings FROM " +
+                            table + " ORDER BY 1");
+  while (row.executeStep()) {
+    CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class, ClassFromRow(row, path, image_ids, num_sessions));
+    classes.push_back(std::move(feature_class));
+  }
+  return classes;
+}
+
+void InsertClasses(SQLite::Database& database, const std::string& table,
+                   const std::vector<FeatureClass>& classes) {
+  SQLite::Statement row(database, "INSERT INTO " + table + " VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const FeatureClass& feature_class : classes) {
+    const Eigen::Vector3d& p = feature_class.position;
+    const Eigen::Matrix3d& c = feature_class.covariance;
+    row.bind(1, feature_class.class_id);
+    BindArray(row, 2, std::array<double, 3>{p.x(), p.y(), p.z()});
+    BindArray(row, 3, std::array<double, 6>{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
+    row.bind(4, feature_class.reprojection_error_px);
+    row.bind(5, feature_class.descriptor.data(), kDescriptorDim);
+    row.bind(6, feature_class.observations.data(),
+             static_cast<int>(feature_class.observations.size() * sizeof(Observation)));
+    row.bind(7, static_cast<double>(feature_class.age.presence));
+    // No sessions: an empty blob, not NULL.
+    const std::vector<SessionSightings>& sightings = feature_class.age.sessions;
+    row.bind(8, sightings.empty() ? static_cast<const void*>("") : sightings.data(),
+             static_cast<int>(sightings.size() * sizeof(SessionSightings)));
+    row.exec();
+    row.reset();
+  }
 }
 
 void InsertCameras(SQLite::Database& database, const std::string& table, const std::vector<Camera>& cameras) {
@@ -116,19 +161,14 @@ Status WriteClasses(const Classes& classes, const std::string& path,
       image_row.exec();
       image_row.reset();
     }
-    SQLite::Statement class_row(database, "INSERT INTO classes VALUES (?, ?, ?, ?, ?, ?)");
-    for (const FeatureClass& feature_class : classes.classes) {
-      const Eigen::Vector3d& p = feature_class.position;
-      const Eigen::Matrix3d& c = feature_class.covariance;
-      class_row.bind(1, feature_class.class_id);
-      BindArray(class_row, 2, std::array<double, 3>{p.x(), p.y(), p.z()});
-      BindArray(class_row, 3, std::array<double, 6>{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
-      class_row.bind(4, feature_class.reprojection_error_px);
-      class_row.bind(5, feature_class.descriptor.data(), kDescriptorDim);
-      class_row.bind(6, feature_class.observations.data(),
-                     static_cast<int>(feature_class.observations.size() * sizeof(Observation)));
-      class_row.exec();
-      class_row.reset();
+    InsertClasses(database, "classes", classes.classes);
+    InsertClasses(database, "vanished", classes.vanished);
+    SQLite::Statement session_row(database, "INSERT INTO sessions VALUES (?, ?)");
+    for (size_t i = 0; i < classes.sessions.size(); ++i) {
+      session_row.bind(1, static_cast<int64_t>(i));
+      session_row.bind(2, classes.sessions[i]);
+      session_row.exec();
+      session_row.reset();
     }
     SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?, ?)");
     BindArray(alignment_row, 1, ArrayFromPose(classes.camera_from_given));
@@ -161,11 +201,13 @@ Eigen::Matrix<uint8_t, 1, kDescriptorDim> MeanDescriptor(DescriptorSum sum) {
 Result<Classes> ReadClasses(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<Classes> {
-    if (!HasTable(database, "classes") || !HasTable(database, "stated_cameras")) {
-      return MakeError(ErrorCode::kUnsupported,
-                       "{}: has no tables 'classes' and 'stated_cameras'; expected the output of this "
-                       "program's group-classes",
-                       path);
+    if (!HasTable(database, "classes") || !HasTable(database, "stated_cameras") ||
+        !HasTable(database, "vanished")) {
+      return MakeError(
+          ErrorCode::kUnsupported,
+          "{}: has no tables 'classes', 'stated_cameras' and 'vanished'; expected the output of this "
+          "program's group-classes",
+          path);
     }
     Classes classes;
     CAIRN_ASSIGN_OR_RETURN(classes.cameras, SelectCameras(database, "cameras", path));
@@ -187,13 +229,12 @@ Result<Classes> ReadClasses(const std::string& path) {
       image_ids.insert(image.image_id);
       classes.images.push_back(image);
     }
-    SQLite::Statement class_row(database,
-                                "SELECT class_id, position, covariance, reprojection_error_px, descriptor, "
-                                "observations FROM classes ORDER BY 1");
-    while (class_row.executeStep()) {
-      CAIRN_ASSIGN_OR_RETURN(FeatureClass feature_class, ClassFromRow(class_row, path, image_ids));
-      classes.classes.push_back(std::move(feature_class));
-    }
+    SQLite::Statement session_row(database, "SELECT name FROM sessions ORDER BY session_idx");
+    while (session_row.executeStep()) classes.sessions.push_back(session_row.getColumn(0).getString());
+    CAIRN_ASSIGN_OR_RETURN(classes.classes,
+                           SelectClasses(database, "classes", path, image_ids, classes.sessions.size()));
+    CAIRN_ASSIGN_OR_RETURN(classes.vanished,
+                           SelectClasses(database, "vanished", path, image_ids, classes.sessions.size()));
     SQLite::Statement alignment_row(
         database,
         "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg, keypoint_correlation "

@@ -21,6 +21,20 @@ struct Observation {
   Keypoint keypoint;
 };
 
+// How often the images of one session could have seen a feature class, and did.
+struct SessionSightings {
+  float expected =
+      0;  // images of the session that see the class if it is there, from what other sessions saw
+  int32_t num_seen = 0;  // images that see it
+  float there = 1;       // probability that it was there, by this session alone; 1 where nothing says
+};
+
+// What the sessions of a survey say of a class (group_classes/persistence).
+struct ClassAge {
+  std::vector<SessionSightings> sessions;  // per session, in the order of time; empty: one survey
+  float presence = 1;                      // probability that it is there now, after the last session
+};
+
 // Equivalence class of keypoints = one scene feature [Sala06 §VI-B], triangulated.
 struct FeatureClass {
   ClassId class_id = 0;
@@ -29,6 +43,7 @@ struct FeatureClass {
   double reprojection_error_px = 0;                      // root mean square over the observations
   Eigen::Matrix<uint8_t, 1, kDescriptorDim> descriptor = Eigen::Matrix<uint8_t, 1, kDescriptorDim>::Zero();
   std::vector<Observation> observations;  // ascending image_id, one per image
+  ClassAge age;
 };
 
 struct SurveyImage {
@@ -53,6 +68,9 @@ struct Classes {
   std::vector<SurveyImage>
       images;  // ascending image_id; all posed images of the capture, with classes or without
   std::vector<FeatureClass> classes;  // ascending class_id
+  std::vector<std::string> sessions;  // of the survey, in the order of time; empty: one
+  // Classes that are probably gone: no longer of the map.  Ascending class_id, none of which is in `classes`.
+  std::vector<FeatureClass> vanished;
   // Constant offset between the pose that the capture states and its camera, if refined, else identity:
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
   Pose camera_from_given;

@@ -103,9 +103,9 @@ $(BUILD)/poses.stamp: $(BUILD)/matches.db $(BUILD)/features.db $(call CAIRN_OPTI
     $(BUILD)/options/odometry $(filter %/odometry.txt %.csv,$(CAPTURE_LISTS)) $(POSED_LISTS)
 	$(call CAIRN_RUN,reconstruct,stage reconstruct $(@D)/matches.db --capture $(CAPTURE))
 
-# Stage 3: matches that show the same point become feature classes.
-$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(POSES_READY) $(call CAIRN_OPTIONS,group_classes) $(SEED_FILE)
-	$(call CAIRN_RUN,group_classes,stage group-classes $(@D)/matches.db --capture $(POSES))
+# Stage 3: matches that show the same point become feature classes.  Of several sessions it says which are still there.
+$(BUILD)/classes.db.stamp: $(BUILD)/matches.db $(POSES_READY) $(call CAIRN_OPTIONS,group_classes) $(SEED_FILE) $(SESSION_LIST)
+	$(call CAIRN_RUN,group_classes,stage group-classes $(@D)/matches.db --capture $(POSES) $(addprefix --sessions ,$(SESSION_LIST)))
 
 # Stage 4: stations, and which classes are widely visible from them.
 $(BUILD)/world.db.stamp: $(BUILD)/classes.db $(call CAIRN_OPTIONS,filter_visibility)

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/capture/sessions.h"
 #include "core/line/memory.h"
 #include "stages/group_classes/adjust/solved_file.h"
 #include "stages/group_classes/group_classes.h"
@@ -18,6 +19,7 @@ struct Arguments {
   std::string matches;
   std::string capture;
   std::string output;
+  std::string sessions;
   GroupClassesOptions options;
   OptionArguments option_arguments;
 };
@@ -69,6 +71,23 @@ std::string AdjustmentText(const GroupClassesResult& result, const MatchedFeatur
   return text;
 }
 
+// What each session says of the classes of the others, a line each.
+std::string PersistenceText(const GroupClassesResult& result) {
+  std::string text;
+  for (size_t s = 0; s < result.sessions.size(); ++s) {
+    const SessionPersistence& session = result.sessions[s];
+    text += fmt::format(
+        "group_classes: {} sees {} of {} classes of other sessions that it could see, {:.0f} % as readily as "
+        "they; "
+        "{:.1f} % are there\n",
+        result.classes.sessions[s], session.num_seen, session.num_known, 100 * session.yield,
+        100 * session.there_ratio);
+  }
+  if (!result.sessions.empty())
+    text += fmt::format("group_classes: {} classes are probably gone\n", result.classes.vanished.size());
+  return text;
+}
+
 Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_ASSIGN_OR_RETURN(const Capture capture, ReadCapture(arguments.capture));
@@ -82,11 +101,15 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       if (camera.model != CameraModel::kEquirectangular) matched.cameras[camera_id] = camera;
     }
   }
+  std::vector<std::string> sessions;
+  if (!arguments.sessions.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(sessions, ReadSessionsText(arguments.sessions));
+  }
   SolvedFile solved(SolvedPath(arguments.output));
   const auto group_and_write = [&]() -> Result<GroupClassesResult> {
     CAIRN_ASSIGN_OR_RETURN(GroupClassesResult result,
                            GroupClasses(matched, capture, arguments.options, environment.num_threads,
-                                        *environment.progress, &solved));
+                                        *environment.progress, &solved, sessions));
     CAIRN_RETURN_IF_ERROR(WriteClasses(result.classes, arguments.output, result.dropped_items));
     return result;
   };
@@ -106,7 +129,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   *environment.out << fmt::format("group_classes: {} tracks, {} classes kept, dropped: {}\n",
                                   result.num_tracks, classes.classes.size(),
                                   dropped.empty() ? "none" : dropped);
-  *environment.out << AdjustmentText(result, matched);
+  *environment.out << AdjustmentText(result, matched) << PersistenceText(result);
   return Ok();
 }
 
@@ -114,20 +137,26 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
 
 Command GroupClassesCommand() {
   const auto arguments = std::make_shared<Arguments>();
-  return {.name = "group-classes",
-          .summary = "Group matching keypoints into triangulated feature classes (stage 3)",
-          .add_arguments =
-              [arguments](ArgumentParser& parser) {
-                parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
-                    .Required()
-                    .Type("matches.db");
-                parser.Add("--capture", arguments->capture, "Capture folder with the survey's poses")
-                    .Required()
-                    .Type("CAPTURE");
-                parser.Add("-o,--output", arguments->output, "File to write").Required().Type("classes.db");
-                arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
-              },
-          .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
+  return {
+      .name = "group-classes",
+      .summary = "Group matching keypoints into triangulated feature classes (stage 3)",
+      .add_arguments =
+          [arguments](ArgumentParser& parser) {
+            parser.Add("matches", arguments->matches, "COLMAP database with verified matches")
+                .Required()
+                .Type("matches.db");
+            parser.Add("--capture", arguments->capture, "Capture folder with the survey's poses")
+                .Required()
+                .Type("CAPTURE");
+            parser
+                .Add("--sessions", arguments->sessions,
+                     "sessions.txt of the capture, in the order of time: image SESSION/NAME belongs to that "
+                     "survey [one survey]")
+                .Type("sessions.txt");
+            parser.Add("-o,--output", arguments->output, "File to write").Required().Type("classes.db");
+            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
+          },
+      .run = [arguments](const CommandEnvironment& environment) { return Run(*arguments, environment); }};
 }
 
 }  // namespace cairn::group_classes

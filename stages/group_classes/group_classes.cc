@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/base/parallel.h"
+#include "core/capture/sessions.h"
 #include "core/files/database.h"
 #include "core/structure/union_matches.h"
 #include "stages/group_classes/make_classes.h"
@@ -84,6 +85,37 @@ void MeasurePoseNoise(Classes* classes) {
   classes->stated_pose_sigma_deg = std::round(1e4 * std::sqrt(squared_deg / num_axes)) / 1e4;
 }
 
+// Gives classes an age, and takes those out that are probably gone.
+void Forget(const std::vector<std::string>& sessions, const PersistenceOptions& options, int num_threads,
+            GroupClassesResult* result) {
+  Classes& classes = result->classes;
+  std::vector<int> session_of_image;
+  for (const SurveyImage& image : classes.images)
+    session_of_image.push_back(SessionOfImage(sessions, image.name));
+  Persistence persistence =
+      EstimatePersistence(classes, session_of_image, static_cast<int>(sessions.size()), num_threads);
+  classes.sessions = sessions;
+  result->sessions = std::move(persistence.sessions);
+  std::vector<FeatureClass> kept;
+  kept.reserve(classes.classes.size());
+  for (size_t i = 0; i < classes.classes.size(); ++i) {
+    FeatureClass& feature = classes.classes[i];
+    feature.age = std::move(persistence.ages[i]);
+    if (feature.age.presence >= options.min_presence) {
+      kept.push_back(std::move(feature));
+      continue;
+    }
+    ++classes.dropped[DescribeDropReason(DropReason::kVanished).name];
+    DroppedItem& item = result->dropped_items.emplace_back();
+    item.reason = DropReason::kVanished;
+    item.item_id = feature.class_id;
+    for (const Observation& observation : feature.observations)
+      item.seen_at.insert(item.seen_at.end(), {observation.image_id, observation.keypoint_idx});
+    classes.vanished.push_back(std::move(feature));
+  }
+  classes.classes = std::move(kept);
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(GroupClassesOptions* o) {
@@ -125,6 +157,7 @@ OptionTable DescribeOptions(GroupClassesOptions* o) {
                    .value = &o->ambiguity.max_duplicate_distance_m,
                    .help = "look-alikes closer than this are one scene feature found twice, metres",
                    .min = 0});
+  for (Option& option : DescribeOptions(&o->persistence)) table.push_back(std::move(option));
   return table;
 }
 
@@ -174,7 +207,8 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
 
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
-                                        Progress& progress, SolvedFile* solved) {
+                                        Progress& progress, SolvedFile* solved,
+                                        const std::vector<std::string>& sessions) {
   PosedImages posed = CollectPosedImages(matched, capture);
   if (posed.num_images() == 0) {
     return MakeError(ErrorCode::kNoData,
@@ -228,6 +262,7 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   MeasurePoseNoise(&classes);
   ListUnposed(matched, posed, &result.dropped_items);
   MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes, &result.dropped_items);
+  if (sessions.size() > 1) Forget(sessions, options.persistence, num_threads, &result);
   progress.Advance();
   progress.End();
   if (classes.classes.empty()) {

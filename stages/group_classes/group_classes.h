@@ -14,6 +14,7 @@
 #include "core/world/feature_class.h"
 #include "stages/group_classes/adjust/adjust_survey.h"
 #include "stages/group_classes/find_ambiguous.h"
+#include "stages/group_classes/persistence/persistence.h"
 #include "stages/group_classes/tracks/posed_images.h"
 
 namespace cairn::group_classes {
@@ -34,6 +35,7 @@ struct GroupClassesOptions {
   double initial_reprojection_error_px = 12.0;
   AdjustSurveyOptions adjustment;
   FindAmbiguousOptions ambiguity;
+  PersistenceOptions persistence;
 };
 OptionTable DescribeOptions(GroupClassesOptions* options);
 
@@ -50,15 +52,19 @@ struct GroupClassesResult {
   double initial_rms_px = 0;
   double final_rms_px = 0;
   bool poses_refined = false;
-  SurveyFindings findings;  // where they were
+  SurveyFindings findings;                   // where they were
+  std::vector<SessionPersistence> sessions;  // of a survey of several
 };
 
 // Pure; same result for any thread count, and for any file of what was `solved` before
-// (adjust/solved_file.h), which may be null.  Classes are ascending by their first observation.  Errors:
+// (adjust/solved_file.h), which may be null.  `sessions`: those that the capture was joined from, in the
+// order of time, if there are several: then classes have an age, and those that are probably gone by now are
+// `vanished` (persistence/persistence.h).  Classes are ascending by their first observation.  Errors:
 // InvalidArgument (options), NoData (no posed image, or no class left: says what dropped the
 // most), Cancelled.
 Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Capture& capture,
                                         const GroupClassesOptions& options, int num_threads,
-                                        Progress& progress, SolvedFile* solved = nullptr);
+                                        Progress& progress, SolvedFile* solved = nullptr,
+                                        const std::vector<std::string>& sessions = {});
 
 }  // namespace cairn::group_classes

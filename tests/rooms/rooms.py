@@ -23,7 +23,7 @@ stages/simulate
 stages/extract_features
 stages/match_features/pairs stages/match_features
 stages/reconstruct/view_graph stages/reconstruct/globally stages/reconstruct/registration stages/reconstruct/inertial stages/reconstruct/verdict stages/reconstruct/by_colmap stages/reconstruct
-stages/group_classes/tracks stages/group_classes/adjust stages/group_classes
+stages/group_classes/persistence stages/group_classes/tracks stages/group_classes/adjust stages/group_classes
 stages/filter_visibility
 stages/decompose_regions/cover stages/decompose_regions/algorithms stages/decompose_regions
 stages/build_vocabulary
