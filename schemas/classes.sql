@@ -59,6 +59,17 @@ CREATE TABLE sessions (
   name        TEXT NOT NULL
 );
 
+-- Where the place changed, by session, the largest first.
+CREATE TABLE changes (
+  session_idx  INTEGER NOT NULL,  -- the first that shows it
+  position     BLOB NOT NULL,     -- float64[3], mean of the classes', world frame, metres
+  radius_m     REAL NOT NULL,     -- root mean square of their distances from it
+  num_vanished INTEGER NOT NULL,  -- classes
+  num_appeared INTEGER NOT NULL,
+  image_before INTEGER NOT NULL,  -- of an earlier session, shows what was there; 0: none
+  image_after  INTEGER NOT NULL   -- of this session, shows what is there now; 0: none
+);
+
 CREATE TABLE alignment (
   camera_from_given BLOB NOT NULL,  -- float64[7], as images.refined
   -- how far refined poses moved from the stated ones, root mean square per axis; 0: poses as stated

@@ -111,6 +111,49 @@ void InsertClasses(SQLite::Database& database, const std::string& table,
   }
 }
 
+void InsertChanges(SQLite::Database& database, const std::vector<PlaceChange>& changes) {
+  SQLite::Statement row(database, "INSERT INTO changes VALUES (?, ?, ?, ?, ?, ?, ?)");
+  for (const PlaceChange& change : changes) {
+    row.bind(1, change.session);
+    BindArray(row, 2, std::array<double, 3>{change.position.x(), change.position.y(), change.position.z()});
+    row.bind(3, change.radius_m);
+    row.bind(4, change.num_vanished);
+    row.bind(5, change.num_appeared);
+    row.bind(6, change.image_before);
+    row.bind(7, change.image_after);
+    row.exec();
+    row.reset();
+  }
+}
+
+Result<std::vector<PlaceChange>> SelectChanges(SQLite::Database& database, const std::string& path,
+                                               const std::set<ImageId>& image_ids, size_t num_sessions) {
+  std::vector<PlaceChange> changes;
+  SQLite::Statement row(database,
+                        "SELECT session_idx, position, radius_m, num_vanished, num_appeared, image_before, "
+                        "image_after FROM changes ORDER BY rowid");
+  while (row.executeStep()) {
+    PlaceChange change;
+    change.session = row.getColumn(0).getInt();
+    const std::string what = fmt::format("{}: change {}", path, changes.size());
+    CAIRN_ASSIGN_OR_RETURN(const auto position, ArrayFromColumn<3>(row.getColumn(1), what));
+    change.position = {position[0], position[1], position[2]};
+    change.radius_m = row.getColumn(2).getDouble();
+    change.num_vanished = row.getColumn(3).getInt();
+    change.num_appeared = row.getColumn(4).getInt();
+    change.image_before = row.getColumn(5).getUInt();
+    change.image_after = row.getColumn(6).getUInt();
+    const bool images_exist = (change.image_before == 0 || image_ids.count(change.image_before) != 0) &&
+                              (change.image_after == 0 || image_ids.count(change.image_after) != 0);
+    if (change.session < 0 || static_cast<size_t>(change.session) >= num_sessions || !images_exist) {
+      return MakeError(ErrorCode::kCorrupt, "{}: of session {} of {}, shown by images {} and {}", what,
+                       change.session, num_sessions, change.image_before, change.image_after);
+    }
+    changes.push_back(change);
+  }
+  return changes;
+}
+
 void InsertCameras(SQLite::Database& database, const std::string& table, const std::vector<Camera>& cameras) {
   SQLite::Statement row(database, "INSERT INTO " + table + " VALUES (?, ?, ?, ?, ?, ?)");
   for (const Camera& camera : cameras) {
@@ -170,6 +213,7 @@ Status WriteClasses(const Classes& classes, const std::string& path,
       session_row.exec();
       session_row.reset();
     }
+    InsertChanges(database, classes.changes);
     SQLite::Statement alignment_row(database, "INSERT INTO alignment VALUES (?, ?, ?, ?)");
     BindArray(alignment_row, 1, ArrayFromPose(classes.camera_from_given));
     alignment_row.bind(2, classes.stated_pose_sigma_m);
@@ -235,6 +279,8 @@ Result<Classes> ReadClasses(const std::string& path) {
                            SelectClasses(database, "classes", path, image_ids, classes.sessions.size()));
     CAIRN_ASSIGN_OR_RETURN(classes.vanished,
                            SelectClasses(database, "vanished", path, image_ids, classes.sessions.size()));
+    CAIRN_ASSIGN_OR_RETURN(classes.changes,
+                           SelectChanges(database, path, image_ids, classes.sessions.size()));
     SQLite::Statement alignment_row(
         database,
         "SELECT camera_from_given, stated_pose_sigma_m, stated_pose_sigma_deg, keypoint_correlation "

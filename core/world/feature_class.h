@@ -35,6 +35,19 @@ struct ClassAge {
   float presence = 1;                      // probability that it is there now, after the last session
 };
 
+// Where a place changed between two sessions, by the classes that vanished and those that appeared there.
+struct PlaceChange {
+  int session = 0;  // the first that shows it
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // mean of the classes', world frame
+  double radius_m = 0;                                 // root mean square of their distances from it
+  int32_t num_vanished = 0;
+  int32_t num_appeared = 0;
+  // The image of an earlier session that shows best what was there, and that of this session which shows what
+  // is there now; 0: none.
+  ImageId image_before = 0;
+  ImageId image_after = 0;
+};
+
 // Equivalence class of keypoints = one scene feature [Sala06 §VI-B], triangulated.
 struct FeatureClass {
   ClassId class_id = 0;
@@ -71,6 +84,7 @@ struct Classes {
   std::vector<std::string> sessions;  // of the survey, in the order of time; empty: one
   // Classes that are probably gone: no longer of the map.  Ascending class_id, none of which is in `classes`.
   std::vector<FeatureClass> vanished;
+  std::vector<PlaceChange> changes;  // ascending session, then the largest first
   // Constant offset between the pose that the capture states and its camera, if refined, else identity:
   // cam_from_world = camera_from_given * given_cam_from_world, up to noise.
   Pose camera_from_given;

@@ -1,6 +1,7 @@
 #include "stages/group_classes/command.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -84,7 +85,21 @@ std::string PersistenceText(const GroupClassesResult& result) {
         100 * session.there_ratio);
   }
   if (!result.sessions.empty())
-    text += fmt::format("group_classes: {} classes are probably gone\n", result.classes.vanished.size());
+    text += fmt::format("group_classes: {} classes are probably gone; the place changed at {} places\n",
+                        result.classes.vanished.size(), result.classes.changes.size());
+  constexpr size_t kMaxLines = 10;
+  const std::vector<PlaceChange>& changes = result.classes.changes;
+  std::map<ImageId, std::string> names;
+  for (const SurveyImage& image : result.classes.images) names[image.image_id] = image.name;
+  const auto name_of = [&](ImageId image_id) { return image_id == 0 ? "no image" : names.at(image_id); };
+  for (size_t i = 0; i < std::min(changes.size(), kMaxLines); ++i) {
+    const PlaceChange& change = changes[i];
+    text += fmt::format("group_classes: in {}, {:.1f} around ({:.1f}, {:.1f}, {:.1f}): {} classes gone, {} new; {} -> {}\n",
+                        result.classes.sessions[change.session], change.radius_m, change.position.x(),
+                        change.position.y(), change.position.z(), change.num_vanished, change.num_appeared,
+                        name_of(change.image_before), name_of(change.image_after));
+  }
+  if (changes.size() > kMaxLines) text += fmt::format("group_classes: ... and {} more\n", changes.size() - kMaxLines);
   return text;
 }
 

@@ -95,6 +95,7 @@ void Forget(const std::vector<std::string>& sessions, const PersistenceOptions& 
   Persistence persistence =
       EstimatePersistence(classes, session_of_image, static_cast<int>(sessions.size()), num_threads);
   classes.sessions = sessions;
+  classes.changes = std::move(persistence.changes);
   result->sessions = std::move(persistence.sessions);
   std::vector<FeatureClass> kept;
   kept.reserve(classes.classes.size());

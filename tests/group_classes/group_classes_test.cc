@@ -284,6 +284,111 @@ TEST(GroupClasses, ClassesReadBackAsTheyWereWritten) {
   EXPECT_EQ(read->dropped, written.dropped);
 }
 
+// Every other image is of session "b", where what lies in the middle is gone: it has keypoints there, but they
+// match nothing.
+Survey SurveyOfTwoSessions(std::set<int>* gone) {
+  Survey survey = MakeSurvey({});
+  for (size_t i = 0; i < survey.matched.images.size(); ++i) {
+    const std::string name = fmt::format("{}/{}", i % 2 == 0 ? "a" : "b", survey.matched.images[i].name);
+    survey.matched.images[i].name = survey.capture.images[i].name = name;
+  }
+  for (size_t p = 0; p < survey.points.size(); ++p) {
+    if (survey.points[p].head<2>().norm() < 0.8) gone->insert(static_cast<int>(p));
+  }
+  for (TwoViewGeometry& geometry : survey.matched.geometries) {
+    std::erase_if(geometry.inliers, [&](const Match& match) {
+      return std::any_of(gone->begin(), gone->end(), [&](int p) {
+        const auto is_of = [&](ImageId image_id, uint32_t keypoint) {
+          const auto found = survey.keypoint_of_point[image_id - 1].find(p);
+          return image_id % 2 == 0 && found != survey.keypoint_of_point[image_id - 1].end() &&
+                 found->second == keypoint;
+        };
+        return is_of(geometry.image_id1, match.idx1) || is_of(geometry.image_id2, match.idx2);
+      });
+    });
+  }
+  std::sort(survey.capture.images.begin(), survey.capture.images.end(),
+            [](const CaptureImage& a, const CaptureImage& b) { return a.name < b.name; });
+  return survey;
+}
+
+TEST(GroupClasses, WhatTheLastSessionMissesIsGoneAndSaidOfEachClass) {
+  std::set<int> gone;
+  const Survey survey = SurveyOfTwoSessions(&gone);
+  NoProgress progress;
+  GroupClassesOptions options;
+  const auto grouped =
+      GroupClasses(survey.matched, survey.capture, options, 2, progress, nullptr, {"a", "b"});
+  ASSERT_TRUE(grouped.ok()) << grouped.error().message;
+  const Classes& classes = grouped->classes;
+  EXPECT_EQ(classes.sessions, (std::vector<std::string>{"a", "b"}));
+  ASSERT_EQ(grouped->sessions.size(), 2u);
+  const auto is_gone = [&](const FeatureClass& feature) {
+    return std::any_of(gone.begin(), gone.end(),
+                       [&](int p) { return (survey.points[p] - feature.position).norm() < 0.02; });
+  };
+  const auto num_gone = std::count_if(classes.vanished.begin(), classes.vanished.end(), is_gone);
+  EXPECT_GT(num_gone, 0.8 * static_cast<double>(gone.size()));
+  EXPECT_LE(static_cast<double>(classes.vanished.size()), 1.1 * static_cast<double>(num_gone));
+  EXPECT_EQ(classes.dropped.at("vanished"), static_cast<int64_t>(classes.vanished.size()));
+  for (const FeatureClass& feature : classes.vanished) {
+    EXPECT_LT(feature.age.presence, 0.5);
+    ASSERT_EQ(feature.age.sessions.size(), 2u);
+    EXPECT_GT(feature.age.sessions[0].num_seen, 1);
+    EXPECT_EQ(feature.age.sessions[1].num_seen, 0);
+  }
+  for (const FeatureClass& feature : classes.classes) {
+    EXPECT_GE(feature.age.presence, 0.5);
+    int num_seen[2] = {0, 0};
+    for (const Observation& observation : feature.observations) ++num_seen[1 - observation.image_id % 2];
+    EXPECT_EQ(feature.age.sessions[0].num_seen, num_seen[0]);
+    EXPECT_EQ(feature.age.sessions[1].num_seen, num_seen[1]);
+  }
+  // All of it is in the file.
+  const std::string path = testing::TempDir() + "/classes_sessions.db",
+                    again = testing::TempDir() + "/classes_sessions_again.db";
+  ASSERT_TRUE(WriteClasses(classes, path).ok());
+  const auto read = ReadClasses(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->vanished.size(), classes.vanished.size());
+  EXPECT_EQ(read->changes.size(), classes.changes.size());
+  EXPECT_EQ(read->sessions, classes.sessions);
+  ASSERT_TRUE(WriteClasses(*read, again).ok());
+  EXPECT_EQ(*HashFile(path), *HashFile(again));
+  // Nothing is forgotten on request.
+  options.persistence.min_presence = 0;
+  const auto all = GroupClasses(survey.matched, survey.capture, options, 2, progress, nullptr, {"a", "b"});
+  ASSERT_TRUE(all.ok());
+  EXPECT_TRUE(all->classes.vanished.empty());
+  EXPECT_EQ(all->classes.classes.size(), classes.classes.size() + classes.vanished.size());
+}
+
+TEST(GroupClasses, SightingsOfAnotherNumberOfSessionsAreCorrupt) {
+  std::set<int> gone;
+  const Survey survey = SurveyOfTwoSessions(&gone);
+  NoProgress progress;
+  const auto grouped = GroupClasses(survey.matched, survey.capture, {}, 2, progress, nullptr, {"a", "b"});
+  ASSERT_TRUE(grouped.ok());
+  const std::string path = testing::TempDir() + "/classes_sessions_damaged.db";
+  for (const auto& [damage, message] :
+       {std::pair("DELETE FROM sessions WHERE session_idx = 1", "sightings of 2 sessions, expected 1"),
+        std::pair("UPDATE classes SET sightings = x'00'", "blob"),
+        std::pair("INSERT INTO changes SELECT 2, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1", "session 2 of 2"),
+        std::pair("INSERT INTO changes SELECT -1, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1", "session -1"),
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 999, 0 FROM classes LIMIT 1", "images 999"),
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 999 FROM classes LIMIT 1", "999")}) {
+    ASSERT_TRUE(WriteClasses(grouped->classes, path).ok());
+    {
+      SQLite::Database database(path, SQLite::OPEN_READWRITE);
+      database.exec(damage);
+    }
+    const auto read = ReadClasses(path);
+    ASSERT_FALSE(read.ok()) << damage;
+    EXPECT_EQ(read.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(read.error().message, HasSubstr(message)) << damage;
+  }
+}
+
 TEST(GroupClasses, CaptureWithoutPosesIsAnErrorWithTheRemedy) {
   Survey survey = MakeSurvey({});
   for (CaptureImage& image : survey.capture.images) image.cam_from_world.reset();

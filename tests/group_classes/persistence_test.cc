@@ -232,6 +232,81 @@ TEST(Persistence, ForgetsAPlaceOfWhichEverythingWasExchanged) {
   EXPECT_LT(forgotten.LivingRatio(), 0.01);
 }
 
+// A poster is taken down, and another hung up beside it.
+bool PosterMoves(int session, const Eigen::Vector3d& point) {
+  const auto is_in = [&](double x) { return std::abs(point.x() - x) < 0.5 && std::abs(point.y()) < 0.5; };
+  return is_in(-2) ? session == 0 : is_in(1.5) ? session > 0 : std::abs(point.x()) > 0.05;
+}
+
+TEST(PlaceChanges, AreWhereAPosterWasAndWhereOneIs) {
+  const SceneOverTime scene = Wall({{}, {}, {}}, PosterMoves);
+  const Persistence persistence = Estimate(scene, 3);
+  ASSERT_EQ(persistence.changes.size(), 2u);
+  for (const PlaceChange& change : persistence.changes) {
+    EXPECT_EQ(change.session, 1);
+    EXPECT_NEAR(change.position.y(), 0, 0.1);
+    EXPECT_NEAR(change.position.z(), 4, 1e-9);
+    EXPECT_NEAR(change.radius_m, 1 / std::sqrt(6.0), 0.06);  // of a square with sides of 1 m
+    // Both images see the place: from sessions 0 and 1, from in front of it.
+    for (const bool is_after : {false, true}) {
+      const ImageId image_id = is_after ? change.image_after : change.image_before;
+      ASSERT_GT(image_id, 0u);
+      EXPECT_EQ(scene.session_of_image[image_id - 1], is_after ? 1 : 0);
+      EXPECT_NEAR(scene.classes.images[image_id - 1].cam_from_world.Center().x(), change.position.x(), 2.1);
+    }
+  }
+  const bool first_is_gone = persistence.changes[0].num_vanished > 0;
+  const PlaceChange& gone = persistence.changes[first_is_gone ? 0 : 1];
+  const PlaceChange& hung = persistence.changes[first_is_gone ? 1 : 0];
+  EXPECT_NEAR(gone.position.x(), -2, 0.1);
+  EXPECT_NEAR(hung.position.x(), 1.5, 0.1);
+  EXPECT_GT(gone.num_vanished, 150);
+  EXPECT_EQ(gone.num_appeared, 0);
+  EXPECT_GT(hung.num_appeared, 150);
+  EXPECT_EQ(hung.num_vanished, 0);
+  EXPECT_GE(persistence.changes[0].num_vanished + persistence.changes[0].num_appeared,
+            persistence.changes[1].num_vanished + persistence.changes[1].num_appeared);
+}
+
+TEST(PlaceChanges, AreOneWhereOneThingStandsForAnother) {
+  SceneOverTime scene = EmptyScene();
+  for (int session = 0; session < 2; ++session) {
+    for (int i = 0; i < 24; ++i) scene.AddImage(session, {-3 + 0.25 * i, 0, 0});
+  }
+  Random random(9);
+  for (int p = 0; p < 4000; ++p) {
+    const bool is_new = p % 4 == 3;
+    const Eigen::Vector3d point(random.Uniform(-3, 3), random.Uniform(-1.2, 1.2), 4);
+    if (is_new && !InPoster(point)) continue;
+    scene.AddPoint(
+        point,
+        [&](int image, const Eigen::Vector3d& at) {
+          return !InPoster(at) || (scene.session_of_image[image] == 1) == is_new ? 0.6 : 0.0;
+        },
+        &random);
+  }
+  const Persistence persistence = Estimate(scene, 2);
+  ASSERT_EQ(persistence.changes.size(), 1u);
+  EXPECT_GT(persistence.changes[0].num_vanished, 200);
+  EXPECT_GT(persistence.changes[0].num_appeared, 60);
+  EXPECT_LT(persistence.changes[0].position.head<2>().norm(), 0.1);
+}
+
+TEST(PlaceChanges, AreNoneInTheDark) {
+  const SceneOverTime scene = Wall({{}, {.visibility = 0.3, .spoilt = 0.4}}, AlwaysThere);
+  EXPECT_TRUE(Estimate(scene, 2).changes.empty());
+}
+
+TEST(PlaceChanges, ComeAndGoByTurns) {
+  const IsThere away_once = [](int session, const Eigen::Vector3d& point) { return session != 1 || !InPoster(point); };
+  const Persistence persistence = Estimate(Wall({{}, {}, {}}, away_once), 3);
+  ASSERT_EQ(persistence.changes.size(), 2u);
+  EXPECT_EQ(persistence.changes[0].session, 1);
+  EXPECT_GT(persistence.changes[0].num_vanished, 200);
+  EXPECT_EQ(persistence.changes[1].session, 2);
+  EXPECT_GT(persistence.changes[1].num_appeared, 200);
+}
+
 TEST(Persistence, IsTheSameForAnyNumberOfThreadsAndAnyUnit) {
   SceneOverTime scene = Wall({{}, {.visibility = 0.4, .spoilt = 0.2}}, PosterVanishes);
   const Persistence one = Estimate(scene, 2, 1), seven = Estimate(scene, 2, 7);

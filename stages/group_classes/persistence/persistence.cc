@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <unordered_map>
 
 #include "core/base/parallel.h"
+#include "stages/group_classes/persistence/changes.h"
+#include "stages/group_classes/persistence/point_grid.h"
 #include "stages/group_classes/persistence/sightings.h"
+#include "stages/group_classes/persistence/surroundings.h"
 
 namespace cairn::group_classes {
 namespace {
@@ -35,8 +37,6 @@ constexpr double kNeighbourRadius = 0.15;
 constexpr size_t kMaxNumNeighbours = 80;
 constexpr double kNumIndependent = 10;
 constexpr double kMaxLogRatio = 3;
-// Neighbours are seen from the same side: a wall's other side is another surface.
-constexpr double kMinSideCosine = 0.2;
 // Then they say again what each thinks by now, in so many rounds, with bounded votes: so the edge of what is
 // gone comes to lie where it is, and not where a sighting, which says more than a miss, pushes it.
 constexpr int kNumRounds = 2;
@@ -76,88 +76,6 @@ Likelihoods LikelihoodsOf(const Known& known, const MissModel& model) {
 
 double ProbabilityOf(double likelihood_ratio, double prior) {
   return prior * likelihood_ratio / (prior * likelihood_ratio + 1 - prior);
-}
-
-// Points of space in cubes, for neighbours within a radius of one edge.
-class PointGrid {
- public:
-  PointGrid(double edge, const std::vector<Eigen::Vector3d>& points) : edge_(edge), points_(points) {
-    for (size_t i = 0; i < points.size(); ++i)
-      cells_[KeyOf(CellOf(points[i]))].push_back(static_cast<int>(i));
-  }
-  template <typename Body>
-  void ForNeighbours(const Eigen::Vector3d& point, const Body& body) const {
-    const Eigen::Vector3i at = CellOf(point);
-    for (int x = -1; x <= 1; ++x) {
-      for (int y = -1; y <= 1; ++y) {
-        for (int z = -1; z <= 1; ++z) {
-          const auto cell = cells_.find(KeyOf(at + Eigen::Vector3i(x, y, z)));
-          if (cell == cells_.end()) continue;
-          for (const int i : cell->second) {
-            const double squared = (points_[i] - point).squaredNorm();
-            if (squared <= edge_ * edge_) body(i, squared);
-          }
-        }
-      }
-    }
-  }
-
- private:
-  Eigen::Vector3i CellOf(const Eigen::Vector3d& point) const {
-    return (point / edge_).array().floor().max(-1e6).min(1e6).cast<int>();
-  }
-  static int64_t KeyOf(const Eigen::Vector3i& cell) {
-    return ((cell.x() + (int64_t{1} << 20)) * (int64_t{1} << 21) + cell.y() + (int64_t{1} << 20)) *
-               (int64_t{1} << 21) +
-           cell.z() + (int64_t{1} << 20);
-  }
-  const double edge_;
-  const std::vector<Eigen::Vector3d>& points_;
-  std::unordered_map<int64_t, std::vector<int>> cells_;
-};
-
-// REQUIRES: not empty
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-struct Surroundings {
-  std::vector<Eigen::Vector3d>
-      sides;  // from which each class is seen: the mean direction to its images, a unit vector
-  double typical_distance = 1;  // from which classes are seen, on the median
-  // Of each image: the classes that it sees, as part of what its session's images see on the median; at
-  // most 1.
-  std::vector<double> sight_ratio;
-};
-
-Surroundings SurroundingsOf(const Classes& classes, const std::vector<int>& session_of_image) {
-  std::unordered_map<ImageId, Eigen::Vector3d> centers;
-  for (const SurveyImage& image : classes.images) centers[image.image_id] = image.cam_from_world.Center();
-  Surroundings surroundings;
-  std::unordered_map<ImageId, double> num_seen;
-  std::vector<double> distances;
-  for (const FeatureClass& feature : classes.classes) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const Observation& observation : feature.observations) {
-      const Eigen::Vector3d to_image = centers.at(observation.image_id) - feature.position;
-      if (&observation == &feature.observations.front()) distances.push_back(to_image.norm());
-      sum += to_image.normalized();
-      ++num_seen[observation.image_id];
-    }
-    surroundings.sides.push_back(sum.normalized());
-  }
-  if (!distances.empty()) surroundings.typical_distance = std::max(Median(distances), 1e-9);
-  std::map<int, std::vector<double>> of_session;
-  for (size_t i = 0; i < classes.images.size(); ++i)
-    of_session[session_of_image[i]].push_back(num_seen[classes.images[i].image_id]);
-  for (size_t i = 0; i < classes.images.size(); ++i) {
-    const double median = Median(of_session[session_of_image[i]]);
-    surroundings.sight_ratio.push_back(
-        std::min(num_seen[classes.images[i].image_id] / std::max(median, 1.0), 1.0));
-  }
-  return surroundings;
 }
 
 // The mixture of one session.
@@ -424,6 +342,7 @@ Persistence EstimatePersistence(const Classes& classes, const std::vector<int>& 
           static_cast<float>(ProbabilityOf(likelihood_ratio[known.class_idx], known.prior));
     }
   }
+  persistence.changes = FindChanges(classes, persistence.ages, views, session_of_image, surroundings);
   return persistence;
 }
 

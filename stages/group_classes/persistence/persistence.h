@@ -39,6 +39,7 @@ struct SessionPersistence {
 struct Persistence {
   std::vector<ClassAge> ages;  // per class
   std::vector<SessionPersistence> sessions;
+  std::vector<PlaceChange> changes;  // changes.h
 };
 
 // `num_sessions` at least 2; sessions are in the order of time.  Pure; the same for any number of threads.
