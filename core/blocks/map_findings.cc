@@ -89,6 +89,32 @@ Status CheckPromise(const MapPromise& promise, size_t num_regions, size_t num_im
   return CheckCurve(promise.held_out);
 }
 
+Status CheckChanges(const std::vector<MapChange>& changes, const MapSizes& sizes) {
+  const auto exists = [&](int32_t image) {
+    return image >= -1 && image < static_cast<int64_t>(sizes.num_images);
+  };
+  for (size_t i = 0; i < changes.size(); ++i) {
+    const MapChange& row = changes[i];
+    if (row.session < 1 || static_cast<size_t>(row.session) >= sizes.num_sessions)
+      return Invalid("change {} is of session {} of {}", i, row.session, sizes.num_sessions);
+    if (!exists(row.image_before) || !exists(row.image_after)) {
+      return Invalid("change {} is shown by images {} and {} of {}", i, row.image_before, row.image_after,
+                     sizes.num_images);
+    }
+    if (!(row.position.array().abs() <= kMaxChangeExtentM).all() ||
+        !(row.radius_m >= 0 && row.radius_m <= kMaxChangeExtentM) || row.num_vanished < 0 ||
+        row.num_appeared < 0 || row.NumFeatures() < 1) {
+      return Invalid("change {}: {} gone and {} new within {} m", i, row.num_vanished, row.num_appeared,
+                     row.radius_m);
+    }
+    if (i == 0) continue;
+    const MapChange& last = changes[i - 1];
+    if (row.session < last.session || (row.session == last.session && row.NumFeatures() > last.NumFeatures()))
+      return Invalid("change {} is out of order", i);
+  }
+  return Ok();
+}
+
 }  // namespace
 
 int MapPromise::NumKept() const {
@@ -97,8 +123,8 @@ int MapPromise::NumKept() const {
   }));
 }
 
-Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations,
-                        size_t num_images) {
+Status CheckMapFindings(const MapFindings& findings, const MapSizes& sizes) {
+  const size_t num_regions = sizes.num_regions;
   for (size_t i = 0; i < findings.self_test_regions.size(); ++i) {
     const RegionSelfTest& row = findings.self_test_regions[i];
     if (i > 0 && row.region <= findings.self_test_regions[i - 1].region)
@@ -116,10 +142,10 @@ Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t 
     const DropCount& row = findings.drops[i];
     if (i > 0 && row.reason_id <= findings.drops[i - 1].reason_id)
       return Invalid("what is dropped for reason {} is out of order", row.reason_id);
-    CAIRN_RETURN_IF_ERROR(CheckDropCount(row, num_stations));
+    CAIRN_RETURN_IF_ERROR(CheckDropCount(row, sizes.num_stations));
   }
-  if (findings.promise) return CheckPromise(*findings.promise, num_regions, num_images);
-  return Ok();
+  if (findings.promise) CAIRN_RETURN_IF_ERROR(CheckPromise(*findings.promise, num_regions, sizes.num_images));
+  return CheckChanges(findings.changes, sizes);
 }
 
 }  // namespace cairn

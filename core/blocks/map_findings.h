@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/base/error.h"
 #include "core/base/ids.h"
 #include "core/promise/promise_model.h"
@@ -87,6 +89,24 @@ struct MapPromise {
   friend bool operator==(const MapPromise&, const MapPromise&) = default;
 };
 
+// Changes lie as near the origin as a map's landmarks have to, m.
+inline constexpr double kMaxChangeExtentM = 2e5;
+
+// Where the place changed from one survey to the next, by the features that vanished and those that appeared
+// there (PlaceChange of core/world/feature_class.h).  Stored to a thousandth of the map's unit.
+struct MapChange {
+  int session = 0;  // by its place in the map's sessions: the first that shows it, never the first of all
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // mean of the features', world frame, metres
+  double radius_m = 0;                                 // root mean square of their distances from it
+  int32_t num_vanished = 0;
+  int32_t num_appeared = 0;
+  // Images by index, that show best what was there and what is there now; -1: none of the map.
+  int32_t image_before = -1;
+  int32_t image_after = -1;
+  int64_t NumFeatures() const { return int64_t{num_vanished} + num_appeared; }
+  friend bool operator==(const MapChange&, const MapChange&) = default;
+};
+
 // What the compilation found out about a map, for people who assess it (schemas/map_findings.sql).  A robot
 // does not need it to localize.
 struct MapFindings {
@@ -94,12 +114,20 @@ struct MapFindings {
   std::vector<RegionEntropy> region_entropies;    // those with images of the appearance graph, ascending
   std::vector<DropCount> drops;                   // reasons that occurred, ascending
   std::optional<MapPromise> promise;              // of maps whose landmarks were chosen by trial
+  std::vector<MapChange> changes;  // of maps of several surveys; ascending session, the largest first
   friend bool operator==(const MapFindings&, const MapFindings&) = default;
 };
 
-// Errors: InvalidArgument, naming the row: a row out of order, of a region, station or image that does not
-// exist, or with impossible numbers.
-Status CheckMapFindings(const MapFindings& findings, size_t num_regions, size_t num_stations,
-                        size_t num_images);
+// How many of each the map has that findings are of.
+struct MapSizes {
+  size_t num_regions = 0;
+  size_t num_stations = 0;
+  size_t num_images = 0;
+  size_t num_sessions = 0;
+};
+
+// Errors: InvalidArgument, naming the row: a row out of order, of a region, station, image or session that
+// does not exist, or with impossible numbers.
+Status CheckMapFindings(const MapFindings& findings, const MapSizes& sizes);
 
 }  // namespace cairn

@@ -264,7 +264,10 @@ Status CheckMapRows(const MapRows& rows) {
     }
     if (!is_document[image]) return Invalid("the vocabulary knows image {}, which is not kept", image_id);
   }
-  return CheckMapFindings(rows.findings, rows.regions.size(), rows.stations.size(), rows.images.size());
+  return CheckMapFindings(rows.findings, {.num_regions = rows.regions.size(),
+                                          .num_stations = rows.stations.size(),
+                                          .num_images = rows.images.size(),
+                                          .num_sessions = rows.sessions.size()});
 }
 
 std::vector<int> LandmarksSeenAt(const MapRows& rows) {

@@ -1,4 +1,4 @@
-// Maps written: the tables of schemas/0002_map.sql and map_findings.sql.
+// Maps written: the tables of schemas/0002_map.sql, map_findings.sql and map_changes.sql.
 #include <limits>
 
 #include "core/blocks/map_layout.h"
@@ -9,6 +9,7 @@
 #include "core/map/map_tables.h"
 #include "core/seal/map_seal.h"
 #include "schemas/0002_map_sql.h"
+#include "schemas/map_changes_sql.h"
 #include "schemas/map_findings_sql.h"
 
 namespace cairn {
@@ -75,6 +76,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
       database.exec("BEGIN");
       database.exec(k0002MapSql);
       database.exec(kMapFindingsSql);
+      if (!rows.findings.changes.empty()) database.exec(kMapChangesSql);
       CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows, path));
       database.exec("COMMIT");
       return Ok();

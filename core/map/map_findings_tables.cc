@@ -14,7 +14,8 @@ constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
 
 // The tables that a map may have: earlier formats lack some.
 const std::vector<StoredTable>& FindingsTables() {
-  static const std::vector<StoredTable> tables = {{"drop_reasons", 7, 4096},
+  static const std::vector<StoredTable> tables = {{"changes", 10, 1 << 20},
+                                                  {"drop_reasons", 7, 4096},
                                                   {"promises", 14, 1},
                                                   {"region_entropies", 2, 1 << 24},
                                                   {"self_test_regions", 8, 1 << 24}};
@@ -128,6 +129,24 @@ void WritePromise(SQLite::Database& database, const MapFindings& findings) {
   insert.exec();
 }
 
+void WriteChanges(SQLite::Database& database, const MapFindings& findings) {
+  SQLite::Statement insert(database, "INSERT INTO changes VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  for (size_t i = 0; i < findings.changes.size(); ++i) {
+    const MapChange& row = findings.changes[i];
+    insert.bind(1, static_cast<int64_t>(i));
+    insert.bind(2, row.session);
+    for (int axis = 0; axis < 3; ++axis)
+      insert.bind(3 + axis, static_cast<int64_t>(std::llround(row.position[axis] * kThousandths)));
+    insert.bind(6, static_cast<int64_t>(std::llround(row.radius_m * kThousandths)));
+    insert.bind(7, row.num_vanished);
+    insert.bind(8, row.num_appeared);
+    insert.bind(9, row.image_before);
+    insert.bind(10, row.image_after);
+    insert.exec();
+    insert.reset();
+  }
+}
+
 int32_t Int32(int64_t value) { return value >= 0 && value <= kMaxCount ? static_cast<int32_t>(value) : -1; }
 
 // Without overflow: the file may be anything.
@@ -238,6 +257,27 @@ Result<DropCount> DecodeDropCount(const StoredRow& stored, const std::string& pa
   return row;
 }
 
+Result<MapChange> DecodeChange(const StoredRow& stored) {
+  // Whole numbers up to here are exact as doubles; CheckMapFindings knows narrower limits.
+  constexpr int64_t kMostThousandths = int64_t{1} << 53;
+  MapChange row;
+  CAIRN_ASSIGN_OR_RETURN(row.session, CountOf(stored, 1));
+  for (int axis = 0; axis < 3; ++axis) {
+    CAIRN_ASSIGN_OR_RETURN(const int64_t steps,
+                           stored.Integer(2 + axis, -kMostThousandths, kMostThousandths));
+    row.position[axis] = static_cast<double>(steps) / kThousandths;
+  }
+  CAIRN_ASSIGN_OR_RETURN(const int64_t radius, stored.Integer(5, 0, kMostThousandths));
+  row.radius_m = static_cast<double>(radius) / kThousandths;
+  CAIRN_ASSIGN_OR_RETURN(row.num_vanished, CountOf(stored, 6));
+  CAIRN_ASSIGN_OR_RETURN(row.num_appeared, CountOf(stored, 7));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t before, stored.Integer(8, -1, kMaxCount));
+  CAIRN_ASSIGN_OR_RETURN(const int64_t after, stored.Integer(9, -1, kMaxCount));
+  row.image_before = static_cast<int32_t>(before);
+  row.image_after = static_cast<int32_t>(after);
+  return row;
+}
+
 }  // namespace
 
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
@@ -245,6 +285,7 @@ void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
   WriteRegionEntropies(database, findings);
   WriteDropCounts(database, findings);
   WritePromise(database, findings);
+  if (!findings.changes.empty()) WriteChanges(database, findings);
 }
 
 Result<StoredRows> ReadFindingsRows(SQLite::Database& database, const std::string& path,
@@ -268,6 +309,9 @@ Result<MapFindings> DecodeMapFindings(const StoredRows& rows, const std::string&
         findings.region_entropies.push_back(entropy);
       } else if (table == "promises") {
         CAIRN_ASSIGN_OR_RETURN(findings.promise, DecodePromise(row, path));
+      } else if (table == "changes") {
+        CAIRN_ASSIGN_OR_RETURN(const MapChange change, DecodeChange(row));
+        findings.changes.push_back(change);
       } else {
         CAIRN_ASSIGN_OR_RETURN(DropCount count, DecodeDropCount(row, path));
         findings.drops.push_back(std::move(count));

@@ -8,8 +8,8 @@
 
 namespace cairn {
 
-// The tables of schemas/map_findings.sql inside a map file.  These throw SQLite::Exception: call them
-// inside WithDatabaseErrors.
+// The tables of schemas/map_findings.sql, and of map_changes.sql where there are changes, inside a map file.
+// These throw SQLite::Exception: call them inside WithDatabaseErrors.
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings);
 // Reads those of the tables that the file has, as ReadStoredRows: earlier formats lack some.
 Result<StoredRows> ReadFindingsRows(SQLite::Database& database, const std::string& path,

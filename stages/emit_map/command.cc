@@ -166,6 +166,7 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
   rows.stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
   rows.frame = inputs.provenance.frame;
   rows.sessions = inputs.provenance.sessions;
+  AddChanges(inputs.classes, &rows);
   if (classes.images.size() == inputs.classes.images.size()) {  // the map itself, not one to be tried
     if (const std::optional<FixNoise> noise = LearnFixNoise(classes, rows, num_threads)) {
       rows.covariance_scale = noise->covariance_scale;

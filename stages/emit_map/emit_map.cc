@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <set>
@@ -475,6 +476,31 @@ Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world
                                       const Decomposition& decomposition, const EmitMapOptions& options) {
   CAIRN_ASSIGN_OR_RETURN(const auto classes_of_regions, ClassesOfRegions(classes, world, decomposition));
   return MarkKept(classes.classes.size(), classes_of_regions, options);
+}
+
+void AddChanges(const Classes& classes, MapRows* rows) {
+  const auto index_of = [&](ImageId image_id) {
+    const auto image =
+        std::lower_bound(rows->images.begin(), rows->images.end(), image_id,
+                         [](const MapImage& map_image, ImageId id) { return map_image.image_id < id; });
+    if (image_id == 0 || image == rows->images.end() || image->image_id != image_id) return int32_t{-1};
+    return static_cast<int32_t>(image - rows->images.begin());
+  };
+  const auto rounded = [](double value) { return std::round(1000 * value) / 1000; };
+  for (const PlaceChange& change : classes.changes) {
+    const auto session =
+        std::find(rows->sessions.begin(), rows->sessions.end(), classes.sessions[change.session]);
+    if (session == rows->sessions.end()) continue;
+    if (!((change.position.array().abs() <= kMaxChangeExtentM).all() && change.radius_m <= kMaxChangeExtentM))
+      continue;
+    rows->findings.changes.push_back({.session = static_cast<int>(session - rows->sessions.begin()),
+                                      .position = change.position.unaryExpr(rounded),
+                                      .radius_m = rounded(change.radius_m),
+                                      .num_vanished = change.num_vanished,
+                                      .num_appeared = change.num_appeared,
+                                      .image_before = index_of(change.image_before),
+                                      .image_after = index_of(change.image_after)});
+  }
 }
 
 Status AddViews(Views views, MapRows* rows) {

@@ -99,6 +99,10 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
 Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,
                                       const Decomposition& decomposition, const EmitMapOptions& options);
 
+// Puts where the place changed into a map that has its sessions already, to a thousandth of its unit.
+// Changes of sessions that the map does not name, and those too far away to be landmarks, are left out.
+void AddChanges(const Classes& classes, MapRows* rows);
+
 // Puts a floor plan and its regions, floor frame, into a map.  Errors: InvalidArgument where the map's unit
 // is not the metre: plans are in metres.
 Status AddViews(Views views, MapRows* rows);

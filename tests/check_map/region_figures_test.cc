@@ -116,8 +116,9 @@ TEST(RegionFigures, ImageCountsInEveryRegionOfItsStationOrOutside) {
   EXPECT_THAT(regions, ElementsAre(RegionSelfTest{-1, 2, 1, 0, RegionSelfTest::Errors{0.03, 0.3, 0.03, 0.3}},
                                    RegionSelfTest{0, 3, 3, 0, RegionSelfTest::Errors{0.02, 0.2, 0.04, 0.4}},
                                    RegionSelfTest{1, 3, 2, 1, RegionSelfTest::Errors{0.02, 0.2, 0.8, 8}}));
-  EXPECT_TRUE(
-      CheckMapFindings({.self_test_regions = regions}, rows.regions.size(), rows.stations.size(), 0).ok());
+  EXPECT_TRUE(CheckMapFindings({.self_test_regions = regions},
+                               {.num_regions = rows.regions.size(), .num_stations = rows.stations.size()})
+                  .ok());
 }
 
 TEST(RegionFigures, GateNamesTheRegionTheFigureAndTheLimit) {

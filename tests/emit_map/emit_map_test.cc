@@ -54,6 +54,33 @@ TEST(EmitMap, FewestLandmarksHaveToBeNamed) {
   EXPECT_EQ(named.landmarks[0].class_id, example.classes.classes[1].class_id);
 }
 
+TEST(AddChanges, RoundsPlacesAndNamesSessionsAndImagesByTheMapsIndices) {
+  EmitExample example = MakeEmitExample();
+  example.classes.sessions = {"old", "new", "newer"};
+  example.classes.changes = {{.session = 1,
+                              .position = {1.23449, -0.0006, 2},
+                              .radius_m = 0.25051,
+                              .num_vanished = 20,
+                              .num_appeared = 3,
+                              .image_before = 4,
+                              .image_after = 2},
+                             {.session = 1, .num_vanished = 15, .image_before = 3, .image_after = 0},
+                             {.session = 1, .position = {1e9, 0, 0}, .num_vanished = 12},
+                             {.session = 2, .num_vanished = 11}};
+  MapRows rows = *Emit(example);
+  rows.sessions = {"older", "old", "new"};  // "newer" is not of this map
+  AddChanges(example.classes, &rows);
+  EXPECT_THAT(rows.findings.changes, ElementsAre(MapChange{.session = 2,
+                                                           .position = {1.234, -0.001, 2},
+                                                           .radius_m = 0.251,
+                                                           .num_vanished = 20,
+                                                           .num_appeared = 3,
+                                                           .image_before = 2,
+                                                           .image_after = 1},
+                                                 MapChange{.session = 2, .num_vanished = 15}));
+  EXPECT_TRUE(CheckMapRows(rows).ok());
+}
+
 TEST(EmitMap, KeepsTheClassesOfRegionsOrderedByFirstRegion) {
   const Result<MapRows> rows = Emit(MakeEmitExample());
   ASSERT_TRUE(rows.ok()) << rows.error().message;

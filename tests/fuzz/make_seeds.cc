@@ -59,6 +59,8 @@ int main(int argc, char** argv) {
                                         {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
     rows->findings.drops = {
         {44, "decompose_regions", "station", "left_over", "not covered", 200, {0, 200, 1}}};
+    rows->sessions = {"old", "new"};
+    rows->findings.changes = {{1, {0.5, -1.25, 2}, 0.25, 20, 3, 0, -1}};
     const std::string map = folder + (min_num_landmarks_for_words == 0 ? "/map_words" : "/map");
     if (min_num_landmarks_for_words == 0 && !WritePacked(*rows, folder)) return 1;
     if (!WriteMapRows(*rows, map).ok()) return 1;

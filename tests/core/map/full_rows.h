@@ -39,6 +39,7 @@ inline MapRows FullRows() {
   rows.findings.self_test_regions = {{kOutsideRegions, 2, 0, 0, {}},
                                      {1, 4, 3, 1, RegionSelfTest::Errors{0.03, 0.3, 0.8, 8}}};
   rows.findings.drops = {{44, "decompose_regions", "station", "left_over", "not covered", 200, {0, 200, 1}}};
+  rows.findings.changes = {{1, {0.5, -1.25, 2}, 0.25, 20, 3, 0, 1}};
   return rows;
 }
 

@@ -67,6 +67,11 @@ std::string FindingsText(const MapFindings& findings) {
     text += fmt::format("{} {} {} {} {} {} {}\n", row.reason_id, row.stage, row.kind, row.name, row.text,
                         row.num_dropped, fmt::join(row.at_stations, ","));
   }
+  for (const MapChange& row : findings.changes) {
+    text += fmt::format("{} {} {} {} {} {} {} {} {}\n", row.session, row.position.x(), row.position.y(),
+                        row.position.z(), row.radius_m, row.num_vanished, row.num_appeared, row.image_before,
+                        row.image_after);
+  }
   if (findings.promise) {
     const MapPromise& promise = *findings.promise;
     text += fmt::format("{} {} {} {} {} {}\n", promise.terms.min_matches, promise.terms.max_error_m,
@@ -127,7 +132,7 @@ class HostileMap : public testing::Test {
     SQLite::Statement query(database, "SELECT name FROM sqlite_schema WHERE type = 'table'");
     std::vector<std::string> tables;
     while (query.executeStep()) tables.push_back(query.getColumn(0).getString());
-    EXPECT_EQ(tables.size(), 13u);
+    EXPECT_EQ(tables.size(), 14u);
     return tables;
   }
 
@@ -345,7 +350,7 @@ TEST_F(HostileMap, TablesWithoutEndAreRefused) {
     SQLite::Statement query(database, "SELECT name, rootpage FROM sqlite_schema");
     while (query.executeStep()) roots[query.getColumn(0).getString()] = query.getColumn(1).getInt();
   }
-  EXPECT_EQ(roots.size(), 14u);
+  EXPECT_EQ(roots.size(), 15u);
   for (const auto& [table, root] : roots) {
     if (table == "seal") continue;  // read without SQLite
     const char type = signed_bytes_[(root - 1) * page_size + (root == 1 ? 100 : 0)];

@@ -19,6 +19,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 // Two regions, three stations.
 MapRows RowsWithFindings() {
@@ -43,6 +44,10 @@ MapRows RowsWithFindings() {
                 {1, 1, 0, 0, 0, 4000, 0.5}},
       .left_out = {{0, 4, 1, 0.25}, {0.95, 300, 299, 0.999}},
       .held_out = {{0.98, 1, 1, 0.981}}};
+  rows.sessions = {"old", "newer", "today"};
+  rows.findings.changes = {{1, {-1.25, 2.125, 0.001}, 0.5, 20, 0, 0, -1},
+                           {2, {4, 0, 1}, 0.25, 30, 31, -1, -1},
+                           {2, {100, -200, 0}, 0, 0, 12, 1, 2}};
   return rows;
 }
 
@@ -114,6 +119,51 @@ TEST(MapFindings, PromisesThatCannotBeAreNotWritten) {
   for (const auto& change : curves) EXPECT_THAT(error_of(change), HasSubstr("kept"));
 }
 
+TEST(MapFindings, ChangesThatCannotBeAreNotWritten) {
+  const auto error_of = [](const std::function<void(MapRows*)>& change) {
+    MapRows rows = RowsWithFindings();
+    change(&rows);
+    const Status status = WriteMapRows(rows, MapPath("never.cairn"));
+    EXPECT_FALSE(status.ok());
+    return status.ok() ? "" : status.error().message;
+  };
+  const double kInfinity = std::numeric_limits<double>::infinity(), kNan = std::nan("");
+  const auto changes = [](MapRows* rows) -> std::vector<MapChange>& { return rows->findings.changes; };
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].session = 0; }), HasSubstr("session 0 of 3"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[2].session = 3; }), HasSubstr("session 3 of 3"));
+  EXPECT_THAT(error_of([&](MapRows* r) { r->sessions.clear(); }), HasSubstr("session 1 of 0"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].image_before = 3; }),
+              HasSubstr("images 3 and -1 of 3"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].image_after = -2; }), HasSubstr("images 0 and -2"));
+  const std::function<void(MapChange*)> numbers[] = {
+      [&](MapChange* c) { c->position.y() = kNan; }, [&](MapChange* c) { c->position.z() = -kInfinity; },
+      [](MapChange* c) { c->position.x() = 3e5; },   [&](MapChange* c) { c->radius_m = kNan; },
+      [](MapChange* c) { c->radius_m = -0.1; },      [&](MapChange* c) { c->radius_m = kInfinity; },
+      [](MapChange* c) { c->num_vanished = -1; },    [](MapChange* c) { c->num_appeared = -1; },
+      [](MapChange* c) { c->num_vanished = 0; }};
+  for (const auto& change : numbers)
+    EXPECT_THAT(error_of([&](MapRows* r) { change(&changes(r)[0]); }), HasSubstr("change 0: "));
+  EXPECT_THAT(error_of([&](MapRows* r) { std::swap(changes(r)[0], changes(r)[1]); }),
+              HasSubstr("out of order"));
+  EXPECT_THAT(error_of([&](MapRows* r) { std::swap(changes(r)[1], changes(r)[2]); }),
+              HasSubstr("out of order"));
+}
+
+// A map of one survey, or of a place where nothing changed, has the bytes that it had before changes were
+// kept.
+TEST(MapFindings, WithoutChangesThereIsNoTableOfThem) {
+  const auto has_table = [](const MapRows& rows) {
+    EXPECT_TRUE(WriteMapRows(rows, MapPath("unchanged.cairn")).ok());
+    SQLite::Database database(MapPath("unchanged.cairn"), SQLite::OPEN_READONLY);
+    return HasTable(database, "changes");
+  };
+  MapRows rows = RowsWithFindings();
+  EXPECT_TRUE(has_table(rows));
+  rows.findings.changes.clear();
+  EXPECT_FALSE(has_table(rows));
+  EXPECT_THAT(ReadMapRows(MapPath("unchanged.cairn"))->findings.changes, IsEmpty());
+}
+
 TEST(MapPromise, CountsTheNodesThatKeepIt) { EXPECT_EQ(RowsWithFindings().findings.promise->NumKept(), 1); }
 
 TEST(MapFindings, DamagedRowsAreRefused) {
@@ -148,8 +198,20 @@ TEST(MapFindings, DamagedRowsAreRefused) {
         "INSERT INTO promises SELECT 1, min_matches, max_error_m, max_error_deg, probability, match_ratio, "
         "shape, "
         "error_ratio, radius_m, radius_deg, landmarks_bound, nodes, left_out, held_out FROM promises",
-        "ALTER TABLE promises DROP COLUMN shape", "ALTER TABLE drop_reasons DROP COLUMN text",
-        "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
+        "UPDATE changes SET session_idx = 0 WHERE change_idx = 0",
+        "UPDATE changes SET session_idx = 3 WHERE change_idx = 2",
+        "UPDATE changes SET session_idx = 4294967297 WHERE change_idx = 0",
+        "UPDATE changes SET change_idx = 7 WHERE change_idx = 0",
+        "UPDATE changes SET x = 'x' WHERE change_idx = 0", "UPDATE changes SET y = 0.5 WHERE change_idx = 0",
+        "UPDATE changes SET z = 200000001 WHERE change_idx = 0",
+        "UPDATE changes SET z = 9223372036854775807 WHERE change_idx = 0",
+        "UPDATE changes SET radius = -1 WHERE change_idx = 0",
+        "UPDATE changes SET num_vanished = 0 WHERE change_idx = 0",
+        "UPDATE changes SET num_appeared = 4294967300 WHERE change_idx = 0",
+        "UPDATE changes SET image_before = 3 WHERE change_idx = 0",
+        "UPDATE changes SET image_after = -2 WHERE change_idx = 0",
+        "ALTER TABLE changes DROP COLUMN image_after", "ALTER TABLE promises DROP COLUMN shape",
+        "ALTER TABLE drop_reasons DROP COLUMN text", "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
         "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
         "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
     ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("damaged.cairn")).ok());
@@ -168,6 +230,7 @@ TEST(GoldenMap, Version2_1IsRead) {
   MapFindings expected = RowsWithFindings().findings;
   expected.region_entropies.clear();  // came with 2.3
   expected.promise.reset();           // came with 2.6
+  expected.changes.clear();           // came with 2.7
   EXPECT_EQ(rows->findings, expected);
   EXPECT_THAT(rows->regions[1].landmarks, ElementsAre(0, 2));
   EXPECT_NEAR(rows->landmarks[0].position.x(), 2.1234, 1e-12);
@@ -184,7 +247,8 @@ TEST(MapFindings, MapOfAFormatWithoutTheTablesHasNone) {
 TEST(MapFindings, ChangedOrMissingFindingsAreRefused) {
   for (const char* const sql :
        {"DROP TABLE self_test_regions", "DROP TABLE region_entropies; DROP TABLE drop_reasons",
-        "UPDATE drop_reasons SET num_dropped = num_dropped + 1", "DROP TABLE promises",
+        "UPDATE drop_reasons SET num_dropped = num_dropped + 1", "DROP TABLE promises", "DROP TABLE changes",
+        "UPDATE changes SET num_vanished = num_vanished + 1 WHERE change_idx = 0",
         "UPDATE promises SET shape = shape + 1"}) {
     ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("changed.cairn")).ok());
     SQLite::Database(MapPath("changed.cairn"), SQLite::OPEN_READWRITE).exec(sql);
