@@ -21,6 +21,7 @@
 #include "pipeline/commands/inspect_place.h"
 #include "pipeline/explain/block_bytes.h"
 #include "pipeline/explain/inspect_drops.h"
+#include "pipeline/explain/place_changes.h"
 #include "pipeline/program/json_text.h"
 #include "pipeline/report/ambiguity_svg.h"
 #include "pipeline/report/floor_svg.h"
@@ -33,6 +34,7 @@ namespace {
 constexpr int kMaxRegionLines = 30;
 constexpr int kMaxStationLines = 10;
 constexpr int kMaxPlaceLines = 10;
+constexpr int kMaxChangeLines = 20;
 
 struct InspectArguments {
   PlaceQuestion question;
@@ -203,6 +205,7 @@ nlohmann::ordered_json MapJson(const MapFile& file, const MapRows& rows, int64_t
   if (rows.lower_bound) json["lower_bound"] = *rows.lower_bound;
   json["cameras"] = CamerasJson(rows);
   json["sessions"] = SessionsJson(rows);
+  if (!rows.findings.changes.empty()) json["changes"] = PlaceChangesJson(rows, rows.findings.changes);
   json["bytes_per_table"] = nlohmann::ordered_json::object();
   for (const auto& [table, bytes] : tables) json["bytes_per_table"][table] = bytes;
   json["self_test"] = rows.self_test;
@@ -261,6 +264,10 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
     }
     if (key == "promise") {
       text += "\n" + check_map::PromiseText(*rows.findings.promise, LengthUnit(rows.frame));
+      continue;
+    }
+    if (key == "changes") {
+      text += "\nchanges\n" + PlaceChangesText(rows, rows.findings.changes, kMaxChangeLines);
       continue;
     }
     if (key == "lower_bound" || key == "uncovered_limit") continue;  // in the line before

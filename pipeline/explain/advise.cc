@@ -29,6 +29,7 @@ constexpr double kAlignedErrors = 0.7;
 constexpr size_t kMinAligned = 10;
 constexpr double kLeastFromWallM = 0.2;
 constexpr int kMaxNames = 6;
+constexpr size_t kMaxPoorerPlaces = 3;  // of which the last survey found less than was there
 // Part of the poses within 10 cm and 5 degrees that is good enough.
 constexpr double kManyWithin = 0.8;
 constexpr double kPoorScaleRatio = 0.03;  // standard deviation of a scale that is worth a word
@@ -231,6 +232,41 @@ void AddBrokenPromises(const MapRows& rows, const std::vector<StationIdx>& about
   }
 }
 
+// Places of which the last survey says that more is gone than new, those that lost most first: what is there
+// now is not well known.
+void AddPoorerPlaces(const MapRows& rows, const std::vector<StationIdx>& about,
+                     const std::vector<std::vector<StationIdx>>& neighbours, std::vector<Advice>* advice) {
+  std::vector<const MapChange*> poorer;
+  for (const MapChange& change : rows.findings.changes) {
+    if (change.session + 1 == static_cast<int>(rows.sessions.size()) &&
+        change.num_appeared < change.num_vanished)
+      poorer.push_back(&change);
+  }
+  std::stable_sort(poorer.begin(), poorer.end(), [](const MapChange* a, const MapChange* b) {
+    return a->num_vanished - a->num_appeared > b->num_vanished - b->num_appeared;
+  });
+  size_t num_places = 0;
+  for (const MapChange* change : poorer) {
+    const int32_t image = change->image_after >= 0 ? change->image_after : change->image_before;
+    std::vector<StationIdx> stations;
+    if (image >= 0 && rows.images[image].station >= 0) stations = {rows.images[image].station};
+    if (!Concerns(stations, about)) continue;
+    if (++num_places > kMaxPoorerPlaces) return;
+    const Eigen::Vector3d place = rows.floor_from_world * change->position;
+    Advice entry{
+        .text = fmt::format(
+            "Survey here next: around {:.2f}, {:.2f} (radius {:.2g} {}) session {} finds {} features "
+            "gone and {} new{}.",
+            place.x(), place.y(), change->radius_m, LengthUnit(rows.frame), rows.sessions[change->session],
+            change->num_vanished, change->num_appeared,
+            image >= 0 ? fmt::format(" ({})", rows.images[image].name) : ""),
+        .stations = stations,
+        .is_weakness = false};
+    if (!stations.empty()) entry.images_to_take = ViewsBetween(rows, stations, neighbours);
+    advice->push_back(std::move(entry));
+  }
+}
+
 void AddAmbiguousRegions(const MapRows& rows, const std::vector<StationIdx>& about,
                          std::vector<Advice>* advice) {
   std::vector<const RegionEntropy*> ambiguous;
@@ -332,6 +368,7 @@ std::vector<Advice> Advise(const MapRows& rows, const std::vector<StationIdx>& a
                    [](const Advice& a, const Advice& b) { return a.stations.size() > b.stations.size(); });
   AddBrokenPromises(rows, about, neighbours, &advice);
   AddPoorRegions(rows, about, neighbours, &advice);
+  AddPoorerPlaces(rows, about, neighbours, &advice);
   AddAmbiguousRegions(rows, about, &advice);
   AddOptions(rows, &advice);
   return advice;

@@ -14,7 +14,7 @@ namespace cairn::pipeline {
 
 // What would make a map better, in plain words, most important first: uncovered places with the reason and
 // the images to take next, places that look like others, regions where held-out images were not localized,
-// options worth changing.
+// places that the last survey found poorer, options worth changing.
 struct Advice {
   struct View {
     Eigen::Vector2d position = Eigen::Vector2d::Zero();  // floor frame, metres
@@ -24,6 +24,7 @@ struct Advice {
   std::vector<StationIdx> stations;  // that it is about, ascending; none: the map as a whole
   std::optional<RegionIdx> region;   // that it is about
   std::vector<View> images_to_take;  // at most kMaxViews
+  bool is_weakness = true;           // false: nothing shows that the map is weak there
   static constexpr size_t kMaxViews = 8;
 };
 

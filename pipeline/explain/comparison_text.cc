@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/explain/compare_maps.h"
+#include "pipeline/explain/place_changes.h"
 #include "pipeline/explain/station_text.h"
 
 namespace cairn::pipeline {
@@ -151,6 +152,10 @@ std::string ComparisonText(const MapRows& a, const MapRows& b, int64_t bytes_a, 
                       comparison.coverage_gained.size());
   text += StationsText(b, comparison.coverage_lost, "lost  ", max_num_lines);
   text += StationsText(b, comparison.coverage_gained, "gained", max_num_lines);
+  if (const std::vector<MapChange> changes = ChangesSince(a, b); !changes.empty()) {
+    text += fmt::format("\nplaces that changed: {} that A does not know\n", changes.size());
+    text += PlaceChangesText(b, changes, max_num_lines);
+  }
   if (!comparison.images_only_in_a.empty() || !comparison.images_only_in_b.empty())
     text += "\nsurvey images\n";
   text += NamesText(comparison.images_only_in_a, "A", max_num_lines);
@@ -190,6 +195,7 @@ nlohmann::ordered_json ComparisonJson(const MapRows& a, const MapRows& b, int64_
   }
   json["coverage_lost"] = comparison.coverage_lost;
   json["coverage_gained"] = comparison.coverage_gained;
+  json["changed_places"] = PlaceChangesJson(b, ChangesSince(a, b));
   json["images_only_in_a"] = comparison.images_only_in_a;
   json["images_only_in_b"] = comparison.images_only_in_b;
   return json;

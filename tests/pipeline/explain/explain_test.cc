@@ -1,11 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/base/random.h"
 #include "core/world/drop_reason.h"
 #include "pipeline/explain/advise.h"
 #include "pipeline/explain/compare_maps.h"
 #include "pipeline/explain/explain_place.h"
+#include "pipeline/explain/place_changes.h"
 #include "pipeline/explain/station_losses.h"
 
 namespace cairn::pipeline {
@@ -119,6 +121,55 @@ TEST(CompareMaps, TextNamesOptionsAndFigures) {
   EXPECT_THAT(text, HasSubstr("-100"));
 }
 
+// The five stations surveyed three times; between the second and the third more vanished than appeared.
+MapRows ThreeSurveys() {
+  MapRows rows = FiveStations();
+  rows.sessions = {"may", "june", "july"};
+  rows.floor_from_world.translation = {10, 0, 0};
+  rows.findings.changes = {{1, {1, 3, 1}, 0.5, 40, 50, 0, 1}, {2, {2, 3, 1}, 0.25, 30, 2, 1, 2}};
+  return rows;
+}
+
+TEST(ChangesSince, AreThoseOfSessionsThatTheOtherMapLacks) {
+  const MapRows b = ThreeSurveys();
+  MapRows a = b;
+  EXPECT_THAT(ChangesSince(a, b), IsEmpty());
+  a.sessions = {"may", "june"};  // by name: whatever changes A tells of
+  EXPECT_THAT(ChangesSince(a, b), ElementsAre(b.findings.changes[1]));
+  EXPECT_THAT(ChangesSince(FiveStations(), b), SizeIs(2));  // one survey, without a name
+  EXPECT_THAT(ChangesSince(b, FiveStations()), IsEmpty());
+}
+
+TEST(ChangesSince, AreInTheComparisonOfMaps) {
+  const MapRows b = ThreeSurveys();
+  MapRows a = b;
+  EXPECT_THAT(ComparisonText(a, b, 1, 1, CompareMaps(a, b), 5), Not(HasSubstr("places that changed")));
+  a.sessions = {"may", "june"};
+  const MapComparison comparison = CompareMaps(a, b);
+  const std::string text = ComparisonText(a, b, 1, 1, comparison, 5);
+  EXPECT_THAT(text, HasSubstr("places that changed: 1 that A does not know"));
+  EXPECT_THAT(text, HasSubstr("july"));
+  EXPECT_THAT(text, HasSubstr("12.00, 3.00"));  // the floor frame's
+  EXPECT_THAT(text, HasSubstr("image1.png -> image2.png"));
+  const auto json = ComparisonJson(a, b, 1, 1, comparison)["changed_places"];
+  ASSERT_EQ(json.size(), 1U);
+  EXPECT_EQ(json[0]["session"], "july");
+  EXPECT_EQ(json[0]["x_m"], 12);
+  EXPECT_EQ(json[0]["num_vanished"], 30);
+  EXPECT_EQ(json[0]["image_before"], "image1.png");
+}
+
+TEST(PlaceChangesText, ShowsTheFirstOfManyAndImagesThatTheMapLacks) {
+  MapRows rows = ThreeSurveys();
+  rows.findings.changes[0].image_before = -1;
+  const std::string text = PlaceChangesText(rows, rows.findings.changes, 1);
+  EXPECT_THAT(text, HasSubstr("- -> image1.png"));
+  EXPECT_THAT(text, HasSubstr("and 1 more"));
+  EXPECT_THAT(text, Not(HasSubstr("july")));
+  EXPECT_TRUE(PlaceChangesJson(rows, rows.findings.changes)[0]["image_before"].is_null());
+  EXPECT_EQ(PlaceChangesText(rows, {}, 1), "");
+}
+
 TEST(CompareMaps, EmptyMapsCanBeCompared) {
   const MapRows rows = FiveStations();
   EXPECT_EQ(CompareMaps({}, {}).num_landmarks_shared, 0);
@@ -193,6 +244,23 @@ TEST(Advise, NamesRegionsThatFailAndThatLookAlike) {
   EXPECT_THAT(text, HasSubstr("localizes 3 of 10"));
   EXPECT_THAT(text, HasSubstr("as 3.0 places alike"));
   EXPECT_THAT(text, HasSubstr("image at 0.50, 0.00 looking towards 90 deg"));
+}
+
+TEST(Advise, SendsTheSurveyWhereTheLastOneFoundLessThanWasThere) {
+  MapRows rows = ThreeSurveys();
+  for (MapStation& station : rows.stations) station.is_covered = true;
+  const std::vector<Advice> advice = Advise(rows);
+  ASSERT_THAT(advice, SizeIs(1));  // what June lost has been surveyed since
+  EXPECT_THAT(advice[0].text, HasSubstr("Survey here next: around 12.00, 3.00"));
+  EXPECT_THAT(advice[0].text, HasSubstr("session july finds 30 features gone and 2 new (image2.png)"));
+  EXPECT_THAT(advice[0].stations, ElementsAre(2));
+  EXPECT_THAT(advice[0].images_to_take, SizeIs(2));
+  EXPECT_THAT(Advise(rows, {0}), IsEmpty());
+  rows.findings.changes[1].num_appeared = 30;  // as much is new
+  EXPECT_THAT(Advise(rows), IsEmpty());
+  rows.findings.changes[1] = {2, {2, 3, 1}, 0.25, 30, 2, -1, -1};  // no image of the map shows it
+  ASSERT_THAT(Advise(rows), SizeIs(1));
+  EXPECT_THAT(Advise(rows)[0].stations, IsEmpty());
 }
 
 TEST(Advise, SaysThatPosesAreOffThoughImagesAreLocalized) {
