@@ -225,7 +225,25 @@ Json AdviceJson(const std::vector<Advice>& advice) {
     list.push_back({{"text", entry.text},
                     {"stations", entry.stations},
                     {"region", entry.region ? Json(*entry.region) : Json()},
-                    {"views", views}});
+                    {"views", views},
+                    {"weak", entry.is_weakness}});
+  }
+  return list;
+}
+
+// Where the place changed between the map's surveys; images by index.
+Json ChangedPlacesJson(const MapRows& rows) {
+  Json list = Json::array();
+  for (const MapChange& change : rows.findings.changes) {
+    const Eigen::Vector3d place = rows.floor_from_world * change.position;
+    list.push_back({{"x", Centi(place.x())},
+                    {"y", Centi(place.y())},
+                    {"radius", Centi(change.radius_m)},
+                    {"session", rows.sessions[change.session]},
+                    {"gone", change.num_vanished},
+                    {"new", change.num_appeared},
+                    {"before", change.image_before},
+                    {"after", change.image_after}});
   }
   return list;
 }
@@ -405,6 +423,7 @@ nlohmann::ordered_json ReportData(const ReportInputs& inputs) {
                {"views", ViewsJson(rows.views)},
                {"drops", DropsJson(rows.findings)},
                {"promise", PromiseJson(rows)},
+               {"changed_places", ChangedPlacesJson(rows)},
                {"self_test", rows.self_test},
                {"advice", AdviceJson(inputs.advice)},
                {"poor_localized_ratio", kPoorLocalizedRatio},

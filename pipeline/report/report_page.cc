@@ -8,6 +8,7 @@
 
 #include "core/picture/svg.h"
 #include "pipeline/explain/inspect_drops.h"
+#include "pipeline/explain/place_changes.h"
 #include "pipeline/report/ambiguity_svg.h"
 #include "pipeline/report/floor_svg.h"
 #include "pipeline/report/reconstruction_data.h"
@@ -38,6 +39,7 @@ namespace {
 
 constexpr int kMaxStationLines = 20;
 constexpr int kMaxRegionLines = 60;
+constexpr int kMaxChangeLines = 40;
 
 // `text` with every `from` replaced.
 std::string Replaced(std::string text, std::string_view from, std::string_view to) {
@@ -142,6 +144,7 @@ std::string PrintedReportPage(const ReportInputs& inputs, const nlohmann::ordere
   html += block("Self-test by region",
                 check_map::SelfTestRegionsText(rows.findings.self_test_regions, kMaxRegionLines, rows.frame));
   html += block("Held-out images not localized, or wrong", FailedImagesText(data));
+  html += block("Changed places", PlaceChangesText(rows, rows.findings.changes, kMaxChangeLines));
   if (inputs.reconstruction != nullptr) {
     html += block("Reconstruction", ReconstructionText(*inputs.reconstruction));
     html += "<figure>" + ReconstructionPicture(inputs) + "</figure>\n";

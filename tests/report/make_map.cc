@@ -2,7 +2,7 @@
 //   make_map MAP                                   nothing in it
 //   make_map MAP NAME                              one station, image and landmark; map and image have this
 //   name make_map MAP LANDMARKS STATIONS REGIONS        a lattice of stations with four headings, regions of
-//   neighbours
+//   neighbours; of two surveys, between which two places changed
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -84,6 +84,11 @@ MapRows Lattice(int num_landmarks, int num_stations, int num_regions) {
     if (i >= 4 && i / 4 % side > 0) rows.station_edges.emplace_back(i - 4, i);
   }
   rows.findings.drops = {few};
+  if (num_stations > 1) {
+    rows.sessions = {"monday", "tuesday"};
+    const double half = 0.25 * side;
+    rows.findings.changes = {{1, {half, half, 1}, 0.4, 50, 20, 0, 1}, {1, {0, half, 1}, 0.3, 0, 12, -1, 1}};
+  }
   for (int region = 0; region < num_regions; ++region) {
     MapRegion row;
     const int first = static_cast<int>(static_cast<int64_t>(num_stations) * region / num_regions);

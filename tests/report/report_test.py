@@ -410,6 +410,35 @@ class OtherPagesTest(unittest.TestCase):
         self.assertIn('map_2.2.cairn', browser.text('#changes'))
         self.assertEqual(browser.problems(), [])
 
+    def test_places_that_changed_are_circles_that_say_what(self):
+        path = os.path.join(self.folder.name, 'lattice.cairn')
+        subprocess.run([MAKE_MAP, path, '400', '144', '4'], check=True)
+        browser = self.look(report(self.folder.name, path), 'changed_places.png')
+        self.assertIn('2\nplaces changed', browser.text('#cards'))
+        self.assertIn('more gone than new', browser.text('#legend'))
+        table = browser.text('#changed-places')
+        for text in ['tuesday', 'image0.jpg', 'image1.jpg', '50', '12']:
+            self.assertIn(text, table)
+        drawn = sum(browser.canvas_sums())
+        browser.script('show("changed places", false)')
+        self.assertLess(sum(browser.canvas_sums()), drawn)
+        browser.script('show("changed places", true)')
+        # What lies in a circle is explained with the images that show it, and these lead to their stations.
+        self.assertEqual(browser.script('const c = changedPlaces[0]; return changeNear(at(c.x + 0.9 * c.radius, c.y))'), 0)
+        self.assertEqual(browser.script('const c = changedPlaces[0]; return changeNear(at(c.x + 1.1 * c.radius, c.y))'), -1)
+        browser.driver.find_element(By.CSS_SELECTOR, '#changed-places-text button').click()
+        text = browser.text('#explanation')
+        self.assertIn('Changed place', text)
+        self.assertIn('features gone', text)
+        self.assertIn('image0.jpg', text)
+        browser.shot('changed_place.png')
+        browser.driver.find_element(By.CSS_SELECTOR, '#explanation table button').click()
+        self.assertIn('Station 0', browser.text('#explanation'))
+        self.assertEqual(browser.problems(), [])
+        plain = self.look(report(self.folder.name, os.path.join(GOLDEN, 'map_2.3.cairn')), 'unchanged.png')
+        self.assertFalse(plain.driver.find_element(By.ID, 'changed-places').is_displayed())
+        self.assertEqual(plain.problems(), [])
+
     def test_a_drive_is_replayed(self):
         run = {'reached': True, 'start': {'x_m': 1, 'y_m': 0, 'heading_deg': 0},
                'legs': [{'kind': 'explore', 'pose': {'x_m': 3, 'y_m': 0, 'heading_deg': 0},

@@ -1,5 +1,5 @@
 // What can be seen on the floor: a drawing per layer.
-const selected = {station: -1, region: -1, image: -1};
+const selected = {station: -1, region: -1, image: -1, change: -1};
 const ground = '#ffffff', dark = '#000000';
 
 const mostSeen = most(S.visible), mostEntropy = Math.max(0.7, most(S.entropy));
@@ -262,6 +262,23 @@ function drawChanges(context, place, inside, scale) {
       context.stroke();
     }
   }
+}
+// Where the place changed between the map's surveys: a circle as wide as the change, around what changed.
+const changedPlaces = data.changed_places;
+const isLoss = change => change.gone > change.new;
+const changedReach = (change, scale) => Math.max(change.radius / 100 * scale, 6);
+function drawChangedPlaces(context, place, inside, scale) {
+  changedPlaces.forEach((change, i) => {
+    const colour = inked(isLoss(change) ? orange : blue);
+    disc(context, ...place(change.x, change.y), changedReach(change, scale));
+    context.fillStyle = colour;
+    context.globalAlpha = i === selected.change ? 0.4 : 0.18;
+    context.fill();
+    context.globalAlpha = 1;
+    context.strokeStyle = colour;
+    context.lineWidth = i === selected.change ? 4 : 2.5;
+    context.stroke();
+  });
 }
 let moment = 0;
 function drawDrive(context, place) {

@@ -11,8 +11,8 @@ function say(...nodes) {
 }
 // Before anything is chosen: where to look first.
 function sayFirst() {
-  const nodes = [element('p', {}, `Click a station, a region or a ${tried} image, or find one by its number or name: what is seen there, what the stages dropped and why.`)];
-  const first = data.advice.filter(entry => entry.stations.length).slice(0, 3);
+  const nodes = [element('p', {}, `Click a station, a region${changedPlaces.length ? ', a changed place' : ''} or a ${tried} image, or find one by its number or name: what is seen there, what the stages dropped and why.`)];
+  const first = data.advice.filter(entry => entry.weak && entry.stations.length).slice(0, 3);
   if (first.length) {
     nodes.push(element('h3', {}, 'Weakest places'), ...first.map(entry => {
       const test = entry.region !== null && R[entry.region].test;
@@ -47,8 +47,8 @@ function showAdvice(entry) {
   if (entry.region !== null) explainRegion(entry.region); else explainStation(entry.stations[0]);
   lookAt(placesOf(entry.stations));
 }
-function choose({station = -1, region = -1, image = -1}) {
-  Object.assign(selected, {station, region, image});
+function choose({station = -1, region = -1, image = -1, change = -1}) {
+  Object.assign(selected, {station, region, image, change});
   redrawAll();
   showLegend();
 }
@@ -140,6 +140,21 @@ function explainView(i) {
     element('h3', {}, 'Why'), element('p', {}, text),
     element('p', {class: 'buttons'}, ...about));
 }
+const changeText = change => `${counted(change.gone, 'feature')} gone, ${count(change.new)} new`;
+// An image of a change by its name, which leads to the station where it was taken.
+function changeImage(image) {
+  if (image < 0) return '\u2013';
+  const station = S.images.findIndex(images => images.includes(image));
+  return station < 0 ? I.name[image] : button(I.name[image], () => explainStation(station));
+}
+const changeRows = change => [['first seen by', change.session], ['features gone', change.gone], ['features new', change.new],
+  ['seen before in', changeImage(change.before)], ['seen after in', changeImage(change.after)]];
+function explainChange(i) {
+  choose({change: i});
+  show('changed places');
+  const change = changedPlaces[i];
+  say(element('h3', {}, 'Changed place'), element('p', {class: 'soft'}, `around ${metres(change.x / 100)}, ${metres(change.y / 100)}; radius ${metres(change.radius / 100)}`), table(changeRows(change)));
+}
 
 // ---- what is under the pointer
 // The nearest within some pixels, of places in hundredths.
@@ -165,6 +180,13 @@ const markPlace = i => aheadOf(S.x[i], S.y[i], S.heading[i], markSize(scaleNow()
 const stationNear = latlng => isShown('stations') || isShown('uncovered') ? nearest(latlng, numStations, markPlace, Math.max(1.3 * markSize(scaleNow()), 9)) : -1;
 const imageNear = latlng => isShown(`${tried} images`) ? nearest(latlng, heldOut.length, i => heldOut[i].at, isSmallScreen() ? 12 : 8) : -1;
 const viewNear = latlng => isShown('images to take') ? nearest(latlng, viewsToTake.length, i => aheadOf(viewsToTake[i].x, viewsToTake[i].y, viewsToTake[i].heading, viewSize(scaleNow())), 9) : -1;
+// The smallest circle of a change around the pointer.
+function changeNear(latlng) {
+  if (!isShown('changed places')) return -1;
+  const away = change => Math.hypot(change.x - 100 * latlng.lng, change.y - 100 * latlng.lat) / 100 * scaleNow();
+  return [...changedPlaces.keys()].filter(i => away(changedPlaces[i]) < changedReach(changedPlaces[i], scaleNow()))
+    .sort((a, b) => changedPlaces[a].radius - changedPlaces[b].radius)[0] ?? -1;
+}
 const isSmallScreen = () => window.innerWidth <= 800;
 // All stations whose marks are under the pointer, nearest first.
 function stationsUnder(latlng) {
@@ -188,6 +210,8 @@ function explainAt(latlng) {
   if (image >= 0) below.push(() => explainImage(image));
   if (view >= 0) below.push(() => explainView(view));
   for (const station of stationsUnder(latlng)) below.push(() => explainStation(station));
+  const change = changeNear(latlng);
+  if (change >= 0) below.push(() => explainChange(change));
   const regions = isShown('regions') ? regionsUnder(latlng) : [];
   for (const region of regions) below.push(() => explainRegion(region, regions.filter(other => other !== region)));
   if (!below.length) return;
@@ -202,8 +226,9 @@ map.on('click', event => explainAt(event.latlng));
 const tip = leaflet.tooltip({direction: 'top', offset: [0, -8]});
 map.on('mousemove', event => {
   const image = imageNear(event.latlng), view = viewNear(event.latlng), station = stationNear(event.latlng);
-  const regions = image < 0 && view < 0 && station < 0 && isShown('regions') ? regionsUnder(event.latlng) : [];
-  $('map').style.cursor = image >= 0 || view >= 0 || station >= 0 || regions.length ? 'pointer' : '';
+  const change = changeNear(event.latlng);
+  const regions = image < 0 && view < 0 && station < 0 && change < 0 && isShown('regions') ? regionsUnder(event.latlng) : [];
+  $('map').style.cursor = image >= 0 || view >= 0 || station >= 0 || change >= 0 || regions.length ? 'pointer' : '';
   let text = '', place = event.latlng;
   if (image >= 0) {
     text = `${heldOut[image].name}: ${outcome(heldOut[image])}`;
@@ -215,6 +240,10 @@ map.on('mousemove', event => {
   } else if (station >= 0) {
     text = `station ${station}: ${counted(S.visible[station], 'feature')} in view, ${counted(S.seen[station], 'landmark')} seen`;
     place = at(S.x[station], S.y[station]);
+  } else if (change >= 0) {
+    const {x, y, session, before, after} = changedPlaces[change];
+    text = [`changed, first seen by ${session}: ${changeText(changedPlaces[change])}`, ...[['before', before], ['after', after]].filter(([, shows]) => shows >= 0).map(([when, shows]) => `${when}: ${I.name[shows]}`)].join('\n');
+    place = at(x, y);
   } else if (regions.length) {
     text = regions.slice(0, 4).map(i => `region ${i}: ${counted(R[i].landmarks.length, 'landmark')}${R[i].test ? `, ${R[i].test.localized} of ${R[i].test.held_out} localized` : ''}`).join('\n');
   }

@@ -54,6 +54,9 @@ const layers = [
    legend: says(['disc', blue, 'localized'], ['square', orange, 'not localized'], ...(heldOut.some(image => image.wrong) ? [['diamond', pink, 'wrong']] : []))},
   {name: 'changes', group: 'the map', draw: drawChanges, on: true, exists: Boolean(data.changes),
    legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'landmarks gone'], ['ring', orange, 'coverage lost'])},
+  {name: 'changed places', group: 'the map', draw: drawChangedPlaces, on: true, exists: changedPlaces.length > 0,
+   legend: says(...[[true, orange, 'places that changed: more gone than new'], [false, blue, 'places that changed: as many new as gone, or more']]
+     .filter(([loss]) => changedPlaces.some(change => isLoss(change) === loss)).map(([, colour, text]) => ['ring', colour, text]))},
   {name: 'drive', group: 'images', draw: drawDrive, on: true, exists: Boolean(data.drive), legend: says(['wedge', pink, 'the robot and its way'])},
   {name: 'numbers', group: 'the map', draw: drawNumbers, on: true, exists: numStations > 0,
    legend: () => element('div', {}, R.length ? 'R0: region 0; stations have their numbers when zoomed in' : 'stations have their numbers when zoomed in')},

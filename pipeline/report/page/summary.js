@@ -40,7 +40,13 @@ if (tested) {
 } else {
   card('not tested', ['no ', term('held-out', 'held-out images'), ' were tried']);
 }
-const weakest = data.advice.find(entry => entry.stations.length);
+if (changedPlaces.length) {
+  card(count(changedPlaces.length), `${changedPlaces.length === 1 ? 'place' : 'places'} changed: show ${changedPlaces.length === 1 ? 'it' : 'the first'}`, {action: () => {
+    explainChange(0);
+    lookAt([[changedPlaces[0].x, changedPlaces[0].y]]);
+  }});
+}
+const weakest = data.advice.find(entry => entry.weak && entry.stations.length);
 if (weakest) card(weakest.region === null ? `Station ${weakest.stations[0]}` : `Region ${weakest.region}`, 'weakest place: show it', {bad: true, action: () => showAdvice(weakest)});
 
 for (const entry of data.advice) {

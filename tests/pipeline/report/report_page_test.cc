@@ -19,6 +19,9 @@ TEST(PrintedReportPage, NoTextOfAMapIsMarkup) {
   rows.stations.emplace_back();
   rows.stage_options[hostile] = hostile;
   rows.self_test[hostile] = 1;
+  rows.images.push_back({.name = hostile});
+  rows.sessions = {"old", hostile};
+  rows.findings.changes = {{.session = 1, .num_vanished = 20, .image_before = 0, .image_after = 0}};
   const nlohmann::ordered_json data = {
       {"bytes", 1},
       {"unit", "metre"},
@@ -27,6 +30,8 @@ TEST(PrintedReportPage, NoTextOfAMapIsMarkup) {
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_EQ(page.find('\x1b'), std::string::npos);
   EXPECT_THAT(page, HasSubstr("<h2>Options of " + shown + "</h2>\n<pre>" + shown + "</pre>"));
+  EXPECT_THAT(page, HasSubstr("<h2>Changed places</h2>"));
+  EXPECT_THAT(page, HasSubstr(shown + " -&gt; " + shown));
   EXPECT_THAT(page, HasSubstr("<h1>" + shown + "</h1>"));
 }
 
