@@ -249,8 +249,10 @@ TEST(Advise, NamesRegionsThatFailAndThatLookAlike) {
 TEST(Advise, SendsTheSurveyWhereTheLastOneFoundLessThanWasThere) {
   MapRows rows = ThreeSurveys();
   for (MapStation& station : rows.stations) station.is_covered = true;
+  rows.findings.changes[0].num_appeared = 1;
   const std::vector<Advice> advice = Advise(rows);
   ASSERT_THAT(advice, SizeIs(1));  // what June lost has been surveyed since
+  EXPECT_FALSE(advice[0].is_weakness);
   EXPECT_THAT(advice[0].text, HasSubstr("Survey here next: around 12.00, 3.00"));
   EXPECT_THAT(advice[0].text, HasSubstr("session july finds 30 features gone and 2 new (image2.png)"));
   EXPECT_THAT(advice[0].stations, ElementsAre(2));
