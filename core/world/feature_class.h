@@ -37,7 +37,7 @@ struct ClassAge {
 
 // Where a place changed between two sessions, by the classes that vanished and those that appeared there.
 struct PlaceChange {
-  int session = 0;  // the first that shows it
+  int session = 0;                                     // the first that shows it
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // mean of the classes', world frame
   double radius_m = 0;                                 // root mean square of their distances from it
   int32_t num_vanished = 0;

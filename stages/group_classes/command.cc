@@ -94,12 +94,14 @@ std::string PersistenceText(const GroupClassesResult& result) {
   const auto name_of = [&](ImageId image_id) { return image_id == 0 ? "no image" : names.at(image_id); };
   for (size_t i = 0; i < std::min(changes.size(), kMaxLines); ++i) {
     const PlaceChange& change = changes[i];
-    text += fmt::format("group_classes: in {}, {:.1f} around ({:.1f}, {:.1f}, {:.1f}): {} classes gone, {} new; {} -> {}\n",
-                        result.classes.sessions[change.session], change.radius_m, change.position.x(),
-                        change.position.y(), change.position.z(), change.num_vanished, change.num_appeared,
-                        name_of(change.image_before), name_of(change.image_after));
+    text += fmt::format(
+        "group_classes: in {}, {:.1f} around ({:.1f}, {:.1f}, {:.1f}): {} classes gone, {} new; {} -> {}\n",
+        result.classes.sessions[change.session], change.radius_m, change.position.x(), change.position.y(),
+        change.position.z(), change.num_vanished, change.num_appeared, name_of(change.image_before),
+        name_of(change.image_after));
   }
-  if (changes.size() > kMaxLines) text += fmt::format("group_classes: ... and {} more\n", changes.size() - kMaxLines);
+  if (changes.size() > kMaxLines)
+    text += fmt::format("group_classes: ... and {} more\n", changes.size() - kMaxLines);
   return text;
 }
 

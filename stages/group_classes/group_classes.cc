@@ -7,6 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/capture/sessions.h"
+#include "core/colmap/landmark_images.h"
 #include "core/files/database.h"
 #include "core/structure/union_matches.h"
 #include "stages/group_classes/make_classes.h"
@@ -86,14 +87,16 @@ void MeasurePoseNoise(Classes* classes) {
 }
 
 // Gives classes an age, and takes those out that are probably gone.
-void Forget(const std::vector<std::string>& sessions, const PersistenceOptions& options, int num_threads,
-            GroupClassesResult* result) {
+void Forget(const std::vector<std::string>& sessions, const std::set<ImageId>& landmark_images,
+            const PersistenceOptions& options, int num_threads, GroupClassesResult* result) {
   Classes& classes = result->classes;
-  std::vector<int> session_of_image;
-  for (const SurveyImage& image : classes.images)
-    session_of_image.push_back(SessionOfImage(sessions, image.name));
+  ImageSessions images;
+  for (const SurveyImage& image : classes.images) {
+    images.session.push_back(SessionOfImage(sessions, image.name));
+    images.shows_landmarks_only.push_back(landmark_images.contains(image.image_id));
+  }
   Persistence persistence =
-      EstimatePersistence(classes, session_of_image, static_cast<int>(sessions.size()), num_threads);
+      EstimatePersistence(classes, images, static_cast<int>(sessions.size()), num_threads);
   classes.sessions = sessions;
   classes.changes = std::move(persistence.changes);
   result->sessions = std::move(persistence.sessions);
@@ -185,6 +188,7 @@ Result<MatchedFeatures> ReadMatchedFeatures(const std::string& matches_path) {
       matched.features.push_back(std::move(features));
     }
     CAIRN_ASSIGN_OR_RETURN(matched.geometries, ReadDatabaseTwoViewGeometries(database, 1));
+    matched.landmark_images = ReadLandmarkImages(database);
     for (const TwoViewGeometry& geometry : matched.geometries) {
       const auto image1 = num_keypoints.find(geometry.image_id1),
                  image2 = num_keypoints.find(geometry.image_id2);
@@ -263,7 +267,8 @@ Result<GroupClassesResult> GroupClasses(const MatchedFeatures& matched, const Ca
   MeasurePoseNoise(&classes);
   ListUnposed(matched, posed, &result.dropped_items);
   MakeClasses(matched, tracks, triangulations, posed.feature_idx, options, &classes, &result.dropped_items);
-  if (sessions.size() > 1) Forget(sessions, options.persistence, num_threads, &result);
+  if (sessions.size() > 1)
+    Forget(sessions, matched.landmark_images, options.persistence, num_threads, &result);
   progress.Advance();
   progress.End();
   if (classes.classes.empty()) {

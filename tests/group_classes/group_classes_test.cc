@@ -284,8 +284,8 @@ TEST(GroupClasses, ClassesReadBackAsTheyWereWritten) {
   EXPECT_EQ(read->dropped, written.dropped);
 }
 
-// Every other image is of session "b", where what lies in the middle is gone: it has keypoints there, but they
-// match nothing.
+// Every other image is of session "b", where what lies in the middle is gone: it has keypoints there, but
+// they match nothing.
 Survey SurveyOfTwoSessions(std::set<int>* gone) {
   Survey survey = MakeSurvey({});
   for (size_t i = 0; i < survey.matched.images.size(); ++i) {
@@ -373,9 +373,12 @@ TEST(GroupClasses, SightingsOfAnotherNumberOfSessionsAreCorrupt) {
   for (const auto& [damage, message] :
        {std::pair("DELETE FROM sessions WHERE session_idx = 1", "sightings of 2 sessions, expected 1"),
         std::pair("UPDATE classes SET sightings = x'00'", "blob"),
-        std::pair("INSERT INTO changes SELECT 2, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1", "session 2 of 2"),
-        std::pair("INSERT INTO changes SELECT -1, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1", "session -1"),
-        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 999, 0 FROM classes LIMIT 1", "images 999"),
+        std::pair("INSERT INTO changes SELECT 2, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1",
+                  "session 2 of 2"),
+        std::pair("INSERT INTO changes SELECT -1, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1",
+                  "session -1"),
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 999, 0 FROM classes LIMIT 1",
+                  "images 999"),
         std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 999 FROM classes LIMIT 1", "999")}) {
     ASSERT_TRUE(WriteClasses(grouped->classes, path).ok());
     {

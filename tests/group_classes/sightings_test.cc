@@ -26,7 +26,8 @@ TEST(ExpectedViews, AreWhatImagesOfOtherSessionsNearbySaw) {
   Random random(1);
   const auto in_session_0 = [&](int image, const Eigen::Vector3d&) { return image % 2 == 0 ? 1.0 : 0.0; };
   ASSERT_TRUE(scene.AddPoint({1, 0, 4}, in_session_0, &random));
-  const std::vector<ClassViews> views = FindExpectedViews(scene.classes, scene.session_of_image, 2);
+  const std::vector<ClassViews> views =
+      FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 2);
   ASSERT_EQ(views.size(), 1u);
   for (int image = 0; image < 20; ++image) {
     const ExpectedView* view = FindView(views[0], image);
@@ -51,7 +52,7 @@ TEST(ExpectedViews, AreTheShareThatSawIt) {
   for (int p = 0; p < 300; ++p) {
     if (!scene.AddPoint({random.Uniform(0.5, 1.5), random.Uniform(-1, 1), 4}, a_third, &random)) continue;
   }
-  for (const ClassViews& views : FindExpectedViews(scene.classes, scene.session_of_image, 2)) {
+  for (const ClassViews& views : FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 2)) {
     const ExpectedView* view = FindView(views, 9);
     if (view == nullptr) continue;
     sum += view->visibility;
@@ -77,7 +78,7 @@ TEST(ExpectedViews, FallWithTheAngleAndTheDistance) {
   };
   ASSERT_TRUE(scene.AddPoint({0, 0, 4}, visibility, &random));
   ASSERT_TRUE(scene.AddPoint({0.01, 0, 4}, visibility, &random));
-  const ClassViews views = FindExpectedViews(scene.classes, scene.session_of_image, 1)[0];
+  const ClassViews views = FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 1)[0];
   const auto visibility_of = [&](int image) {
     const ExpectedView* view = FindView(views, image);
     return view == nullptr ? 0 : view->visibility;
@@ -98,11 +99,11 @@ TEST(ExpectedViews, EndWhereNearerThingsAreInTheWay) {
   const auto poster = [&](int image, const Eigen::Vector3d&) { return image % 2 == 0 ? 1.0 : 0.0; };
   const auto shelf = [&](int image, const Eigen::Vector3d&) { return image % 2 == 1 ? 1.0 : 0.0; };
   ASSERT_TRUE(scene.AddPoint({1, 0, 4}, poster, &random));
-  std::vector<ClassViews> views = FindExpectedViews(scene.classes, scene.session_of_image, 1);
+  std::vector<ClassViews> views = FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 1);
   EXPECT_NE(FindView(views[0], 9), nullptr);
   for (int p = 0; p < 400; ++p)
     scene.AddPoint({random.Uniform(0, 2), random.Uniform(-0.5, 0.5), 2}, shelf, &random);
-  views = FindExpectedViews(scene.classes, scene.session_of_image, 1);
+  views = FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 1);
   EXPECT_EQ(FindView(views[0], 9), nullptr);
   EXPECT_NE(FindView(views[0], 8), nullptr);  // seen: not hidden
 }
@@ -113,7 +114,8 @@ TEST(ExpectedViews, AreNoneOfImagesWithoutASession) {
   scene.session_of_image[9] = -1;
   ASSERT_TRUE(scene.AddPoint(
       {1, 0, 4}, [](int, const Eigen::Vector3d&) { return 1.0; }, &random));
-  const std::vector<ClassViews> views = FindExpectedViews(scene.classes, scene.session_of_image, 1);
+  const std::vector<ClassViews> views =
+      FindExpectedViews(scene.classes, {.session = scene.session_of_image}, 1);
   EXPECT_EQ(FindView(views[0], 9), nullptr);
   EXPECT_EQ(views[0].size(), 19u);
 }

@@ -9,6 +9,7 @@
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
 #include "core/colmap/colmap_database.h"
+#include "core/colmap/landmark_images.h"
 #include "core/promise/view_distance.h"
 #include "runtime/localize/localizer.h"
 
@@ -171,10 +172,7 @@ Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::strin
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(matches_path));
   return WithDatabaseErrors(matches_path, [&]() -> Result<std::set<size_t>> {
     std::set<size_t> positions;
-    if (!HasTable(database, "cairn_landmark_images")) return positions;
-    std::set<int64_t> image_ids;
-    SQLite::Statement query(database, "SELECT image_id FROM cairn_landmark_images");
-    while (query.executeStep()) image_ids.insert(query.getColumn(0).getInt64());
+    const std::set<ImageId> image_ids = ReadLandmarkImages(database);
     for (size_t i = 0; i < classes.images.size(); ++i) {
       if (image_ids.contains(classes.images[i].image_id)) positions.insert(i);
     }

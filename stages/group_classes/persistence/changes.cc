@@ -59,8 +59,7 @@ ImageId Largest(const Classes& classes, const std::map<int, double>& weights) {
 }
 
 PlaceChange Describe(const Classes& classes, const std::vector<ClassViews>& views,
-                     const std::vector<int>& session_of_image, int session,
-                     const std::vector<ChangedClass>& members) {
+                     const ImageSessions& images, int session, const std::vector<ChangedClass>& members) {
   PlaceChange change{.session = session};
   for (const ChangedClass& member : members) {
     change.position += classes.classes[member.class_idx].position / static_cast<double>(members.size());
@@ -72,7 +71,7 @@ PlaceChange Describe(const Classes& classes, const std::vector<ClassViews>& view
   for (const ChangedClass& member : members) {
     squared += (classes.classes[member.class_idx].position - change.position).squaredNorm();
     for (const ExpectedView& view : views[member.class_idx]) {
-      const int other = session_of_image[view.image];
+      const int other = images.session[view.image];
       if (other == session) {
         after[view.image] += member.is_new ? (view.seen ? 1 : 0) : view.visibility;
       } else if (other < session) {
@@ -89,8 +88,8 @@ PlaceChange Describe(const Classes& classes, const std::vector<ClassViews>& view
 }  // namespace
 
 std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<ClassAge>& ages,
-                                     const std::vector<ClassViews>& views,
-                                     const std::vector<int>& session_of_image, const Surroundings& surroundings) {
+                                     const std::vector<ClassViews>& views, const ImageSessions& images,
+                                     const Surroundings& surroundings) {
   std::vector<PlaceChange> changes;
   const std::vector<std::vector<ChangedClass>> changed = ChangedClasses(ages);
   for (size_t session = 1; session < changed.size(); ++session) {
@@ -117,7 +116,7 @@ std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<C
     const size_t first = changes.size();
     for (const auto& [root, cluster] : clusters) {
       if (cluster.size() >= kMinNumClasses)
-        changes.push_back(Describe(classes, views, session_of_image, static_cast<int>(session), cluster));
+        changes.push_back(Describe(classes, views, images, static_cast<int>(session), cluster));
     }
     std::stable_sort(changes.begin() + static_cast<ptrdiff_t>(first), changes.end(),
                      [](const PlaceChange& a, const PlaceChange& b) {

@@ -15,7 +15,7 @@ namespace cairn::group_classes {
 //
 // Ascending by session, then the largest first.  Pure.
 std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<ClassAge>& ages,
-                                     const std::vector<ClassViews>& views,
-                                     const std::vector<int>& session_of_image, const Surroundings& surroundings);
+                                     const std::vector<ClassViews>& views, const ImageSessions& images,
+                                     const Surroundings& surroundings);
 
 }  // namespace cairn::group_classes

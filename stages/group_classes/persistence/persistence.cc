@@ -90,11 +90,11 @@ class SessionMixture {
         radius_(radius),
         num_threads_(num_threads) {}
 
-  void Add(int class_idx, const ClassViews& views, const std::vector<int>& session_of_image) {
+  void Add(int class_idx, const ClassViews& views, const ImageSessions& images) {
     Known known{.class_idx = class_idx};
     double sum = 0;
     for (const ExpectedView& view : views) {
-      if (session_of_image[view.image] != session_) continue;
+      if (images.session[view.image] != session_) continue;
       known.num_seen += view.seen ? 1 : 0;
       if (view.visibility > 0) known.views.emplace_back(view.image, view.visibility);
       if (view.visibility > 0 && view.seen) seen_views_.emplace_back(known_.size(), view.image);
@@ -299,18 +299,18 @@ OptionTable DescribeOptions(PersistenceOptions* o) {
        .max = 1}};
 }
 
-Persistence EstimatePersistence(const Classes& classes, const std::vector<int>& session_of_image,
-                                int num_sessions, int num_threads) {
-  const std::vector<ClassViews> views = FindExpectedViews(classes, session_of_image, num_threads);
+Persistence EstimatePersistence(const Classes& classes, const ImageSessions& images, int num_sessions,
+                                int num_threads) {
+  const std::vector<ClassViews> views = FindExpectedViews(classes, images, num_threads);
   Persistence persistence;
   persistence.ages.resize(classes.classes.size());
   for (size_t c = 0; c < views.size(); ++c) {
     persistence.ages[c].sessions.resize(num_sessions);
     for (const ExpectedView& view : views[c]) {
-      if (view.seen) ++persistence.ages[c].sessions[session_of_image[view.image]].num_seen;
+      if (view.seen) ++persistence.ages[c].sessions[images.session[view.image]].num_seen;
     }
   }
-  const Surroundings surroundings = SurroundingsOf(classes, session_of_image);
+  const Surroundings surroundings = SurroundingsOf(classes, images);
   const double radius = kNeighbourRadius * surroundings.typical_distance;
   // Of the sessions since a class was last seen: what they say together, and the last prior.
   std::vector<double> likelihood_ratio(classes.classes.size(), 1);
@@ -326,7 +326,7 @@ Persistence EstimatePersistence(const Classes& classes, const std::vector<int>& 
   }
   for (int session = 0; session < num_sessions; ++session) {
     SessionMixture mixture(classes, surroundings, session, radius, num_threads);
-    for (size_t c = 0; c < views.size(); ++c) mixture.Add(static_cast<int>(c), views[c], session_of_image);
+    for (size_t c = 0; c < views.size(); ++c) mixture.Add(static_cast<int>(c), views[c], images);
     for (size_t c = 0; c < views.size(); ++c) {
       if (first_seen[c] == session && session > 0) mixture.AddNew(static_cast<int>(c), earlier_ratio[c]);
     }
@@ -342,7 +342,7 @@ Persistence EstimatePersistence(const Classes& classes, const std::vector<int>& 
           static_cast<float>(ProbabilityOf(likelihood_ratio[known.class_idx], known.prior));
     }
   }
-  persistence.changes = FindChanges(classes, persistence.ages, views, session_of_image, surroundings);
+  persistence.changes = FindChanges(classes, persistence.ages, views, images, surroundings);
   return persistence;
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/options/options.h"
 #include "core/world/feature_class.h"
+#include "stages/group_classes/persistence/surroundings.h"
 
 namespace cairn::group_classes {
 
@@ -43,7 +44,7 @@ struct Persistence {
 };
 
 // `num_sessions` at least 2; sessions are in the order of time.  Pure; the same for any number of threads.
-Persistence EstimatePersistence(const Classes& classes, const std::vector<int>& session_of_image,
-                                int num_sessions, int num_threads);
+Persistence EstimatePersistence(const Classes& classes, const ImageSessions& images, int num_sessions,
+                                int num_threads);
 
 }  // namespace cairn::group_classes

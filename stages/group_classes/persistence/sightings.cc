@@ -44,6 +44,7 @@ struct View {
   const Camera* camera = nullptr;
   double min_cosine = -1;  // of the angle between its axis and what it sees
   int session = -1;
+  bool shows_landmarks_only = false;
   double typical_distance = 0;  // of the classes that it sees
   std::vector<int> neighbours;
   std::vector<std::vector<float>> depths;  // of the classes that it sees, by cell
@@ -111,7 +112,7 @@ double Median(std::vector<float>* values) {
   return *middle;
 }
 
-std::vector<View> ViewsOf(const Classes& classes, const std::vector<int>& session_of_image, int num_threads) {
+std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, int num_threads) {
   std::map<CameraId, const Camera*> cameras;
   std::map<CameraId, double> min_cosines;
   for (const Camera& camera : classes.cameras) {
@@ -129,7 +130,9 @@ std::vector<View> ViewsOf(const Classes& classes, const std::vector<int>& sessio
     views[i].direction = image.cam_from_world.ViewingDirection();
     views[i].camera = cameras.at(image.camera_id);
     views[i].min_cosine = min_cosines.at(image.camera_id);
-    views[i].session = session_of_image[i];
+    views[i].session = images.session[i];
+    views[i].shows_landmarks_only =
+        !images.shows_landmarks_only.empty() && images.shows_landmarks_only[i] != 0;
     views[i].depths.resize(kDepthColumns * kDepthRows);
   }
   std::vector<std::vector<float>> distances(views.size());
@@ -211,7 +214,7 @@ class ClassRegression {
     }
     ClassViews found;
     for (const int i : inside) {
-      const float visibility = Visibility(i);
+      const float visibility = views_[i].shows_landmarks_only ? 0 : Visibility(i);
       if (visibility > 0 || seen_[i]) found.push_back({i, visibility, seen_[i] != 0});
     }
     return found;
@@ -249,14 +252,14 @@ class ClassRegression {
 
 }  // namespace
 
-std::vector<ClassViews> FindExpectedViews(const Classes& classes, const std::vector<int>& session_of_image,
+std::vector<ClassViews> FindExpectedViews(const Classes& classes, const ImageSessions& images,
                                           int num_threads) {
-  const std::vector<View> views = ViewsOf(classes, session_of_image, num_threads);
+  const std::vector<View> views = ViewsOf(classes, images, num_threads);
   std::map<ImageId, int> idx_of_id;
   int num_sessions = 0;
   for (size_t i = 0; i < classes.images.size(); ++i) {
     idx_of_id[classes.images[i].image_id] = static_cast<int>(i);
-    num_sessions = std::max(num_sessions, session_of_image[i] + 1);
+    num_sessions = std::max(num_sessions, images.session[i] + 1);
   }
   std::vector<ClassViews> found(classes.classes.size());
   constexpr int64_t kBlock = 256;

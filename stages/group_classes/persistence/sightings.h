@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/world/feature_class.h"
+#include "stages/group_classes/persistence/surroundings.h"
 
 namespace cairn::group_classes {
 
@@ -23,10 +24,10 @@ struct ExpectedView {
 // model of their own: where a wall hides the class from here it also hid it from nearby.  Where the sessions
 // that know the class were never near, nothing is expected.
 //
-// `session_of_image`: per image of `classes`, -1: of none (then it is not counted).  Pure; the same for any
+// Images that show landmarks alone are expected to see nothing but what they do.  Pure; the same for any
 // number of threads.  O(classes x images near their viewpoints).
 using ClassViews = std::vector<ExpectedView>;
-std::vector<ClassViews> FindExpectedViews(const Classes& classes, const std::vector<int>& session_of_image,
+std::vector<ClassViews> FindExpectedViews(const Classes& classes, const ImageSessions& images,
                                           int num_threads);
 
 }  // namespace cairn::group_classes

@@ -16,7 +16,7 @@ double Median(std::vector<double> values) {
 
 }  // namespace
 
-Surroundings SurroundingsOf(const Classes& classes, const std::vector<int>& session_of_image) {
+Surroundings SurroundingsOf(const Classes& classes, const ImageSessions& images) {
   std::unordered_map<ImageId, Eigen::Vector3d> centers;
   for (const SurveyImage& image : classes.images) centers[image.image_id] = image.cam_from_world.Center();
   Surroundings surroundings;
@@ -35,9 +35,9 @@ Surroundings SurroundingsOf(const Classes& classes, const std::vector<int>& sess
   if (!distances.empty()) surroundings.typical_distance = std::max(Median(distances), 1e-9);
   std::map<int, std::vector<double>> of_session;
   for (size_t i = 0; i < classes.images.size(); ++i)
-    of_session[session_of_image[i]].push_back(num_seen[classes.images[i].image_id]);
+    of_session[images.session[i]].push_back(num_seen[classes.images[i].image_id]);
   for (size_t i = 0; i < classes.images.size(); ++i) {
-    const double median = Median(of_session[session_of_image[i]]);
+    const double median = Median(of_session[images.session[i]]);
     surroundings.sight_ratio.push_back(
         std::min(num_seen[classes.images[i].image_id] / std::max(median, 1.0), 1.0));
   }

@@ -9,6 +9,14 @@ namespace cairn::group_classes {
 // Neighbours are seen from the same side, within this cosine: a wall's other side is another surface.
 inline constexpr double kMinSideCosine = 0.2;
 
+// Per image of a survey.
+struct ImageSessions {
+  std::vector<int> session;  // -1: of none; it is not counted
+  // Its features are landmarks of an earlier map: what it does not show may have been there.  Empty: none
+  // are.
+  std::vector<char> shows_landmarks_only;
+};
+
 // Where the classes of a survey lie, and what its images see, as persistence.h and changes.h need it.
 struct Surroundings {
   std::vector<Eigen::Vector3d>
@@ -19,7 +27,6 @@ struct Surroundings {
   std::vector<double> sight_ratio;
 };
 
-// `session_of_image`: per image of `classes`.
-Surroundings SurroundingsOf(const Classes& classes, const std::vector<int>& session_of_image);
+Surroundings SurroundingsOf(const Classes& classes, const ImageSessions& images);
 
 }  // namespace cairn::group_classes

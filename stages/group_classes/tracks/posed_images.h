@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@ struct MatchedFeatures {
   std::vector<DatabaseImage> images;        // ascending image_id
   std::vector<Features> features;           // per image
   std::vector<TwoViewGeometry> geometries;  // ascending pair
+  std::set<ImageId> landmark_images;        // whose features are landmarks of an earlier map
 };
 
 // The survey's images that have a pose, contiguous: as stated, and as they are known by now.
