@@ -17,7 +17,7 @@ import sys
 
 # Pages in the order of the table; folders are those of bench/.
 ORDER = """
-held_out redkitchen poses reconstruct ../docs/sizes.md
+held_out redkitchen poses reconstruct change ../docs/sizes.md
 pairs matching regions vocabulary appearance views visual_map
 drive servo
 runtime bindings report

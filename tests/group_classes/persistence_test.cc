@@ -335,6 +335,31 @@ TEST(PlaceChanges, ComeAndGoByTurns) {
   EXPECT_GT(persistence.changes[1].num_appeared, 200);
 }
 
+TEST(Persistence, ABlurredImageIsNoChange) {
+  // Session 1 passes twice: all of its images of the second pass, which alone sees the right half, are blurred.
+  SceneOverTime scene = EmptyScene();
+  for (int i = 0; i < 48; ++i) scene.AddImage(0, {-6 + 0.25 * i, 0, 0});
+  for (int i = 0; i < 48; ++i) scene.AddImage(1, {-6 + 0.25 * i, 0, 0});
+  Random random(11);
+  for (int p = 0; p < 5000; ++p) {
+    scene.AddPoint({random.Uniform(-8, 8), random.Uniform(-1.2, 1.2), 4},
+                   [&](int image, const Eigen::Vector3d&) { return image >= 48 + 24 ? 0.02 : 0.6; }, &random);
+  }
+  const Persistence persistence = Estimate(scene, 2);
+  const Forgotten forgotten = Count(scene, persistence, AlwaysThere, 1);
+  EXPECT_LT(forgotten.LivingRatio(), 0.02);
+  EXPECT_TRUE(persistence.changes.empty());
+}
+
+TEST(Persistence, ClassesAtOnePlaceAreFinite) {
+  SceneOverTime scene = Wall({{}, {}}, AlwaysThere, 12, 200);
+  for (FeatureClass& feature : scene.classes.classes) feature.position = scene.classes.classes.front().position;
+  for (const ClassAge& age : Estimate(scene, 2).ages) {
+    EXPECT_TRUE(age.presence >= 0 && age.presence <= 1);
+    for (const SessionSightings& session : age.sessions) EXPECT_TRUE(session.there >= 0 && session.there <= 1);
+  }
+}
+
 TEST(Persistence, IsTheSameForAnyNumberOfThreadsAndAnyUnit) {
   SceneOverTime scene = Wall({{}, {.visibility = 0.4, .spoilt = 0.2}}, PosterVanishes);
   const Persistence one = Estimate(scene, 2, 1), seven = Estimate(scene, 2, 7);
