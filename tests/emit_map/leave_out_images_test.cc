@@ -115,6 +115,29 @@ TEST(ChooseLeftOut, ImagesThatAreNoRobotsAreOnlyLeftOut) {
   EXPECT_THAT((*rounds)[0].left_out, ElementsAre(90, 91, 92, 93, 94, 95, 96, 97, 98, 99));
 }
 
+TEST(ImagesOfThePast, AreThoseNearAViewOfALaterSession) {
+  Classes classes = Row(60, 0.1, 2.5);  // twice a view: 0.5 m
+  for (size_t i = 0; i < 60; ++i) classes.images[i].name = fmt::format("{}/{:02d}.png", i < 30 ? "a" : "b", i);
+  EXPECT_THAT(ImagesOfThePast(classes), IsEmpty());  // no sessions
+  classes.sessions = {"a", "b"};
+  EXPECT_THAT(ImagesOfThePast(classes), ElementsAre(26, 27, 28, 29));
+  classes.sessions = {"b", "a"};
+  EXPECT_THAT(ImagesOfThePast(classes), ElementsAre(30, 31, 32, 33));
+  // Images of no session are neither.
+  classes.sessions = {"a", "c"};
+  EXPECT_THAT(ImagesOfThePast(classes), IsEmpty());
+}
+
+TEST(ImagesOfThePast, AreTriedAllTheSameWhereTodayHasFew) {
+  for (const int num_today : {24, 23}) {
+    Classes classes = Row(2 * num_today, 0.1, 2.5);
+    for (size_t i = 0; i < classes.images.size(); ++i)
+      classes.images[i].name = fmt::format("{}/{:02d}.png", i % 2 == 0 ? "a" : "b", i);
+    classes.sessions = {"a", "b"};
+    EXPECT_EQ(ImagesOfThePast(classes).size(), num_today == 24 ? 24U : 0U);
+  }
+}
+
 TEST(ChooseLeftOut, OneImageInFourAtATimeInAtMostSixRounds) {
   const auto rounds = ChooseLeftOut(Row(40, 0.1, 4.95), 40);  // nine images a view, ten at a time
   ASSERT_TRUE(rounds.ok());

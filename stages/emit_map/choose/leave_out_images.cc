@@ -8,6 +8,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/quantiles.h"
+#include "core/capture/sessions.h"
 #include "core/colmap/colmap_database.h"
 #include "core/colmap/landmark_images.h"
 #include "core/promise/view_distance.h"
@@ -178,6 +179,29 @@ Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::strin
     }
     return positions;
   });
+}
+
+std::set<size_t> ImagesOfThePast(const Classes& classes) {
+  std::set<size_t> past;
+  if (classes.sessions.size() < 2) return past;
+  constexpr double kReach = 2;
+  std::vector<int> session;
+  for (const SurveyImage& image : classes.images)
+    session.push_back(SessionOfImage(classes.sessions, image.name));
+  const ViewDistance distance(classes, {});
+  for (size_t i = 0; i < session.size(); ++i) {
+    for (size_t j = 0; j < session.size() && !past.contains(i); ++j) {
+      if (session[i] >= 0 && session[i] < session[j] && distance.Squared(i, j) < kReach * kReach) past.insert(i);
+    }
+  }
+  if (session.size() - past.size() < kMinNumToday) past.clear();
+  return past;
+}
+
+Result<std::set<size_t>> NeverTried(const Classes& classes, const std::string& matches_path) {
+  CAIRN_ASSIGN_OR_RETURN(std::set<size_t> never_tried, LandmarkImages(classes, matches_path));
+  never_tried.merge(ImagesOfThePast(classes));
+  return never_tried;
 }
 
 Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& matches_path,

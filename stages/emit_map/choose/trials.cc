@@ -37,7 +37,7 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
                             const LeftOutLimits& limits, const EmitKept& emit, int num_threads,
                             Progress& progress) {
   Trials trials(emit, limits, num_threads);
-  CAIRN_ASSIGN_OR_RETURN(const auto never_tried, LandmarkImages(classes, matches_path));
+  CAIRN_ASSIGN_OR_RETURN(const auto never_tried, NeverTried(classes, matches_path));
   CAIRN_ASSIGN_OR_RETURN(const auto rounds, ChooseLeftOut(classes, max_num_left_out, never_tried));
   trials.parts_.resize(rounds.size());
   CAIRN_RETURN_IF_ERROR(trials.ForParts([&](Part& part, size_t round, int threads) -> Status {

@@ -85,7 +85,7 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
                      "hold_out = 0 leaves nothing out, so there is nothing to do; give a ratio, or \"auto\"");
   }
   CAIRN_ASSIGN_OR_RETURN(const WholeMap whole, ReadWholeMap(arguments));
-  CAIRN_ASSIGN_OR_RETURN(const auto never_tried, LandmarkImages(whole.classes, arguments.matches_path));
+  CAIRN_ASSIGN_OR_RETURN(const auto never_tried, NeverTried(whole.classes, arguments.matches_path));
   Result<LeftOutRuns> runs = ChooseRuns(whole.classes, arguments.options, never_tried);
   if (!runs.ok() && runs.error().code != ErrorCode::kNoData) return runs.error();
   std::optional<std::string> reason;
