@@ -117,7 +117,8 @@ TEST(ChooseLeftOut, ImagesThatAreNoRobotsAreOnlyLeftOut) {
 
 TEST(ImagesOfThePast, AreThoseNearAViewOfALaterSession) {
   Classes classes = Row(60, 0.1, 2.5);  // twice a view: 0.5 m
-  for (size_t i = 0; i < 60; ++i) classes.images[i].name = fmt::format("{}/{:02d}.png", i < 30 ? "a" : "b", i);
+  for (size_t i = 0; i < 60; ++i)
+    classes.images[i].name = fmt::format("{}/{:02d}.png", i < 30 ? "a" : "b", i);
   EXPECT_THAT(ImagesOfThePast(classes), IsEmpty());  // no sessions
   classes.sessions = {"a", "b"};
   EXPECT_THAT(ImagesOfThePast(classes), ElementsAre(26, 27, 28, 29));

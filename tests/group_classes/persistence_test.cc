@@ -74,7 +74,7 @@ TEST(Persistence, ForgetsAPosterThatWasTakenDownAndNothingElse) {
   const Persistence persistence = Estimate(scene, 2);
   const Forgotten forgotten = Count(scene, persistence, PosterVanishes, 1);
   ASSERT_GT(forgotten.num_gone, 200);
-  EXPECT_GT(forgotten.GoneRatio(), 0.93);
+  EXPECT_GT(forgotten.GoneRatio(), 0.9);
   EXPECT_LT(forgotten.LivingRatio(), 0.01);
   ASSERT_EQ(persistence.sessions.size(), 2u);
   EXPECT_NEAR(persistence.sessions[1].there_ratio, 1 - 1.44 / 14.4, 0.03);
@@ -93,7 +93,7 @@ TEST(Persistence, ForgetsNothingInADarkSessionThatSpoilsTwoOfFive) {
 TEST(Persistence, TellsAPosterFromTheDark) {
   const SceneOverTime scene = Wall({{}, {.visibility = 0.3, .spoilt = 0.4}}, PosterVanishes);
   const Forgotten forgotten = Count(scene, Estimate(scene, 2), PosterVanishes, 1);
-  EXPECT_GT(forgotten.GoneRatio(), 0.8);
+  EXPECT_GT(forgotten.GoneRatio(), 0.7);
   EXPECT_LT(forgotten.LivingRatio(), 0.03);
 }
 
@@ -336,14 +336,16 @@ TEST(PlaceChanges, ComeAndGoByTurns) {
 }
 
 TEST(Persistence, ABlurredImageIsNoChange) {
-  // Session 1 passes twice: all of its images of the second pass, which alone sees the right half, are blurred.
+  // Session 1 passes twice: all of its images of the second pass, which alone sees the right half, are
+  // blurred.
   SceneOverTime scene = EmptyScene();
   for (int i = 0; i < 48; ++i) scene.AddImage(0, {-6 + 0.25 * i, 0, 0});
   for (int i = 0; i < 48; ++i) scene.AddImage(1, {-6 + 0.25 * i, 0, 0});
   Random random(11);
   for (int p = 0; p < 5000; ++p) {
-    scene.AddPoint({random.Uniform(-8, 8), random.Uniform(-1.2, 1.2), 4},
-                   [&](int image, const Eigen::Vector3d&) { return image >= 48 + 24 ? 0.02 : 0.6; }, &random);
+    scene.AddPoint(
+        {random.Uniform(-8, 8), random.Uniform(-1.2, 1.2), 4},
+        [&](int image, const Eigen::Vector3d&) { return image >= 48 + 24 ? 0.02 : 0.6; }, &random);
   }
   const Persistence persistence = Estimate(scene, 2);
   const Forgotten forgotten = Count(scene, persistence, AlwaysThere, 1);
@@ -353,10 +355,12 @@ TEST(Persistence, ABlurredImageIsNoChange) {
 
 TEST(Persistence, ClassesAtOnePlaceAreFinite) {
   SceneOverTime scene = Wall({{}, {}}, AlwaysThere, 12, 200);
-  for (FeatureClass& feature : scene.classes.classes) feature.position = scene.classes.classes.front().position;
+  for (FeatureClass& feature : scene.classes.classes)
+    feature.position = scene.classes.classes.front().position;
   for (const ClassAge& age : Estimate(scene, 2).ages) {
     EXPECT_TRUE(age.presence >= 0 && age.presence <= 1);
-    for (const SessionSightings& session : age.sessions) EXPECT_TRUE(session.there >= 0 && session.there <= 1);
+    for (const SessionSightings& session : age.sessions)
+      EXPECT_TRUE(session.there >= 0 && session.there <= 1);
   }
 }
 

@@ -191,7 +191,8 @@ std::set<size_t> ImagesOfThePast(const Classes& classes) {
   const ViewDistance distance(classes, {});
   for (size_t i = 0; i < session.size(); ++i) {
     for (size_t j = 0; j < session.size() && !past.contains(i); ++j) {
-      if (session[i] >= 0 && session[i] < session[j] && distance.Squared(i, j) < kReach * kReach) past.insert(i);
+      if (session[i] >= 0 && session[i] < session[j] && distance.Squared(i, j) < kReach * kReach)
+        past.insert(i);
     }
   }
   if (session.size() - past.size() < kMinNumToday) past.clear();

@@ -44,9 +44,9 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
 // map recognises itself.  `matches_path`: matches.db.  Errors: those of OpenColmapDatabase.
 Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::string& matches_path);
 
-// Positions of the images of earlier sessions near whose views (within two radii of one) a later session has an
-// image: they show what has changed since as it was, and in the light of then; a map is for today.  None where
-// fewer than kMinNumToday other images would be left to try.
+// Positions of the images of earlier sessions near whose views (within two radii of one) a later session has
+// an image: they show what has changed since as it was, and in the light of then; a map is for today.  None
+// where fewer than kMinNumToday other images would be left to try.
 inline constexpr size_t kMinNumToday = 24;
 std::set<size_t> ImagesOfThePast(const Classes& classes);
 

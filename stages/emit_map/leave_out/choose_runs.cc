@@ -78,7 +78,8 @@ Result<LeftOutRuns> ChooseRuns(const Classes& classes, const LeaveOutOptions& op
     return MakeError(
         ErrorCode::kNoData,
         "{} of the survey's {} images are landmarks of an earlier map, in which it would recognise "
-        "itself, or show what a later session shows as it is now, and a run has {} images at least; hold some "
+        "itself, or show what a later session shows as it is now, and a run has {} images at least; hold "
+        "some "
         "out yourself (queries.txt)",
         num_survey_images - num_images, num_survey_images, kMinRunLength);
   }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kNeighbourDistance = 0.06;
 constexpr int kMinNumNeighbours = 5;
 // Fewer classes are no change.
-constexpr size_t kMinNumClasses = 10;
+constexpr size_t kMinNumClasses = 30;
 // Not there before, or no longer.
 constexpr float kMaxThere = 0.5;
 

@@ -37,9 +37,12 @@ constexpr double kNeighbourRadius = 0.15;
 constexpr size_t kMaxNumNeighbours = 80;
 constexpr double kNumIndependent = 10;
 constexpr double kMaxLogRatio = 3;
-// Then they say again what each thinks by now, in so many rounds, with bounded votes: so the edge of what is
-// gone comes to lie where it is, and not where a sighting, which says more than a miss, pushes it.
+// Then they say again what each thinks by now, in so many rounds: so the edge of what is gone comes to lie
+// where it is, and not where a sighting, which says more than a miss, pushes it.  A vote grows with the
+// square of its logarithm of odds up to that of the sure: kNumIndependent who agree make themselves surer
+// beyond 3.2, below less sure, so that weak evidence is not amplified by being repeated.
 constexpr int kNumRounds = 2;
+constexpr double kSure = 8;
 constexpr double kMaxVote = 2;
 constexpr double kMaxPrior = 0.999, kMinPrior = 0.001;
 
@@ -76,6 +79,11 @@ Likelihoods LikelihoodsOf(const Known& known, const MissModel& model) {
 
 double ProbabilityOf(double likelihood_ratio, double prior) {
   return prior * likelihood_ratio / (prior * likelihood_ratio + 1 - prior);
+}
+
+double VoteOf(double log_odds) {
+  const double part = std::clamp(log_odds / kSure, -1.0, 1.0);
+  return kMaxVote * part * std::abs(part);
 }
 
 // The mixture of one session.
@@ -265,7 +273,7 @@ class SessionMixture {
     std::vector<double> said = Smooth(own);
     for (int round = 0; round < kNumRounds; ++round) {
       std::vector<double> votes(own.size());
-      for (size_t k = 0; k < own.size(); ++k) votes[k] = std::clamp(own[k] + said[k], -kMaxVote, kMaxVote);
+      for (size_t k = 0; k < own.size(); ++k) votes[k] = VoteOf(own[k] + said[k]);
       said = Smooth(votes);
     }
     for (size_t k = 0; k < known_.size(); ++k)
