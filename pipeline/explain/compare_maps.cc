@@ -5,53 +5,15 @@
 #include <iterator>
 #include <map>
 #include <set>
-#include <tuple>
 
 #include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/floor_pose.h"
+#include "core/geometry/point_grid.h"
 #include "core/geometry/pose.h"
 
 namespace cairn::pipeline {
 namespace {
-
-using Cell = std::tuple<int64_t, int64_t, int64_t>;
-
-// Points by the cube of space that they lie in.
-class PointGrid {
- public:
-  PointGrid(const std::vector<Eigen::Vector3d>& points, double side) : points_(points), side_(side) {
-    for (size_t i = 0; i < points.size(); ++i) cells_[CellOf(points[i])].push_back(static_cast<int>(i));
-  }
-
-  // Calls visit(index, distance) for all points within the side of a place.
-  template <typename Visit>
-  void ForNear(const Eigen::Vector3d& place, const Visit& visit) const {
-    const auto [x, y, z] = CellOf(place);
-    for (int64_t i = x - 1; i <= x + 1; ++i) {
-      for (int64_t j = y - 1; j <= y + 1; ++j) {
-        for (int64_t k = z - 1; k <= z + 1; ++k) {
-          const auto cell = cells_.find({i, j, k});
-          if (cell == cells_.end()) continue;
-          for (const int index : cell->second) {
-            const double distance = (points_[index] - place).norm();
-            if (distance <= side_) visit(index, distance);
-          }
-        }
-      }
-    }
-  }
-
- private:
-  Cell CellOf(const Eigen::Vector3d& place) const {
-    const Eigen::Vector3d cell = (place / side_).array().floor();
-    return {static_cast<int64_t>(cell.x()), static_cast<int64_t>(cell.y()), static_cast<int64_t>(cell.z())};
-  }
-
-  const std::vector<Eigen::Vector3d>& points_;
-  double side_;
-  std::map<Cell, std::vector<int>> cells_;
-};
 
 // Per point of A the point of B, where each is the other's best by cost(a, b, distance); a negative cost: not
 // the same.

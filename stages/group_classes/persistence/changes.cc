@@ -5,8 +5,8 @@
 #include <map>
 #include <optional>
 
+#include "core/geometry/point_grid.h"
 #include "core/structure/disjoint_sets.h"
-#include "stages/group_classes/persistence/point_grid.h"
 
 namespace cairn::group_classes {
 namespace {
@@ -96,11 +96,11 @@ std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<C
     const std::vector<ChangedClass>& members = changed[session];
     std::vector<Eigen::Vector3d> points;
     for (const ChangedClass& member : members) points.push_back(classes.classes[member.class_idx].position);
-    const PointGrid grid(kNeighbourDistance * surroundings.typical_distance, points);
+    const PointGrid grid(points, kNeighbourDistance * surroundings.typical_distance);
     std::vector<std::vector<int>> neighbours(points.size());
     for (size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d& side = surroundings.sides[members[i].class_idx];
-      grid.ForNeighbours(points[i], [&](int other, double) {
+      grid.ForNear(points[i], [&](int other, double) {
         if (other != static_cast<int>(i) &&
             side.dot(surroundings.sides[members[other].class_idx]) > kMinSideCosine)
           neighbours[i].push_back(other);

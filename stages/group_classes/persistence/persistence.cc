@@ -6,8 +6,8 @@
 #include <map>
 
 #include "core/base/parallel.h"
+#include "core/geometry/point_grid.h"
 #include "stages/group_classes/persistence/changes.h"
-#include "stages/group_classes/persistence/point_grid.h"
 #include "stages/group_classes/persistence/sightings.h"
 #include "stages/group_classes/persistence/surroundings.h"
 
@@ -145,10 +145,7 @@ class SessionMixture {
       ratio = std::clamp(evidence > 0 ? there / evidence : ratio, kMinPrior, kMaxPrior);
     }
     findings.there_ratio = known_.empty() ? 1 : ratio;
-    for (const Known& known : known_) {
-      findings.expected += 1 - MissedProbability(known.expected, model_);
-      findings.num_seen += known.num_seen > 0 ? 1 : 0;
-    }
+    for (const Known& known : known_) findings.num_seen += known.num_seen > 0 ? 1 : 0;
     return findings;
   }
 
@@ -222,12 +219,13 @@ class SessionMixture {
 
   // Of each point.
   void FindNeighbours() {
-    const PointGrid grid(radius_, points_);
+    const PointGrid grid(points_, radius_);
     neighbours_.resize(points_.size());
     ForPoints([&](int64_t k) {
       std::vector<std::pair<double, int>> near;
-      grid.ForNeighbours(points_[k], [&](int other, double squared) {
-        if (other != k && sides_[k].dot(sides_[other]) > kMinSideCosine) near.emplace_back(squared, other);
+      grid.ForNear(points_[k], [&](int other, double distance) {
+        if (other != k && sides_[k].dot(sides_[other]) > kMinSideCosine)
+          near.emplace_back(distance * distance, other);
       });
       if (near.size() > kMaxNumNeighbours) {
         std::nth_element(near.begin(), near.begin() + kMaxNumNeighbours, near.end());
@@ -236,12 +234,11 @@ class SessionMixture {
       std::sort(near.begin(), near.end());
       double farthest = 1e-12 * radius_ * radius_, weights = 0;
       if (!near.empty()) farthest = std::max(farthest, near.back().first);
-      for (const auto& [squared, other] : near) weights += std::exp(-2 * squared / farthest);
+      const auto weight_of = [&](double squared) { return std::exp(-2 * squared / farthest); };
+      for (const auto& [squared, other] : near) weights += weight_of(squared);
       const double independent = std::min(1.0, kNumIndependent / std::max(weights, 1e-12));
-      for (const auto& [squared, other] : near) {
-        neighbours_[k].push_back(
-            {other, static_cast<float>(independent * std::exp(-2 * squared / farthest))});
-      }
+      for (const auto& [squared, other] : near)
+        neighbours_[k].push_back({other, static_cast<float>(independent * weight_of(squared))});
     });
   }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "core/options/options.h"
@@ -31,8 +30,7 @@ OptionTable DescribeOptions(PersistenceOptions* options);
 
 struct SessionPersistence {
   int64_t num_known = 0;   // classes of other sessions that this one could have seen
-  double expected = 0;     // of these, how many it should have seen, were all of them there
-  int64_t num_seen = 0;    // and did
+  int64_t num_seen = 0;    // and saw
   double yield = 0;        // how readily its images see what is there, as part of the other sessions'
   double there_ratio = 1;  // share of the classes that are there, of those that it could have seen
 };

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
+#include <numbers>
 #include <optional>
 
 #include "core/base/parallel.h"
+#include "core/base/quantiles.h"
 #include "core/camera/camera.h"
 
 namespace cairn::group_classes {
@@ -105,13 +106,6 @@ bool IsHidden(const View& view, const Sight& sight) {
   return num >= kMinNumHiding && num_nearer >= kMinHidingShare * num;
 }
 
-// REQUIRES: not empty
-double Median(std::vector<float>* values) {
-  const auto middle = values->begin() + static_cast<ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
 std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, int num_threads) {
   std::map<CameraId, const Camera*> cameras;
   std::map<CameraId, double> min_cosines;
@@ -135,26 +129,26 @@ std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, i
         !images.shows_landmarks_only.empty() && images.shows_landmarks_only[i] != 0;
     views[i].depths.resize(kDepthColumns * kDepthRows);
   }
-  std::vector<std::vector<float>> distances(views.size());
+  std::vector<std::vector<double>> distances(views.size());
   for (const FeatureClass& feature : classes.classes) {
     for (const Observation& observation : feature.observations) {
       const int i = idx_of_id.at(observation.image_id);
       View& view = views[i];
       const double distance = (feature.position - view.center).norm();
-      distances[i].push_back(static_cast<float>(distance));
+      distances[i].push_back(distance);
       const CellOfPixel cell = CellOf(*view.camera, {observation.keypoint.x, observation.keypoint.y});
       view.depths[cell.row * kDepthColumns + cell.column].push_back(static_cast<float>(distance));
     }
   }
   // An image that sees nothing sees as far as the others do.
-  std::vector<float> typical;
+  std::vector<double> typical;
   for (size_t i = 0; i < views.size(); ++i) {
     if (distances[i].empty()) continue;
-    views[i].typical_distance = Median(&distances[i]);
-    typical.push_back(static_cast<float>(views[i].typical_distance));
+    views[i].typical_distance = UpperMedian(distances[i]);
+    typical.push_back(views[i].typical_distance);
   }
   if (typical.empty()) return views;
-  const double typical_of_all = Median(&typical);
+  const double typical_of_all = UpperMedian(typical);
   for (size_t i = 0; i < views.size(); ++i) {
     if (distances[i].empty()) views[i].typical_distance = typical_of_all;
   }

@@ -3,19 +3,11 @@
 #include <algorithm>
 #include <map>
 #include <unordered_map>
+#include <utility>
+
+#include "core/base/quantiles.h"
 
 namespace cairn::group_classes {
-namespace {
-
-// REQUIRES: not empty
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 Surroundings SurroundingsOf(const Classes& classes, const ImageSessions& images) {
   std::unordered_map<ImageId, Eigen::Vector3d> centers;
   for (const SurveyImage& image : classes.images) centers[image.image_id] = image.cam_from_world.Center();
@@ -32,14 +24,16 @@ Surroundings SurroundingsOf(const Classes& classes, const ImageSessions& images)
     }
     surroundings.sides.push_back(sum.normalized());
   }
-  if (!distances.empty()) surroundings.typical_distance = std::max(Median(distances), 1e-9);
+  if (!distances.empty()) surroundings.typical_distance = std::max(UpperMedian(std::move(distances)), 1e-9);
   std::map<int, std::vector<double>> of_session;
   for (size_t i = 0; i < classes.images.size(); ++i)
     of_session[images.session[i]].push_back(num_seen[classes.images[i].image_id]);
+  std::map<int, double> median_of_session;
+  for (auto& [session, counts] : of_session)
+    median_of_session[session] = std::max(UpperMedian(std::move(counts)), 1.0);
   for (size_t i = 0; i < classes.images.size(); ++i) {
-    const double median = Median(of_session[images.session[i]]);
     surroundings.sight_ratio.push_back(
-        std::min(num_seen[classes.images[i].image_id] / std::max(median, 1.0), 1.0));
+        std::min(num_seen[classes.images[i].image_id] / median_of_session.at(images.session[i]), 1.0));
   }
   return surroundings;
 }
