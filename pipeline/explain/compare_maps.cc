@@ -9,8 +9,8 @@
 #include "core/base/quantiles.h"
 #include "core/features/descriptor_distance.h"
 #include "core/geometry/floor_pose.h"
-#include "core/geometry/point_grid.h"
 #include "core/geometry/pose.h"
+#include "core/structure/point_grid.h"
 
 namespace cairn::pipeline {
 namespace {

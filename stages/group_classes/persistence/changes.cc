@@ -5,8 +5,8 @@
 #include <map>
 #include <optional>
 
-#include "core/geometry/point_grid.h"
 #include "core/structure/disjoint_sets.h"
+#include "core/structure/point_grid.h"
 
 namespace cairn::group_classes {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/geometry/point_grid.h"
+#include "core/structure/point_grid.h"
 
 #include <set>
 
