@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -35,6 +37,10 @@ constexpr int64_t kMaxNumPairs = 60'000;
 constexpr size_t kMaxNumNear = 64;
 constexpr size_t kMaxImagesInTable = 4096;
 constexpr int kMinNumShared = 5;
+// Images agree on what they see from this many views' radii at most, and from another view.
+constexpr double kAgreeReach = 3;
+// What was rather not there teaches nothing by not being seen.
+constexpr double kLeastPresence = 0.5;
 constexpr double kLeastDistance = 1e-9;
 // Features of the nearest sight: its angle and its octaves are counted in these.
 constexpr double kAngleUnitDeg = 20;
@@ -55,7 +61,7 @@ struct View {
 class Learner {
  public:
   Learner(const Classes& classes, const ViewOptions& options, int num_threads)
-      : classes_(classes), distance_(classes, options) {
+      : classes_(classes), distance_(classes, options), evidence_(classes) {
     std::unordered_map<CameraId, const Camera*> cameras;
     for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
     std::unordered_map<ImageId, int32_t> index;
@@ -102,12 +108,12 @@ class Learner {
   }
   // The sights of a class: the images that look at it, those that see it first, ascending each.
   struct Lookers {
+    size_t class_position = 0;
     std::vector<int32_t> images;
     std::vector<Direction> seen_from;  // of those that see it
   };
   Lookers LookersOf(size_t i) const {
-    Lookers lookers;
-    lookers.images = Looking(i);
+    Lookers lookers{.class_position = i, .images = Looking(i), .seen_from = {}};
     const auto sees = [&](int32_t image) {
       return std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image);
     };
@@ -118,26 +124,30 @@ class Learner {
     return lookers;
   }
 
-  // What is known of a class from the sights of it, for an image that looks at it from there.
+  // What is known of a class from the sights of it, for an image of this session that looks at it from there.
   // `weight(image)`: WeightAt of the image's view and a survey image's.  False where no sight is left or all
   // are far.
   template <class Weight>
-  bool Describe(const Lookers& lookers, const Direction& from, double prior, Sights which,
+  bool Describe(const Lookers& lookers, const Direction& from, int session, double prior, Sights which,
                 const Weight& weight_of, FeatureVector* features) const {
     const double own_view = WeightAt(1), farther = which == Sights::kFromNearby ? WeightAt(1) : 1.0;
     const double unit_rad = RadFromDeg(kAngleUnitDeg);
     const size_t num_that_see = lookers.seen_from.size();
     double sum = 0, seen = 0, least = std::numeric_limits<double>::infinity(), nearest_deg = 180,
            nearest_octaves = 10;
+    double num_looking = 0, num_that_saw = 0;  // counted by how much they tell
     int num_seen = 0;
     for (size_t other = 0; other < lookers.images.size(); ++other) {
       double weight = weight_of(lookers.images[other]);
+      const double tells = Tells(lookers, other, session);
+      num_looking += tells;
       if (which == Sights::kOfOtherViews && weight > own_view) continue;
-      weight *= farther;
+      weight *= farther * tells;
       if (weight < kLeastWeight) weight = 0;
       sum += weight;
       if (other >= num_that_see) continue;
       seen += weight;
+      num_that_saw += tells;
       ++num_seen;
       const Direction& there = lookers.seen_from[other];
       const double octaves = std::abs(from.log_distance - there.log_distance);
@@ -158,9 +168,8 @@ class Learner {
     }
     const double rate =
         std::clamp((seen + kPriorWeight * prior) / (sum + kPriorWeight), kLeastRate, 1 - kLeastRate);
-    *features << 1, std::log(rate / (1 - rate)), std::log1p(sum), std::log(num_seen),
-        nearest_deg / kAngleUnitDeg, nearest_octaves / kOctavesUnit,
-        static_cast<double>(num_seen) / static_cast<double>(lookers.images.size());
+    *features << 1, std::log(rate / (1 - rate)), std::log1p(sum), std::log(num_that_saw),
+        nearest_deg / kAngleUnitDeg, nearest_octaves / kOctavesUnit, num_that_saw / num_looking;
     return true;
   }
   // For the j-th image that looks at class i.
@@ -170,8 +179,35 @@ class Learner {
     const Direction from =
         j < lookers.seen_from.size() ? lookers.seen_from[j] : DirectionTo(i, views_[image].center);
     return Describe(
-        lookers, from, prior, which, [&](int32_t other) { return Weight(image, other); }, features);
+        lookers, from, evidence_.SessionOf(image), prior, which,
+        [&](int32_t other) { return Weight(image, other); }, features);
   }
+  // The probability that the j-th image could see the class: it was there; 1 where the image sees it.
+  double CouldSee(const Lookers& lookers, size_t j) const {
+    return j < lookers.seen_from.size() ? 1 : evidence_.There(lookers.class_position, lookers.images[j]);
+  }
+  // How much what the j-th image sees counts for an image of this session.
+  double Tells(const Lookers& lookers, size_t j, int session) const {
+    if (!evidence_.HasSeveral()) return 1;
+    return evidence_.Weight(session, evidence_.SessionOf(lookers.images[j])) * CouldSee(lookers, j);
+  }
+  // From the pairs of images, of different views that are near each other, that look at one of these classes.
+  void LearnEvidence(std::span<const Lookers> of_classes, size_t step) {
+    for (size_t i = 0; i < of_classes.size(); i += step) {
+      const Lookers& lookers = of_classes[i];
+      for (size_t a = 0; a < lookers.images.size(); ++a) {
+        for (size_t b = 0; b < a; ++b) {
+          const double weight = Weight(lookers.images[a], lookers.images[b]);
+          if (weight > WeightAt(1) || weight < WeightAt(kAgreeReach * kAgreeReach)) continue;
+          evidence_.Count({evidence_.SessionOf(lookers.images[a]), a < lookers.seen_from.size()},
+                          {evidence_.SessionOf(lookers.images[b]), b < lookers.seen_from.size()},
+                          CouldSee(lookers, a) * CouldSee(lookers, b));
+        }
+      }
+    }
+    evidence_.Learn();
+  }
+  const SessionEvidence& evidence() const { return evidence_; }
 
   const ViewDistance& distance() const { return distance_; }
   const std::vector<int32_t>& seen_by(size_t i) const { return seen_by_[i]; }
@@ -229,6 +265,7 @@ class Learner {
 
   const Classes& classes_;
   const ViewDistance distance_;
+  SessionEvidence evidence_;
   std::vector<View> views_;
   std::vector<std::vector<int32_t>> seen_by_;
   std::vector<float> weights_;  // of all pairs; empty: too many images
@@ -276,11 +313,13 @@ class MatchModel::Impl {
     prior_ = static_cast<double>(num_seen) / static_cast<double>(num_looking);
 
     const int64_t step = std::max<int64_t>(1, num_looking / kMaxNumPairs);
+    if (learner_.evidence().HasSeveral()) learner_.LearnEvidence(lookers_, step);
     std::vector<std::vector<std::pair<FeatureVector, char>>> learnt(num_classes);
     ParallelFor((num_classes + step - 1) / step, num_threads, [&](int64_t n) {
       const int64_t i = n * step;
       for (size_t j = 0; j < lookers_[i].images.size(); ++j) {
         FeatureVector features;
+        if (learner_.CouldSee(lookers_[i], j) < kLeastPresence) continue;
         if (learner_.DescribeAtImage(i, lookers_[i], j, prior_, Learner::Sights::kOfOtherViews, &features))
           learnt[i].emplace_back(features, j < lookers_[i].seen_from.size());
       }
@@ -296,7 +335,9 @@ class MatchModel::Impl {
 
   ExpectedMatches OfViews(int num_threads) const {
     ExpectedMatches matches;
-    matches.views = ImagesApart(distance(), classes_.images.size(), kViewSpacing);
+    std::vector<int32_t> all(classes_.images.size());
+    std::iota(all.begin(), all.end(), 0);
+    matches.views = ImagesApart(distance(), all, kViewSpacing);
     matches.depth = learner_.distance().depth();
     matches.num_learnt_from = num_learnt_from_;
     for (int f = 0; f < kNumMatchFeatures; ++f) matches.weights[f] = weights_[f];
@@ -317,7 +358,8 @@ class MatchModel::Impl {
     return matches;
   }
 
-  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, Where where) const {
+  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, int session,
+                             Where where) const {
     const size_t num_images = classes_.images.size();
     std::vector<double> squared(num_images), weights(num_images);
     std::vector<size_t> nearest(num_images);
@@ -343,7 +385,7 @@ class MatchModel::Impl {
       if (!learner_.IsInView(camera, cam_from_world, i)) continue;
       FeatureVector features;
       if (learner_.Describe(
-              lookers_[i], learner_.DirectionTo(i, center), prior_, which,
+              lookers_[i], learner_.DirectionTo(i, center), session, prior_, which,
               [&](int32_t image) { return weights[image]; }, &features))
         matches.push_back({i, static_cast<float>(Probability(weights_, features))});
     }
@@ -351,6 +393,7 @@ class MatchModel::Impl {
   }
 
   const ViewDistance& distance() const { return learner_.distance(); }
+  const SessionEvidence& evidence() const { return learner_.evidence(); }
 
  private:
   const Classes& classes_;
@@ -370,11 +413,14 @@ MatchModel& MatchModel::operator=(MatchModel&&) noexcept = default;
 
 ExpectedMatches MatchModel::OfViews(int num_threads) const { return impl_->OfViews(num_threads); }
 
-std::vector<ClassMatch> MatchModel::At(const Camera& camera, const Pose& cam_from_world, Where where) const {
-  return impl_->At(camera, cam_from_world, where);
+std::vector<ClassMatch> MatchModel::At(const Camera& camera, const Pose& cam_from_world, int session,
+                                       Where where) const {
+  return impl_->At(camera, cam_from_world, session, where);
 }
 
 const ViewDistance& MatchModel::distance() const { return impl_->distance(); }
+
+const SessionEvidence& MatchModel::evidence() const { return impl_->evidence(); }
 
 ExpectedMatches LearnMatches(const Classes& classes, const ViewOptions& options, int num_threads) {
   return MatchModel(classes, options, num_threads).OfViews(num_threads);

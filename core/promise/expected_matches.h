@@ -8,6 +8,7 @@
 
 #include "core/camera/camera.h"
 #include "core/geometry/pose.h"
+#include "core/promise/session_evidence.h"
 #include "core/promise/view_distance.h"
 #include "core/world/feature_class.h"
 
@@ -55,10 +56,13 @@ class MatchModel {
     kThere,   // exactly there: the pose is known
     kNearby,  // about one view's radius from there
   };
-  // The classes that an image taken there may find, ascending.  Const and safe from any thread.
-  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, Where where) const;
+  // The classes that an image taken there, when this session's were taken (-1: at any time), may find,
+  // ascending.  Const and safe from any thread.
+  std::vector<ClassMatch> At(const Camera& camera, const Pose& cam_from_world, int session,
+                             Where where) const;
 
   const ViewDistance& distance() const;
+  const SessionEvidence& evidence() const;
 
  private:
   class Impl;

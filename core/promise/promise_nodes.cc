@@ -26,9 +26,10 @@ Pose PoseBetween(const Pose& a, const Pose& b, int part, int num_parts) {
   return {rotation, -(rotation * center)};
 }
 
-std::vector<int32_t> ImagesApart(const ViewDistance& distance, size_t num_images, double spacing) {
+std::vector<int32_t> ImagesApart(const ViewDistance& distance, const std::vector<int32_t>& images,
+                                 double spacing) {
   std::vector<int32_t> chosen;
-  for (int32_t image = 0; image < static_cast<int32_t>(num_images); ++image) {
+  for (const int32_t image : images) {
     const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](int32_t other) {
       return distance.Squared(image, other) < spacing * spacing;
     });
@@ -37,10 +38,11 @@ std::vector<int32_t> ImagesApart(const ViewDistance& distance, size_t num_images
   return chosen;
 }
 
-std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance) {
+std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance,
+                                      const std::vector<int32_t>& of_images) {
   std::unordered_map<CameraId, double> view_deg;
   for (const Camera& camera : classes.cameras) view_deg[camera.camera_id] = FieldOfViewDeg(camera);
-  const std::vector<int32_t> images = ImagesApart(distance, classes.images.size(), kViewSpacing);
+  const std::vector<int32_t> images = ImagesApart(distance, of_images, kViewSpacing);
   std::vector<PromiseNode> nodes;
   for (const int32_t image : images) nodes.push_back({classes.images[image].cam_from_world, image, image});
 

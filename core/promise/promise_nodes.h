@@ -27,11 +27,15 @@ inline constexpr double kNodeReach = 1.5;
 
 // Views lie this many radii apart.
 inline constexpr double kViewSpacing = 0.5;
-// Survey images that lie apart, so that every image is within `spacing` radii of one of them; ascending.
-std::vector<int32_t> ImagesApart(const ViewDistance& distance, size_t num_images, double spacing);
+// Those of these images (ascending) that lie apart, so that every one is within `spacing` radii of one of
+// them; ascending.
+std::vector<int32_t> ImagesApart(const ViewDistance& distance, const std::vector<int32_t>& images,
+                                 double spacing);
 
 // Images that lie apart, and, where the survey looked several ways from one place (lattices), headings
-// between two neighbouring ones that see some of the same: a robot looks any way.  O(images^2).
-std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance);
+// between two neighbouring ones that see some of the same: a robot looks any way.  Of these images,
+// ascending. O(images^2).
+std::vector<PromiseNode> PromiseNodes(const Classes& classes, const ViewDistance& distance,
+                                      const std::vector<int32_t>& of_images);
 
 }  // namespace cairn

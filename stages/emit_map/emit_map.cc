@@ -11,6 +11,7 @@
 #include "core/blocks/map_documents.h"
 #include "core/camera/pixel_ray.h"
 #include "core/features/transform_code.h"
+#include "stages/emit_map/images_of_map.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
 
@@ -135,13 +136,25 @@ double MeanScaleM(const FeatureClass& feature_class, const std::map<ImageId, con
   return count > 0 ? sum / count : 0;
 }
 
-Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order, MapRows* rows) {
+// Whether a point lies in front of an image's camera and projects into the image.
+bool IsInView(const Camera& camera, const Pose& cam_from_world, const Eigen::Vector3d& position) {
+  const auto pixel = ImageFromCamera(camera, cam_from_world * position);
+  return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < camera.width &&
+         pixel->y() < camera.height;
+}
+
+// A listed image sees what it saw, and what those whose views it shows saw.
+Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order,
+                    const ImagesOfMap& images_of_map, MapRows* rows) {
   std::map<ImageId, const SurveyImage*> images;
   std::map<CameraId, const Camera*> cameras;
   std::map<ImageId, size_t> image_index;
   for (const SurveyImage& image : classes.images) {
+    image_index[image.image_id] = images.size();
     images[image.image_id] = &image;
-    image_index[image.image_id] = rows->images.size();
+  }
+  for (const int32_t i : images_of_map.listed) {
+    const SurveyImage& image = classes.images[i];
     rows->images.push_back({.image_id = image.image_id,
                             .name = image.name,
                             .camera_id = image.camera_id,
@@ -165,13 +178,26 @@ Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order, Ma
                          "emit_map: class {} is seen in image {}, which has no pose", feature_class.class_id,
                          observation.image_id);
       }
-      rows->images[image->second].landmarks.push_back(static_cast<LandmarkIdx>(landmark_idx));
+      MapImage& row = rows->images[images_of_map.row_of_image[image->second]];
+      if (!images_of_map.Lists(image->second) &&
+          !IsInView(*cameras.at(row.camera_id), row.cam_from_world, feature_class.position))
+        continue;
+      const auto landmark = static_cast<LandmarkIdx>(landmark_idx);
+      if (row.landmarks.empty() || row.landmarks.back() != landmark) row.landmarks.push_back(landmark);
     }
   }
   return Ok();
 }
 
-Status AddStations(const World& world, const std::vector<StationIdx>& uncovered, MapRows* rows) {
+bool IsOfSurvey(const Classes& classes, ImageId image_id) {
+  const auto image = std::lower_bound(
+      classes.images.begin(), classes.images.end(), image_id,
+      [](const SurveyImage& survey_image, ImageId id) { return survey_image.image_id < id; });
+  return image != classes.images.end() && image->image_id == image_id;
+}
+
+Status AddStations(const World& world, const std::vector<StationIdx>& uncovered, const Classes& classes,
+                   MapRows* rows) {
   for (StationIdx i = 0; i < world.num_stations(); ++i) {
     MapStation station{.position = world.positions[i]};
     if (!world.headings_deg.empty()) station.heading_deg = world.headings_deg[i];
@@ -191,6 +217,7 @@ Status AddStations(const World& world, const std::vector<StationIdx>& uncovered,
           std::lower_bound(rows->images.begin(), rows->images.end(), image_id,
                            [](const MapImage& map_image, ImageId id) { return map_image.image_id < id; });
       if (image == rows->images.end() || image->image_id != image_id) {
+        if (IsOfSurvey(classes, image_id)) continue;  // it is not listed
         return MakeError(ErrorCode::kInvalidArgument,
                          "emit_map: station {} has image {}, which the classes lack", station, image_id);
       }
@@ -200,11 +227,13 @@ Status AddStations(const World& world, const std::vector<StationIdx>& uncovered,
   return Ok();
 }
 
-// The stations at which these images were taken, ascending.
-std::vector<StationIdx> StationsOf(const std::vector<size_t>& images, const MapRows& rows) {
+// The stations at which these images of the survey were taken, or those that show their views, ascending.
+std::vector<StationIdx> StationsOf(const std::vector<size_t>& images, const ImagesOfMap& images_of_map,
+                                   const MapRows& rows) {
   std::set<StationIdx> stations;
   for (const size_t image : images) {
-    if (rows.images[image].station >= 0) stations.insert(rows.images[image].station);
+    const StationIdx station = rows.images[images_of_map.row_of_image[image]].station;
+    if (station >= 0) stations.insert(station);
   }
   return {stations.begin(), stations.end()};
 }
@@ -429,10 +458,20 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   rows.keypoint_correlation = classes.keypoint_correlation;
   rows.cameras = classes.cameras;
   rows.stated_cameras = classes.stated_cameras;
-  CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, &rows));
-  CAIRN_RETURN_IF_ERROR(
-      AddStations(world, promises != nullptr ? std::vector<StationIdx>() : decomposition.uncovered, &rows));
-  if (appearance) AddAppearance(*appearance, &rows);
+  // The visual map's sights are of all images.
+  const ImagesOfMap images_of_map = ChooseImages(classes, /*all_images=*/options.visual_map);
+  CAIRN_RETURN_IF_ERROR(AddLandmarks(classes, order, images_of_map, &rows));
+  CAIRN_RETURN_IF_ERROR(AddStations(
+      world, promises != nullptr ? std::vector<StationIdx>() : decomposition.uncovered, classes, &rows));
+  if (rows.findings.promise) {
+    for (NodePromise& node : rows.findings.promise->nodes) {
+      for (int32_t* image : {&node.image, &node.other_image}) *image = images_of_map.row_of_image[*image];
+    }
+  }
+  if (appearance) {
+    AddAppearance(
+        images_of_map.ListsAll() ? *appearance : OfListedImages(*appearance, classes, images_of_map), &rows);
+  }
   rows.documents = options.documents;
   const std::vector<char> is_document = DocumentImages(rows);
   if (std::count(is_document.begin(), is_document.end(), 1) == 0) {
@@ -446,8 +485,9 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
   std::vector<LandmarkIdx> landmark_of_class(classes.classes.size(), -1);
   for (size_t i = 0; i < order.size(); ++i) landmark_of_class[order[i]] = static_cast<LandmarkIdx>(i);
   for (size_t region = 0; region < classes_of_regions.size(); ++region) {
-    MapRegion row{.stations = promises != nullptr ? StationsOf(promises->regions[region].images, rows)
-                                                  : decomposition.regions[region].stations};
+    MapRegion row{.stations = promises != nullptr
+                                  ? StationsOf(promises->regions[region].images, images_of_map, rows)
+                                  : decomposition.regions[region].stations};
     for (const size_t i : classes_of_regions[region]) row.landmarks.push_back(landmark_of_class[i]);
     std::sort(row.landmarks.begin(), row.landmarks.end());
     // Two features of a world may be parts of one class.

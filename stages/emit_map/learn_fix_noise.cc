@@ -31,7 +31,7 @@ constexpr double kMaxSigmaM = 0.2;
 
 // An observation of a landmark, linear in its position.
 struct RunSight {
-  int image = 0;  // index into MapRows::images
+  int image = 0;  // index into Classes::images
   Keypoint keypoint;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -49,12 +49,12 @@ struct Tried {
 
 class FixNoiseLearner {
  public:
-  FixNoiseLearner(const Classes& classes, const MapRows& rows) : rows_(rows), measured_(rows.images.size()) {
+  FixNoiseLearner(const Classes& classes, const MapRows& rows)
+      : images_(classes.images), measured_(images_.size()) {
     for (const Camera& camera : rows.cameras) cameras_[camera.camera_id] = &camera;
     std::map<ImageId, int> image_of_id;
-    for (size_t i = 0; i < rows.images.size(); ++i)
-      image_of_id[rows.images[i].image_id] = static_cast<int>(i);
-    const size_t num_runs = (rows.images.size() + kRunLength - 1) / kRunLength;
+    for (size_t i = 0; i < images_.size(); ++i) image_of_id[images_[i].image_id] = static_cast<int>(i);
+    const size_t num_runs = (images_.size() + kRunLength - 1) / kRunLength;
     const size_t step = (num_runs + kMaxNumRuns - 1) / kMaxNumRuns;
     for (size_t run = step / 2; run < num_runs; run += step) is_tried_.insert(static_cast<int>(run));
     std::map<ClassId, const FeatureClass*> class_of_id;
@@ -91,7 +91,7 @@ class FixNoiseLearner {
     for (const Observation& observation : feature.observations) {
       const auto image = image_of_id.find(observation.image_id);
       if (image == image_of_id.end()) continue;
-      const MapImage& row = rows_.images[image->second];
+      const SurveyImage& row = images_[image->second];
       const auto ray =
           MakePixelRay(*cameras_.at(row.camera_id), {observation.keypoint.x, observation.keypoint.y});
       const Eigen::Vector3d x = row.cam_from_world * feature.position;
@@ -127,7 +127,7 @@ class FixNoiseLearner {
   }
 
   Tried Try(int image) const {
-    const MapImage& row = rows_.images[image];
+    const SurveyImage& row = images_[image];
     Features features;
     for (const auto& [measurement, keypoint] : measured_[image]) features.keypoints.push_back(keypoint);
     const Query query = MakeQuery(std::move(features), *cameras_.at(row.camera_id), {});
@@ -173,7 +173,7 @@ class FixNoiseLearner {
     return FitFixNoise(factors);
   }
 
-  const MapRows& rows_;
+  const std::vector<SurveyImage>& images_;
   std::map<CameraId, const Camera*> cameras_;
   std::set<int> is_tried_;                                                   // runs
   std::vector<std::vector<std::pair<PoseMeasurement, Keypoint>>> measured_;  // per image

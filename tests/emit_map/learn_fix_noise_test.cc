@@ -68,16 +68,16 @@ Row MakeRow(int num_images, int num_points, const Errors& errors, uint64_t seed)
     row.rows.landmarks.push_back(landmark);
   }
   for (int image = 0; image < num_images; ++image) {
-    MapImage map_image;
-    map_image.image_id = image + 1;
-    map_image.camera_id = 1;
-    map_image.cam_from_world = PoseOf(image * kSpacingM);
-    row.rows.images.push_back(map_image);
-    const auto keypoints = See(points, row.rows.cameras[0], map_image.cam_from_world, errors, random);
+    SurveyImage survey_image;
+    survey_image.image_id = image + 1;
+    survey_image.camera_id = 1;
+    survey_image.cam_from_world = PoseOf(image * kSpacingM);
+    row.classes.images.push_back(survey_image);
+    const auto keypoints = See(points, row.rows.cameras[0], survey_image.cam_from_world, errors, random);
     for (int i = 0; i < num_points; ++i) {
       if (!keypoints[i]) continue;
       row.classes.classes[i].observations.push_back(
-          {map_image.image_id, static_cast<KeypointIdx>(i), *keypoints[i]});
+          {survey_image.image_id, static_cast<KeypointIdx>(i), *keypoints[i]});
     }
   }
   return row;
@@ -92,7 +92,8 @@ double PartWithinBound(const Row& row, const Errors& errors, const RefineOptions
   constexpr int kNum = 300;
   int num_within = 0;
   for (int i = 0; i < kNum; ++i) {
-    const Pose truth = PoseOf(random.Uniform(1, kSpacingM * static_cast<double>(row.rows.images.size()) - 1));
+    const Pose truth =
+        PoseOf(random.Uniform(1, kSpacingM * static_cast<double>(row.classes.images.size()) - 1));
     std::vector<PoseMeasurement> measurements;
     Features features;
     for (const auto& keypoint : See(points, row.rows.cameras[0], truth, errors, random))

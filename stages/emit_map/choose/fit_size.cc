@@ -288,7 +288,8 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   }
   // Half an image is lost by chance: sizes around one that localizes them all pull it down.
   const double num_right = fitted.trial_of_all.NumRight();
-  const SizeTerms terms{.min_num_right = std::min(options.min_recall_ratio * num_right, num_right - 0.5),
+  const double may_be_lost = std::max(0.5, std::round((1 - options.min_recall_ratio) * num_right));
+  const SizeTerms terms{.min_num_right = num_right - may_be_lost,
                         .max_log_error_ratio = std::log(options.max_error_ratio)};
   size_t num_kept = classes.classes.size();
   for (const int bits : FewestBitsFirst(options.descriptor_bits)) {

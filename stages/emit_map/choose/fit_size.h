@@ -20,9 +20,9 @@ namespace cairn::emit_map {
 // survey on survey images that are left out (leave_out_images.h).  Candidates are the first classes of
 // LandmarkOrder (core/promise/landmark_order.h); what is chosen is then made from the whole survey.
 struct FitSizeOptions {
-  int64_t max_bytes = 0;    // of the sealed map's file
-  int descriptor_bits = 5;  // at most
-  size_t max_num_left_out = 48;
+  int64_t max_bytes = 0;         // of the sealed map's file
+  int descriptor_bits = 5;       // at most
+  size_t max_num_left_out = 48;  // of one session (Trials)
   LeftOutLimits limits;
   // ChooseFewest: of the left-out images that the map of everything localizes, the part that must stay
   // localized, and the largest growth of their errors (ErrorRatio).  REQUIRES: in [0, 1]; >= 1

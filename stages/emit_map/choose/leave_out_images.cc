@@ -11,6 +11,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/colmap_database.h"
 #include "core/colmap/landmark_images.h"
+#include "core/promise/later_views.h"
 #include "core/promise/view_distance.h"
 #include "runtime/localize/localizer.h"
 
@@ -184,18 +185,11 @@ Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::strin
 std::set<size_t> ImagesOfThePast(const Classes& classes) {
   std::set<size_t> past;
   if (classes.sessions.size() < 2) return past;
-  constexpr double kReach = 2;
-  std::vector<int> session;
-  for (const SurveyImage& image : classes.images)
-    session.push_back(SessionOfImage(classes.sessions, image.name));
-  const ViewDistance distance(classes, {});
-  for (size_t i = 0; i < session.size(); ++i) {
-    for (size_t j = 0; j < session.size() && !past.contains(i); ++j) {
-      if (session[i] >= 0 && session[i] < session[j] && distance.Squared(i, j) < kReach * kReach)
-        past.insert(i);
-    }
+  const std::vector<int32_t> later = LaterViews(classes, ViewDistance(classes, {}));
+  for (size_t i = 0; i < later.size(); ++i) {
+    if (later[i] >= 0) past.insert(i);
   }
-  if (session.size() - past.size() < kMinNumToday) past.clear();
+  if (later.size() - past.size() < kMinNumToday) past.clear();
   return past;
 }
 
@@ -217,7 +211,10 @@ Result<LeftOutSurvey> LeaveOutImages(const Classes& classes, const std::string& 
     for (const size_t i : which.left_out) left_out.insert(classes.images[i].image_id);
     for (const size_t i : which.tried) {
       const SurveyImage& image = classes.images[i];
-      TrialImage row{.camera = *cameras.at(image.camera_id), .cam_from_world = image.cam_from_world};
+      TrialImage row{.camera = *cameras.at(image.camera_id),
+                     .cam_from_world = image.cam_from_world,
+                     .features = {},
+                     .session = SessionOfImage(classes.sessions, image.name)};
       CAIRN_ASSIGN_OR_RETURN(row.features, ReadFeatures(database, image.image_id));
       survey.images.push_back(std::move(row));
     }

@@ -20,6 +20,7 @@ struct TrialImage {
   Camera camera;
   Pose cam_from_world;
   Features features;
+  int session = -1;  // position in Classes::sessions; -1: of none
 };
 
 // Which images are left out of the survey together, and which of them a map of the rest is tried on.
@@ -44,9 +45,9 @@ Result<std::vector<LeftOutImages>> ChooseLeftOut(const Classes& classes, size_t 
 // map recognises itself.  `matches_path`: matches.db.  Errors: those of OpenColmapDatabase.
 Result<std::set<size_t>> LandmarkImages(const Classes& classes, const std::string& matches_path);
 
-// Positions of the images of earlier sessions near whose views (within two radii of one) a later session has
-// an image: they show what has changed since as it was, and in the light of then; a map is for today.  None
-// where fewer than kMinNumToday other images would be left to try.
+// Positions of the images whose views a later session's show (core/promise/later_views.h): they show what has
+// changed since as it was, and in the light of then.  None where fewer than kMinNumToday other images would
+// be left to try.
 inline constexpr size_t kMinNumToday = 24;
 std::set<size_t> ImagesOfThePast(const Classes& classes);
 

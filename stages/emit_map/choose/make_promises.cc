@@ -7,6 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/promise/expectation.h"
+#include "core/promise/later_views.h"
 #include "core/promise/promise_cover.h"
 #include "core/promise/promise_regions.h"
 
@@ -36,14 +37,15 @@ PromiseMaker::PromiseMaker(const Classes& classes, int num_threads)
       num_threads_(num_threads),
       model_(classes, {}, num_threads),
       sights_(classes, {}),
-      nodes_(PromiseNodes(classes, model_.distance())),
+      nodes_(PromiseNodes(classes, model_.distance(), ImagesOfToday(LaterViews(classes, model_.distance())))),
       of_node_(nodes_.size()),
       of_class_(classes.classes.size()) {
   std::unordered_map<CameraId, const Camera*> cameras;
   for (const Camera& camera : classes.cameras) cameras[camera.camera_id] = &camera;
   ParallelFor(static_cast<int64_t>(nodes_.size()), num_threads, [&](int64_t node) {
     const Camera& camera = *cameras.at(classes.images[nodes_[node].image].camera_id);
-    of_node_[node] = model_.At(camera, nodes_[node].cam_from_world, MatchModel::Where::kNearby);
+    of_node_[node] = model_.At(camera, nodes_[node].cam_from_world,
+                               model_.evidence().SessionOf(nodes_[node].image), MatchModel::Where::kNearby);
   });
   for (size_t node = 0; node < nodes_.size(); ++node) {
     for (const ClassMatch& match : of_node_[node])

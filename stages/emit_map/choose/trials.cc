@@ -10,6 +10,9 @@
 namespace cairn::emit_map {
 namespace {
 
+// Of more sessions, no more images are tried.
+constexpr size_t kMaxNumSessionsTried = 3;
+
 // Positions of the classes that a map may have in a survey that lacks some.
 std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
                            const std::vector<char>& may_keep) {
@@ -38,7 +41,9 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
                             Progress& progress) {
   Trials trials(emit, limits, num_threads);
   CAIRN_ASSIGN_OR_RETURN(const auto never_tried, NeverTried(classes, matches_path));
-  CAIRN_ASSIGN_OR_RETURN(const auto rounds, ChooseLeftOut(classes, max_num_left_out, never_tried));
+  const size_t num_sessions = std::clamp<size_t>(classes.sessions.size(), 1, kMaxNumSessionsTried);
+  CAIRN_ASSIGN_OR_RETURN(const auto rounds,
+                         ChooseLeftOut(classes, num_sessions * max_num_left_out, never_tried));
   trials.parts_.resize(rounds.size());
   CAIRN_RETURN_IF_ERROR(trials.ForParts([&](Part& part, size_t round, int threads) -> Status {
     if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "choosing landmarks was stopped");
@@ -50,8 +55,8 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
     part.pool = PoolIn(survey, classes, may_keep);
     part.matches.resize(survey.images.size());
     ParallelFor(static_cast<int64_t>(part.matches.size()), threads, [&](int64_t i) {
-      part.matches[i] =
-          model.At(survey.images[i].camera, survey.images[i].cam_from_world, MatchModel::Where::kThere);
+      part.matches[i] = model.At(survey.images[i].camera, survey.images[i].cam_from_world,
+                                 survey.images[i].session, MatchModel::Where::kThere);
     });
     part.order.emplace(survey.classes, model.OfViews(threads), part.pool, LandmarkOrderOptions(), threads);
     part.sights.emplace(survey.classes, KeypointErrors());

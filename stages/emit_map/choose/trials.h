@@ -33,8 +33,10 @@ std::vector<char> MarkThese(const std::vector<size_t>& chosen, size_t num_classe
 // first n classes of LandmarkOrder.
 class Trials {
  public:
-  // At most about `max_num_left_out` images are tried.  `may_keep`: per class, whether a map may have it.
-  // Advances `progress` by kMaxNumRounds.  Errors: those of ChooseLeftOut, LeaveOutImages; Cancelled.
+  // At most about `max_num_left_out` images are tried, times the number of sessions up to three: more
+  // sessions localize better, and what less does to that is seen in few images.  `may_keep`: per class,
+  // whether a map may have it. Advances `progress` by kMaxNumRounds.  Errors: those of ChooseLeftOut,
+  // LeaveOutImages; Cancelled.
   static Result<Trials> Make(const Classes& classes, const std::vector<char>& may_keep,
                              const std::string& matches_path, size_t max_num_left_out,
                              const LeftOutLimits& limits, const EmitKept& emit, int num_threads,

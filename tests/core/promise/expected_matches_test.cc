@@ -1,6 +1,7 @@
 #include "core/promise/expected_matches.h"
 
 #include <cmath>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -92,6 +93,75 @@ TEST(LearnMatches, OnlyImagesThatLookAtAClassExpectIt) {
       EXPECT_LE(std::abs(x), 2 + 1e-9);  // half of 400 px at 2 m, f = 200 px
     }
   }
+}
+
+// Two sessions of the same places take turns.  The first sees half of the classes well and of the others this
+// part, the second the other way round: another light shows other things.
+Classes SurveyInTwoLights(double first_sees_others, double second_sees_others, uint64_t seed) {
+  Classes classes = WallSurvey(48, 0.125);
+  classes.sessions = {"noon", "night"};
+  for (size_t i = 0; i < classes.images.size(); ++i)
+    classes.images[i].name = classes.sessions[i % 2] + "/" + std::to_string(i);
+  Random random(seed);
+  for (int n = 0; n < 600; ++n) {
+    const double x = 6 * random.Uniform();
+    std::vector<ImageId> seen_by;
+    for (int image = 0; image < 48; ++image) {
+      const double of_others = image % 2 == 0 ? first_sees_others : second_sees_others;
+      if (std::abs(x - 0.125 * image) < 2 && random.Uniform() < (image % 2 == n % 2 ? 0.8 : of_others))
+        seen_by.push_back(static_cast<ImageId>(image + 1));
+    }
+    AddClass({x, 2 * random.Uniform() - 1, 2}, seen_by, 3, &classes);
+  }
+  return classes;
+}
+
+TEST(LearnMatches, WhatOneLightShowsIsHardlyExpectedInAnother) {
+  const Classes classes = SurveyInTwoLights(0.1, 0.1, 8);
+  const ExpectedMatches matches = LearnMatches(classes, {}, 2);
+  double sums[2] = {0, 0};
+  int nums[2] = {0, 0};
+  for (size_t i = 0; i < matches.of_class.size(); ++i) {
+    for (const ExpectedMatch& match : matches.of_class[i]) {
+      const bool is_own = matches.views[match.view] % 2 == static_cast<int>(i % 2);
+      sums[is_own] += match.probability;
+      ++nums[is_own];
+    }
+  }
+  ASSERT_GT(nums[0], 1000);
+  EXPECT_GT(sums[1] / nums[1], 0.7);
+  EXPECT_LT(sums[0] / nums[0], 0.25);
+  // An image that is taken in a light expects what that shows.
+  const MatchModel model(classes, {}, 1);
+  double expected[2][2] = {{0, 0}, {0, 0}};
+  for (const int session : {0, 1}) {
+    for (const ClassMatch& match :
+         model.At(classes.cameras[0], classes.images[24].cam_from_world, session, MatchModel::Where::kNearby))
+      expected[session][match.i % 2] += match.probability;
+  }
+  EXPECT_GT(expected[0][0], 3 * expected[0][1]);
+  EXPECT_GT(expected[1][1], 3 * expected[1][0]);
+}
+
+// The second session is the first to see classes that are new: that the first does not see them says nothing.
+TEST(LearnMatches, WhatWasNotThereYetIsExpectedAllTheSame) {
+  Classes classes = SurveyInTwoLights(0, 0.5, 9);
+  const auto mean_at_night = [&] {
+    const ExpectedMatches matches = LearnMatches(classes, {}, 2);
+    double sum = 0;
+    int num = 0;
+    for (size_t i = 1; i < matches.of_class.size(); i += 2) {
+      for (const ExpectedMatch& match : matches.of_class[i]) {
+        if (matches.views[match.view] % 2 == 1) sum += match.probability, ++num;
+      }
+    }
+    return sum / num;
+  };
+  const double as_if_there = mean_at_night();
+  for (size_t i = 0; i < classes.classes.size(); ++i)
+    classes.classes[i].age.sessions = {{.there = i % 2 == 1 ? 0.0F : 1.0F}, {.there = 1}};
+  EXPECT_GT(mean_at_night(), as_if_there + 0.01);
+  EXPECT_NEAR(mean_at_night(), 0.8, 0.05);
 }
 
 TEST(LearnMatches, SameForAnyNumberOfThreads) {
