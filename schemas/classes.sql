@@ -67,7 +67,9 @@ CREATE TABLE changes (
   num_vanished INTEGER NOT NULL,  -- classes
   num_appeared INTEGER NOT NULL,
   image_before INTEGER NOT NULL,  -- of an earlier session, shows what was there; 0: none
-  image_after  INTEGER NOT NULL   -- of this session, shows what is there now; 0: none
+  image_after  INTEGER NOT NULL,  -- of this session, shows what is there now; 0: none
+  moved_to     INTEGER NOT NULL,  -- by position, from 0: the change of this session where it is now; -1: nowhere
+  num_moved    INTEGER NOT NULL   -- classes that show that
 );
 
 CREATE TABLE alignment (

@@ -112,6 +112,16 @@ Status CheckChanges(const std::vector<MapChange>& changes, const MapSizes& sizes
     if (row.session < last.session || (row.session == last.session && row.NumFeatures() > last.NumFeatures()))
       return Invalid("change {} is out of order", i);
   }
+  for (size_t i = 0; i < changes.size(); ++i) {
+    const MapChange& row = changes[i];
+    const int32_t to = row.moved_to;
+    if (to < -1 || to >= static_cast<int32_t>(changes.size()) || (to < 0) != (row.num_moved == 0) ||
+        row.num_moved < 0 || row.num_moved > row.num_vanished ||
+        (to >= 0 && changes[to].session != row.session)) {
+      return Invalid("change {}: {} features of {} moved to change {} of {}", i, row.num_moved,
+                     row.num_vanished, to, changes.size());
+    }
+  }
   return Ok();
 }
 
@@ -121,6 +131,10 @@ int MapPromise::NumKept() const {
   return static_cast<int>(std::count_if(nodes.begin(), nodes.end(), [&](const NodePromise& node) {
     return node.probability >= terms.probability;
   }));
+}
+
+bool MapFindings::HasMoves() const {
+  return std::any_of(changes.begin(), changes.end(), [](const MapChange& row) { return row.moved_to >= 0; });
 }
 
 Status CheckMapFindings(const MapFindings& findings, const MapSizes& sizes) {

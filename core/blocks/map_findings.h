@@ -103,6 +103,10 @@ struct MapChange {
   // Images by index, that show best what was there and what is there now; -1: none of the map.
   int32_t image_before = -1;
   int32_t image_after = -1;
+  // By index, the change of the same session where what was there is now (it may be this one), and how many
+  // features show that; -1, 0: nowhere.
+  int32_t moved_to = -1;
+  int32_t num_moved = 0;
   int64_t NumFeatures() const { return int64_t{num_vanished} + num_appeared; }
   friend bool operator==(const MapChange&, const MapChange&) = default;
 };
@@ -115,6 +119,7 @@ struct MapFindings {
   std::vector<DropCount> drops;                   // reasons that occurred, ascending
   std::optional<MapPromise> promise;              // of maps whose landmarks were chosen by trial
   std::vector<MapChange> changes;  // of maps of several surveys; ascending session, the largest first
+  bool HasMoves() const;           // whether something moved from one change to another
   friend bool operator==(const MapFindings&, const MapFindings&) = default;
 };
 

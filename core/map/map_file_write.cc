@@ -11,6 +11,7 @@
 #include "schemas/0002_map_sql.h"
 #include "schemas/map_changes_sql.h"
 #include "schemas/map_findings_sql.h"
+#include "schemas/map_moves_sql.h"
 
 namespace cairn {
 namespace {
@@ -77,6 +78,7 @@ Status WriteMapRows(const MapRows& rows, const std::string& path) {
       database.exec(k0002MapSql);
       database.exec(kMapFindingsSql);
       if (!rows.findings.changes.empty()) database.exec(kMapChangesSql);
+      if (rows.findings.HasMoves()) database.exec(kMapMovesSql);
       CAIRN_ASSIGN_OR_RETURN(root, WriteTables(database, rows, path));
       database.exec("COMMIT");
       return Ok();

@@ -14,11 +14,9 @@ constexpr int64_t kMaxCount = std::numeric_limits<int32_t>::max();
 
 // The tables that a map may have: earlier formats lack some.
 const std::vector<StoredTable>& FindingsTables() {
-  static const std::vector<StoredTable> tables = {{"changes", 10, 1 << 20},
-                                                  {"drop_reasons", 7, 4096},
-                                                  {"promises", 14, 1},
-                                                  {"region_entropies", 2, 1 << 24},
-                                                  {"self_test_regions", 8, 1 << 24}};
+  static const std::vector<StoredTable> tables = {
+      {"changes", 10, 1 << 20}, {"drop_reasons", 7, 4096},        {"moves", 3, 1 << 20},
+      {"promises", 14, 1},      {"region_entropies", 2, 1 << 24}, {"self_test_regions", 8, 1 << 24}};
   return tables;
 }
 
@@ -142,6 +140,18 @@ void WriteChanges(SQLite::Database& database, const MapFindings& findings) {
     insert.bind(8, row.num_appeared);
     insert.bind(9, row.image_before);
     insert.bind(10, row.image_after);
+    insert.exec();
+    insert.reset();
+  }
+}
+
+void WriteMoves(SQLite::Database& database, const MapFindings& findings) {
+  SQLite::Statement insert(database, "INSERT INTO moves VALUES (?, ?, ?)");
+  for (size_t i = 0; i < findings.changes.size(); ++i) {
+    if (findings.changes[i].moved_to < 0) continue;
+    insert.bind(1, static_cast<int64_t>(i));
+    insert.bind(2, findings.changes[i].moved_to);
+    insert.bind(3, findings.changes[i].num_moved);
     insert.exec();
     insert.reset();
   }
@@ -278,6 +288,16 @@ Result<MapChange> DecodeChange(const StoredRow& stored) {
   return row;
 }
 
+// REQUIRES: the changes have been read.
+Status DecodeMove(const StoredRow& stored, const std::string& path, std::vector<MapChange>* changes) {
+  CAIRN_ASSIGN_OR_RETURN(const int64_t change, stored.Integer(0));
+  if (change < 0 || change >= static_cast<int64_t>(changes->size()))
+    return Corrupt(path, "table moves: change {} of {}", change, changes->size());
+  CAIRN_ASSIGN_OR_RETURN((*changes)[change].moved_to, CountOf(stored, 1));
+  CAIRN_ASSIGN_OR_RETURN((*changes)[change].num_moved, CountOf(stored, 2));
+  return Ok();
+}
+
 }  // namespace
 
 void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
@@ -286,6 +306,7 @@ void WriteMapFindings(SQLite::Database& database, const MapFindings& findings) {
   WriteDropCounts(database, findings);
   WritePromise(database, findings);
   if (!findings.changes.empty()) WriteChanges(database, findings);
+  if (findings.HasMoves()) WriteMoves(database, findings);
 }
 
 Result<StoredRows> ReadFindingsRows(SQLite::Database& database, const std::string& path,
@@ -312,6 +333,8 @@ Result<MapFindings> DecodeMapFindings(const StoredRows& rows, const std::string&
       } else if (table == "changes") {
         CAIRN_ASSIGN_OR_RETURN(const MapChange change, DecodeChange(row));
         findings.changes.push_back(change);
+      } else if (table == "moves") {  // after "changes"
+        CAIRN_RETURN_IF_ERROR(DecodeMove(row, path, &findings.changes));
       } else {
         CAIRN_ASSIGN_OR_RETURN(DropCount count, DecodeDropCount(row, path));
         findings.drops.push_back(std::move(count));

@@ -352,7 +352,7 @@ class MatchModel::Impl {
         if (view < 0 ||
             !learner_.DescribeAtImage(i, lookers_[i], j, prior_, Learner::Sights::kFromNearby, &features))
           continue;
-        matches.of_class[i].push_back({view, static_cast<float>(Probability(weights_, features))});
+        matches.of_class[i].push_back({view, FoundAgain(i, features)});
       }
     });
     return matches;
@@ -387,7 +387,7 @@ class MatchModel::Impl {
       if (learner_.Describe(
               lookers_[i], learner_.DirectionTo(i, center), session, prior_, which,
               [&](int32_t image) { return weights[image]; }, &features))
-        matches.push_back({i, static_cast<float>(Probability(weights_, features))});
+        matches.push_back({i, FoundAgain(i, features)});
     }
     return matches;
   }
@@ -396,6 +396,11 @@ class MatchModel::Impl {
   const SessionEvidence& evidence() const { return learner_.evidence(); }
 
  private:
+  // What is gone is found by nobody.
+  float FoundAgain(size_t i, const FeatureVector& features) const {
+    return classes_.classes[i].age.presence * static_cast<float>(Probability(weights_, features));
+  }
+
   const Classes& classes_;
   Learner learner_;
   std::vector<Learner::Lookers> lookers_;     // per class

@@ -16,8 +16,9 @@ namespace cairn {
 
 // A class from a survey image.
 struct ExpectedMatch {
-  int32_t view = 0;       // position in ExpectedMatches::views
-  float probability = 0;  // that a robot about one view's radius from there finds the class again
+  int32_t view = 0;  // position in ExpectedMatches::views
+  // That the class is there now, and that a robot about one view's radius from there finds it again.
+  float probability = 0;
 };
 
 // logit P(seen) = sum of weights x features; see expected_matches.cc for the features.

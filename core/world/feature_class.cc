@@ -112,7 +112,7 @@ void InsertClasses(SQLite::Database& database, const std::string& table,
 }
 
 void InsertChanges(SQLite::Database& database, const std::vector<PlaceChange>& changes) {
-  SQLite::Statement row(database, "INSERT INTO changes VALUES (?, ?, ?, ?, ?, ?, ?)");
+  SQLite::Statement row(database, "INSERT INTO changes VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
   for (const PlaceChange& change : changes) {
     row.bind(1, change.session);
     BindArray(row, 2, std::array<double, 3>{change.position.x(), change.position.y(), change.position.z()});
@@ -121,6 +121,8 @@ void InsertChanges(SQLite::Database& database, const std::vector<PlaceChange>& c
     row.bind(5, change.num_appeared);
     row.bind(6, change.image_before);
     row.bind(7, change.image_after);
+    row.bind(8, change.moved_to);
+    row.bind(9, change.num_moved);
     row.exec();
     row.reset();
   }
@@ -131,7 +133,7 @@ Result<std::vector<PlaceChange>> SelectChanges(SQLite::Database& database, const
   std::vector<PlaceChange> changes;
   SQLite::Statement row(database,
                         "SELECT session_idx, position, radius_m, num_vanished, num_appeared, image_before, "
-                        "image_after FROM changes ORDER BY rowid");
+                        "image_after, moved_to, num_moved FROM changes ORDER BY rowid");
   while (row.executeStep()) {
     PlaceChange change;
     change.session = row.getColumn(0).getInt();
@@ -143,6 +145,8 @@ Result<std::vector<PlaceChange>> SelectChanges(SQLite::Database& database, const
     change.num_appeared = row.getColumn(4).getInt();
     change.image_before = row.getColumn(5).getUInt();
     change.image_after = row.getColumn(6).getUInt();
+    change.moved_to = row.getColumn(7).getInt();
+    change.num_moved = row.getColumn(8).getInt();
     const bool images_exist = (change.image_before == 0 || image_ids.count(change.image_before) != 0) &&
                               (change.image_after == 0 || image_ids.count(change.image_after) != 0);
     if (change.session < 0 || static_cast<size_t>(change.session) >= num_sessions || !images_exist) {
@@ -150,6 +154,14 @@ Result<std::vector<PlaceChange>> SelectChanges(SQLite::Database& database, const
                        change.session, num_sessions, change.image_before, change.image_after);
     }
     changes.push_back(change);
+  }
+  for (size_t i = 0; i < changes.size(); ++i) {
+    const int32_t to = changes[i].moved_to;
+    if (to < -1 || to >= static_cast<int32_t>(changes.size()) ||
+        (to >= 0 && changes[to].session != changes[i].session)) {
+      return MakeError(ErrorCode::kCorrupt, "{}: change {} moved to change {} of {}", path, i, to,
+                       changes.size());
+    }
   }
   return changes;
 }
@@ -246,7 +258,7 @@ Result<Classes> ReadClasses(const std::string& path) {
   CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenDatabaseReadOnly(path));
   return WithDatabaseErrors(path, [&]() -> Result<Classes> {
     if (!HasTable(database, "classes") || !HasTable(database, "stated_cameras") ||
-        !HasTable(database, "vanished")) {
+        !HasTable(database, "vanished") || !HasColumn(database, "changes", "moved_to")) {
       return MakeError(
           ErrorCode::kUnsupported,
           "{}: has no tables 'classes', 'stated_cameras' and 'vanished'; expected the output of this "

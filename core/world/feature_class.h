@@ -46,6 +46,10 @@ struct PlaceChange {
   // is there now; 0: none.
   ImageId image_before = 0;
   ImageId image_after = 0;
+  // Where what was there is now: the change of the same session, by position in Classes::changes, where most
+  // of it appears (it may be this one), and how many classes show that; -1, 0: nowhere.
+  int32_t moved_to = -1;
+  int32_t num_moved = 0;
 };
 
 // Equivalence class of keypoints = one scene feature [Sala06 §VI-B], triangulated.

@@ -11,6 +11,25 @@ std::string ImageText(const MapRows& rows, int32_t image) {
   return image >= 0 ? rows.images[image].name : "-";
 }
 
+// Where what was at a change is now; null: nowhere.
+const MapChange* Destination(const MapRows& rows, const MapChange& change) {
+  return change.moved_to >= 0 ? &rows.findings.changes[change.moved_to] : nullptr;
+}
+
+std::string DestinationText(const MapRows& rows, const MapChange& change) {
+  const MapChange* to = Destination(rows, change);
+  if (to == nullptr) return "-";
+  const Eigen::Vector3d place = rows.floor_from_world * to->position;
+  return fmt::format("{:.2f}, {:.2f}", place.x(), place.y());
+}
+
+nlohmann::ordered_json DestinationJson(const MapRows& rows, const MapChange& change) {
+  const MapChange* to = Destination(rows, change);
+  if (to == nullptr) return {};
+  const Eigen::Vector3d place = rows.floor_from_world * to->position;
+  return {{"x_m", place.x()}, {"y_m", place.y()}, {"z_m", place.z()}, {"num_features", change.num_moved}};
+}
+
 nlohmann::ordered_json ImageJson(const MapRows& rows, int32_t image) {
   return image >= 0 ? nlohmann::ordered_json(rows.images[image].name) : nlohmann::ordered_json();
 }
@@ -29,15 +48,17 @@ std::vector<MapChange> ChangesSince(const MapRows& a, const MapRows& b) {
 
 std::string PlaceChangesText(const MapRows& rows, const std::vector<MapChange>& changes, int max_num_lines) {
   if (changes.empty()) return "";
-  std::string text = fmt::format("  {:<16} {:>16} {:>8} {:>6} {:>6}  {}\n", "first seen by", "place (floor)",
-                                 "radius", "gone", "new", "image before -> after");
+  std::string text =
+      fmt::format("  {:<16} {:>16} {:>8} {:>6} {:>6} {:>16}  {}\n", "first seen by", "place (floor)",
+                  "radius", "gone", "new", "moved to", "image before -> after");
   for (size_t i = 0; i < changes.size() && i < static_cast<size_t>(max_num_lines); ++i) {
     const MapChange& change = changes[i];
     const Eigen::Vector3d place = rows.floor_from_world * change.position;
-    text += fmt::format("  {:<16} {:>16} {:>8.2f} {:>6} {:>6}  {} -> {}\n", rows.sessions[change.session],
-                        fmt::format("{:.2f}, {:.2f}", place.x(), place.y()), change.radius_m,
-                        change.num_vanished, change.num_appeared, ImageText(rows, change.image_before),
-                        ImageText(rows, change.image_after));
+    text +=
+        fmt::format("  {:<16} {:>16} {:>8.2f} {:>6} {:>6} {:>16}  {} -> {}\n", rows.sessions[change.session],
+                    fmt::format("{:.2f}, {:.2f}", place.x(), place.y()), change.radius_m, change.num_vanished,
+                    change.num_appeared, DestinationText(rows, change), ImageText(rows, change.image_before),
+                    ImageText(rows, change.image_after));
   }
   if (changes.size() > static_cast<size_t>(max_num_lines))
     text += fmt::format("  and {} more (cairn inspect --json lists all)\n", changes.size() - max_num_lines);
@@ -55,6 +76,7 @@ nlohmann::ordered_json PlaceChangesJson(const MapRows& rows, const std::vector<M
                     {"radius_m", change.radius_m},
                     {"num_vanished", change.num_vanished},
                     {"num_appeared", change.num_appeared},
+                    {"moved_to", DestinationJson(rows, change)},
                     {"image_before", ImageJson(rows, change.image_before)},
                     {"image_after", ImageJson(rows, change.image_after)}});
   }

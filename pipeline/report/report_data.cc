@@ -242,6 +242,8 @@ Json ChangedPlacesJson(const MapRows& rows) {
                     {"session", rows.sessions[change.session]},
                     {"gone", change.num_vanished},
                     {"new", change.num_appeared},
+                    {"to", change.moved_to},
+                    {"moved", change.num_moved},
                     {"before", change.image_before},
                     {"after", change.image_after}});
   }

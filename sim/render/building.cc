@@ -211,10 +211,47 @@ class BuildingMaker {
       const int face = panel.face % 6;
       const int job = AddJob({Painter::kWallPanel, panel.width_m, options_.height_m, panel.material});
       box.faces[face] = FaceSurface(box, face, job);
-      ChangedSurface changed{ChangedSurface::Kind::kPanel, box.min, box.max};
-      const int axis = face / 2;
-      (face % 2 == 0 ? changed.max : changed.min)[axis] = (face % 2 == 0 ? box.min : box.max)[axis];
-      building_.changed.push_back(changed);
+      building_.changed.push_back(Flat(ChangedSurface::Kind::kPanel, panel.face));
+    }
+    ExchangePanels(order, &random);
+  }
+
+  ChangedSurface Flat(ChangedSurface::Kind kind, int panel_face) const {
+    const Box& box = building_.boxes[panel_face / 6];
+    const int face = panel_face % 6, axis = face / 2;
+    ChangedSurface surface{.kind = kind, .min = box.min, .max = box.max};
+    (face % 2 == 0 ? surface.max : surface.min)[axis] = (face % 2 == 0 ? box.min : box.max)[axis];
+    return surface;
+  }
+
+  // Pairs of panels of one width, none of which is otherwise changed, show each other's textures.
+  void ExchangePanels(const std::vector<int>& changed, Random* random) {
+    const auto wanted = std::lround(options_.moved_panel_ratio * static_cast<double>(panels_.size()) / 2);
+    std::vector<int> free = RandomOrder(static_cast<int>(panels_.size()), random);
+    std::erase_if(free, [&](int i) { return std::binary_search(changed.begin(), changed.end(), i); });
+    const auto texture = [&](int i) -> int& {
+      return building_.boxes[panels_[i].face / 6].faces[panels_[i].face % 6].texture;
+    };
+    for (int64_t n = 0; n < wanted && !free.empty(); ++n) {
+      const int first = free.back();
+      free.pop_back();
+      const auto other = std::find_if(free.rbegin(), free.rend(), [&](int i) {
+        return std::abs(panels_[i].width_m - panels_[first].width_m) < 1e-9 && texture(i) != texture(first);
+      });
+      if (other == free.rend()) {
+        --n;
+        continue;
+      }
+      const int second = *other;
+      free.erase(std::next(other).base());
+      std::swap(texture(first), texture(second));
+      for (const auto& [here, there] : {std::pair(first, second), std::pair(second, first)}) {
+        ChangedSurface moved = Flat(ChangedSurface::Kind::kMovedPanel, panels_[here].face);
+        const ChangedSurface now = Flat(ChangedSurface::Kind::kMovedPanel, panels_[there].face);
+        moved.now_min = now.min;
+        moved.now_max = now.max;
+        building_.changed.push_back(moved);
+      }
     }
   }
 

@@ -33,8 +33,14 @@ struct Box {
 // A piece of a building's surface that shows something else than when it was built, or a piece of furniture
 // that is gone: what lay on it has vanished.
 struct ChangedSurface {
-  enum class Kind { kPanel, kFurniture } kind = Kind::kPanel;
+  enum class Kind {
+    kPanel,
+    kFurniture,
+    kMovedPanel,  // what it showed is elsewhere now
+  } kind = Kind::kPanel;
   Eigen::Vector3d min, max;  // of the panel flat
+  // Of a moved panel: where what it showed is now.
+  Eigen::Vector3d now_min = Eigen::Vector3d::Zero(), now_max = Eigen::Vector3d::Zero();
 };
 
 // Where a ray ends.

@@ -34,6 +34,8 @@ OptionTable DescribeOptions(SimulateOptions* o) {
        "Share of wall panels that show something else after a change", 0, 1},
       {"removed_furniture_ratio", &o->removed_furniture_ratio,
        "Share of pieces of furniture that are gone after a change", 0, 1},
+      {"moved_panel_ratio", &o->moved_panel_ratio,
+       "Share of wall panels that exchange what they show with another of their width after a change", 0, 1},
       {"texel_m", &o->texel_m, "Edge of a wall texel, metres; floor and ceiling have twice that", 0.001,
        0.05},
       {.name = "camera_model",

@@ -58,6 +58,9 @@ struct SimulateOptions {
   // REQUIRES: in [0, 1]
   double changed_panel_ratio = 0.3;
   double removed_furniture_ratio = 0;
+  // Share of wall panels that exchange what they show with another then: things that were moved.
+  // REQUIRES: in [0, 1]
+  double moved_panel_ratio = 0;
   // Edge of a wall texel; floor and ceiling have twice that.  REQUIRES: in [0.001, 0.05]
   double texel_m = 0.003;
 

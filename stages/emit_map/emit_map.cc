@@ -527,12 +527,15 @@ void AddChanges(const Classes& classes, MapRows* rows) {
     return static_cast<int32_t>(image - rows->images.begin());
   };
   const auto rounded = [](double value) { return std::round(1000 * value) / 1000; };
+  std::vector<int32_t> row_of_change;  // -1: it has none
   for (const PlaceChange& change : classes.changes) {
+    row_of_change.push_back(-1);
     const auto session =
         std::find(rows->sessions.begin(), rows->sessions.end(), classes.sessions[change.session]);
     if (session == rows->sessions.end()) continue;
     if (!((change.position.array().abs() <= kMaxChangeExtentM).all() && change.radius_m <= kMaxChangeExtentM))
       continue;
+    row_of_change.back() = static_cast<int32_t>(rows->findings.changes.size());
     rows->findings.changes.push_back({.session = static_cast<int>(session - rows->sessions.begin()),
                                       .position = change.position.unaryExpr(rounded),
                                       .radius_m = rounded(change.radius_m),
@@ -540,6 +543,13 @@ void AddChanges(const Classes& classes, MapRows* rows) {
                                       .num_appeared = change.num_appeared,
                                       .image_before = index_of(change.image_before),
                                       .image_after = index_of(change.image_after)});
+  }
+  for (size_t i = 0; i < classes.changes.size(); ++i) {
+    const PlaceChange& change = classes.changes[i];
+    if (row_of_change[i] < 0 || change.moved_to < 0 || row_of_change[change.moved_to] < 0) continue;
+    MapChange& row = rows->findings.changes[row_of_change[i]];
+    row.moved_to = row_of_change[change.moved_to];
+    row.num_moved = change.num_moved;
   }
 }
 

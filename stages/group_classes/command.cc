@@ -92,13 +92,19 @@ std::string PersistenceText(const GroupClassesResult& result) {
   std::map<ImageId, std::string> names;
   for (const SurveyImage& image : result.classes.images) names[image.image_id] = image.name;
   const auto name_of = [&](ImageId image_id) { return image_id == 0 ? "no image" : names.at(image_id); };
+  const auto moved_text = [&](const PlaceChange& change) {
+    if (change.moved_to < 0) return std::string();
+    const Eigen::Vector3d& to = changes[change.moved_to].position;
+    return fmt::format(", {} of the gone are now around ({:.1f}, {:.1f}, {:.1f})", change.num_moved, to.x(),
+                       to.y(), to.z());
+  };
   for (size_t i = 0; i < std::min(changes.size(), kMaxLines); ++i) {
     const PlaceChange& change = changes[i];
     text += fmt::format(
-        "group_classes: in {}, {:.1f} around ({:.1f}, {:.1f}, {:.1f}): {} classes gone, {} new; {} -> {}\n",
+        "group_classes: in {}, {:.1f} around ({:.1f}, {:.1f}, {:.1f}): {} classes gone, {} new{}; {} -> {}\n",
         result.classes.sessions[change.session], change.radius_m, change.position.x(), change.position.y(),
-        change.position.z(), change.num_vanished, change.num_appeared, name_of(change.image_before),
-        name_of(change.image_after));
+        change.position.z(), change.num_vanished, change.num_appeared, moved_text(change),
+        name_of(change.image_before), name_of(change.image_after));
   }
   if (changes.size() > kMaxLines)
     text += fmt::format("group_classes: ... and {} more\n", changes.size() - kMaxLines);

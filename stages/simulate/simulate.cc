@@ -78,9 +78,20 @@ std::vector<CaptureImage> StatedImages(const std::vector<sim::PlannedImage>& pla
 std::string ChangesJson(const sim::Building& building) {
   nlohmann::ordered_json changes = nlohmann::ordered_json::array();
   for (const sim::ChangedSurface& changed : building.changed) {
-    changes.push_back({{"kind", changed.kind == sim::ChangedSurface::Kind::kPanel ? "panel" : "furniture"},
-                       {"min", {changed.min.x(), changed.min.y(), changed.min.z()}},
-                       {"max", {changed.max.x(), changed.max.y(), changed.max.z()}}});
+    using Kind = sim::ChangedSurface::Kind;
+    const auto json = [](const Eigen::Vector3d& point) {
+      return nlohmann::ordered_json{point.x(), point.y(), point.z()};
+    };
+    nlohmann::ordered_json row = {{"kind", changed.kind == Kind::kPanel       ? "panel"
+                                           : changed.kind == Kind::kFurniture ? "furniture"
+                                                                              : "moved panel"},
+                                  {"min", json(changed.min)},
+                                  {"max", json(changed.max)}};
+    if (changed.kind == Kind::kMovedPanel) {
+      row["now_min"] = json(changed.now_min);
+      row["now_max"] = json(changed.now_max);
+    }
+    changes.push_back(std::move(row));
   }
   return nlohmann::ordered_json{{"changed", changes}}.dump(1) + "\n";
 }

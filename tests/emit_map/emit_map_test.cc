@@ -57,27 +57,31 @@ TEST(EmitMap, FewestLandmarksHaveToBeNamed) {
 TEST(AddChanges, RoundsPlacesAndNamesSessionsAndImagesByTheMapsIndices) {
   EmitExample example = MakeEmitExample();
   example.classes.sessions = {"old", "new", "newer"};
-  example.classes.changes = {{.session = 1,
-                              .position = {1.23449, -0.0006, 2},
-                              .radius_m = 0.25051,
-                              .num_vanished = 20,
-                              .num_appeared = 3,
-                              .image_before = 4,
-                              .image_after = 2},
-                             {.session = 1, .num_vanished = 15, .image_before = 3, .image_after = 0},
-                             {.session = 1, .position = {1e9, 0, 0}, .num_vanished = 12},
-                             {.session = 2, .num_vanished = 11}};
+  example.classes.changes = {
+      {.session = 1,
+       .position = {1.23449, -0.0006, 2},
+       .radius_m = 0.25051,
+       .num_vanished = 20,
+       .num_appeared = 3,
+       .image_before = 4,
+       .image_after = 2,
+       .moved_to = 1,
+       .num_moved = 12},
+      {.session = 1, .position = {1e9, 0, 0}, .num_vanished = 17, .moved_to = 0},
+      {.session = 1, .num_vanished = 15, .image_before = 3, .image_after = 0, .moved_to = 0, .num_moved = 11},
+      {.session = 2, .num_vanished = 11}};
   MapRows rows = *Emit(example);
   rows.sessions = {"older", "old", "new"};  // "newer" is not of this map
   AddChanges(example.classes, &rows);
-  EXPECT_THAT(rows.findings.changes, ElementsAre(MapChange{.session = 2,
-                                                           .position = {1.234, -0.001, 2},
-                                                           .radius_m = 0.251,
-                                                           .num_vanished = 20,
-                                                           .num_appeared = 3,
-                                                           .image_before = 2,
-                                                           .image_after = 1},
-                                                 MapChange{.session = 2, .num_vanished = 15}));
+  EXPECT_THAT(rows.findings.changes,
+              ElementsAre(MapChange{.session = 2,
+                                    .position = {1.234, -0.001, 2},
+                                    .radius_m = 0.251,
+                                    .num_vanished = 20,
+                                    .num_appeared = 3,
+                                    .image_before = 2,
+                                    .image_after = 1},
+                          MapChange{.session = 2, .num_vanished = 15, .moved_to = 0, .num_moved = 11}));
   EXPECT_TRUE(CheckMapRows(rows).ok());
 }
 

@@ -347,11 +347,18 @@ TEST(GroupClasses, WhatTheLastSessionMissesIsGoneAndSaidOfEachClass) {
   // All of it is in the file.
   const std::string path = testing::TempDir() + "/classes_sessions.db",
                     again = testing::TempDir() + "/classes_sessions_again.db";
-  ASSERT_TRUE(WriteClasses(classes, path).ok());
+  Classes with_changes = classes;
+  with_changes.changes = {
+      {.session = 1, .num_vanished = 20, .image_before = 1, .moved_to = 1, .num_moved = 11},
+      {.session = 1, .num_appeared = 15, .image_after = 2}};
+  ASSERT_TRUE(WriteClasses(with_changes, path).ok());
   const auto read = ReadClasses(path);
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->vanished.size(), classes.vanished.size());
-  EXPECT_EQ(read->changes.size(), classes.changes.size());
+  ASSERT_EQ(read->changes.size(), 2U);
+  EXPECT_EQ(read->changes[0].moved_to, 1);
+  EXPECT_EQ(read->changes[0].num_moved, 11);
+  EXPECT_EQ(read->changes[1].moved_to, -1);
   EXPECT_EQ(read->sessions, classes.sessions);
   ASSERT_TRUE(WriteClasses(*read, again).ok());
   EXPECT_EQ(*HashFile(path), *HashFile(again));
@@ -373,13 +380,18 @@ TEST(GroupClasses, SightingsOfAnotherNumberOfSessionsAreCorrupt) {
   for (const auto& [damage, message] :
        {std::pair("DELETE FROM sessions WHERE session_idx = 1", "sightings of 2 sessions, expected 1"),
         std::pair("UPDATE classes SET sightings = x'00'", "blob"),
-        std::pair("INSERT INTO changes SELECT 2, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1",
+        std::pair("INSERT INTO changes SELECT 2, position, 1, 1, 1, 0, 0, -1, 0 FROM classes LIMIT 1",
                   "session 2 of 2"),
-        std::pair("INSERT INTO changes SELECT -1, position, 1, 1, 1, 0, 0 FROM classes LIMIT 1",
+        std::pair("INSERT INTO changes SELECT -1, position, 1, 1, 1, 0, 0, -1, 0 FROM classes LIMIT 1",
                   "session -1"),
-        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 999, 0 FROM classes LIMIT 1",
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 999, 0, -1, 0 FROM classes LIMIT 1",
                   "images 999"),
-        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 999 FROM classes LIMIT 1", "999")}) {
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 999, -1, 0 FROM classes LIMIT 1",
+                  "999"),
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 0, 1, 5 FROM classes LIMIT 1",
+                  "moved to change 1 of"),
+        std::pair("INSERT INTO changes SELECT 1, position, 1, 1, 1, 0, 0, -2, 5 FROM classes LIMIT 1",
+                  "moved to change -2")}) {
     ASSERT_TRUE(WriteClasses(grouped->classes, path).ok());
     {
       SQLite::Database database(path, SQLite::OPEN_READWRITE);

@@ -1,12 +1,12 @@
 // What changed: between the map's surveys, and since another map.
 if (changedPlaces.length) {
   $('changed-places').hidden = $('changed-places-link').hidden = false;
-  const mostRows = 30, rows = changedPlaces.slice(0, mostRows).map((change, i) => [button(`${metres(change.x / 100)}, ${metres(change.y / 100)}`, () => {
+  const mostRows = 30, anyMoved = changedPlaces.some(change => change.to >= 0), rows = changedPlaces.slice(0, mostRows).map((change, i) => [button(`${metres(change.x / 100)}, ${metres(change.y / 100)}`, () => {
     explainChange(i);
     lookAt([[change.x, change.y]]);
-  }), metres(change.radius / 100), change.session, change.gone, change.new, changeImage(change.before), changeImage(change.after)]);
-  $('changed-places-text').append(element('p', {}, 'Where features of the earlier surveys are gone, or such appeared that these did not see, many together on one surface.'),
-    table(rows, ['around', 'radius', 'first seen by', 'gone', 'new', 'seen before in', 'seen after in']));
+  }), metres(change.radius / 100), change.session, change.gone, change.new, ...(anyMoved ? [changeDestination(change)] : []), changeImage(change.before), changeImage(change.after)]);
+  $('changed-places-text').append(element('p', {}, 'Where features of the earlier surveys are gone, or such appeared that these did not see, many together on one surface. What has the features of what is gone elsewhere has moved.'),
+    table(rows, ['around', 'radius', 'first seen by', 'gone', 'new', ...(anyMoved ? ['moved to'] : []), 'seen before in', 'seen after in']));
   if (changedPlaces.length > mostRows) $('changed-places-text').append(element('p', {class: 'soft'}, `and ${count(changedPlaces.length - mostRows)} more: the layer \u201Cchanged places\u201D shows all`));
 }
 if (data.changes) {

@@ -278,6 +278,10 @@ function drawChangedPlaces(context, place, inside, scale) {
     context.strokeStyle = colour;
     context.lineWidth = i === selected.change ? 4 : 2.5;
     context.stroke();
+    if (change.to < 0 || change.to === i) return;
+    const to = changedPlaces[change.to];
+    context.lineWidth = 1.5;
+    arrow(context, place(change.x, change.y), place(to.x, to.y));
   });
 }
 let moment = 0;

@@ -147,7 +147,17 @@ function changeImage(image) {
   const station = S.images.findIndex(images => images.includes(image));
   return station < 0 ? I.name[image] : button(I.name[image], () => explainStation(station));
 }
+// Where what was there is now, which leads to that place.
+function changeDestination(change) {
+  if (change.to < 0) return '\u2013';
+  const to = changedPlaces[change.to];
+  return button(`${metres(to.x / 100)}, ${metres(to.y / 100)}`, () => {
+    explainChange(change.to);
+    lookAt([[to.x, to.y]]);
+  });
+}
 const changeRows = change => [['first seen by', change.session], ['features gone', change.gone], ['features new', change.new],
+  ...(change.to < 0 ? [] : [['features moved', change.moved], ['moved to', changeDestination(change)]]),
   ['seen before in', changeImage(change.before)], ['seen after in', changeImage(change.after)]];
 function explainChange(i) {
   choose({change: i});

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
+#include <utility>
 
 #include "core/structure/disjoint_sets.h"
 #include "core/structure/point_grid.h"
+#include "stages/group_classes/persistence/moves.h"
 
 namespace cairn::group_classes {
 namespace {
@@ -27,7 +30,7 @@ struct ChangedClass {
 };
 
 // Per session: what it shows to have changed.
-std::vector<std::vector<ChangedClass>> ChangedClasses(const std::vector<ClassAge>& ages) {
+std::vector<std::vector<ChangedClass>> ClassesThatChanged(const std::vector<ClassAge>& ages) {
   std::vector<std::vector<ChangedClass>> changed(ages.empty() ? 0 : ages.front().sessions.size());
   for (size_t c = 0; c < ages.size(); ++c) {
     const std::vector<SessionSightings>& sessions = ages[c].sessions;
@@ -91,7 +94,7 @@ std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<C
                                      const std::vector<ClassViews>& views, const ImageSessions& images,
                                      const Surroundings& surroundings) {
   std::vector<PlaceChange> changes;
-  const std::vector<std::vector<ChangedClass>> changed = ChangedClasses(ages);
+  const std::vector<std::vector<ChangedClass>> changed = ClassesThatChanged(ages);
   for (size_t session = 1; session < changed.size(); ++session) {
     const std::vector<ChangedClass>& members = changed[session];
     std::vector<Eigen::Vector3d> points;
@@ -113,15 +116,22 @@ std::vector<PlaceChange> FindChanges(const Classes& classes, const std::vector<C
     }
     std::map<int, std::vector<ChangedClass>> clusters;
     for (size_t i = 0; i < points.size(); ++i) clusters[sets.Find(static_cast<int>(i))].push_back(members[i]);
-    const size_t first = changes.size();
-    for (const auto& [root, cluster] : clusters) {
-      if (cluster.size() >= kMinNumClasses)
-        changes.push_back(Describe(classes, views, images, static_cast<int>(session), cluster));
+    std::vector<std::vector<ChangedClass>> largest_first;
+    for (auto& [root, cluster] : clusters) {
+      if (cluster.size() >= kMinNumClasses) largest_first.push_back(std::move(cluster));
     }
-    std::stable_sort(changes.begin() + static_cast<ptrdiff_t>(first), changes.end(),
-                     [](const PlaceChange& a, const PlaceChange& b) {
-                       return a.num_vanished + a.num_appeared > b.num_vanished + b.num_appeared;
-                     });
+    std::stable_sort(largest_first.begin(), largest_first.end(),
+                     [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    const size_t first = changes.size();
+    std::vector<ChangedClasses> classes_of_changes;
+    for (const std::vector<ChangedClass>& cluster : largest_first) {
+      changes.push_back(Describe(classes, views, images, static_cast<int>(session), cluster));
+      ChangedClasses& of_change = classes_of_changes.emplace_back();
+      for (const ChangedClass& member : cluster)
+        (member.is_new ? of_change.appeared : of_change.vanished).push_back(member.class_idx);
+    }
+    FindMoves(classes, classes_of_changes, static_cast<int>(first), surroundings.typical_distance,
+              std::span(changes).subspan(first));
   }
   return changes;
 }

@@ -68,9 +68,9 @@ std::string FindingsText(const MapFindings& findings) {
                         row.num_dropped, fmt::join(row.at_stations, ","));
   }
   for (const MapChange& row : findings.changes) {
-    text += fmt::format("{} {} {} {} {} {} {} {} {}\n", row.session, row.position.x(), row.position.y(),
+    text += fmt::format("{} {} {} {} {} {} {} {} {} {} {}\n", row.session, row.position.x(), row.position.y(),
                         row.position.z(), row.radius_m, row.num_vanished, row.num_appeared, row.image_before,
-                        row.image_after);
+                        row.image_after, row.moved_to, row.num_moved);
   }
   if (findings.promise) {
     const MapPromise& promise = *findings.promise;

@@ -46,7 +46,7 @@ MapRows RowsWithFindings() {
       .held_out = {{0.98, 1, 1, 0.981}}};
   rows.sessions = {"old", "newer", "today"};
   rows.findings.changes = {{1, {-1.25, 2.125, 0.001}, 0.5, 20, 0, 0, -1},
-                           {2, {4, 0, 1}, 0.25, 30, 31, -1, -1},
+                           {2, {4, 0, 1}, 0.25, 30, 31, -1, -1, 2, 12},
                            {2, {100, -200, 0}, 0, 0, 12, 1, 2}};
   return rows;
 }
@@ -135,6 +135,13 @@ TEST(MapFindings, ChangesThatCannotBeAreNotWritten) {
   EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].image_before = 3; }),
               HasSubstr("images 3 and -1 of 3"));
   EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].image_after = -2; }), HasSubstr("images 0 and -2"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].moved_to = 3; }), HasSubstr("moved to change 3 of 3"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].moved_to = 0; }), HasSubstr("moved to change 0"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].moved_to = -1; }), HasSubstr("moved to change -1"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[0].moved_to = -2; }), HasSubstr("moved to change -2"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].num_moved = 0; }), HasSubstr("0 features of 30"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].num_moved = -1; }), HasSubstr("-1 features of 30"));
+  EXPECT_THAT(error_of([&](MapRows* r) { changes(r)[1].num_moved = 31; }), HasSubstr("31 features of 30"));
   const std::function<void(MapChange*)> numbers[] = {
       [&](MapChange* c) { c->position.y() = kNan; }, [&](MapChange* c) { c->position.z() = -kInfinity; },
       [](MapChange* c) { c->position.x() = 3e5; },   [&](MapChange* c) { c->radius_m = kNan; },
@@ -209,9 +216,13 @@ TEST(MapFindings, DamagedRowsAreRefused) {
         "UPDATE changes SET num_vanished = 0 WHERE change_idx = 0",
         "UPDATE changes SET num_appeared = 4294967300 WHERE change_idx = 0",
         "UPDATE changes SET image_before = 3 WHERE change_idx = 0",
-        "UPDATE changes SET image_after = -2 WHERE change_idx = 0",
-        "ALTER TABLE changes DROP COLUMN image_after", "ALTER TABLE promises DROP COLUMN shape",
-        "ALTER TABLE drop_reasons DROP COLUMN text", "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
+        "UPDATE changes SET image_after = -2 WHERE change_idx = 0", "UPDATE moves SET change_idx = 3",
+        "UPDATE moves SET change_idx = -1", "UPDATE moves SET moved_to = 0",
+        "UPDATE moves SET moved_to = 4294967298", "UPDATE moves SET num_features = 0",
+        "UPDATE moves SET num_features = 31", "INSERT INTO moves VALUES (0, -1, 5)", "DELETE FROM changes",
+        "ALTER TABLE moves DROP COLUMN num_features", "ALTER TABLE changes DROP COLUMN image_after",
+        "ALTER TABLE promises DROP COLUMN shape", "ALTER TABLE drop_reasons DROP COLUMN text",
+        "ALTER TABLE self_test_regions DROP COLUMN p90_error_m",
         "ALTER TABLE self_test_regions ADD COLUMN late REAL AS (p90_error_m + 1)",
         "DROP TABLE drop_reasons; CREATE VIRTUAL TABLE drop_reasons USING fts5(reason_id)"}) {
     ASSERT_TRUE(WriteMapRows(RowsWithFindings(), MapPath("damaged.cairn")).ok());

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -162,6 +163,21 @@ TEST(LearnMatches, WhatWasNotThereYetIsExpectedAllTheSame) {
     classes.classes[i].age.sessions = {{.there = i % 2 == 1 ? 0.0F : 1.0F}, {.there = 1}};
   EXPECT_GT(mean_at_night(), as_if_there + 0.01);
   EXPECT_NEAR(mean_at_night(), 0.8, 0.05);
+}
+
+TEST(LearnMatches, WhatIsPerhapsGoneIsExpectedAsMuchLess) {
+  Classes classes = RandomWallSurvey(24, 0.25, 300, 0.5, 0.5, 3);
+  const Camera& camera = classes.cameras[0];
+  const auto expected = [&] {
+    const MatchModel model(classes, {}, 1);
+    const auto of_image = model.At(camera, classes.images[12].cam_from_world, -1, MatchModel::Where::kThere);
+    return std::pair(model.OfViews(1).of_class[7].at(0).probability, of_image.at(5).probability);
+  };
+  const auto certain = expected();
+  for (FeatureClass& row : classes.classes) row.age.presence = 0.5F;
+  const auto perhaps = expected();
+  EXPECT_FLOAT_EQ(perhaps.first, certain.first / 2);
+  EXPECT_FLOAT_EQ(perhaps.second, certain.second / 2);
 }
 
 TEST(LearnMatches, SameForAnyNumberOfThreads) {

@@ -159,6 +159,20 @@ TEST(ChangesSince, AreInTheComparisonOfMaps) {
   EXPECT_EQ(json[0]["image_before"], "image1.png");
 }
 
+TEST(PlaceChangesText, SaysWhereThingsMovedTo) {
+  MapRows rows = ThreeSurveys();
+  EXPECT_TRUE(PlaceChangesJson(rows, rows.findings.changes)[1]["moved_to"].is_null());
+  rows.findings.changes[0].moved_to = 1;
+  rows.findings.changes[0].num_moved = 14;
+  // Also in a list of one: the place is that of the map's change.
+  const std::vector<MapChange> first = {rows.findings.changes[0]};
+  EXPECT_THAT(PlaceChangesText(rows, first, 5), HasSubstr(" 12.00, 3.00  "));
+  const auto json = PlaceChangesJson(rows, first)[0]["moved_to"];
+  EXPECT_EQ(json["x_m"], 12);
+  EXPECT_EQ(json["y_m"], 3);
+  EXPECT_EQ(json["num_features"], 14);
+}
+
 TEST(PlaceChangesText, ShowsTheFirstOfManyAndImagesThatTheMapLacks) {
   MapRows rows = ThreeSurveys();
   rows.findings.changes[0].image_before = -1;

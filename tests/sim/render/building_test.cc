@@ -225,6 +225,44 @@ TEST(ChangedBuilding, ShowsSomethingElseOnSomePanelsAndTheSameElsewhere) {
   EXPECT_GT(DifferentFaces(after, Make(options)).size(), different.size());
 }
 
+TEST(ChangedBuilding, PanelsExchangeWhatTheyShow) {
+  SimulateOptions options = QuickOptions();
+  options.change = 1;
+  options.changed_panel_ratio = 0.2;
+  const Building before = Make(options);
+  options.moved_panel_ratio = 0.3;
+  const Building after = Make(options);
+  const size_t num_changed = std::lround(0.2 * before.num_wall_panels);
+  const size_t num_pairs = std::lround(0.3 * before.num_wall_panels / 2);
+  ASSERT_GT(num_pairs, 0u);
+  ASSERT_EQ(after.changed.size(), num_changed + 2 * num_pairs);
+  EXPECT_EQ(DifferentFaces(before, after).size(), 2 * num_pairs);
+  const auto picture = [](const Building& building, const Eigen::Vector3d& min, const Eigen::Vector3d& max) {
+    const Eigen::Vector3d size = max - min;
+    int axis = -1;
+    size.minCoeff(&axis);
+    for (const Box& box : building.boxes) {
+      for (const int face : {2 * axis, 2 * axis + 1}) {
+        Eigen::Vector3d low = box.min, high = box.max;
+        (face % 2 == 0 ? high : low)[axis] = (face % 2 == 0 ? box.min : box.max)[axis];
+        if (low.isApprox(min) && high.isApprox(max)) return building.textures[box.faces[face].texture].base();
+      }
+    }
+    ADD_FAILURE() << "no such panel";
+    return cv::Mat();
+  };
+  for (size_t i = num_changed; i < after.changed.size(); ++i) {
+    const ChangedSurface& moved = after.changed[i];
+    EXPECT_EQ(moved.kind, ChangedSurface::Kind::kMovedPanel);
+    const cv::Mat was_here = picture(before, moved.min, moved.max);
+    EXPECT_TRUE(SamePicture(was_here, picture(after, moved.now_min, moved.now_max)));
+    EXPECT_FALSE(SamePicture(was_here, picture(after, moved.min, moved.max)));
+  }
+  // However many are wanted, each is exchanged once.
+  options.moved_panel_ratio = 1;
+  EXPECT_LE(Make(options).changed.size(), static_cast<size_t>(before.num_wall_panels));
+}
+
 TEST(ChangedBuilding, LacksSomeFurniture) {
   SimulateOptions options = QuickOptions();
   const Building before = Make(options);
