@@ -123,8 +123,8 @@ $(BUILD)/vocabulary.db.stamp: $(BUILD)/features.db $(if $(filter yes,$(RECONSTRU
 
 # Stage 7: which images see the same, and the fewest that still locate a robot.  Held-out images of a reconstructed
 # capture are linked in matches.db, but are no survey.
-$(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(POSES_READY) $(call CAIRN_OPTIONS,link_appearance) $(SEED_FILE)
-	$(call CAIRN_RUN,link_appearance,stage link-appearance $(@D)/matches.db $(@D)/vocabulary.db --capture $(POSES))
+$(BUILD)/appearance.db.stamp: $(BUILD)/matches.db $(BUILD)/vocabulary.db $(BUILD)/classes.db $(POSES_READY) $(call CAIRN_OPTIONS,link_appearance) $(SEED_FILE)
+	$(call CAIRN_RUN,link_appearance,stage link-appearance $(@D)/matches.db $(@D)/vocabulary.db --capture $(POSES) --classes $(@D)/classes.db)
 
 # Stage 8: regions of the floor plan, where the recipe names one; that of a simulated capture is one of its files.
 ifneq ($(FLOOR_PLAN),)

@@ -6,6 +6,7 @@
 #include "core/files/file.h"
 #include "stages/link_appearance/check_appearance.h"
 #include "stages/link_appearance/command.h"
+#include "stages/link_appearance/contradicted_links.h"
 
 namespace cairn::link_appearance {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 struct CheckArguments {
   std::string matches;
   std::string capture;
+  std::string classes;
   std::string held_out;
   LinkAppearanceOptions options;
   CheckAppearanceOptions check_options;
@@ -98,6 +100,10 @@ Status RunCheck(const CheckArguments& arguments, const CommandEnvironment& envir
     CAIRN_ASSIGN_OR_RETURN(capture, ReadCapture(arguments.capture));
   }
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images, ReadImageLinks(arguments.matches, options.min_num_inliers));
+  if (!arguments.classes.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
+    CAIRN_RETURN_IF_ERROR(TellLookAlikes(classes, arguments.matches, environment.progress, &images));
+  }
   CAIRN_ASSIGN_OR_RETURN(images.links, NearLinks(images, capture ? &*capture : nullptr, options));
   HeldOutSplit split{.survey = images};
   if (!arguments.held_out.empty()) {
@@ -144,6 +150,11 @@ Command CheckAppearanceCommand() {
                          "Capture folder with the survey's poses, for fuse = place, max_link_distance_m "
                          "and max_link_turn_deg")
                     .Type("CAPTURE");
+                parser
+                    .Add("--classes", arguments->classes,
+                         "feature classes of the survey: matches that contradict where the images stand "
+                         "locate nothing [all matches count]")
+                    .Type("classes.db");
                 parser
                     .Add("--held-out", arguments->held_out,
                          "Images of the database that do not belong to the survey: names, folders (ending in "

@@ -5,7 +5,10 @@
 #include "core/capture/capture.h"
 #include "core/files/file.h"
 #include "core/line/memory.h"
+#include "core/promise/view_distance.h"
 #include "core/world/appearance.h"
+#include "core/world/feature_class.h"
+#include "stages/link_appearance/contradicted_links.h"
 #include "stages/link_appearance/link_appearance.h"
 #include "stages/link_appearance/picture.h"
 
@@ -19,6 +22,7 @@ struct Arguments {
   std::string matches;
   std::string vocabulary;
   std::string capture;
+  std::string classes;
   std::string output;
   std::string svg;
   LinkAppearanceOptions options;
@@ -57,6 +61,14 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   CAIRN_ASSIGN_OR_RETURN(ImageLinks images,
                          ReadImageLinks(arguments.matches, arguments.options.min_num_inliers));
   if (capture) images = SurveyImagesOf(*capture, images);
+  AmbiguityOptions ambiguity = arguments.options.ambiguity;
+  if (!arguments.classes.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const Classes classes, ReadClasses(arguments.classes));
+    CAIRN_RETURN_IF_ERROR(TellLookAlikes(classes, arguments.matches, environment.progress, &images));
+    // A survey without scale: its own measure of what is near.
+    if (capture && capture->frame && !IsMetric(*capture->frame))
+      ambiguity.confusable_distance_m = ViewDistance(classes, {}).depth();
+  }
   CAIRN_ASSIGN_OR_RETURN(LinkAppearanceResult result,
                          LinkAppearance(images, capture ? &*capture : nullptr, arguments.options,
                                         environment.seed, environment.progress));
@@ -65,8 +77,8 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
       capture ? NodePlaces(appearance, images.images, *capture) : std::vector<std::optional<FloorPose>>();
   if (!arguments.vocabulary.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const Vocabulary vocabulary, ReadVocabulary(arguments.vocabulary));
-    CAIRN_RETURN_IF_ERROR(FindAmbiguity(vocabulary, places, arguments.options.ambiguity,
-                                        environment.num_threads, environment.progress, &result.appearance));
+    CAIRN_RETURN_IF_ERROR(FindAmbiguity(vocabulary, places, ambiguity, environment.num_threads,
+                                        environment.progress, &result.appearance, &result.look_alikes));
   }
   CAIRN_RETURN_IF_ERROR(WriteAppearance(appearance, arguments.output));
   if (!arguments.svg.empty()) {
@@ -81,6 +93,12 @@ Status Run(const Arguments& arguments, const CommandEnvironment& environment) {
   *environment.out << fmt::format("link_appearance: {} images, {} nodes, {} links, {} components\n",
                                   images.images.size(), appearance.graph.num_nodes(),
                                   appearance.graph.num_links(), appearance.NumComponents());
+  if (!images.look_alikes.empty()) {
+    *environment.out << fmt::format(
+        "link_appearance: {} pairs more match and only look alike: their matches contradict where the images "
+        "stand\n",
+        images.look_alikes.size());
+  }
   *environment.out << fmt::format("link_appearance: {}\n", KeptText(result));
   for (const std::string& note : result.notes) *environment.out << fmt::format("link_appearance: {}\n", note);
   return Ok();
@@ -107,6 +125,11 @@ Command LinkAppearanceCommand() {
                      "Capture folder: only images of its survey are used, and its poses are used for fuse = "
                      "place, max_link_distance_m, max_link_turn_deg and the picture [all images]")
                 .Type("CAPTURE");
+            parser
+                .Add("--classes", arguments->classes,
+                     "feature classes of the survey: matches that contradict where the images stand join "
+                     "places that look alike, and lead nowhere [all matches lead]")
+                .Type("classes.db");
             parser.Add("-o,--output", arguments->output, "File to write").Required().Type("appearance.db");
             parser
                 .Add("--svg", arguments->svg,

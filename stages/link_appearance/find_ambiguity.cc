@@ -38,9 +38,11 @@ struct NodeScores {
 class AmbiguitySearch {
  public:
   AmbiguitySearch(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
-                  const AmbiguityOptions& options, const Appearance& appearance)
+                  const AppearanceGraph* look_alikes, const AmbiguityOptions& options,
+                  const Appearance& appearance)
       : vocabulary_(vocabulary),
         places_(places),
+        look_alikes_(look_alikes),
         options_(options),
         appearance_(appearance),
         bags_(DocumentWords(vocabulary)),
@@ -140,13 +142,19 @@ class AmbiguitySearch {
     return places;
   }
 
+  bool OnlyLookAlike(NodeIdx a, NodeIdx b) const {
+    return look_alikes_ != nullptr && look_alikes_->AreLinked(a, b);
+  }
+
   bool ShowTheSame(NodeIdx a, NodeIdx b) const {
     if (a == b || appearance_.graph.AreLinked(a, b)) return true;
+    if (OnlyLookAlike(a, b)) return false;
     return !places_.empty() && places_[a] && places_[b] &&
            (places_[a]->position - places_[b]->position).norm() < options_.confusable_distance_m;
   }
 
   bool AreApart(NodeIdx a, NodeIdx b) const {
+    if (OnlyLookAlike(a, b)) return true;
     if (places_.empty() || !places_[a] || !places_[b]) return false;
     return (places_[a]->position - places_[b]->position).norm() >= options_.confusable_distance_m &&
            !appearance_.graph.AreLinked(a, b);
@@ -157,7 +165,8 @@ class AmbiguitySearch {
     std::vector<LookAlike> apart;
     if (min_score <= 0) return apart;
     for (size_t other = 0; other < scores.size(); ++other) {
-      if (scores[other] < min_score || !AreApart(node, static_cast<NodeIdx>(other))) continue;
+      if (scores[other] < min_score && !OnlyLookAlike(node, static_cast<NodeIdx>(other))) continue;
+      if (!AreApart(node, static_cast<NodeIdx>(other))) continue;
       apart.push_back({static_cast<NodeIdx>(other), scores[other]});
     }
     std::stable_sort(apart.begin(), apart.end(),
@@ -169,6 +178,7 @@ class AmbiguitySearch {
 
   const Vocabulary& vocabulary_;
   const std::vector<std::optional<FloorPose>>& places_;
+  const AppearanceGraph* look_alikes_;  // null: none are
   const AmbiguityOptions& options_;
   const Appearance& appearance_;
   std::vector<BagOfWords> bags_;
@@ -208,10 +218,10 @@ OptionTable DescribeOptions(AmbiguityOptions* options) {
 
 Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
                      const AmbiguityOptions& options, int num_threads, Progress* progress,
-                     Appearance* appearance) {
+                     Appearance* appearance, const AppearanceGraph* look_alikes) {
   AmbiguityOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  const AmbiguitySearch search(vocabulary, places, options, *appearance);
+  const AmbiguitySearch search(vocabulary, places, look_alikes, options, *appearance);
   const auto num_nodes = static_cast<int64_t>(appearance->nodes.size());
   std::vector<NodeScores> scores(num_nodes);
   std::vector<NodeIdx> nodes(num_nodes);

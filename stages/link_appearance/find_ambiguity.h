@@ -37,11 +37,12 @@ OptionTable DescribeOptions(AmbiguityOptions* options);
 // Sets every node's entropy [Mariottini11 eq. 1] and the confusable pairs.  The distribution of an image is
 // that of the scores that it gets as a query, its own included (see entropy_over); for several images at one
 // node, their mean; the probability of a node is the sum over its images.  Pairs are found among nodes with
-// places (one per node; none without poses) that are not linked: linked nodes show the same.  An image that
-// the vocabulary lacks could be anywhere.  Same result for any number of threads.  O(nodes * postings of
-// their words).  Errors: InvalidArgument (an option), Cancelled.
+// places (one per node; none without poses) that are not linked: linked nodes show the same.  Nodes of
+// `look_alikes` (may be null) are confusable wherever they lie and however they score: their images match. An
+// image that the vocabulary lacks could be anywhere.  Same result for any number of threads.  O(nodes *
+// postings of their words).  Errors: InvalidArgument (an option), Cancelled.
 Status FindAmbiguity(const Vocabulary& vocabulary, const std::vector<std::optional<FloorPose>>& places,
                      const AmbiguityOptions& options, int num_threads, Progress* progress,
-                     Appearance* appearance);
+                     Appearance* appearance, const AppearanceGraph* look_alikes = nullptr);
 
 }  // namespace cairn::link_appearance

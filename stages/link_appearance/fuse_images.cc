@@ -107,6 +107,10 @@ ImageLinks SubsetOf(const ImageLinks& images, const std::vector<char>& is_in) {
     if (!is_in[link.node1] || !is_in[link.node2]) continue;
     subset.links.push_back({index_of[link.node1], index_of[link.node2], link.num_inliers});
   }
+  for (const AppearanceLink& link : images.look_alikes) {
+    if (is_in[link.node1] && is_in[link.node2])
+      subset.look_alikes.push_back({index_of[link.node1], index_of[link.node2], link.num_inliers});
+  }
   return subset;
 }
 

@@ -14,6 +14,8 @@ namespace cairn::link_appearance {
 struct ImageLinks {
   std::vector<DatabaseImage> images;  // ascending image_id
   std::vector<AppearanceLink> links;  // of indices into `images`
+  // Links that join places which only look alike (contradicted_links.h): they lead nowhere.
+  std::vector<AppearanceLink> look_alikes;
 };
 
 // Reads the verified pairs of a COLMAP database that have at least `min_num_inliers` inliers: pairs from

@@ -146,6 +146,14 @@ void AddNotes(const Domination& domination, const LinkAppearanceOptions& options
   }
 }
 
+// Nodes with a look-alike link and no other.
+AppearanceGraph LookAlikesOf(const ImageLinks& images, const std::vector<NodeIdx>& node_of_image,
+                             const AppearanceGraph& linked) {
+  std::vector<AppearanceLink> links = FusedGraph(images.look_alikes, node_of_image).Links();
+  std::erase_if(links, [&](const AppearanceLink& link) { return linked.AreLinked(link.node1, link.node2); });
+  return {linked.num_nodes(), std::move(links)};
+}
+
 }  // namespace
 
 Result<std::vector<AppearanceLink>> NearLinks(const ImageLinks& images, const Capture* capture,
@@ -270,6 +278,7 @@ Result<LinkAppearanceResult> LinkAppearance(const ImageLinks& images, const Capt
   Appearance& appearance = result.appearance;
   CAIRN_ASSIGN_OR_RETURN(const std::vector<AppearanceLink> links, NearLinks(images, capture, options));
   appearance.graph = FusedGraph(links, node_of_image);
+  result.look_alikes = LookAlikesOf(images, node_of_image, appearance.graph);
   appearance.num_dominators = options.num_dominators;
   appearance.strong_num_inliers = options.strong_num_inliers;
   appearance.max_detour_links = options.num_kept == 0 ? options.max_detour_links : 0;

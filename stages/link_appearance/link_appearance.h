@@ -65,6 +65,7 @@ OptionTable DescribeOptions(LinkAppearanceOptions* options);
 
 struct LinkAppearanceResult {
   Appearance appearance;
+  AppearanceGraph look_alikes;       // of the same nodes: those that look alike and are not linked
   int num_greedy = 0;                // before local search
   std::vector<NodeIdx> undominated;  // where the given size does not suffice
   std::vector<std::string> notes;    // anything unusual about the graph or the set, for people

@@ -43,6 +43,23 @@ std::vector<std::optional<FloorPose>> PlacesAt(const std::vector<double>& xs) {
 // Images 0 and 2 are twins; 1 is like no other; 3 shares a word with 1.
 const std::vector<std::vector<WordIdx>> kTwins = {{0, 1, 2}, {3, 4, 5, 6}, {0, 1, 2}, {6, 7, 8, 9}};
 
+// Twins a metre apart, nearer than places that differ have to be: what their matches say decides.
+TEST(FindAmbiguity, LookAlikesAreConfusableWhereverTheyLie) {
+  const std::vector<std::vector<WordIdx>> words = {{0, 1, 2}, {3, 4, 5, 6}, {0, 1, 2, 7}, {7, 8, 9}};
+  Appearance near = NodesWithAnImageEach(4, {{0, 1}, {2, 3}});
+  Appearance told = near;
+  const auto places = PlacesAt({0, 0, 1, 1});
+  ASSERT_TRUE(FindAmbiguity(VocabularyOf(words, 10), places, {}, 1, nullptr, &near).ok());
+  EXPECT_THAT(near.confusable, IsEmpty());
+  EXPECT_LT(*near.nodes[0].entropy, 0.1);
+  const AppearanceGraph look_alikes = GraphOf(4, {{0, 2}, {1, 3}});
+  ASSERT_TRUE(FindAmbiguity(VocabularyOf(words, 10), places, {}, 1, nullptr, &told, &look_alikes).ok());
+  ASSERT_FALSE(told.confusable.empty());
+  EXPECT_EQ(told.confusable[0].node1, 0);
+  EXPECT_EQ(told.confusable[0].node2, 2);
+  EXPECT_GT(*told.nodes[0].entropy, 0.5);
+}
+
 TEST(FindAmbiguity, TwinsHaveTheEntropyOfTwoPlacesAndAreConfusable) {
   Appearance appearance = NodesWithAnImageEach(4, {{0, 1}, {1, 2}, {2, 3}});
   ASSERT_TRUE(
