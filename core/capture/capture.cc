@@ -14,6 +14,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_model.h"
+#include "core/colmap/cut_database.h"
 #include "core/colmap/image_list.h"
 #include "core/files/file.h"
 
@@ -298,6 +299,38 @@ Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture
   return Ok();
 }
 
+// Finds images of sessions to be registered that are copies of images which the capture has already: of its
+// survey, they would count what is seen there twice; of its held-out images, the map would be tried on what
+// it was made of.
+class RegisteredCopies {
+ public:
+  explicit RegisteredCopies(const Capture& capture) {
+    for (const CaptureImage& image : capture.images) copies_.FindOrAdd(capture.ImagePath(image));
+    for (const CaptureImage& image : capture.queries) {
+      copies_.FindOrAdd(capture.ImagePath(image));
+      held_out_.insert(capture.ImagePath(image));
+    }
+  }
+
+  // Whether it is a copy: then it is one of the rejects.
+  bool Reject(const std::string& name, Capture* capture) {
+    const std::string* original = copies_.FindOrAdd(capture->images_folder + "/" + name);
+    if (original == nullptr) return false;
+    const std::string of = fs::path(*original).lexically_relative(capture->images_folder).generic_string();
+    capture->rejects.push_back(
+        {name, held_out_.contains(*original)
+                   ? fmt::format("the same file as {}, which is held out: the map would be tried on an image "
+                                 "that it was made of",
+                                 of)
+                   : fmt::format("the same file as {}: it says nothing more", of)});
+    return true;
+  }
+
+ private:
+  ImageCopies copies_;
+  std::set<std::string> held_out_;  // paths
+};
+
 // Images of sessions that have no pose in the frame of the others.
 Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* features, Capture* capture) {
   for (const auto* list : {&capture->images, &capture->queries}) {
@@ -312,6 +345,7 @@ Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* fe
   }
   CAIRN_ASSIGN_OR_RETURN(KnownCameras known, ReadKnownCameras(capture->root, capture->registered, false));
   FlatFolderCameras cameras(std::move(known), capture);
+  RegisteredCopies copies(*capture);
   for (const std::string& session : capture->registered) {
     const std::string path = SessionPosesPath(capture->root, session);
     if (!IsThere(path)) continue;
@@ -320,6 +354,7 @@ Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* fe
       if (!image.name.starts_with(session + "/")) {
         return MakeError(ErrorCode::kCorrupt, "{}: '{}' is no image of the session", path, image.name);
       }
+      if (copies.Reject(image.name, capture)) continue;
       capture->own_poses.emplace(image.name, *image.cam_from_world);
       image.cam_from_world.reset();
       capture->images.push_back(std::move(image));
@@ -328,6 +363,7 @@ Status ReadRegistered(const std::vector<std::string>& names, CaptureFeatures* fe
   for (const std::string& name : names) {
     const int session = SessionOfImage(capture->registered, name);
     if (session < 0 || IsThere(SessionPosesPath(capture->root, capture->registered[session]))) continue;
+    if (copies.Reject(name, capture)) continue;
     CAIRN_RETURN_IF_ERROR(AddUnposed(name, session, &cameras, capture));
   }
   for (const std::string& session : capture->registered) {
@@ -424,6 +460,20 @@ void WarnOfUnreadOdometry(Capture* capture) {
   }
 }
 
+// Databases of features whose end is missing.
+void WarnOfCutFeatures(Capture* capture) {
+  std::set<std::string> paths;
+  for (const auto& [name, row] : capture->features) paths.insert(row.path);
+  for (const std::string& path : paths) {
+    const DatabasePart part = PartOfDatabase(path);
+    if (!part.is_cut()) continue;
+    capture->warnings.push_back(fmt::format(
+        "{}: truncated: {} of {} bytes are there; images whose features are among them are taken, "
+        "for the others copy it again",
+        path, part.num_bytes, part.num_bytes_whole));
+  }
+}
+
 }  // namespace
 
 std::string SessionCamerasPath(const std::string& root, const std::string& session) {
@@ -511,6 +561,7 @@ Result<Capture> ReadCapture(const std::string& root) {
     return MakeError(ErrorCode::kNoData, "{}: no usable image{}", root, first);
   }
   if (!capture.has_poses) WarnOfUnreadOdometry(&capture);
+  WarnOfCutFeatures(&capture);
   return capture;
 }
 

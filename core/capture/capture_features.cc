@@ -6,6 +6,7 @@
 
 #include "core/capture/sessions.h"
 #include "core/colmap/colmap_database.h"
+#include "core/colmap/cut_database.h"
 
 namespace cairn {
 namespace {
@@ -20,11 +21,29 @@ bool IsThere(const std::string& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
+// What is said of a database whose end is missing.
+std::string CutText(const std::string& path) {
+  const DatabasePart part = PartOfDatabase(path);
+  return fmt::format("{}: truncated: {} of {} bytes are there", path, part.num_bytes, part.num_bytes_whole);
+}
+
+Result<SQLite::Database> OpenFeatures(const std::string& path) {
+  return PartOfDatabase(path).is_cut() ? OpenCutDatabase(path) : OpenColmapDatabase(path);
+}
+
+// Of a database whose end is missing those whose rows are there.
+Result<std::vector<DatabaseImage>> ReadImages(const std::string& path, SQLite::Database& database) {
+  if (!PartOfDatabase(path).is_cut()) return ReadDatabaseImages(database);
+  std::vector<DatabaseImage> images = ReadCutDatabaseImages(database);
+  if (!images.empty()) return images;
+  return MakeError(ErrorCode::kCorrupt, "{}, and no image's row is; copy it again", CutText(path));
+}
+
 Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, const std::string& prefix) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(path));
   return WithDatabaseErrors(path, [&]() -> Result<std::map<std::string, FeaturesRow>> {
+    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(path));
     CAIRN_ASSIGN_OR_RETURN(const auto cameras, ReadDatabaseCameras(database));
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadDatabaseImages(database));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadImages(path, database));
     std::map<std::string, FeaturesRow> rows;
     for (const DatabaseImage& image : images) {
       const auto camera = cameras.find(image.camera_id);
@@ -40,6 +59,40 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
     while (query.executeStep()) of_landmarks.insert(query.getColumn(0).getInt64());
     for (auto& [name, row] : rows) row.are_landmarks = of_landmarks.contains(row.image_id);
     return rows;
+  });
+}
+
+Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera) {
+  return WithDatabaseErrors(row.path, [&]() -> Result<Features> {
+    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(row.path));
+    if (camera.width != row.camera.width || camera.height != row.camera.height) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: features of an image of {} x {} px, but its camera {} has {} x {} px", row.path,
+                       row.camera.width, row.camera.height, camera.camera_id, camera.width, camera.height);
+    }
+    Features features;
+    CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, row.image_id));
+    CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, row.image_id));
+    if (static_cast<Eigen::Index>(features.keypoints.size()) != features.descriptors.rows()) {
+      return MakeError(ErrorCode::kCorrupt, "{}: image {}: {} keypoints and {} descriptors", row.path,
+                       row.image_id, features.keypoints.size(), features.descriptors.rows());
+    }
+    for (size_t i = 0; i < features.keypoints.size(); ++i) {
+      const Keypoint& keypoint = features.keypoints[i];
+      const bool is_inside = keypoint.x >= -kBorderPx && keypoint.y >= -kBorderPx &&
+                             keypoint.x <= static_cast<float>(camera.width) + kBorderPx &&
+                             keypoint.y <= static_cast<float>(camera.height) + kBorderPx;
+      if (!is_inside) {
+        return MakeError(ErrorCode::kCorrupt,
+                         "{}: image {}: keypoint {} at ({:g}, {:g}) is not in {} x {} px", row.path,
+                         row.image_id, i, keypoint.x, keypoint.y, camera.width, camera.height);
+      }
+      if (!(keypoint.scale > 0)) {
+        return MakeError(ErrorCode::kCorrupt, "{}: image {}: keypoint {} has the scale {:g}", row.path,
+                         row.image_id, i, keypoint.scale);
+      }
+    }
+    return features;
   });
 }
 
@@ -81,37 +134,14 @@ Result<const FeaturesRow*> CaptureFeatures::Find(const std::string& name) {
 }
 
 Result<Features> ReadCaptureFeatures(const FeaturesRow& row, const Camera& camera) {
-  CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenColmapDatabase(row.path));
-  return WithDatabaseErrors(row.path, [&]() -> Result<Features> {
-    if (camera.width != row.camera.width || camera.height != row.camera.height) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: features of an image of {} x {} px, but its camera {} has {} x {} px", row.path,
-                       row.camera.width, row.camera.height, camera.camera_id, camera.width, camera.height);
-    }
-    Features features;
-    CAIRN_ASSIGN_OR_RETURN(features.keypoints, ReadDatabaseKeypoints(database, row.image_id));
-    CAIRN_ASSIGN_OR_RETURN(features.descriptors, ReadDatabaseDescriptors(database, row.image_id));
-    if (static_cast<Eigen::Index>(features.keypoints.size()) != features.descriptors.rows()) {
-      return MakeError(ErrorCode::kCorrupt, "{}: image {}: {} keypoints and {} descriptors", row.path,
-                       row.image_id, features.keypoints.size(), features.descriptors.rows());
-    }
-    for (size_t i = 0; i < features.keypoints.size(); ++i) {
-      const Keypoint& keypoint = features.keypoints[i];
-      const bool is_inside = keypoint.x >= -kBorderPx && keypoint.y >= -kBorderPx &&
-                             keypoint.x <= static_cast<float>(camera.width) + kBorderPx &&
-                             keypoint.y <= static_cast<float>(camera.height) + kBorderPx;
-      if (!is_inside) {
-        return MakeError(ErrorCode::kCorrupt,
-                         "{}: image {}: keypoint {} at ({:g}, {:g}) is not in {} x {} px", row.path,
-                         row.image_id, i, keypoint.x, keypoint.y, camera.width, camera.height);
-      }
-      if (!(keypoint.scale > 0)) {
-        return MakeError(ErrorCode::kCorrupt, "{}: image {}: keypoint {} has the scale {:g}", row.path,
-                         row.image_id, i, keypoint.scale);
-      }
-    }
-    return features;
-  });
+  if (!PartOfDatabase(row.path).is_cut()) return ReadFeaturesOf(row, camera);
+  // A row that ends on a page of which a part is missing ends in zeros.
+  const Result<Features> features = ReadFeaturesOf(row, camera);
+  const bool is_whole =
+      features.ok() && (features->descriptors.rows() == 0 || features->descriptors.bottomRows(1).any());
+  if (is_whole) return features;
+  return MakeError(ErrorCode::kCorrupt, "{}, and the features of image {} are not; copy it again",
+                   CutText(row.path), row.image_id);
 }
 
 }  // namespace cairn

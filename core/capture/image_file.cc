@@ -114,4 +114,22 @@ Result<cv::Mat> ReadGreyImage(const std::string& path) {
   return DecodeGreyImage(bytes, path);
 }
 
+const std::string* ImageCopies::FindOrAdd(const std::string& path) {
+  std::error_code error;
+  const uintmax_t num_bytes = std::filesystem::file_size(path, error);
+  if (error) return nullptr;
+  std::vector<Given>& same_size = of_size_[num_bytes];
+  const auto hash_of = [](const std::string& file) -> std::string {
+    const Result<std::string> hash = HashFile(file);
+    return hash.ok() ? *hash : "";
+  };
+  const std::string hash = same_size.empty() ? "" : hash_of(path);
+  for (Given& given : same_size) {
+    if (given.hash.empty()) given.hash = hash_of(given.path);
+    if (!hash.empty() && given.hash == hash) return &given.path;
+  }
+  same_size.push_back({path, hash});
+  return nullptr;
+}
+
 }  // namespace cairn

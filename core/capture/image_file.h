@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
@@ -22,5 +25,20 @@ Result<cv::Mat> DecodeGreyImage(std::string_view bytes, const std::string& path)
 
 // The same from a file.  Errors: also NotFound, Io.
 Result<cv::Mat> ReadGreyImage(const std::string& path);
+
+// Image files by their bytes, to find one that is another's copy under another name.  Only files of one size
+// are read.
+class ImageCopies {
+ public:
+  // The first file that was given with the same bytes; null: there is none, or the file cannot be read.
+  const std::string* FindOrAdd(const std::string& path);
+
+ private:
+  struct Given {
+    std::string path;
+    std::string hash;  // empty: not needed so far
+  };
+  std::map<uintmax_t, std::vector<Given>> of_size_;
+};
 
 }  // namespace cairn

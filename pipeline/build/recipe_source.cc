@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kWhatIsCompiled =
     "compile takes a recipe (docs/recipe.md), a film, a ROS bag or the folder of a capture";
+constexpr const char* kWhatIsASurvey =
+    "what is new is a film, a ROS bag or the folder of a capture (docs/captures.md)";
 
 // Links to folders are not followed below it.
 bool HoldsImages(const std::string& folder) {
@@ -31,11 +33,12 @@ bool HoldsImages(const std::string& folder) {
   return false;
 }
 
-Status CheckIsCapture(const std::string& folder) {
+// `what_is_taken`: instead of what was given.
+Status CheckIsCapture(const std::string& folder, const char* what_is_taken) {
   std::error_code error;
   if (fs::exists(folder + "/config.mk", error) && fs::is_directory(folder + "/options", error)) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: the build folder of a map, not a capture; {}", folder,
-                     kWhatIsCompiled);
+                     what_is_taken);
   }
   // images/ may be a link to a folder.
   if (HoldsImages(folder) || HoldsImages(folder + "/images")) return Ok();
@@ -46,18 +49,17 @@ Status CheckIsCapture(const std::string& folder) {
       hint = fmt::format("did you mean the recipe {}?", entry.path().string());
   }
   return MakeError(ErrorCode::kInvalidArgument, "{}: a folder without an image; {}; {}", folder,
-                   kWhatIsCompiled, hint);
+                   what_is_taken, hint);
 }
 
 // A file that is clearly not a text gets a message which says what it is.
-Status CheckIsText(const std::string& path) {
+Status CheckIsText(const std::string& path, const char* what_is_taken) {
   std::error_code error;
   if (!fs::exists(path, error)) {
-    return MakeError(ErrorCode::kNotFound, "{}: no such file or folder; {}", path, kWhatIsCompiled);
+    return MakeError(ErrorCode::kNotFound, "{}: no such file or folder; {}", path, what_is_taken);
   }
   if (!fs::is_regular_file(path, error)) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: neither a file nor a folder; {}", path,
-                     kWhatIsCompiled);
+    return MakeError(ErrorCode::kInvalidArgument, "{}: neither a file nor a folder; {}", path, what_is_taken);
   }
   if (IsSqliteFile(path)) {
     const bool is_map = WithDatabaseErrors(path, [&]() -> Status {
@@ -69,10 +71,10 @@ Status CheckIsText(const std::string& path) {
                         }).ok();
     if (is_map) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a compiled map; `cairn inspect` shows it, and {}",
-                       path, kWhatIsCompiled);
+                       path, what_is_taken);
     }
     return MakeError(ErrorCode::kInvalidArgument, "{}: a database of COLMAP or of a stage, not a recipe; {}",
-                     path, kWhatIsCompiled);
+                     path, what_is_taken);
   }
   if (HasImageSuffix(path)) {
     const std::string folder = fs::absolute(path).lexically_normal().parent_path().string();
@@ -98,12 +100,12 @@ Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map
   const bool is_folder = fs::is_directory(given, error);
   const bool is_bag = KindOfCapture(given) == CaptureKind::kBag;
   if (!is_folder && !is_bag && !IsFilm(given)) {
-    CAIRN_RETURN_IF_ERROR(CheckIsText(given));
+    CAIRN_RETURN_IF_ERROR(CheckIsText(given, kWhatIsCompiled));
     return RecipeSource{.recipe = given, .map = map};
   }
   fs::path folder = fs::absolute(given).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // a trailing '/'
-  if (is_folder && !is_bag) CAIRN_RETURN_IF_ERROR(CheckIsCapture(given));
+  if (is_folder && !is_bag) CAIRN_RETURN_IF_ERROR(CheckIsCapture(given, kWhatIsCompiled));
   const std::string name = NameOfFolder(folder.string());
   RecipeSource source{.map = map.empty() ? name + ".cairn" : map};
   if (fs::path(source.map).extension() != ".cairn")
@@ -124,8 +126,8 @@ Result<RecipeSource> FindRecipe(const std::string& given, const std::string& map
 Status CheckIsSurvey(const std::string& given) {
   std::error_code error;
   if (KindOfCapture(given) == CaptureKind::kBag || IsFilm(given)) return Ok();
-  if (fs::is_directory(given, error)) return CheckIsCapture(given);
-  CAIRN_RETURN_IF_ERROR(CheckIsText(given));
+  if (fs::is_directory(given, error)) return CheckIsCapture(given, kWhatIsASurvey);
+  CAIRN_RETURN_IF_ERROR(CheckIsText(given, kWhatIsASurvey));
   return MakeError(
       ErrorCode::kInvalidArgument,
       "{}: neither the folder of a capture nor a film or a ROS bag; a recipe says itself what it "

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
 
 #include "core/blocks/map_rows.h"
+#include "core/files/file.h"
 #include "pipeline/build/build_files.h"
 #include "pipeline/build/folder_lock.h"
 #include "pipeline/build/make_words.h"
@@ -80,6 +82,31 @@ Result<std::string> RecipeOfUpdate(const MapRows& rows, const std::vector<MapCap
   return text + options;
 }
 
+// Whether a run until this stage finds poses.
+bool FindsPoses(std::string until) {
+  std::replace(until.begin(), until.end(), '-', '_');
+  return until != "import" && until != "extract_features" && until != "match_features";
+}
+
+// A map that nothing was added to is the old one with what it kept of its survey, and so with less: who puts
+// it in the old one's place every night would see it fade.  Errors: NoData (no image of the session was
+// joined).
+Status CheckIsJoined(const BuildPaths& paths, const std::string& session,
+                     const UpdateMapArguments& arguments) {
+  const std::string path = paths.build_dir + "/poses/reconstruction.json";
+  CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  const auto report = nlohmann::json::parse(text, nullptr, false);
+  if (report.is_discarded() || !report.contains("sessions")) return Ok();
+  for (const auto& of_session : report["sessions"]) {
+    if (of_session.value("name", "") != session || of_session.value("num_joined", 1) > 0) continue;
+    return MakeError(ErrorCode::kNoData,
+                     "no image of {} is joined to {} ({} has the reasons): there is nothing to update it by; "
+                     "keep it, as {} is made of its landmarks alone",
+                     arguments.survey, arguments.map, path, arguments.compile.output);
+  }
+  return Ok();
+}
+
 Status UpdateMap(UpdateMapArguments arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(CheckIsSurvey(arguments.survey));
   CAIRN_ASSIGN_OR_RETURN(const MapRows rows, ReadMapRows(arguments.map));
@@ -117,7 +144,10 @@ Status UpdateMap(UpdateMapArguments arguments, const CommandEnvironment& environ
     *environment.out << fmt::format("{}: the recipe of this; to change something, edit it and compile it\n",
                                     arguments.compile.recipe);
   }
-  return Compile(arguments.compile, environment);
+  CAIRN_RETURN_IF_ERROR(Compile(arguments.compile, environment));
+  return FindsPoses(arguments.compile.until)
+             ? CheckIsJoined(paths, NameOfSession(arguments.survey, captures), arguments)
+             : Ok();
 }
 
 }  // namespace

@@ -74,6 +74,14 @@ Result<ColmapModel> RegisterToOthers(const MapperInput& input, const Capture& ca
   CollectRegistered(input, capture, found, options.hold_out_every, result);
   for (const RegisteredSession& session : found.sessions) {
     if (session.num_joined > 0) continue;
+    if (session.num_images == 0) {
+      result->warnings.push_back(
+          fmt::format("{}: session '{}' has no image with features, each for the reason that "
+                      "extract_features gave: it is "
+                      "not in the map",
+                      capture.root, session.name));
+      continue;
+    }
     result->warnings.push_back(fmt::format(
         "{}: none of the {} images of session '{}' were joined to the other captures: it is not in the map",
         capture.root, session.num_images, session.name));

@@ -229,7 +229,8 @@ TEST_F(UpdateMap, WhatIsNoMapOrNoSurveyIsRefusedBeforeAnythingIsWritten) {
   fs::create_directories(Path("empty"));
   refused(Path("text.cairn") + " " + Path("tonight") + output, 13, "text.cairn");
   refused(Path("none.cairn") + " " + Path("tonight") + output, 3, "none.cairn");
-  refused(OldMap() + " " + Path("empty") + output, 2, "a folder without an image");
+  refused(OldMap() + " " + Path("empty") + output, 2,
+          "a folder without an image; what is new is a film, a ROS bag or the folder of a capture");
   refused(OldMap() + " " + Path("none") + output, 3, "no such file or folder");
   refused(OldMap() + " " + Path("old.toml") + output, 2, "neither the folder of a capture nor a film");
   refused(OldMap() + " " + Path("tonight") + " -o " + Path("refused.map"), 2, "a map's name ends in .cairn");
@@ -280,16 +281,21 @@ TEST_F(UpdateMap, RobotsLogIsASession) {
             0);
 }
 
-// Nothing is forced: the map is the old one's landmarks alone.
-TEST_F(UpdateMap, ImagesOfAnotherPlaceAreLeftOut) {
+// Nothing is forced: the map is the old one's landmarks alone, and who would put it in its place is told.
+TEST_F(UpdateMap, ImagesOfAnotherPlaceAreLeftOutAndUpdateNothing) {
   fs::create_directories(Path("other"));
   for (int i = 0; i < 3; ++i)
     std::ofstream(Path(fmt::format("other/{}.pgm", i))) << "P5\n64 48\n255\n" << std::string(64 * 48, 'x');
   const ProgramRun run = RunShell("cairn update-map " + OldMap() + " " + Path("other") + " -o " +
                                   Path("with_other.cairn") + " --progress none --until reconstruct");
-  ASSERT_EQ(run.exit_code, 0) << run.err;
+  ASSERT_EQ(run.exit_code, 6) << run.err;
   EXPECT_THAT(run.err, HasSubstr("images of session 'other' were joined to the other captures"));
+  EXPECT_THAT(run.err, HasSubstr("there is nothing to update it by; keep it"));
   EXPECT_EQ(ReadCapture(Path("with_other.build/poses"))->images.size(), NumOld());
+  EXPECT_EQ(RunShell("cairn update-map " + OldMap() + " " + Path("other") + " -o " +
+                     Path("with_other.cairn") + " --progress none --until match-features")
+                .exit_code,
+            0);
 }
 
 }  // namespace

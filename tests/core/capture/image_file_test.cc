@@ -189,5 +189,23 @@ TEST(ImageFile, UnreadableFilesAreErrorsThatNameThem) {
   EXPECT_FALSE(ReadGreyImage(testing::TempDir()).ok()) << "a folder is not an image";
 }
 
+TEST(ImageCopies, FindsFilesOfTheSameBytes) {
+  const auto write = [](const std::string& name, const std::string& bytes) {
+    const std::string path = testing::TempDir() + "/image_copies_" + name;
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path;
+  };
+  const std::string first = write("first", "aab");
+  ImageCopies copies;
+  EXPECT_EQ(copies.FindOrAdd(first), nullptr);
+  EXPECT_EQ(copies.FindOrAdd(write("same_size", "aba")), nullptr);
+  EXPECT_EQ(copies.FindOrAdd(write("longer", "aaba")), nullptr);
+  const std::string* found = copies.FindOrAdd(write("copy", "aab"));
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(*found, first);
+  EXPECT_EQ(copies.FindOrAdd(first + ".missing"), nullptr);
+  EXPECT_EQ(copies.FindOrAdd(first + ".missing"), nullptr) << "files that are not there are no copies";
+}
+
 }  // namespace
 }  // namespace cairn

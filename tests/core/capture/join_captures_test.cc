@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -288,6 +289,40 @@ TEST_F(JoinCapturesTest, SessionsThatAreNotInTheFrameAreListedForRegistration) {
   Write("joined/register.txt", "old\n");
   EXPECT_THAT(ReadCapture(Path("joined")).error().message,
               HasSubstr("register.txt names old, whose image old/1.png"));
+}
+
+// One image of 'new' is a copy of one that is held out, one of one of the survey, and one of another of
+// 'new'; 'own', which has poses of its own, has one of another session's.
+TEST_F(JoinCapturesTest, CopiesOfOtherImagesAreNotRegistered) {
+  const auto picture = [](char pixel) { return fmt::format("P5\n1 1\n255\n{}", pixel); };
+  WriteCapture("old", "1 PINHOLE 1 1 5 5 4 3\n", Line(1, 1, "1.pgm"));
+  Write("old/queries.txt", Line(1, 1, "2.pgm"));
+  Write("old/images/1.pgm", picture('a'));
+  Write("old/images/2.pgm", picture('b'));
+  Write("new/3.pgm", picture('b'));
+  Write("new/4.pgm", picture('a'));
+  Write("new/5.pgm", picture('c'));
+  Write("new/6.pgm", picture('c'));
+  WriteCapture("own", "1 PINHOLE 1 1 7 7 4 3\n", Line(1, 1, "7.pgm") + Line(2, 1, "8.pgm"));
+  Write("own/images/7.pgm", picture('a'));
+  Write("own/images/8.pgm", picture('d'));
+  CaptureSession own = Session("own");
+  own.is_registered = true;
+  ASSERT_TRUE(Join({Session("old"), Session("new"), own}).ok());
+  const auto capture = ReadCapture(Path("joined"));
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  std::vector<std::string> names;
+  for (const CaptureImage& image : capture->images) names.push_back(image.name);
+  EXPECT_THAT(names, ElementsAre("new/5.pgm", "old/1.pgm", "own/8.pgm"));
+  EXPECT_EQ(capture->queries.size(), 1u);
+  EXPECT_EQ(capture->own_poses.count("own/7.pgm"), 0u);
+  std::map<std::string, std::string> reasons;
+  for (const Reject& reject : capture->rejects) reasons.emplace(reject.name, reject.reason);
+  EXPECT_EQ(reasons.size(), 4u);
+  EXPECT_THAT(reasons["new/3.pgm"], HasSubstr("the same file as old/2.pgm, which is held out"));
+  EXPECT_EQ(reasons["new/4.pgm"], "the same file as old/1.pgm: it says nothing more");
+  EXPECT_THAT(reasons["new/6.pgm"], HasSubstr("as new/5.pgm"));
+  EXPECT_THAT(reasons["own/7.pgm"], HasSubstr("as old/1.pgm"));
 }
 
 TEST_F(JoinCapturesTest, WhatCannotBeJoinedIsRefusedWithTheRemedy) {
