@@ -36,11 +36,11 @@ Result<std::vector<DatabaseImage>> ReadImages(const std::string& path, SQLite::D
   if (!PartOfDatabase(path).is_cut()) return ReadDatabaseImages(database);
   std::vector<DatabaseImage> images = ReadCutDatabaseImages(database);
   if (!images.empty()) return images;
-  return MakeError(ErrorCode::kCorrupt, "{}, and no image's row is; copy it again", CutText(path));
+  return MakeError(ErrorCode::kCorrupt, "{}: no row of table images is there", path);
 }
 
 Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, const std::string& prefix) {
-  return WithDatabaseErrors(path, [&]() -> Result<std::map<std::string, FeaturesRow>> {
+  auto read = WithDatabaseErrors(path, [&]() -> Result<std::map<std::string, FeaturesRow>> {
     CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(path));
     CAIRN_ASSIGN_OR_RETURN(const auto cameras, ReadDatabaseCameras(database));
     CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadImages(path, database));
@@ -60,6 +60,9 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
     for (auto& [name, row] : rows) row.are_landmarks = of_landmarks.contains(row.image_id);
     return rows;
   });
+  if (read.ok() || !PartOfDatabase(path).is_cut()) return read;
+  return MakeError(ErrorCode::kCorrupt, "{}, and its images and cameras are not; copy it again",
+                   CutText(path));
 }
 
 Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera) {

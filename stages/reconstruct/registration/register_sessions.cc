@@ -12,6 +12,7 @@
 #include "core/capture/sessions.h"
 #include "stages/reconstruct/registration/adjust_registered.h"
 #include "stages/reconstruct/registration/place_piece.h"
+#include "stages/reconstruct/registration/standing_images.h"
 
 namespace cairn::reconstruct {
 namespace {
@@ -89,6 +90,10 @@ class Registrar {
       is_held_.push_back(posed_.cam_from_world.back().has_value());
     }
     result_.reasons.resize(input.images.size());
+    for (size_t s = 0; s < images_of_.size(); ++s) {
+      result_.sessions[s].num_images = static_cast<int>(images_of_[s].size());
+      LeaveOutStanding(&images_of_[s]);
+    }
   }
 
   Result<Registration> Register() {
@@ -122,6 +127,18 @@ class Registrar {
           capture_.registered[session_of_[i]]);
     }
     return Ok();
+  }
+
+  // Images of a session that repeat another one of it.
+  void LeaveOutStanding(std::vector<int>* images) {
+    const std::vector<std::optional<RepeatedImage>> repeated = FindStandingImages(input_, *images);
+    motions_ = MotionsOfRepeated(motions_, repeated);
+    std::erase_if(*images, [&](int i) {
+      if (!repeated[i]) return false;
+      result_.reasons[i] = fmt::format("shows what {} shows, from the same place: it says nothing more",
+                                       input_.images[repeated[i]->image].name);
+      return true;
+    });
   }
 
   // The session by itself: pieces that are rigid, and the other images one by one.
@@ -308,7 +325,6 @@ class Registrar {
   void Count() {
     for (size_t s = 0; s < images_of_.size(); ++s) {
       RegisteredSession& session = result_.sessions[s];
-      session.num_images = static_cast<int>(images_of_[s].size());
       for (const int i : images_of_[s]) {
         session.num_joined += posed_.cam_from_world[i].has_value();
         session.num_supported +=
@@ -331,7 +347,7 @@ class Registrar {
 
   const MapperInput& input_;
   const Capture& capture_;
-  const std::vector<ImageMotion>& motions_;
+  std::vector<ImageMotion> motions_;
   const MapGloballyOptions& options_;
   int num_threads_;
   Progress& progress_;

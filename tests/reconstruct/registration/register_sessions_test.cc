@@ -115,6 +115,45 @@ TEST(RegisterSessions, HalvesOfAPieceAreEachPutWhereTheyAre) {
   sessions.ExpectNear(found, 0.03, 0.1);
 }
 
+// Of twenty images that show what one shows, all keypoints 1 px to the right of it, none is joined, and none
+// pulls at it.
+TEST(RegisterSessions, ImagesOfACameraThatStandsAreLeftOut) {
+  TwoSessions sessions(24, IsOdd);
+  MapperInput& input = sessions.survey.input;
+  const DatabaseImage standing = input.images[11];
+  const std::vector<TwoViewGeometry> geometries = input.geometries;
+  for (ImageId id = 101; id <= 120; ++id) {
+    input.images.push_back({id, fmt::format("tonight/stands{}.jpg", id), standing.camera_id});
+    sessions.survey.capture.images.push_back({input.images.back().name, standing.camera_id, std::nullopt});
+    input.keypoints.push_back(input.keypoints[11]);
+    for (Keypoint& keypoint : input.keypoints.back()) keypoint.x += 1;
+    for (TwoViewGeometry pair : geometries) {
+      const bool is_second = pair.image_id2 == standing.image_id;
+      if (!is_second && pair.image_id1 != standing.image_id) continue;
+      if (!is_second) {  // ids of a pair ascend
+        std::swap(pair.image_id1, pair.image_id2);
+        for (Match& match : pair.inliers) std::swap(match.idx1, match.idx2);
+        pair.F.transposeInPlace();
+        pair.E.transposeInPlace();
+      }
+      pair.image_id2 = id;
+      input.geometries.push_back(pair);
+    }
+    TwoViewGeometry same{.image_id1 = standing.image_id, .image_id2 = id};
+    for (KeypointIdx k = 0; k < input.keypoints[11].size(); ++k) same.inliers.push_back({k, k});
+    input.geometries.push_back(same);
+  }
+  const Registration found = sessions.Register();
+  EXPECT_EQ(found.sessions[0].num_images, 32);
+  EXPECT_EQ(found.sessions[0].num_joined, 12);
+  sessions.ExpectNear(found, 0.03, 0.15);
+  for (int i = 24; i < 44; ++i) {
+    EXPECT_FALSE(found.cam_from_world[i]);
+    EXPECT_EQ(found.reasons[i],
+              "shows what " + standing.name + " shows, from the same place: it says nothing more");
+  }
+}
+
 // They are where those are that they are joined with.
 TEST(RegisterSessions, ImagesThatSeeNothingOfTheOthersAreBridged) {
   TwoSessions sessions(24, [](int i) { return i >= 10; });
