@@ -70,6 +70,8 @@ bool ReadParameters(NodeParameters* p, std::string* wrong) {
   reader.Read("camera_in_robot", &p->camera_in_robot);
   reader.Read("camera_model", &p->camera_model);
   reader.Read("camera_params", &p->camera_params);
+  reader.Read("log", &p->log);
+  reader.Read("log_max_mb_per_day", &p->log_max_mb_per_day);
   reader.Read("diagnostics_period_s", &p->diagnostics_period_s);
   *wrong = reader.wrong();
   return wrong->empty();
@@ -138,6 +140,8 @@ class LocalizerNode {
     status.level = answer.is_error ? Diagnostic::ERROR : answer.has_fix ? Diagnostic::OK : Diagnostic::WARN;
     status.message = answer.has_fix ? "fix" : answer.message;
     if (answer.is_error) ROS_ERROR_THROTTLE(10, "%s", answer.message.c_str());
+    if (const std::string why = localizer_->log_error(); !why.empty())
+      ROS_WARN_ONCE("nothing is logged from here on: %s", why.c_str());
     const steady_clock::time_point now = steady_clock::now();
     const bool is_due =
         now - last_published_ >= std::chrono::duration<double>(parameters_.diagnostics_period_s);
@@ -153,7 +157,8 @@ class LocalizerNode {
                      KeyValue("region", answer.region),
                      KeyValue("library_ms", answer.library_ms),
                      KeyValue("node_ms", node_ms),
-                     KeyValue("kept_bytes", localizer_->num_kept_bytes())};
+                     KeyValue("kept_bytes", localizer_->num_kept_bytes()),
+                     KeyValue("logged", localizer_->num_logged())};
     diagnostic_msgs::DiagnosticArray message;
     message.header.stamp = image.header.stamp;
     message.status = {status};

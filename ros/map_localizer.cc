@@ -6,7 +6,9 @@
 
 #include "ros/grey_pixels.h"
 #include "ros/robot_pose.h"
+#include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
+#include "runtime/robot_log/shared_log.h"
 
 namespace cairn_ros {
 namespace {
@@ -55,6 +57,7 @@ struct MapLocalizer::State {
   Pose robot_from_camera;
   Localizer localizer;
   RegionTracker tracker;
+  std::shared_ptr<SharedLog> log;  // null: none
 
   Result<Camera> CameraFor(const cv::Mat& grey) const {
     if (parameters.camera_model.empty()) return map->CameraForSize(grey.cols, grey.rows);
@@ -66,13 +69,23 @@ struct MapLocalizer::State {
     return camera;
   }
 
+  Result<Localization> LocateAndLog(const cv::Mat& grey, const Camera& camera) {
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
+    CAIRN_ASSIGN_OR_RETURN(Localization found, parameters.follow
+                                                   ? tracker.TrackFeatures(query.features, camera)
+                                                   : localizer.LocalizeQuery(query, std::nullopt));
+    log->Offer(query, found);
+    return found;
+  }
+
   Result<Localization> Locate(const Image& image, double* library_ms) {
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixels({image.encoding, image.width, image.height,
                                                            image.step, image.bytes, image.num_bytes}));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
     const auto begin = std::chrono::steady_clock::now();
-    Result<Localization> found =
-        parameters.follow ? tracker.Track(grey, camera) : localizer.Localize(grey, camera);
+    Result<Localization> found = log                 ? LocateAndLog(grey, camera)
+                                 : parameters.follow ? tracker.Track(grey, camera)
+                                                     : localizer.Localize(grey, camera);
     *library_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     return found;
   }
@@ -92,8 +105,14 @@ std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, i
   if (!mounting.ok()) return fail(mounting.error());
   const auto map = OpenMap(parameters);
   if (!map.ok()) return fail(map.error());
-  return std::unique_ptr<MapLocalizer>(
-      new MapLocalizer(std::make_unique<State>(parameters, *map, *mounting)));
+  auto state = std::make_unique<State>(parameters, *map, *mounting);
+  if (!parameters.log.empty()) {
+    const auto log =
+        SharedLog::Open(parameters.log, **map, {.max_mb_per_day = parameters.log_max_mb_per_day});
+    if (!log.ok()) return fail(log.error());
+    state->log = *log;
+  }
+  return std::unique_ptr<MapLocalizer>(new MapLocalizer(std::move(state)));
 }
 
 Answer MapLocalizer::Locate(const Image& image) {
@@ -122,5 +141,11 @@ Answer MapLocalizer::Locate(const Image& image) {
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }
 int64_t MapLocalizer::num_landmarks() const { return state_->map->num_landmarks(); }
 int64_t MapLocalizer::num_kept_bytes() const { return state_->map->num_kept_bytes(); }
+int64_t MapLocalizer::num_logged() const { return state_->log ? state_->log->num_kept() : 0; }
+std::string MapLocalizer::log_error() const {
+  if (!state_->log) return "";
+  const Status error = state_->log->error();
+  return error.ok() ? "" : error.error().message;
+}
 
 }  // namespace cairn_ros

@@ -21,6 +21,8 @@ struct Parameters {
   std::vector<double> camera_in_robot;
   std::string camera_model;  // COLMAP's name; empty: the map's camera of the image's size
   std::vector<double> camera_params;
+  std::string log;  // folder of a log (docs/robots.md); empty: none
+  double log_max_mb_per_day = 50;
 };
 
 struct Image {
@@ -52,6 +54,8 @@ class MapLocalizer {
   std::string map_name() const;
   int64_t num_landmarks() const;
   int64_t num_kept_bytes() const;  // of the map, in memory
+  int64_t num_logged() const;      // frames
+  std::string log_error() const;   // why the log can no longer be written; empty: it can
 
  private:
   struct State;

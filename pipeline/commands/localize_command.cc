@@ -23,9 +23,9 @@
 #include "pipeline/commands/odometry.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
-#include "pipeline/robot_log/robot_log.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
+#include "runtime/robot_log/robot_log.h"
 
 namespace cairn::pipeline {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
+#include "runtime/c_api/logs.h"
 #include "runtime/c_api/structs.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -26,6 +27,7 @@ struct OpenLocalizer : OfOneThread {
   std::shared_ptr<const Map> map;
   std::unique_ptr<Localizer> localizer;
   std::shared_ptr<const VisualMap> visual;  // once it was asked for
+  std::shared_ptr<SharedLog> log;           // where it has one
 };
 
 Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>& OpenLocalizers() {
@@ -185,6 +187,14 @@ int32_t cairn_localizer_set_option(cairn_localizer* localizer, const char* name,
   });
 }
 
+int32_t cairn_localizer_set_log(cairn_localizer* localizer, const cairn_log* log) {
+  return Call("cairn_localizer_set_log", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenLocalizer>::Begin(OpenLocalizers(), localizer));
+    CAIRN_ASSIGN_OR_RETURN(used->log, LogFor(log, *used->map));
+    return Ok();
+  });
+}
+
 int32_t cairn_localizer_destroy(cairn_localizer* localizer) {
   return Call("cairn_localizer_destroy",
               [&]() -> Status { return DestroyObject(OpenLocalizers(), localizer); });
@@ -199,8 +209,10 @@ int32_t cairn_localize(cairn_localizer* localizer, const cairn_image* image, con
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
     CAIRN_ASSIGN_OR_RETURN(const std::optional<PosePrior> believed, PriorOf(prior));
-    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->Localize(grey, chosen, believed));
+    CAIRN_ASSIGN_OR_RETURN(const Query query, used->localizer->QueryFromImage(grey, chosen));
+    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->localizer->LocalizeQuery(query, believed));
     Return(FixFrom(found), fix);
+    if (used->log) used->log->Offer(query, found);
     return Ok();
   });
 }

@@ -88,6 +88,7 @@ typedef struct cairn_map cairn_map;
 typedef struct cairn_localizer cairn_localizer;
 typedef struct cairn_tracker cairn_tracker;
 typedef struct cairn_visual_tracker cairn_visual_tracker;
+typedef struct cairn_log cairn_log;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -204,6 +205,14 @@ typedef struct cairn_floor_fix {
 #define CAIRN_FLOOR_FIX_INIT \
   { sizeof(cairn_floor_fix), 0, 0, 0, 0, {0}, 0, {0}, {0}, {0}, 0 }
 
+/* How much a log keeps. */
+typedef struct cairn_log_options {
+  size_t size;
+  double max_mb_per_day; /* its largest growth in any 24 hours, 10^6 bytes, > 0 */
+} cairn_log_options;
+#define CAIRN_LOG_OPTIONS_INIT \
+  { sizeof(cairn_log_options), 50 }
+
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
 /* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES, "track" for CAIRN_SCOPE_TRACK;
@@ -276,6 +285,25 @@ CAIRN_API int32_t cairn_visual_tracker_move(cairn_visual_tracker* tracker, doubl
 CAIRN_API int32_t cairn_visual_tracker_track(cairn_visual_tracker* tracker, const cairn_image* image,
                                              const cairn_camera* camera, cairn_floor_fix* fix);
 CAIRN_API int32_t cairn_visual_tracker_destroy(cairn_visual_tracker* tracker);
+
+/* What a robot brings home for a later compile (docs/robots.md): the folder that `cairn localize --log`
+ * writes, with features and fix of frames that differ in place.  It is made, or gone on with; after every
+ * frame it is whole.  A log may be that of several localizers and trackers, in any threads.
+ *
+ * `options` may be NULL.  CAIRN_BUSY: another log writes there, in this process or another;
+ * CAIRN_INVALID_ARGUMENT: the folder has something else in it, or the log of a map of another name or frame.
+ */
+CAIRN_API int32_t cairn_log_open(const cairn_map* map, const char* folder, const cairn_log_options* options,
+                                 cairn_log** log);
+/* From now on each frame with a fix is offered to the log, which must be of the same map; NULL: to none.
+ * Their options may be set before and after. */
+CAIRN_API int32_t cairn_localizer_set_log(cairn_localizer* localizer, const cairn_log* log);
+CAIRN_API int32_t cairn_tracker_set_log(cairn_tracker* tracker, const cairn_log* log);
+/* How many frames were kept since it was opened.  A log that can no longer be written (CAIRN_DISK_FULL, ...)
+ * keeps nothing more, and fixes are as ever: this call returns the error, and *num_kept too. */
+CAIRN_API int32_t cairn_log_num_kept(const cairn_log* log, int64_t* num_kept);
+/* Its localizers and trackers go on without it.  NULL is allowed. */
+CAIRN_API int32_t cairn_log_close(cairn_log* log);
 
 /* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
  * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one

@@ -5,6 +5,7 @@
 
 #include "runtime/c_api/cairn.h"
 #include "runtime/c_api/calls.h"
+#include "runtime/c_api/logs.h"
 #include "runtime/c_api/structs.h"
 #include "runtime/c_api/tracker_options.h"
 #include "runtime/localize/localizer.h"
@@ -19,6 +20,7 @@ struct OpenTracker : OfOneThread {
   std::shared_ptr<const Map> map;
   SpaceTrackerOptions options;
   std::optional<RegionTracker> tracker;
+  std::shared_ptr<SharedLog> log;  // where it has one
 
   Status Begin(const SpaceTrackerOptions& given) {
     options = given;
@@ -97,8 +99,16 @@ int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image, co
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
-    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->Track(grey, chosen));
+    if (!used->log) {
+      CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->Track(grey, chosen));
+      Return(FixFrom(found), fix);
+      return Ok();
+    }
+    const Localizer localizer(used->map, used->options.localizer);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, chosen));
+    CAIRN_ASSIGN_OR_RETURN(const Localization found, used->tracker->TrackFeatures(query.features, chosen));
     Return(FixFrom(found), fix);
+    used->log->Offer(query, found);
     return Ok();
   });
 }
@@ -114,6 +124,14 @@ int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cair
     if (!expected) return Ok();
     Return(PriorFrom(*expected), prior);
     *is_expected = 1;
+    return Ok();
+  });
+}
+
+int32_t cairn_tracker_set_log(cairn_tracker* tracker, const cairn_log* log) {
+  return Call("cairn_tracker_set_log", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    CAIRN_ASSIGN_OR_RETURN(used->log, LogFor(log, *used->map));
     return Ok();
   });
 }

@@ -8,6 +8,7 @@
 #include <pybind11/stl.h>
 
 #include "runtime/localize/localizer.h"
+#include "runtime/localize/measurement.h"
 #include "runtime/map/update_map.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
@@ -54,7 +55,8 @@ PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::op
 
 class PyLocalizer {
  public:
-  PyLocalizer(const PyMap& map, const py::kwargs& given) : map_(map.map) {
+  PyLocalizer(const PyMap& map, const PyLog* log, const py::kwargs& given)
+      : map_(map.map), log_(LogFor(log, *map.map)) {
     LocalizerOptions options;
     SetFromPython(DescribeOptions(&options), given);
     localizer_ = std::make_unique<Localizer>(map_, options);
@@ -65,11 +67,17 @@ class PyLocalizer {
     const cv::Mat grey = PixelsOf(image);
     const py::gil_scoped_release release;
     const auto used = one_thread_.Use();
-    return ValueOrThrow(localizer_->Localize(grey, CameraFor(*map_, grey, camera), prior));
+    const Camera chosen = CameraFor(*map_, grey, camera);
+    if (!log_) return ValueOrThrow(localizer_->Localize(grey, chosen, prior));
+    const Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
+    Localization found = ValueOrThrow(localizer_->LocalizeQuery(query, prior));
+    log_->Offer(query, found);
+    return found;
   }
 
  private:
   std::shared_ptr<const Map> map_;
+  std::shared_ptr<SharedLog> log_;
   std::unique_ptr<Localizer> localizer_;
   OneThread one_thread_{"localizer", "thread"};
 };
@@ -204,9 +212,33 @@ void BindLocalizer(py::module_& module) {
                            center.z(), self.num_inliers);
       });
   py::class_<PyLocalizer>(module, "Localizer")
-      .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))
+      .def(py::init<const PyMap&, const PyLog*, const py::kwargs&>(), py::arg("map"), py::kw_only(),
+           py::arg("log") = py::none())
       .def("localize", &PyLocalizer::Localize, py::arg("image").noconvert(), py::arg("camera") = py::none(),
            py::arg("prior") = py::none());
+}
+
+PyLog OpenLog(const PyMap& map, const py::object& folder, double max_mb_per_day) {
+  const std::string path = PathOf(folder);
+  const py::gil_scoped_release release;
+  return {ValueOrThrow(SharedLog::Open(path, *map.map, {.max_mb_per_day = max_mb_per_day}))};
+}
+
+void BindLog(py::module_& module) {
+  py::class_<PyLog>(module, "Log")
+      .def(py::init(&OpenLog), py::arg("map"), py::arg("folder"), py::kw_only(),
+           py::arg("max_mb_per_day") = RobotLogOptions().max_mb_per_day)
+      .def_property_readonly("num_kept", [](const PyLog& self) { return self.log->num_kept(); })
+      .def_property_readonly("error",
+                             [](const PyLog& self) -> std::optional<std::string> {
+                               const Status error = self.log->error();
+                               if (error.ok()) return std::nullopt;
+                               return error.error().message;
+                             })
+      .def("close", [](const PyLog& self) {
+        const py::gil_scoped_release release;
+        self.log->Close();
+      });
 }
 
 }  // namespace
@@ -217,6 +249,7 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindErrors(module);
   cairn::BindMap(module);
   cairn::BindUpdates(module);
+  cairn::BindLog(module);
   cairn::BindLocalizer(module);
   cairn::BindTrackers(module);
 }

@@ -9,6 +9,7 @@
 
 #include "runtime/localize/localizer.h"
 #include "runtime/python/convert.h"
+#include "runtime/robot_log/shared_log.h"
 #include "runtime/visual_map/visual_tracker.h"
 
 // The objects that Python holds, in all parts of the module.
@@ -18,6 +19,17 @@ struct PyMap {
   std::shared_ptr<const Map> map;
   std::string path;
 };
+
+struct PyLog {
+  std::shared_ptr<SharedLog> log;
+};
+
+// The log that a localizer or tracker of `map` is given; null: none.  Throws cairn.Error.
+inline std::shared_ptr<SharedLog> LogFor(const PyLog* log, const Map& map) {
+  if (log == nullptr) return nullptr;
+  ThrowIfError(log->log->CheckIsOf(map));
+  return log->log;
+}
 
 // What is for one thread at a time, and says so when a second thread uses it.
 class OneThread {
@@ -57,6 +69,8 @@ struct ConstructedCaster : type_caster_base<T> {
 };
 template <>
 struct type_caster<cairn::PyMap> : ConstructedCaster<cairn::PyMap> {};
+template <>
+struct type_caster<cairn::PyLog> : ConstructedCaster<cairn::PyLog> {};
 template <>
 struct type_caster<cairn::Camera> : ConstructedCaster<cairn::Camera> {};
 template <>

@@ -21,17 +21,24 @@ namespace {
 
 class PyTracker {
  public:
-  PyTracker(const PyMap& map, const py::kwargs& given) : map_(map.map) {
+  PyTracker(const PyMap& map, const PyLog* log, const py::kwargs& given)
+      : map_(map.map), log_(LogFor(log, *map.map)) {
     SpaceTrackerOptions options;
     SetFromPython(DescribeOptions(&options), given);
     tracker_.emplace(map_, options.localizer, options.tracker);
+    localizer_.emplace(map_, options.localizer);
   }
 
   Localization Track(const py::array& image, const std::optional<Camera>& camera) {
     const cv::Mat grey = PixelsOf(image);
     const py::gil_scoped_release release;
     const auto used = one_thread_.Use();
-    return ValueOrThrow(tracker_->Track(grey, CameraFor(*map_, grey, camera)));
+    const Camera chosen = CameraFor(*map_, grey, camera);
+    if (!log_) return ValueOrThrow(tracker_->Track(grey, chosen));
+    const Query query = ValueOrThrow(localizer_->QueryFromImage(grey, chosen));
+    Localization found = ValueOrThrow(tracker_->TrackFeatures(query.features, chosen));
+    log_->Offer(query, found);
+    return found;
   }
 
   std::optional<PosePrior> Predict() {
@@ -41,6 +48,8 @@ class PyTracker {
 
  private:
   std::shared_ptr<const Map> map_;
+  std::shared_ptr<SharedLog> log_;
+  std::optional<Localizer> localizer_;  // for the features that are logged
   std::optional<RegionTracker> tracker_;
   OneThread one_thread_{"tracker", "camera"};
 };
@@ -128,7 +137,8 @@ void BindTrackers(py::module_& module) {
                            self.pose.num_agreeing);
       });
   py::class_<PyTracker>(module, "Tracker")
-      .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))
+      .def(py::init<const PyMap&, const PyLog*, const py::kwargs&>(), py::arg("map"), py::kw_only(),
+           py::arg("log") = py::none())
       .def("track", &PyTracker::Track, py::arg("image").noconvert(), py::arg("camera") = py::none())
       .def("predict", &PyTracker::Predict);
   py::class_<PyVisualTracker>(module, "VisualTracker")

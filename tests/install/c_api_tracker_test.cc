@@ -2,13 +2,16 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <numbers>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/capture/capture.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
@@ -277,6 +280,65 @@ TEST_F(CTrackers, ShorterFixesOfEarlierReleasesAreEnough) {
   EXPECT_TRUE(std::isnan(floor_fix.entropy));  // not written
   floor_fix.size = offsetof(cairn_floor_fix, mean_m) - 1;
   EXPECT_EQ(cairn_visual_tracker_track(visual_, &image, nullptr, &floor_fix), CAIRN_INVALID_ARGUMENT);
+}
+
+// A localizer and a tracker share a log: each place is kept once, whoever saw it.
+TEST_F(CTrackers, ShareALogWithALocalizer) {
+  const std::string folder = testing::TempDir() + "/c_api_log";
+  std::filesystem::remove_all(folder);
+  cairn_map* map = nullptr;
+  ASSERT_EQ(cairn_map_open((testing::TempDir() + "/c_api_drive.cairn").c_str(), nullptr, &map), CAIRN_OK);
+  cairn_log_options options = CAIRN_LOG_OPTIONS_INIT;
+  cairn_log* log = nullptr;
+  ASSERT_EQ(cairn_log_open(map, folder.c_str(), &options, &log), CAIRN_OK) << cairn_last_error();
+  cairn_log* second = nullptr;
+  EXPECT_EQ(cairn_log_open(map, folder.c_str(), nullptr, &second), CAIRN_BUSY);
+  cairn_localizer* localizer = nullptr;
+  cairn_tracker* tracker = nullptr;
+  ASSERT_EQ(cairn_localizer_create(map, &localizer), CAIRN_OK);
+  ASSERT_EQ(cairn_tracker_create(map, &tracker), CAIRN_OK);
+  ASSERT_EQ(cairn_localizer_set_log(localizer, log), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_tracker_set_log(tracker, log), CAIRN_OK) << cairn_last_error();
+  cairn_fix fix = CAIRN_FIX_INIT, plain = CAIRN_FIX_INIT;
+  int64_t num_kept = -1;
+  const auto see = [&](int frame, bool tracks) {
+    const cairn_image image = ImageOf(Drive().frames()[frame].picture);
+    EXPECT_EQ(tracks ? cairn_tracker_track(tracker, &image, nullptr, &fix)
+                     : cairn_localize(localizer, &image, nullptr, nullptr, &fix),
+              CAIRN_OK)
+        << cairn_last_error();
+    EXPECT_EQ(cairn_log_num_kept(log, &num_kept), CAIRN_OK);
+    return num_kept;
+  };
+  EXPECT_EQ(see(0, false), 1);
+  ASSERT_EQ(cairn_tracker_track(tracker_, nullptr, nullptr, &plain), CAIRN_INVALID_ARGUMENT);
+  plain = Track(0);
+  EXPECT_EQ(see(0, true), 1);
+  EXPECT_EQ(Eigen::Vector3d(fix.translation_m), Eigen::Vector3d(plain.translation_m));
+  EXPECT_EQ(see(PosterDrive::kCarried, true), 2);
+  EXPECT_EQ(see(PosterDrive::kCarried, false), 2);
+  const auto capture = ReadCapture(folder);
+  ASSERT_TRUE(capture.ok()) << capture.error().message;
+  EXPECT_EQ(capture->images.size(), 2u);
+  EXPECT_EQ(capture->images[1].name, "00000002.pgm");
+  EXPECT_LT(CenterErrorM(*capture->images[1].cam_from_world,
+                         Drive().frames()[PosterDrive::kCarried].cam_from_world),
+            0.05);
+  // Without it, or when it is closed, answers go on.
+  EXPECT_EQ(cairn_localizer_set_log(localizer, nullptr), CAIRN_OK);
+  EXPECT_EQ(cairn_log_close(log), CAIRN_OK);
+  EXPECT_EQ(cairn_log_close(log), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_log_num_kept(log, &num_kept), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_localizer_set_log(localizer, log), CAIRN_INVALID_ARGUMENT);
+  const cairn_image image = ImageOf(Drive().frames()[0].picture);
+  EXPECT_EQ(cairn_tracker_track(tracker, &image, nullptr, &fix), CAIRN_OK);
+  EXPECT_EQ(fix.has_fix, 1);
+  options.max_mb_per_day = -1;
+  EXPECT_EQ(cairn_log_open(map, (folder + "_2").c_str(), &options, &log), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_log_open(map, nullptr, nullptr, &log), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_localizer_destroy(localizer), CAIRN_OK);
+  EXPECT_EQ(cairn_tracker_destroy(tracker), CAIRN_OK);
+  EXPECT_EQ(cairn_map_close(map), CAIRN_OK);
 }
 
 }  // namespace

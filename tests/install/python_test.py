@@ -4,6 +4,7 @@ python_test.py POSTER PROGRAM: the folder of make_poster_map, the program `cairn
 """
 import json
 import pathlib
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,77 @@ class Poster(unittest.TestCase):
 
     def setUp(self):
         self.localizer = cairn.Localizer(self.map)
+
+
+class Logging(unittest.TestCase):
+    """Frames of the drive: 0 and 1 are 10 cm apart, 5 is elsewhere."""
+    NAMES = [POSTER / f"{i}.pgm" for i in (0, 1, 5)]
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.map = cairn.Map.open(POSTER / "drive.cairn")
+
+    def contents(self, name):
+        """All that a log holds, but for when."""
+        folder = self.folder / name
+        database = sqlite3.connect(folder / "features.db")
+        found = {table: database.execute(f"SELECT * FROM {table} ORDER BY 1").fetchall()
+                 for table in ("cameras", "images", "keypoints", "descriptors", "cairn_log_map")}
+        found["poses"] = database.execute(
+            "SELECT image_id, qw, qx, qy, qz, tx, ty, tz FROM cairn_log_frames ORDER BY 1").fetchall()
+        database.close()
+        for file in ("images.txt", "cameras.txt", "frame.json"):
+            found[file] = (folder / file).read_bytes()
+        return found
+
+    def program(self, name, *options):
+        subprocess.run([PROGRAM, "localize", POSTER / "drive.cairn", *options, "--log", self.folder / name,
+                        *self.NAMES], capture_output=True, check=True)
+        return self.contents(name)
+
+    def test_keeps_what_the_program_keeps(self):
+        log = cairn.Log(self.map, self.folder / "own")
+        localizer = cairn.Localizer(self.map, log=log)
+        plain = cairn.Localizer(self.map)
+        for name in self.NAMES:
+            image = read_pgm(name)
+            self.assertEqual(localizer.localize(image).center.tolist(), plain.localize(image).center.tolist())
+        self.assertEqual((log.num_kept, log.error), (2, None))
+        log.close()
+        self.assertEqual(self.contents("own"), self.program("program"))
+
+    def test_of_a_tracker_too(self):
+        log = cairn.Log(self.map, self.folder / "own")
+        tracker = cairn.Tracker(self.map, log=log)
+        for name in self.NAMES:
+            self.assertTrue(tracker.track(read_pgm(name)))
+        self.assertEqual(log.num_kept, 2)
+        log.close()
+        self.assertEqual(self.contents("own"), self.program("program", "--sequence"))
+
+    def test_one_writes_a_folder_and_it_is_of_one_map(self):
+        log = cairn.Log(self.map, self.folder / "own")
+        with self.assertRaises(cairn.Error) as busy:
+            cairn.Log(self.map, self.folder / "own")
+        self.assertEqual(busy.exception.name, "busy")
+        other = cairn.Map.open(POSTER / "poster.cairn")
+        with self.assertRaises(cairn.Error) as of_other:
+            cairn.Localizer(other, log=log)
+        self.assertEqual(of_other.exception.name, "invalid_argument")
+        log.close()
+        log.close()
+        with self.assertRaises(cairn.Error):
+            cairn.Log(other, self.folder / "own")
+        self.assertEqual(cairn.Log(self.map, self.folder / "own").num_kept, 0)
+        with self.assertRaises(cairn.Error):
+            cairn.Log(self.map, self.folder / "second", max_mb_per_day=0)
+        self.assertTrue(cairn.Localizer(self.map, log=log).localize(read_pgm(self.NAMES[0])))
+        for wrong in (lambda: cairn.Log.__new__(cairn.Log).close(), lambda: cairn.Localizer(self.map, log=3),
+                      lambda: cairn.Log(self.map, "")):
+            with self.assertRaises((TypeError, ValueError)):
+                wrong()
 
 
 class Localizing(Poster):

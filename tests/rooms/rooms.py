@@ -17,7 +17,7 @@ import sys
 ORDER = """
 core/base core/files core/options core/geometry core/picture core/features core/camera core/vocabulary core/colmap core/structure
 core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/line
-runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/c_api
+runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/robot_log runtime/c_api
 sim/render sim/survey sim/robot sim/worlds
 stages/simulate
 stages/extract_features
@@ -32,7 +32,7 @@ stages/decompose_views/plan stages/decompose_views
 stages/emit_map/choose stages/emit_map stages/emit_map/leave_out
 stages/check_map
 pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film
-pipeline/exchange/bags/files pipeline/exchange/bags pipeline/robot_log
+pipeline/exchange/bags/files pipeline/exchange/bags
 pipeline/commands pipeline
 """.split()
 # What robots' authors write, and Python's module: nobody includes them.

@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import socket
+import sqlite3
 import statistics
 import subprocess
 import sys
@@ -69,7 +70,8 @@ class Node(unittest.TestCase):
                 break
             time.sleep(0.2)
         rospy.init_node("player", anonymous=True, disable_signals=True)
-        cls.node = cls.start(f"_map:={MAP}", "_diagnostics_period_s:=0", "_map_frame:=kitchen", "_follow:=false")
+        cls.node = cls.start(f"_map:={MAP}", "_diagnostics_period_s:=0", "_map_frame:=kitchen", "_follow:=false",
+                             f"_log:={HOME.name}/log")
         cls.images = rospy.Publisher("image", Image, queue_size=1, tcp_nodelay=True)
         cls.poses, cls.diagnostics = {}, {}
         rospy.Subscriber("pose", PoseWithCovarianceStamped, lambda m: cls.poses.update({m.header.stamp.to_nsec(): (time.time(), m)}),
@@ -143,6 +145,18 @@ class Node(unittest.TestCase):
         self.assertLess(statistics.median(in_node_ms), 5)
         self.assertLess(added[0], 5)  # other work on the machine delays some: not the quickest quarter
         self.assertLess(growth_kib, 8192)
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's picture")
+    def test_logs_a_place_once(self):
+        for _ in range(2):
+            status, _ = self.ask(read_pgm(PICTURES[0]), "mono8")
+        self.assertEqual({pair.key: pair.value for pair in status.values}["logged"], "1")
+        database = sqlite3.connect(f"{HOME.name}/log/features.db")
+        self.assertEqual(database.execute("SELECT name FROM images").fetchall(), [("00000001.pgm",)])
+        database.close()
+        refused = self.start(f"_map:={MAP}", "__name:=second", f"_log:={HOME.name}/log")
+        self.assertIn("another process writes this log", refused.communicate(timeout=60)[0])
+        self.assertEqual(refused.returncode, 9)
 
     def test_colours_and_what_is_no_picture(self):
         grey = read_pgm(PICTURES[0])

@@ -173,11 +173,34 @@ class FloorFix:
     def num_agreeing(self) -> int: ...
 
 @final
+class Log:
+    """What a robot brings home for a later compile: the folder that `cairn localize --log` writes.
+
+    Localizers and trackers that are given it offer it each frame with a fix; one log may be that of several, in any
+    threads.  A log that can no longer be written keeps nothing more, and fixes are as ever: see `error`.
+    """
+
+    def __init__(self, map: Map, folder: str | PathLike[str], *, max_mb_per_day: float = 50.0) -> None:
+        """Makes the folder, or goes on with it; it grows by at most `max_mb_per_day` 10^6 bytes in any 24 hours.
+
+        Raises Error: busy (another log writes there), invalid_argument (something else is in the folder, or the log of
+        a map of another name or frame).
+        """
+    @property
+    def num_kept(self) -> int:
+        """Frames that were kept since it was opened."""
+    @property
+    def error(self) -> str | None:
+        """Why it can no longer be written."""
+    def close(self) -> None:
+        """Its localizers and trackers go on without it; another process may write to it."""
+
+@final
 class Localizer:
     """Finds where a camera is.  One per thread: use by two at once raises Error (busy)."""
 
-    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
-        """`options`: any that `cairn localize --help` lists under "Stage options", such as min_num_inliers=9."""
+    def __init__(self, map: Map, *, log: Log | None = None, **options: bool | int | float | str) -> None:
+        """`log`: of the same map; `options`: any that `cairn localize --help` lists under "Stage options", such as min_num_inliers=9."""
     def localize(
         self, image: NDArray[np.uint8], camera: Camera | None = None, prior: Prior | None = None
     ) -> Fix:
@@ -193,8 +216,8 @@ class Tracker:
     One per camera: use by two threads at once raises Error (busy).
     """
 
-    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
-        """`options`: any that `cairn localize --sequence` takes, such as step_sigma_m=0.3 or min_num_inliers=9."""
+    def __init__(self, map: Map, *, log: Log | None = None, **options: bool | int | float | str) -> None:
+        """`log`: of the same map; `options`: any that `cairn localize --sequence` takes, such as step_sigma_m=0.3 or min_num_inliers=9."""
     def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
         """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
     def predict(self) -> Prior | None:

@@ -1,4 +1,4 @@
-#include "pipeline/robot_log/log_budget.h"
+#include "runtime/robot_log/log_budget.h"
 
 #include <ctime>
 
@@ -6,7 +6,7 @@
 
 #include "core/files/file.h"
 
-namespace cairn::pipeline {
+namespace cairn {
 namespace {
 
 constexpr double kSecondsADay = 86400;
@@ -48,4 +48,4 @@ double LogBudget::Fill(double max_bytes_per_day) const {
   return std::clamp(bytes / MostBytes(max_bytes_per_day), 0.0, 1.0);
 }
 
-}  // namespace cairn::pipeline
+}  // namespace cairn

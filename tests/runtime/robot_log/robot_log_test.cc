@@ -1,4 +1,4 @@
-#include "pipeline/robot_log/robot_log.h"
+#include "runtime/robot_log/robot_log.h"
 
 #include <filesystem>
 
@@ -9,7 +9,7 @@
 #include "core/files/file.h"
 #include "tests/core/capture/features_database.h"
 
-namespace cairn::pipeline {
+namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
@@ -201,4 +201,4 @@ TEST_F(RobotLogTest, OnlyOneProcessWritesAndOnlyToALogOfThisMap) {
 }
 
 }  // namespace
-}  // namespace cairn::pipeline
+}  // namespace cairn

@@ -1,20 +1,25 @@
-#include "pipeline/robot_log/robot_log.h"
+#include "runtime/robot_log/robot_log.h"
 
 #include <fcntl.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <map>
+#include <utility>
+#include <vector>
 
-#include "core/capture/capture.h"
 #include "core/capture/capture_features.h"
+#include "core/capture/capture_frame.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_database.h"
+#include "core/files/database.h"
 #include "core/files/file.h"
-#include "core/promise/view_distance.h"
+#include "core/files/file_lock.h"
 
-namespace cairn::pipeline {
+namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
@@ -88,22 +93,70 @@ Result<FileLock> LockFolder(const std::string& folder) {
 
 }  // namespace
 
+class RobotLog::Writer {
+ public:
+  Writer(std::string folder, const RobotLogOptions& options, FileLock lock)
+      : folder_(std::move(folder)), options_(options), lock_(std::move(lock)) {}
+  Status Load(const MapHead& map, const MachineClocks& now);
+  Result<bool> Offer(const LoggedFrame& frame, const MachineClocks& now);
+  double MaxBytesPerDay() const { return 1e6 * options_.max_mb_per_day; }
+  int num_kept() const { return num_kept_; }
+
+ private:
+  struct Kept {
+    Pose cam_from_world;
+    double lived_s = 0;
+  };
+
+  bool IsElsewhere(const Pose& cam_from_world) const;
+  Status Keep(const LoggedFrame& frame, const std::string& name, double num_bytes);
+  CameraId CameraIdOf(const Camera& camera);
+  void SaveBudget();
+  Status WriteLists() const;
+
+  std::string folder_;
+  RobotLogOptions options_;
+  FileLock lock_;
+  std::unique_ptr<SQLite::Database> database_;
+  LogBudget budget_;
+  std::vector<Kept> recent_;  // of the last 24 hours
+  std::map<CameraId, Camera> cameras_;
+  std::string images_text_;  // of images.txt
+  ImageId last_id_ = 0;
+  int num_kept_ = 0;
+};
+
+RobotLog::RobotLog(std::unique_ptr<Writer> writer) : writer_(std::move(writer)) {}
+RobotLog::RobotLog(RobotLog&& other) noexcept = default;
+RobotLog& RobotLog::operator=(RobotLog&& other) noexcept = default;
+RobotLog::~RobotLog() = default;
+
+int RobotLog::num_kept() const { return writer_->num_kept(); }
+
+Result<bool> RobotLog::Offer(const LoggedFrame& frame, const MachineClocks& now) {
+  return writer_->Offer(frame, now);
+}
+
 Result<RobotLog> RobotLog::Open(const std::string& folder, const MapHead& map, const RobotLogOptions& options,
                                 const MachineClocks& now) {
+  if (!(options.max_mb_per_day > 0) || !std::isfinite(options.max_mb_per_day)) {
+    return MakeError(ErrorCode::kInvalidArgument, "max_mb_per_day is {:g}; must be greater than 0",
+                     options.max_mb_per_day);
+  }
   const std::string path = folder + "/" + kFeaturesFile;
   CAIRN_RETURN_IF_ERROR(CheckIsOurs(folder, path));
   CAIRN_ASSIGN_OR_RETURN(FileLock lock, LockFolder(folder));
-  RobotLog log(folder, options, std::move(lock));
+  auto writer = std::make_unique<Writer>(folder, options, std::move(lock));
   std::error_code error;
   if (!fs::exists(path, error)) {
-    CAIRN_RETURN_IF_ERROR(WriteEmptyLog(path, map, LogBudget::Begin(log.MaxBytesPerDay(), now)));
+    CAIRN_RETURN_IF_ERROR(WriteEmptyLog(path, map, LogBudget::Begin(writer->MaxBytesPerDay(), now)));
   }
   CAIRN_RETURN_IF_ERROR(CheckSqliteFile(path));
-  CAIRN_RETURN_IF_ERROR(WithDatabaseErrors(path, [&] { return log.Load(map, now); }));
-  return log;
+  CAIRN_RETURN_IF_ERROR(WithDatabaseErrors(path, [&] { return writer->Load(map, now); }));
+  return RobotLog(std::move(writer));
 }
 
-Status RobotLog::Load(const MapHead& map, const MachineClocks& now) {
+Status RobotLog::Writer::Load(const MapHead& map, const MachineClocks& now) {
   const std::string path = folder_ + "/" + kFeaturesFile;
   database_ = std::make_unique<SQLite::Database>(path, SQLite::OPEN_READWRITE);
   SQLite::Database& database = *database_;
@@ -147,15 +200,16 @@ Status RobotLog::Load(const MapHead& map, const MachineClocks& now) {
   return images_text_.empty() ? Ok() : WriteLists();
 }
 
-bool RobotLog::IsElsewhere(const Pose& cam_from_world) const {
+bool RobotLog::Writer::IsElsewhere(const Pose& cam_from_world) const {
   const double fill = std::max(budget_.Fill(MaxBytesPerDay()), 1 / kMaxRadiusRatio);
   return std::none_of(recent_.begin(), recent_.end(), [&](const Kept& kept) {
     return kept.lived_s > budget_.lived_s - kRecentS &&
-           ViewDistanceSquared(cam_from_world, kept.cam_from_world, kRadiusM / fill, kRadiusDeg / fill) < 1;
+           std::hypot(CenterErrorM(cam_from_world, kept.cam_from_world) / kRadiusM,
+                      RotationErrorDeg(cam_from_world, kept.cam_from_world) / kRadiusDeg) < 1 / fill;
   });
 }
 
-Result<bool> RobotLog::Offer(const LoggedFrame& frame, const MachineClocks& now) {
+Result<bool> RobotLog::Writer::Offer(const LoggedFrame& frame, const MachineClocks& now) {
   budget_.Advance(MaxBytesPerDay(), now);
   if (frame.features->keypoints.empty() || !IsElsewhere(frame.cam_from_world)) return false;
   std::error_code error;
@@ -178,7 +232,7 @@ Result<bool> RobotLog::Offer(const LoggedFrame& frame, const MachineClocks& now)
 
 // The image first, then all that refers to it at once, then the lists, which the next process writes where
 // this one does not come to it.
-Status RobotLog::Keep(const LoggedFrame& frame, const std::string& name, double num_bytes) {
+Status RobotLog::Writer::Keep(const LoggedFrame& frame, const std::string& name, double num_bytes) {
   if (options_.keep_images) {
     std::error_code error;
     fs::create_directories(folder_ + "/images", error);
@@ -218,7 +272,7 @@ Status RobotLog::Keep(const LoggedFrame& frame, const std::string& name, double 
   return Ok();
 }
 
-CameraId RobotLog::CameraIdOf(const Camera& camera) {
+CameraId RobotLog::Writer::CameraIdOf(const Camera& camera) {
   for (const auto& [camera_id, known] : cameras_) {
     if (known.model == camera.model && known.width == camera.width && known.height == camera.height &&
         known.params == camera.params)
@@ -230,7 +284,7 @@ CameraId RobotLog::CameraIdOf(const Camera& camera) {
   return added.camera_id;
 }
 
-void RobotLog::SaveBudget() {
+void RobotLog::Writer::SaveBudget() {
   SQLite::Statement row(*database_,
                         "UPDATE cairn_log_budget SET bytes = ?, lived_s = ?, latest_wall_s = ?, boot_s = ?, "
                         "boot_id = ?");
@@ -242,9 +296,9 @@ void RobotLog::SaveBudget() {
   row.exec();
 }
 
-Status RobotLog::WriteLists() const {
+Status RobotLog::Writer::WriteLists() const {
   CAIRN_RETURN_IF_ERROR(WriteCamerasText(folder_ + "/cameras.txt", cameras_));
   return WriteFileAtomically(folder_ + "/images.txt", images_text_);
 }
 
-}  // namespace cairn::pipeline
+}  // namespace cairn

@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace cairn::pipeline {
+namespace cairn {
 
 // What a machine's clocks say.
 struct MachineClocks {
@@ -32,4 +32,4 @@ struct LogBudget {
   double Fill(double max_bytes_per_day) const;
 };
 
-}  // namespace cairn::pipeline
+}  // namespace cairn

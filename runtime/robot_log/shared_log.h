@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/base/error.h"
+#include "runtime/localize/localization.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
+#include "runtime/robot_log/robot_log.h"
+
+namespace cairn {
+
+// A log of a map's frames for several localizers and trackers, in any threads.  A log that can no longer be
+// written keeps nothing more, and keeps no robot from knowing where it is: the answers go on, and error()
+// says why.  Frames have no file: they are called as if they came from .pgm files.
+class SharedLog {
+ public:
+  // As RobotLog::Open, by the machine's clocks.  Errors: also InvalidArgument (images are to be kept, which
+  // pixels are not).
+  static Result<std::shared_ptr<SharedLog>> Open(const std::string& folder, const Map& map,
+                                                 const RobotLogOptions& options = {});
+  ~SharedLog();
+  SharedLog(const SharedLog&) = delete;
+  SharedLog& operator=(const SharedLog&) = delete;
+
+  // Errors: InvalidArgument (of a map of another name or frame).
+  Status CheckIsOf(const Map& map) const;
+
+  // A frame that was localized; without a fix, or after Close, nothing happens.
+  void Offer(const Query& query, const Localization& found);
+
+  // What keeps it from being written.
+  Status error() const;
+  int num_kept() const;
+  // Another process may write to it.
+  void Close();
+
+ private:
+  struct State;
+  explicit SharedLog(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace cairn
