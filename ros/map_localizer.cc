@@ -107,8 +107,7 @@ std::unique_ptr<MapLocalizer> MapLocalizer::Open(const Parameters& parameters, i
   if (!map.ok()) return fail(map.error());
   auto state = std::make_unique<State>(parameters, *map, *mounting);
   if (!parameters.log.empty()) {
-    const auto log =
-        SharedLog::Open(parameters.log, **map, {.max_mb_per_day = parameters.log_max_mb_per_day});
+    const auto log = SharedLog::Open(parameters.log, **map, parameters.log_max_mb_per_day);
     if (!log.ok()) return fail(log.error());
     state->log = *log;
   }

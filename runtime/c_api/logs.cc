@@ -37,7 +37,7 @@ int32_t cairn_log_open(const cairn_map* map, const char* folder, const cairn_log
       std::memcpy(&asked, options, std::min(options->size, sizeof(asked)));
     }
     auto open = std::make_shared<OpenLog>();
-    CAIRN_ASSIGN_OR_RETURN(open->log, SharedLog::Open(folder, *of, {.max_mb_per_day = asked.max_mb_per_day}));
+    CAIRN_ASSIGN_OR_RETURN(open->log, SharedLog::Open(folder, *of, asked.max_mb_per_day));
     *log = OpenLogs().Add(std::move(open));
     return Ok();
   });

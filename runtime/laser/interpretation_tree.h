@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 
 #include "core/base/error.h"
-#include "core/base/progress.h"
 #include "core/geometry/planar_pose.h"
 #include "core/options/options.h"
 #include "runtime/laser/view_search_index.h"

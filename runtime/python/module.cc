@@ -221,13 +221,13 @@ void BindLocalizer(py::module_& module) {
 PyLog OpenLog(const PyMap& map, const py::object& folder, double max_mb_per_day) {
   const std::string path = PathOf(folder);
   const py::gil_scoped_release release;
-  return {ValueOrThrow(SharedLog::Open(path, *map.map, {.max_mb_per_day = max_mb_per_day}))};
+  return {ValueOrThrow(SharedLog::Open(path, *map.map, max_mb_per_day))};
 }
 
 void BindLog(py::module_& module) {
   py::class_<PyLog>(module, "Log")
       .def(py::init(&OpenLog), py::arg("map"), py::arg("folder"), py::kw_only(),
-           py::arg("max_mb_per_day") = RobotLogOptions().max_mb_per_day)
+           py::arg("max_mb_per_day") = SharedLog::kMaxMbPerDay)
       .def_property_readonly("num_kept", [](const PyLog& self) { return self.log->num_kept(); })
       .def_property_readonly("error",
                              [](const PyLog& self) -> std::optional<std::string> {

@@ -6,8 +6,11 @@
 
 #include "core/base/no_throw.h"
 #include "core/capture/capture_frame.h"
+#include "runtime/robot_log/robot_log.h"
 
 namespace cairn {
+
+static_assert(SharedLog::kMaxMbPerDay == RobotLogOptions().max_mb_per_day);
 
 struct SharedLog::State {
   std::string map_name;
@@ -22,13 +25,9 @@ SharedLog::SharedLog(std::unique_ptr<State> state) : state_(std::move(state)) {}
 SharedLog::~SharedLog() = default;
 
 Result<std::shared_ptr<SharedLog>> SharedLog::Open(const std::string& folder, const Map& map,
-                                                   const RobotLogOptions& options) {
+                                                   double max_mb_per_day) {
   return WithoutExceptions("open a log", [&]() -> Result<std::shared_ptr<SharedLog>> {
-    if (options.keep_images) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "keep_images: pixels have no file that could be kept; `cairn localize --log-images` "
-                       "keeps those of files");
-    }
+    const RobotLogOptions options{.max_mb_per_day = max_mb_per_day};
     CAIRN_ASSIGN_OR_RETURN(RobotLog log, RobotLog::Open(folder, map.head(), options, ReadMachineClocks()));
     auto state = std::make_unique<State>();
     state->map_name = map.head().name;

@@ -7,7 +7,6 @@
 #include "runtime/localize/localization.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/map.h"
-#include "runtime/robot_log/robot_log.h"
 
 namespace cairn {
 
@@ -16,10 +15,11 @@ namespace cairn {
 // says why.  Frames have no file: they are called as if they came from .pgm files.
 class SharedLog {
  public:
-  // As RobotLog::Open, by the machine's clocks.  Errors: also InvalidArgument (images are to be kept, which
-  // pixels are not).
+  // As RobotLog::Open (runtime/robot_log/robot_log.h), by the machine's clocks; at most 10^6 times so many
+  // bytes in any 24 hours.  No images are kept.
+  static constexpr double kMaxMbPerDay = 50;
   static Result<std::shared_ptr<SharedLog>> Open(const std::string& folder, const Map& map,
-                                                 const RobotLogOptions& options = {});
+                                                 double max_mb_per_day = kMaxMbPerDay);
   ~SharedLog();
   SharedLog(const SharedLog&) = delete;
   SharedLog& operator=(const SharedLog&) = delete;
