@@ -47,6 +47,12 @@ std::vector<Kind> SetKinds(const LinkAppearanceOptions& base, const CheckAppeara
     LinkAppearanceOptions exact = base;
     exact.algorithm = "greedy";
     kinds.push_back({fmt::format("exactly {}", base.num_kept), exact});
+  } else if (base.num_dominators > 1 || base.strong_num_inliers > 1) {
+    LinkAppearanceOptions asked = greedy;
+    asked.num_tries = base.num_tries;
+    asked.num_dominators = base.num_dominators;
+    asked.strong_num_inliers = base.strong_num_inliers;
+    kinds.push_back({"as asked", asked});
   }
   return kinds;
 }
@@ -146,6 +152,10 @@ void Summarize(const std::vector<LeftOutImage>& left_out, const std::vector<Outc
     }
     figure.num_by_random = expected_of_random(figure.num_kept);
     check->sets.push_back(figure);
+    std::vector<std::string>& missed = check->missed.emplace_back();
+    for (size_t i = 0; i < outcomes.size(); ++i) {
+      if (outcomes[i].by_set[kind] == 0 && !left_out[i].linked.empty()) missed.push_back(left_out[i].name);
+    }
   }
   for (size_t kind = 0; kind < check->curve_names.size(); ++kind) {
     std::vector<AppearanceFigure>& curve = check->curves.emplace_back();
@@ -262,8 +272,10 @@ Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::st
     return MakeError(ErrorCode::kNotFound,
                      "held-out image {} is not in the database of matches; match it with the survey's", name);
   }
-  HeldOutSplit split{.survey = SubsetOf(images, is_survey)};
+  HeldOutSplit split{.survey = SubsetOf(images, is_survey), .names = {}, .linked = {}};
   split.linked.resize(held_out_of_name.size());
+  split.names.resize(held_out_of_name.size());
+  for (const auto& [name, index] : held_out_of_name) split.names[index] = name;
   for (const AppearanceLink& link : images.links) {
     if (is_survey[link.node1] == is_survey[link.node2]) continue;
     const auto [inside, outside] =

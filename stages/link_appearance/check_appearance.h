@@ -27,6 +27,7 @@ OptionTable DescribeOptions(CheckAppearanceOptions* options);
 struct LeftOutImage {
   std::vector<NodeIdx> linked;  // ascending
   NodeIdx node = -1;            // the node of the graph that is this image, -1: none
+  std::string name;             // for people
 };
 
 // The results of a set, or of sets of one size or kind.
@@ -40,8 +41,10 @@ struct AppearanceCheck {
   int num_left_out = 0;
   int num_linked = 0;  // of these, with any link: no set can locate more
   std::vector<std::string>
-      set_names;  // of sets that meet their demands: "greedy", "improved", "weighted", ...
+      set_names;  // of sets that meet their demands: "greedy", "improved", "weighted", ..., "as asked"
   std::vector<AppearanceFigure> sets;
+  // Per set: the names of the left-out images that have links and are not localized, in their order.
+  std::vector<std::vector<std::string>> missed;
   std::vector<int> sizes;                             // the curve's
   std::vector<std::string> curve_names;               // "greedy", "weighted", "2-fold"
   std::vector<std::vector<AppearanceFigure>> curves;  // per name and size
@@ -52,10 +55,11 @@ struct AppearanceCheck {
 std::vector<LeftOutImage> EachNodeLeftOut(const AppearanceGraph& graph);
 
 // Sets by `link_options` (its num_tries for the improved ones), by links that count by inliers, and of m-fold
-// domination; and greedy sets of the curve's sizes.  The probability that a random set of k of n nodes
-// locates an image with d neighbours is computed, without sampling: 1 - C(n - d, k) / C(n, k).  Same figures
-// for any number of threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options), NoData (nothing,
-// or all, is left out), Cancelled.
+// domination; last, the set that the options ask for, of so many dominators by so weighted links; and greedy
+// sets of the curve's sizes.  The probability that a random set of k of n nodes locates an image with d
+// neighbours is computed, without sampling: 1 - C(n - d, k) / C(n, k).  Same figures for any number of
+// threads.  O(left-out nodes * sets).  Errors: InvalidArgument (options), NoData (nothing, or all, is left
+// out), Cancelled.
 Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
                                         const std::vector<LeftOutImage>& left_out,
                                         const LinkAppearanceOptions& link_options,
@@ -67,6 +71,7 @@ Result<AppearanceCheck> CheckAppearance(const AppearanceGraph& graph,
 // held-out image.  Errors: NotFound (a name that the survey does not have).
 struct HeldOutSplit {
   ImageLinks survey;
+  std::vector<std::string> names;        // of the held-out images
   std::vector<std::vector<int>> linked;  // per held-out image: indices of survey images, ascending
 };
 Result<HeldOutSplit> HoldOut(const ImageLinks& images, const std::vector<std::string>& names);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <optional>
 #include <set>
 
@@ -37,7 +38,6 @@ OptionTable LinkOptionsRead(LinkAppearanceOptions* options) {
                                               "num_tries"};
   OptionTable table = DescribeOptions(options);
   std::erase_if(table, [](const Option& option) { return !kRead.contains(option.name); });
-  AddCondition({"num_kept", {"not 0"}}, {"num_dominators", "strong_num_inliers"}, &table);
   return table;
 }
 
@@ -85,6 +85,23 @@ std::string Table(const AppearanceCheck& check) {
   return text;
 }
 
+// Which images the set that is asked for loses, or, where none is, the improved one.
+std::string MissedText(const AppearanceCheck& check) {
+  constexpr size_t kMaxNumNames = 20;
+  auto set_name = std::find(check.set_names.begin(), check.set_names.end(), "as asked");
+  if (set_name == check.set_names.end())
+    set_name = std::find(check.set_names.begin(), check.set_names.end(), "improved");
+  if (set_name == check.set_names.end()) return "";
+  const auto set = static_cast<size_t>(set_name - check.set_names.begin());
+  if (check.missed[set].empty()) return "";
+  const std::vector<std::string>& missed = check.missed[set];
+  std::string text =
+      fmt::format("linked, and not located by the set '{}': {}", check.set_names[set],
+                  fmt::join(missed.begin(), missed.begin() + std::min(missed.size(), kMaxNumNames), ", "));
+  if (missed.size() > kMaxNumNames) text += fmt::format(", {} more", missed.size() - kMaxNumNames);
+  return text + "\n";
+}
+
 Status RunCheck(const CheckArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   const LinkAppearanceOptions& options = arguments.options;
@@ -117,18 +134,21 @@ Status RunCheck(const CheckArguments& arguments, const CommandEnvironment& envir
   std::vector<LeftOutImage> left_out;
   if (arguments.held_out.empty()) {
     left_out = EachNodeLeftOut(graph);
+    for (size_t i = node_of_image.size(); i-- > 0;)
+      left_out[node_of_image[i]].name = CapturedName(split.survey.images[i].name);
   } else {
     for (const std::vector<int>& linked : split.linked) {
       LeftOutImage& image = left_out.emplace_back();
       for (const int index : linked) image.linked.push_back(node_of_image[index]);
       std::sort(image.linked.begin(), image.linked.end());
       image.linked.erase(std::unique(image.linked.begin(), image.linked.end()), image.linked.end());
+      image.name = split.names[left_out.size() - 1];
     }
   }
   CAIRN_ASSIGN_OR_RETURN(const AppearanceCheck check,
                          CheckAppearance(graph, left_out, options, arguments.check_options, environment.seed,
                                          environment.num_threads, *environment.progress));
-  *environment.out << Table(check);
+  *environment.out << Table(check) << MissedText(check);
   return Ok();
 }
 

@@ -233,15 +233,41 @@ TEST(CheckAppearance, CountsLeaveOneOutOnAHandSizedGraph) {
   //    without 2: 0-1 | 3-4 keeps 0 3, 2 sees 3: located.
   const AppearanceGraph graph = PathGraph(5);
   NoProgress progress;
+  std::vector<LeftOutImage> left_out = EachNodeLeftOut(graph);
+  for (size_t i = 0; i < left_out.size(); ++i) left_out[i].name = fmt::format("{}.jpg", i);
   const Result<AppearanceCheck> check =
-      CheckAppearance(graph, EachNodeLeftOut(graph), {.num_tries = 0}, {}, 0, 1, progress);
+      CheckAppearance(graph, left_out, {.num_tries = 0}, {}, 0, 1, progress);
   ASSERT_TRUE(check.ok());
   EXPECT_EQ(check->num_left_out, 5);
+  EXPECT_THAT(check->missed[0], ElementsAre("0.jpg", "4.jpg"));
+  EXPECT_EQ(check->missed.size(), check->sets.size());
   EXPECT_EQ(check->set_names[0], "greedy");
   EXPECT_EQ(check->sets[0].num_localized, 3);
   EXPECT_DOUBLE_EQ(check->sets[0].num_kept, 2);
   // Ends have one neighbour of four, the others two: 2 random ones of four hold it by 1/2, one of two by 5/6.
   EXPECT_NEAR(check->sets[0].num_by_random, 2 * 0.5 + 3 * 5.0 / 6, 1e-9);
+}
+
+// Of so many dominators, by links that count by their inliers.
+TEST(CheckAppearance, ChecksTheSetThatIsAskedFor) {
+  const AppearanceGraph graph = GeometricGraph(40, 7, 5);
+  NoProgress progress;
+  const auto check = [&](int num_dominators, int strong_num_inliers) {
+    LinkAppearanceOptions options{.num_tries = 0};
+    options.num_dominators = num_dominators;
+    options.strong_num_inliers = strong_num_inliers;
+    return *CheckAppearance(graph, EachNodeLeftOut(graph), options, {.max_num_dominators = 3}, 0, 1,
+                            progress);
+  };
+  const auto of_set = [](const AppearanceCheck& of, const std::string& name) {
+    const auto found = std::find(of.set_names.begin(), of.set_names.end(), name);
+    EXPECT_NE(found, of.set_names.end()) << name;
+    return of.sets[found - of.set_names.begin()];
+  };
+  const AppearanceCheck plain = check(1, 1), threefold = check(3, 1), both = check(3, 100);
+  EXPECT_EQ(std::count(plain.set_names.begin(), plain.set_names.end(), "as asked"), 0);
+  EXPECT_EQ(of_set(threefold, "as asked").num_kept, of_set(threefold, "3-fold, improved").num_kept);
+  EXPECT_GT(of_set(both, "as asked").num_kept, of_set(both, "3-fold, improved").num_kept);
 }
 
 TEST(CheckAppearance, IsTheSameForAnyNumberOfThreads) {
@@ -264,6 +290,7 @@ TEST(CheckAppearance, HeldOutImagesLeaveTheGraphAndKeepTheirLinks) {
   EXPECT_EQ(split->survey.images.size(), 4u);
   EXPECT_THAT(split->survey.links, ElementsAre(AppearanceLink{0, 1, 30}, AppearanceLink{2, 3, 30}));
   EXPECT_THAT(split->linked, ElementsAre(ElementsAre(1, 2)));
+  EXPECT_THAT(split->names, ElementsAre("image2.jpg"));
   EXPECT_EQ(HoldOut(images, {"nobody.jpg"}).error().code, ErrorCode::kNotFound);
 }
 

@@ -56,7 +56,8 @@ const layers = [
    legend: says(['dot', blue, 'new landmarks'], ['ring', blue, 'coverage gained'], ['dot', orange, 'landmarks gone'], ['ring', orange, 'coverage lost'])},
   {name: 'changed places', group: 'the map', draw: drawChangedPlaces, on: true, exists: changedPlaces.length > 0,
    legend: says(...[[true, orange, 'places that changed: more gone than new'], [false, blue, 'places that changed: as many new as gone, or more']]
-     .filter(([loss]) => changedPlaces.some(change => isLoss(change) === loss)).map(([, colour, text]) => ['ring', colour, text]))},
+     .filter(([loss]) => changedPlaces.some(change => isLoss(change) === loss)).map(([, colour, text]) => ['ring', colour, text]),
+   ...(changedPlaces.some((change, i) => change.to >= 0 && change.to !== i) ? [['arrow', orange, 'what was there is here now']] : []))},
   {name: 'drive', group: 'images', draw: drawDrive, on: true, exists: Boolean(data.drive), legend: says(['wedge', pink, 'the robot and its way'])},
   {name: 'numbers', group: 'the map', draw: drawNumbers, on: true, exists: numStations > 0,
    legend: () => element('div', {}, R.length ? 'R0: region 0; stations have their numbers when zoomed in' : 'stations have their numbers when zoomed in')},

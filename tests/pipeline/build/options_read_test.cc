@@ -145,8 +145,6 @@ TEST(OptionsRead, CheckAppearanceHasOnlyTheOptionsThatItReads) {
     ExpectRefused(
         {{"stage", "check-appearance", "m.db", option, "1"}, fmt::format("no option '{}'", option)});
   }
-  ExpectRefused({{"stage", "check-appearance", "m.db", "--num-dominators", "2"},
-                 "where num_kept is not 0, and it is 0"});
 }
 
 TEST(OptionsRead, ConditionsNameOptionsOfTheirTableAndValuesThatTheyCanHave) {
