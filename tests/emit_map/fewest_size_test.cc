@@ -44,6 +44,23 @@ TEST(FewestThatDo, AnImageLostByChanceWithMoreLandmarksCountsInPart) {
   EXPECT_EQ(FewestThatDo(trials, {9.6, 0.2}), 800u);
 }
 
+// Of four images the first is lost with few, the second by chance, the third always, the fourth never.
+TEST(WithoutChance, ImagesThatFewerLocalizeAndMoreDoNotCountAsLocalized) {
+  const std::vector<TriedSize> tried = {{{100, 1, 0.3}, {0, 0, 0, 1}},
+                                        {{200, 2, 0.2}, {0, 1, 0, 1}},
+                                        {{400, 2, 0.1}, {1, 0, 0, 1}},
+                                        {{800, 3, 0}, {1, 1, 0, 1}}};
+  const std::vector<SizeTrial> trials = WithoutChance(tried);
+  ASSERT_EQ(trials.size(), 4U);
+  EXPECT_EQ(trials[0].num_right, 2);
+  EXPECT_EQ(trials[1].num_right, 2);
+  EXPECT_EQ(trials[2].num_right, 3);
+  EXPECT_EQ(trials[3].num_right, 3);
+  EXPECT_EQ(trials[1].num_landmarks, 200U);
+  EXPECT_EQ(trials[1].log_error_ratio, 0.2);
+  EXPECT_TRUE(WithoutChance({}).empty());
+}
+
 TEST(FewestThatDo, NothingWhereNoSizeWillDo) {
   EXPECT_FALSE(FewestThatDo({{100, 10, 0.5}, {200, 10, 0.3}}, {10, 0.2}).has_value());
   EXPECT_FALSE(FewestThatDo({{100, 9, 0}}, {10, 0.2}).has_value());

@@ -26,6 +26,22 @@ std::vector<double> IsotonicRegression(const std::vector<double>& values) {
   return fitted;
 }
 
+std::vector<SizeTrial> WithoutChance(const std::vector<TriedSize>& tried) {
+  std::vector<SizeTrial> trials;
+  for (const TriedSize& size : tried) trials.push_back(size.trial);
+  const size_t num_images = tried.empty() ? 0 : tried.front().is_right.size();
+  for (size_t image = 0; image < num_images; ++image) {
+    bool was_right = false, is_by_chance = false;
+    for (const TriedSize& size : tried) {
+      is_by_chance = is_by_chance || (was_right && size.is_right[image] == 0);
+      was_right = was_right || size.is_right[image] != 0;
+    }
+    if (!is_by_chance) continue;
+    for (size_t n = 0; n < tried.size(); ++n) trials[n].num_right += tried[n].is_right[image] == 0 ? 1 : 0;
+  }
+  return trials;
+}
+
 std::optional<size_t> FewestThatDo(std::vector<SizeTrial> trials, const SizeTerms& terms) {
   std::sort(trials.begin(), trials.end(),
             [](const SizeTrial& a, const SizeTrial& b) { return a.num_landmarks < b.num_landmarks; });

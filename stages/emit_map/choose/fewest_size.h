@@ -13,6 +13,18 @@ struct SizeTrial {
   double log_error_ratio = 0;  // logarithm of ErrorRatio (leave_out_images.h)
 };
 
+// A size, and which of the left-out images it localizes.
+struct TriedSize {
+  SizeTrial trial;
+  std::vector<char> is_right;  // per image
+};
+
+// The trials with what chance decides taken out: an image that some number of landmarks localizes and a
+// larger one does not is not lost for want of landmarks, so it counts as localized by all of them.  Of a
+// hundred images one or two are like that (their view shows what other places show as well), and one may be
+// lost. `tried`: ascending by size, the same images in each.
+std::vector<SizeTrial> WithoutChance(const std::vector<TriedSize>& tried);
+
 struct SizeTerms {
   double min_num_right = 0;
   double max_log_error_ratio = 0;

@@ -154,29 +154,44 @@ std::vector<size_t> Ladder(size_t num_classes) {
 }
 
 // The fewest landmarks that will do, of what is found by bisection and beside it; nothing where not even the
-// last size will do.
+// last size will do.  What chance decides is known when more sizes have been tried: then the bisection is
+// made anew, of what is known and what it still asks for.
 Result<std::optional<size_t>> FewestOf(const std::vector<size_t>& sizes, const SizeTerms& terms,
-                                       const std::function<Result<SizeTrial>(size_t)>& try_size) {
-  std::map<size_t, SizeTrial> tried;  // by index of sizes
-  size_t too_few = 0, enough = sizes.size();
-  while (too_few < enough) {
-    const size_t middle = (too_few + enough) / 2;
-    CAIRN_ASSIGN_OR_RETURN(tried[middle], try_size(sizes[middle]));
-    if (FewestThatDo({tried[middle]}, terms)) {
-      enough = middle;
-    } else {
-      too_few = middle + 1;
+                                       const std::function<Result<TriedSize>(size_t)>& try_size) {
+  std::map<size_t, TriedSize> tried;  // by index of sizes
+  const auto try_once = [&](size_t i) -> Status {
+    if (!tried.contains(i)) {
+      CAIRN_ASSIGN_OR_RETURN(tried[i], try_size(sizes[i]));
     }
-  }
-  if (enough == sizes.size()) return std::optional<size_t>();
-  const size_t last = std::min(sizes.size() - 1, enough + kNumBeside);
-  for (size_t i = enough - std::min(enough, kNumBeside); i <= last; ++i) {
-    if (tried.contains(i)) continue;
-    CAIRN_ASSIGN_OR_RETURN(tried[i], try_size(sizes[i]));
-  }
-  std::vector<SizeTrial> trials;
-  for (const auto& [i, trial] : tried) trials.push_back(trial);
-  return FewestThatDo(std::move(trials), terms);
+    return Ok();
+  };
+  const auto trials = [&] {
+    std::vector<TriedSize> ascending;
+    for (const auto& [i, size] : tried) ascending.push_back(size);
+    return WithoutChance(ascending);
+  };
+  const auto does = [&](size_t i) {
+    const auto position = static_cast<size_t>(std::distance(tried.begin(), tried.find(i)));
+    return FewestThatDo({trials()[position]}, terms).has_value();
+  };
+  size_t num_tried = 0;
+  do {
+    num_tried = tried.size();
+    size_t too_few = 0, enough = sizes.size();
+    while (too_few < enough) {
+      const size_t middle = (too_few + enough) / 2;
+      CAIRN_RETURN_IF_ERROR(try_once(middle));
+      if (does(middle)) {
+        enough = middle;
+      } else {
+        too_few = middle + 1;
+      }
+    }
+    if (enough == sizes.size()) return std::optional<size_t>();
+    const size_t last = std::min(sizes.size() - 1, enough + kNumBeside);
+    for (size_t i = enough - std::min(enough, kNumBeside); i <= last; ++i) CAIRN_RETURN_IF_ERROR(try_once(i));
+  } while (tried.size() > num_tried);
+  return FewestThatDo(trials(), terms);
 }
 
 }  // namespace
@@ -266,7 +281,7 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   const std::vector<size_t> sizes = Ladder(classes.classes.size());
   const auto num_halvings = static_cast<size_t>(std::ceil(std::log2(sizes.size() + 1)));
   progress.Begin("trying how few landmarks will do",
-                 static_cast<int64_t>(kMaxNumRounds + num_halvings + 2 * kNumBeside + 3), "steps");
+                 static_cast<int64_t>(kMaxNumRounds + 2 * num_halvings + 2 * kNumBeside + 3), "steps");
   Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, options.max_num_left_out,
                                        options.limits, emit, num_threads, progress);
   if (!trials.ok()) {
@@ -293,13 +308,16 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
                         .max_log_error_ratio = std::log(options.max_error_ratio)};
   size_t num_kept = classes.classes.size();
   for (const int bits : FewestBitsFirst(options.descriptor_bits)) {
-    const auto try_size = [&](size_t n) -> Result<SizeTrial> {
+    const auto try_size = [&](size_t n) -> Result<TriedSize> {
       LeftOutTrial trial = fitted.trial_of_all;
       if (n != classes.classes.size() || bits != options.descriptor_bits) {
         CAIRN_ASSIGN_OR_RETURN(trial, attempt(n, bits));
       }
-      return SizeTrial{n, trial.NumRight(),
-                       std::log(ErrorRatio(trial, fitted.trial_of_all, options.least_error_m))};
+      TriedSize tried{.trial = {n, trial.NumRight(),
+                                std::log(ErrorRatio(trial, fitted.trial_of_all, options.least_error_m))},
+                      .is_right = {}};
+      for (const LeftOutResult& image : trial.images) tried.is_right.push_back(image.is_right ? 1 : 0);
+      return tried;
     };
     CAIRN_ASSIGN_OR_RETURN(const std::optional<size_t> fewest, FewestOf(sizes, terms, try_size));
     if (!fewest) continue;
