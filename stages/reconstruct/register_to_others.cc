@@ -72,6 +72,15 @@ Result<ColmapModel> RegisterToOthers(const MapperInput& input, const Capture& ca
   result->frame.is_reconstructed = false;
   result->frame.has_refined_cameras = true;
   CollectRegistered(input, capture, found, options.hold_out_every, result);
+  if (options.hold_out_every > 0 && result->queries.empty()) {
+    const auto num_joined = std::count_if(found.sessions.begin(), found.sessions.end(),
+                                          [](const auto& session) { return session.num_joined > 0; });
+    return MakeError(
+        ErrorCode::kNoData,
+        "hold_out_every = {}: of {} registered sessions {} are joined, with too few images to hold one "
+        "out; a smaller number holds out more, and without it runs of the survey are left out",
+        options.hold_out_every, found.sessions.size(), num_joined);
+  }
   for (const RegisteredSession& session : found.sessions) {
     if (session.num_joined > 0) continue;
     if (session.num_images == 0) {

@@ -123,6 +123,18 @@ TEST(OfListedImages, NodesOfThePastBecomeOneWithThoseThatShowTheirViews) {
   EXPECT_THAT(merged.graph.Neighbours(1), ElementsAre(AppearanceGraph::Neighbour{2, 40}));
   EXPECT_THAT(merged.confusable, ElementsAre(ConfusablePair{0, 1, 0.75}, ConfusablePair{0, 2, 0.5}));
 
+  // The first node may be the one that shows the view.
+  EmitExample reversed = MakeExampleOfTwoSessions();
+  reversed.classes.images[0].name = "new/1.png";
+  reversed.classes.images[1].name = "old/2.png";
+  const ImagesOfMap first = ChooseImages(reversed.classes, false);
+  EXPECT_THAT(first.row_of_image, ElementsAre(0, 0, 1));
+  const Appearance by_first = OfListedImages(reversed.appearance, reversed.classes, first);
+  ASSERT_EQ(by_first.nodes.size(), 3U);
+  EXPECT_THAT(by_first.nodes[0].images, ElementsAre(1));
+  EXPECT_EQ(by_first.nodes[0].role, NodeRole::kDominating);
+  EXPECT_TRUE(by_first.graph.AreLinked(0, 2));
+
   // A kept node stays what it is, and a node with another image of today stays as well.
   example.appearance.nodes[1].role = NodeRole::kDominating;
   EXPECT_EQ(OfListedImages(example.appearance, example.classes, images).nodes[0].role, NodeRole::kDominating);

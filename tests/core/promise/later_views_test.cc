@@ -46,6 +46,14 @@ TEST(LaterViews, AreOfToday) {
   EXPECT_THAT(ImagesOfToday(LaterViewsOf(classes)), ElementsAre(0, 2, 4));
 }
 
+// The first image of the survey may be the one that stands for others.
+TEST(LaterViews, AreOfTodayWhereTheLastSessionIsListedFirst) {
+  Classes classes = SurveyAt({{"a", 0}, {"b", 0.3}, {"c", 0.6}});
+  classes.sessions = {"c", "b", "a"};
+  EXPECT_THAT(LaterViewsOf(classes), ElementsAre(-1, 0, -1));
+  EXPECT_THAT(ImagesOfToday(LaterViewsOf(classes)), ElementsAre(0, 2));
+}
+
 TEST(LaterViews, ImagesOfNoSessionStandForThemselvesAndForNoOther) {
   Classes classes = SurveyAt({{"a", 0}, {"x", 0}, {"b", 0.1}, {"x", 0.05}});
   classes.sessions = {"a", "b"};
