@@ -467,10 +467,9 @@ void WarnOfCutFeatures(Capture* capture) {
   for (const std::string& path : paths) {
     const DatabasePart part = PartOfDatabase(path);
     if (!part.is_cut()) continue;
-    capture->warnings.push_back(fmt::format(
-        "{}: truncated: {} of {} bytes are there; images whose features are among them are taken, "
-        "for the others copy it again",
-        path, part.num_bytes, part.num_bytes_whole));
+    capture->warnings.push_back(
+        CutText(path, part) +
+        "; images whose features are among them are taken, for the others copy it again");
   }
 }
 

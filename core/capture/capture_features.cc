@@ -21,29 +21,26 @@ bool IsThere(const std::string& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-// What is said of a database whose end is missing.
-std::string CutText(const std::string& path) {
-  const DatabasePart part = PartOfDatabase(path);
-  return fmt::format("{}: truncated: {} of {} bytes are there", path, part.num_bytes, part.num_bytes_whole);
-}
-
-Result<SQLite::Database> OpenFeatures(const std::string& path) {
-  return PartOfDatabase(path).is_cut() ? OpenCutDatabase(path) : OpenColmapDatabase(path);
+Result<SQLite::Database> OpenFeatures(const std::string& path, bool is_cut) {
+  return is_cut ? OpenCutDatabase(path) : OpenColmapDatabase(path);
 }
 
 // Of a database whose end is missing those whose rows are there.
-Result<std::vector<DatabaseImage>> ReadImages(const std::string& path, SQLite::Database& database) {
-  if (!PartOfDatabase(path).is_cut()) return ReadDatabaseImages(database);
+Result<std::vector<DatabaseImage>> ReadImages(const std::string& path, bool is_cut,
+                                              SQLite::Database& database) {
+  if (!is_cut) return ReadDatabaseImages(database);
   std::vector<DatabaseImage> images = ReadCutDatabaseImages(database);
   if (!images.empty()) return images;
   return MakeError(ErrorCode::kCorrupt, "{}: no row of table images is there", path);
 }
 
 Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, const std::string& prefix) {
+  const DatabasePart part = PartOfDatabase(path);
   auto read = WithDatabaseErrors(path, [&]() -> Result<std::map<std::string, FeaturesRow>> {
-    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(path));
+    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(path, part.is_cut()));
     CAIRN_ASSIGN_OR_RETURN(const auto cameras, ReadDatabaseCameras(database));
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images, ReadImages(path, database));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<DatabaseImage> images,
+                           ReadImages(path, part.is_cut(), database));
     std::map<std::string, FeaturesRow> rows;
     for (const DatabaseImage& image : images) {
       const auto camera = cameras.find(image.camera_id);
@@ -60,14 +57,14 @@ Result<std::map<std::string, FeaturesRow>> ReadRows(const std::string& path, con
     for (auto& [name, row] : rows) row.are_landmarks = of_landmarks.contains(row.image_id);
     return rows;
   });
-  if (read.ok() || !PartOfDatabase(path).is_cut()) return read;
+  if (read.ok() || !part.is_cut()) return read;
   return MakeError(ErrorCode::kCorrupt, "{}, and its images and cameras are not; copy it again",
-                   CutText(path));
+                   CutText(path, part));
 }
 
-Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera) {
+Result<Features> ReadFeaturesOf(const FeaturesRow& row, const Camera& camera, bool is_cut) {
   return WithDatabaseErrors(row.path, [&]() -> Result<Features> {
-    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(row.path));
+    CAIRN_ASSIGN_OR_RETURN(SQLite::Database database, OpenFeatures(row.path, is_cut));
     if (camera.width != row.camera.width || camera.height != row.camera.height) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: features of an image of {} x {} px, but its camera {} has {} x {} px", row.path,
@@ -137,14 +134,15 @@ Result<const FeaturesRow*> CaptureFeatures::Find(const std::string& name) {
 }
 
 Result<Features> ReadCaptureFeatures(const FeaturesRow& row, const Camera& camera) {
-  if (!PartOfDatabase(row.path).is_cut()) return ReadFeaturesOf(row, camera);
+  const DatabasePart part = PartOfDatabase(row.path);
+  const Result<Features> features = ReadFeaturesOf(row, camera, part.is_cut());
+  if (!part.is_cut()) return features;
   // A row that ends on a page of which a part is missing ends in zeros.
-  const Result<Features> features = ReadFeaturesOf(row, camera);
   const bool is_whole =
       features.ok() && (features->descriptors.rows() == 0 || features->descriptors.bottomRows(1).any());
   if (is_whole) return features;
   return MakeError(ErrorCode::kCorrupt, "{}, and the features of image {} are not; copy it again",
-                   CutText(row.path), row.image_id);
+                   CutText(row.path, part), row.image_id);
 }
 
 }  // namespace cairn

@@ -14,6 +14,10 @@ DatabasePart PartOfDatabase(const std::string& path) {
   return {num_bytes, header.page_size * header.num_pages};
 }
 
+std::string CutText(const std::string& path, const DatabasePart& part) {
+  return fmt::format("{}: truncated: {} of {} bytes are there", path, part.num_bytes, part.num_bytes_whole);
+}
+
 Result<SQLite::Database> OpenCutDatabase(const std::string& path) {
   SQLite::Database database(DatabaseUri(path) + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI);
   const uint64_t num_bytes = PartOfDatabase(path).num_bytes;

@@ -21,6 +21,9 @@ struct DatabasePart {
 // Whole where a filled write-ahead log lies beside it: the rest may be there.
 DatabasePart PartOfDatabase(const std::string& path);
 
+// "PATH: truncated: N of M bytes are there"
+std::string CutText(const std::string& path, const DatabasePart& part);
+
 // Opens a cut database of COLMAP, immutable and hardened.  Rows that reach beyond its end fail where they are
 // read (SQLite's exception); of a blob that ends on the last page, if that page is not whole either, the end
 // reads as zeros.  Throws SQLite::Exception.  Errors: Corrupt (a table is missing).

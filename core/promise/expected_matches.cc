@@ -193,12 +193,13 @@ class Learner {
   }
   // From the pairs of images, of different views that are near each other, that look at one of these classes.
   void LearnEvidence(std::span<const Lookers> of_classes, size_t step) {
+    const double most = WeightAt(1), least = WeightAt(kAgreeReach * kAgreeReach);
     for (size_t i = 0; i < of_classes.size(); i += step) {
       const Lookers& lookers = of_classes[i];
       for (size_t a = 0; a < lookers.images.size(); ++a) {
         for (size_t b = 0; b < a; ++b) {
           const double weight = Weight(lookers.images[a], lookers.images[b]);
-          if (weight > WeightAt(1) || weight < WeightAt(kAgreeReach * kAgreeReach)) continue;
+          if (weight > most || weight < least) continue;
           evidence_.Count({evidence_.SessionOf(lookers.images[a]), a < lookers.seen_from.size()},
                           {evidence_.SessionOf(lookers.images[b]), b < lookers.seen_from.size()},
                           CouldSee(lookers, a) * CouldSee(lookers, b));
@@ -211,12 +212,6 @@ class Learner {
 
   const ViewDistance& distance() const { return distance_; }
   const std::vector<int32_t>& seen_by(size_t i) const { return seen_by_[i]; }
-
-  bool IsInView(const Camera& camera, const Pose& cam_from_world, size_t i) const {
-    const auto pixel = ImageFromCamera(camera, cam_from_world * classes_.classes[i].position);
-    return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < camera.width &&
-           pixel->y() < camera.height;
-  }
 
  private:
   double Weight(int32_t a, int32_t b) const {
@@ -238,7 +233,8 @@ class Learner {
 
   bool LooksAt(int32_t image, size_t i) const {
     const View& view = views_[image];
-    return view.camera != nullptr && IsInView(*view.camera, view.cam_from_world, i);
+    return view.camera != nullptr &&
+           IsInView(*view.camera, view.cam_from_world, classes_.classes[i].position);
   }
 
   void FindNear() {
@@ -382,7 +378,7 @@ class MatchModel::Impl {
     const auto which = where == Where::kThere ? Learner::Sights::kFromThere : Learner::Sights::kFromNearby;
     std::vector<ClassMatch> matches;
     for (const size_t i : candidates) {
-      if (!learner_.IsInView(camera, cam_from_world, i)) continue;
+      if (!IsInView(camera, cam_from_world, classes_.classes[i].position)) continue;
       FeatureVector features;
       if (learner_.Describe(
               lookers_[i], learner_.DirectionTo(i, center), session, prior_, which,

@@ -20,6 +20,12 @@ double SquaredInRadii(const Eigen::Quaterniond& rotation_a, const Eigen::Vector3
 
 }  // namespace
 
+bool IsInView(const Camera& camera, const Pose& cam_from_world, const Eigen::Vector3d& point) {
+  const auto pixel = ImageFromCamera(camera, cam_from_world * point);
+  return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < camera.width &&
+         pixel->y() < camera.height;
+}
+
 double ViewDistanceSquared(const Pose& a, const Pose& b, double radius_m, double radius_deg) {
   return SquaredInRadii(a.rotation, a.Center(), b.rotation, b.Center(), radius_m, radius_deg);
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/camera/camera.h"
 #include "core/geometry/pose.h"
 #include "core/world/feature_class.h"
 
@@ -16,6 +17,9 @@ struct ViewOptions {
   double same_view_ratio = 0.1;  // REQUIRES: > 0
   double same_view_deg = 15;     // REQUIRES: > 0
 };
+
+// Whether a point (world frame) lies in front of a camera and projects into its image.
+bool IsInView(const Camera& camera, const Pose& cam_from_world, const Eigen::Vector3d& point);
 
 // Square of the distance of two views in radii, a view's radius being `radius_m` and `radius_deg`.
 double ViewDistanceSquared(const Pose& a, const Pose& b, double radius_m, double radius_deg);

@@ -11,6 +11,7 @@
 #include "core/blocks/map_documents.h"
 #include "core/camera/pixel_ray.h"
 #include "core/features/transform_code.h"
+#include "core/promise/view_distance.h"
 #include "stages/emit_map/images_of_map.h"
 #include "stages/emit_map/map_vocabulary.h"
 #include "stages/emit_map/quantize_descriptors.h"
@@ -136,13 +137,6 @@ double MeanScaleM(const FeatureClass& feature_class, const std::map<ImageId, con
   return count > 0 ? sum / count : 0;
 }
 
-// Whether a point lies in front of an image's camera and projects into the image.
-bool IsInView(const Camera& camera, const Pose& cam_from_world, const Eigen::Vector3d& position) {
-  const auto pixel = ImageFromCamera(camera, cam_from_world * position);
-  return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < camera.width &&
-         pixel->y() < camera.height;
-}
-
 // A listed image sees what it saw, and what those whose views it shows saw.
 Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order,
                     const ImagesOfMap& images_of_map, MapRows* rows) {
@@ -189,13 +183,6 @@ Status AddLandmarks(const Classes& classes, const std::vector<size_t>& order,
   return Ok();
 }
 
-bool IsOfSurvey(const Classes& classes, ImageId image_id) {
-  const auto image = std::lower_bound(
-      classes.images.begin(), classes.images.end(), image_id,
-      [](const SurveyImage& survey_image, ImageId id) { return survey_image.image_id < id; });
-  return image != classes.images.end() && image->image_id == image_id;
-}
-
 Status AddStations(const World& world, const std::vector<StationIdx>& uncovered, const Classes& classes,
                    MapRows* rows) {
   for (StationIdx i = 0; i < world.num_stations(); ++i) {
@@ -213,15 +200,12 @@ Status AddStations(const World& world, const std::vector<StationIdx>& uncovered,
   rows->station_edges = world.edges;
   for (size_t station = 0; station < world.station_images.size(); ++station) {
     for (const ImageId image_id : world.station_images[station]) {
-      const auto image =
-          std::lower_bound(rows->images.begin(), rows->images.end(), image_id,
-                           [](const MapImage& map_image, ImageId id) { return map_image.image_id < id; });
-      if (image == rows->images.end() || image->image_id != image_id) {
-        if (IsOfSurvey(classes, image_id)) continue;  // it is not listed
+      if (PositionOf(classes.images, image_id) < 0) {
         return MakeError(ErrorCode::kInvalidArgument,
                          "emit_map: station {} has image {}, which the classes lack", station, image_id);
       }
-      image->station = static_cast<StationIdx>(station);
+      const int32_t image = PositionOf(rows->images, image_id);
+      if (image >= 0) rows->images[image].station = static_cast<StationIdx>(station);
     }
   }
   return Ok();
@@ -520,11 +504,7 @@ Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world
 
 void AddChanges(const Classes& classes, MapRows* rows) {
   const auto index_of = [&](ImageId image_id) {
-    const auto image =
-        std::lower_bound(rows->images.begin(), rows->images.end(), image_id,
-                         [](const MapImage& map_image, ImageId id) { return map_image.image_id < id; });
-    if (image_id == 0 || image == rows->images.end() || image->image_id != image_id) return int32_t{-1};
-    return static_cast<int32_t>(image - rows->images.begin());
+    return image_id == 0 ? -1 : PositionOf(rows->images, image_id);
   };
   const auto rounded = [](double value) { return std::round(1000 * value) / 1000; };
   std::vector<int32_t> row_of_change;  // -1: it has none

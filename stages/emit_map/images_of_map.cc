@@ -16,16 +16,14 @@ constexpr NodeIdx kNoNode = -1;
 // Per node, the node that it becomes one with: itself where one of its images is listed.
 std::vector<NodeIdx> StandIns(const Appearance& appearance, const Classes& classes,
                               const ImagesOfMap& images) {
-  std::map<ImageId, size_t> position;
-  for (size_t i = 0; i < classes.images.size(); ++i) position[classes.images[i].image_id] = i;
   std::vector<NodeIdx> node_of_row(images.listed.size(), kNoNode);
   const auto row_of = [&](ImageId image_id) {
-    const auto found = position.find(image_id);
-    return found == position.end() ? -1 : images.row_of_image[found->second];
+    const int32_t image = PositionOf(classes.images, image_id);
+    return image < 0 ? -1 : images.row_of_image[image];
   };
   const auto is_listed = [&](ImageId image_id) {
-    const auto found = position.find(image_id);
-    return found != position.end() && images.Lists(found->second);
+    const int32_t image = PositionOf(classes.images, image_id);
+    return image >= 0 && images.Lists(image);
   };
   for (size_t node = 0; node < appearance.nodes.size(); ++node) {
     for (const ImageId image_id : appearance.nodes[node].images) {
@@ -54,12 +52,10 @@ ImagesOfMap ChooseImages(const Classes& classes, bool all_images) {
   std::vector<int32_t> later(num_images, -1);
   if (!all_images && classes.sessions.size() > 1) {
     later = LaterViews(classes, ViewDistance(classes, {}));
-    for (size_t i = 0; i < num_images; ++i) {
-      const ImageId image_id = classes.images[i].image_id;
-      if (std::any_of(classes.changes.begin(), classes.changes.end(), [&](const PlaceChange& change) {
-            return change.image_before == image_id || change.image_after == image_id;
-          }))
-        later[i] = -1;
+    for (const PlaceChange& change : classes.changes) {
+      for (const ImageId image_id : {change.image_before, change.image_after}) {
+        if (const int32_t image = PositionOf(classes.images, image_id); image >= 0) later[image] = -1;
+      }
     }
   }
   ImagesOfMap images{.listed = ImagesOfToday(later), .row_of_image = {}};
