@@ -265,7 +265,8 @@ void SortByName(std::vector<CaptureImage>* images) {
 }
 
 // A capture without image lists.
-Status ReadFlatFolder(const std::vector<std::string>& sessions, Capture* capture) {
+Status ReadFlatFolder(Capture* capture) {
+  const std::vector<std::string>& sessions = capture->sessions;
   const std::string queries = capture->root + "/queries.txt";
   if (IsThere(queries)) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -414,7 +415,7 @@ void RejectUnusable(const CaptureFeatures& features, Capture* capture, std::vect
 }
 
 // The lists of a capture with poses.
-Status ReadLists(const std::vector<std::string>& sessions, Capture* capture) {
+Status ReadLists(Capture* capture) {
   const std::string& root = capture->root;
   capture->images_folder = root + "/images";
   CAIRN_ASSIGN_OR_RETURN(capture->cameras, ReadCamerasText(root + "/cameras.txt"));
@@ -425,7 +426,7 @@ Status ReadLists(const std::vector<std::string>& sessions, Capture* capture) {
   if (const std::string frame = root + "/" + kCaptureFrameFile; IsThere(frame)) {
     CAIRN_ASSIGN_OR_RETURN(capture->frame, ReadCaptureFrame(frame));
   }
-  const std::vector<std::string> names = ListImages(capture->images_folder, sessions);
+  const std::vector<std::string> names = ListImages(capture->images_folder, capture->sessions);
   CaptureFeatures features(root);
   if (const std::string path = root + "/" + kRegisterFile; IsThere(path)) {
     CAIRN_ASSIGN_OR_RETURN(capture->registered, ReadSessionsText(path));
@@ -537,12 +538,11 @@ Result<Capture> ReadCapture(const std::string& root) {
   }
   Capture capture;
   capture.root = root;
-  std::vector<std::string> sessions;
   if (const std::string path = root + "/" + kSessionsFile; IsThere(path)) {
-    CAIRN_ASSIGN_OR_RETURN(sessions, ReadSessionsText(path));
+    CAIRN_ASSIGN_OR_RETURN(capture.sessions, ReadSessionsText(path));
   }
   if (!IsThere(root + "/images.txt")) {
-    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(sessions, &capture));
+    CAIRN_RETURN_IF_ERROR(ReadFlatFolder(&capture));
   } else {
     if (!IsThere(root + "/cameras.txt")) {
       return MakeError(ErrorCode::kNotFound,
@@ -550,7 +550,7 @@ Result<Capture> ReadCapture(const std::string& root) {
                        "images.txt: the capture then has no poses, and its cameras come from EXIF",
                        root);
     }
-    CAIRN_RETURN_IF_ERROR(ReadLists(sessions, &capture));
+    CAIRN_RETURN_IF_ERROR(ReadLists(&capture));
   }
   if (capture.images.empty()) {
     const std::string first = capture.rejects.empty()

@@ -39,6 +39,7 @@ struct Capture {
   std::vector<std::string> notes;     // what was found and is no fault: where focal lengths come from
   bool has_poses = false;             // of all images
   std::optional<CaptureFrame> frame;  // of frame.json, if there is one
+  std::vector<std::string> sessions;  // of sessions.txt, if there is one, in the order of time
   // Sessions that are to be registered to the others (register.txt): their images have no pose in the frame.
   std::vector<std::string> registered;
   // Of those of their images that are posed in a frame of the session's own: cam_from_session, by name.

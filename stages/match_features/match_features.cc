@@ -11,6 +11,7 @@
 #include "core/files/file.h"
 #include "core/world/dropped_items.h"
 #include "stages/match_features/match_round.h"
+#include "stages/match_features/pairs/earlier_partners.h"
 #include "stages/match_features/pairs/pair_list.h"
 #include "stages/match_features/partners_by_looks.h"
 
@@ -100,11 +101,18 @@ Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, c
     PairPredictor::View& view = views.emplace_back();
     view.center = image.cam_from_world->Center();
     view.focal_px = camera.MeanFocal();
+    view.generation = GenerationOfSession(image.session);
     const Eigen::Quaterniond world_from_cam = image.cam_from_world->rotation.conjugate();
     for (const Eigen::Vector3d& bearing : bearings)
       view.rays.push_back((world_from_cam * bearing).cast<float>());
   }
   return views;
+}
+
+EarlierPartners PartnersBySession(const MatchImages& images, double ratio) {
+  std::vector<int> sessions;
+  for (const MatchImage& image : images.images) sessions.push_back(image.session);
+  return {std::move(sessions), ratio};
 }
 
 // Matches the pairs of largest overlap, then repeatedly those that the matches so far predict.
@@ -118,7 +126,8 @@ Status MatchFrustum(SQLite::Database& database, MatchRun* run) {
     CAIRN_RETURN_IF_ERROR(MatchRound(FrustumPairs(ranking), nullptr, database, run));
     return Ok();
   }
-  IndexPairs next = FrustumSeeds(ranking, options.num_frustum_seeds, options.num_frustum_scouts);
+  EarlierPartners partners = PartnersBySession(run->images, options.earlier_partners_ratio);
+  IndexPairs next = partners.Seeds(ranking, options.num_frustum_seeds, options.num_frustum_scouts);
   ranking = {};
   CAIRN_ASSIGN_OR_RETURN(std::vector<PairPredictor::View> views,
                          ReadViews(run->features, run->images, progress));
@@ -128,13 +137,15 @@ Status MatchFrustum(SQLite::Database& database, MatchRun* run) {
       .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
       .max_prior_error_px = options.matching.verification.max_prior_error_px,
       .min_baseline_m = options.matching.verification.min_baseline_m};
-  IndexPairs tried;
+  IndexPairs known = next;
   while (!next.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const bool goes_on, MatchRound(next, &predictor, database, run));
     if (!goes_on) break;
-    tried.insert(tried.end(), next.begin(), next.end());
-    std::sort(tried.begin(), tried.end());
-    CAIRN_ASSIGN_OR_RETURN(next, predictor.Predict(tried, prediction, num_threads, progress));
+    CAIRN_ASSIGN_OR_RETURN(const std::vector<PredictedPair> predicted,
+                           predictor.Predict(known, prediction, num_threads, progress));
+    for (const PredictedPair& pair : predicted) known.push_back(pair.idxs);
+    std::sort(known.begin(), known.end());
+    next = partners.Choose(predicted);
   }
   return Ok();
 }

@@ -46,6 +46,10 @@ struct MatchFeaturesOptions {
   int num_frustum_scouts = 5;
   // Frustum: fewest matches that a predicted pair is expected to have.  REQUIRES: >= 1
   int min_num_expected_matches = 25;
+  // Frustum, from the third session on: most images of all earlier sessions together that an image is matched
+  // with after the seeds, over the number of those of the one that has the most (earlier_partners.h).
+  // REQUIRES: >= 0
+  double earlier_partners_ratio = 1;
   MatchPairsOptions matching;
 };
 OptionTable DescribeOptions(MatchFeaturesOptions* options);

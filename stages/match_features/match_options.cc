@@ -56,6 +56,12 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
        .help = "pairs = frustum: fewest expected matches, by the matches of both images with others, of a "
                "pair that is matched after the seeds",
        .min = 1},
+      {.name = "earlier_partners_ratio",
+       .value = &o->earlier_partners_ratio,
+       .help = "pairs = frustum: from the third session on, most images of all earlier sessions together "
+               "that an image is matched with, over those of the one session that has the most for it; the "
+               "seeds are matched in any case",
+       .min = 0},
       {.name = "max_view_angle_deg",
        .value = &o->frustum.max_view_angle_deg,
        .help = "pairs = frustum: largest angle between two views of a point, degrees",
@@ -70,10 +76,11 @@ OptionTable DescribeOptions(MatchFeaturesOptions* o) {
   AddCondition({"pairs", {"auto"}}, {"max_num_exhaustive_images"}, &table);
   AddCondition({"pairs", {"auto", "retrieval"}}, {"num_retrieved"}, &table);
   AddCondition({"pairs", {"sequence"}}, {"sequence_window", "num_loop_candidates"}, &table);
-  AddCondition({"pairs", {"auto", "frustum"}},
-               {"frustum_near_m", "frustum_far_m", "min_overlap_ratio", "num_frustum_seeds",
-                "num_frustum_scouts", "min_num_expected_matches", "max_view_angle_deg", "max_scale_ratio"},
-               &table);
+  AddCondition(
+      {"pairs", {"auto", "frustum"}},
+      {"frustum_near_m", "frustum_far_m", "min_overlap_ratio", "num_frustum_seeds", "num_frustum_scouts",
+       "min_num_expected_matches", "earlier_partners_ratio", "max_view_angle_deg", "max_scale_ratio"},
+      &table);
   return table;
 }
 

@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,6 +82,73 @@ TEST_F(MatchFeaturesTest, PredictedPairsAreTheSameForAnyMemoryBudgetAndNumberOfT
   options_.matching.memory_budget_mib = 1;
   ASSERT_TRUE(Match(true, 4).ok());
   EXPECT_EQ(*HashFile(folder_ + "/matches.db"), one);
+}
+
+// Images that see the same, in sessions a, b, c, ... by turns; `matched` without those from a session on.
+class MatchSessionsTest : public MatchFeaturesTest {
+ protected:
+  using NamePairs = std::set<std::pair<std::string, std::string>>;
+  // Verified pairs, by name.
+  NamePairs MatchUpTo(int num_images, char last_session) {
+    capture_ = {};
+    capture_.sessions = {"a", "b", "c", "d"};
+    const auto name_of = [](int idx) { return fmt::format("{:c}/{}.png", 'a' + idx % 4, idx); };
+    WriteFeatures(num_images, [&](SQLite::Database& database) {
+      for (int idx = 0; idx < num_images; ++idx) {
+        database.exec(
+            fmt::format("UPDATE images SET name = '{}' WHERE image_id = {}", name_of(idx), idx + 1));
+        if ('a' + idx % 4 > last_session)
+          database.exec(fmt::format("DELETE FROM images WHERE image_id = {}", idx + 1));
+      }
+    });
+    for (int idx = 0; idx < num_images; ++idx) capture_.images[idx].name = name_of(idx);
+    EXPECT_TRUE(Match(true).ok());
+    auto database = OpenDatabaseReadOnly(folder_ + "/matches.db");
+    std::map<ImageId, std::string> names;
+    const auto images = ReadDatabaseImages(*database);
+    for (const DatabaseImage& image : *images) names[image.image_id] = image.name;
+    NamePairs pairs;
+    const auto geometries = ReadDatabaseTwoViewGeometries(*database, 15);
+    for (const TwoViewGeometry& geometry : *geometries)
+      pairs.emplace(names.at(geometry.image_id1), names.at(geometry.image_id2));
+    return pairs;
+  }
+};
+
+TEST_F(MatchSessionsTest, PairsStayWhenASessionIsAddedThatIsNotTheSecond) {
+  options_.num_frustum_seeds = 1;
+  options_.num_frustum_scouts = 1;
+  const NamePairs three = MatchUpTo(24, 'c');
+  NamePairs four = MatchUpTo(24, 'd');
+  const size_t num_all = four.size();
+  std::erase_if(four, [](const auto& pair) { return pair.first[0] == 'd' || pair.second[0] == 'd'; });
+  EXPECT_EQ(four, three);
+  EXPECT_LT(four.size(), num_all);
+  // With the second, the first session's images have other seeds.
+  EXPECT_LT(MatchUpTo(24, 'a').size(), MatchUpTo(24, 'b').size());
+}
+
+TEST_F(MatchSessionsTest, AnImageHasAsManyPartnersInAllEarlierSessionsAsInOne) {
+  //   six images a session: 15 pairs within each, 36 of a and b, and six partners of each image of c and d
+  options_.num_frustum_seeds = 2;
+  options_.num_frustum_scouts = 0;
+  const NamePairs pairs = MatchUpTo(24, 'd');
+  std::map<std::string, std::map<char, int>> num_partners;
+  for (const auto& [name1, name2] : pairs) {
+    const auto [earlier, later] = std::minmax(name1, name2);
+    ++num_partners[later][earlier[0]];
+  }
+  EXPECT_EQ(pairs.size(), 4 * 15 + 36 + 6 * 6 + 6 * 6);
+  for (const auto& [name, by_session] : num_partners) {
+    if (name[0] == 'd') {
+      for (const char earlier : {'a', 'b', 'c'}) EXPECT_EQ(by_session.at(earlier), 2) << name;
+    } else if (name[0] == 'c') {
+      EXPECT_EQ(by_session.at('a'), 3) << name;
+      EXPECT_EQ(by_session.at('b'), 3) << name;
+    }
+  }
+  options_.earlier_partners_ratio = 2;
+  EXPECT_EQ(MatchUpTo(24, 'd').size(), 4 * 15 + 36 + 6 * 12 + 6 * 12);
 }
 
 TEST_F(MatchFeaturesTest, SequenceWithLoopsAndAllImagesAgreeOnFewImages) {

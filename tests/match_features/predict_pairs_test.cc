@@ -36,11 +36,18 @@ std::vector<Match> Same(uint32_t begin, uint32_t end) {
   return matches;
 }
 
+IndexPairs IdxsOf(const std::vector<PredictedPair>& predicted) {
+  IndexPairs pairs;
+  for (const PredictedPair& pair : predicted) pairs.push_back(pair.idxs);
+  return pairs;
+}
+
 // Works on a copy: a call of its own changes what later ones return.
 IndexPairs Predict(PairPredictor predictor, int min_num_expected, const IndexPairs& tried,
                    double max_ray_angle_deg = 90, int num_threads = 2) {
   NoProgress progress;
-  return *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16, 1e-3}, num_threads, progress);
+  return IdxsOf(
+      *predictor.Predict(tried, {min_num_expected, max_ray_angle_deg, 16, 1e-3}, num_threads, progress));
 }
 
 TEST(PredictPairs, ImagesThatMatchAThirdAreExpectedToMatch) {
@@ -52,6 +59,39 @@ TEST(PredictPairs, ImagesThatMatchAThirdAreExpectedToMatch) {
   EXPECT_THAT(Predict(predictor, 2, tried), ElementsAre(Pair(0, 2)));
   EXPECT_THAT(Predict(predictor, 3, tried), IsEmpty());
   EXPECT_THAT(Predict(predictor, 1, {{0, 1}, {0, 2}, {1, 2}}), IsEmpty());
+}
+
+TEST(PredictPairs, APairSaysHowManyMatchesItIsExpectedToHave) {
+  //   0 - 1: 0 .. 5, 1 - 2: 4 .. 9, 1 - 3: 5 .. 9
+  PairPredictor predictor({At(0), At(0.01), At(0.02), At(0.03)});
+  predictor.Add(0, 1, Same(0, 6));
+  predictor.Add(1, 2, Same(4, 10));
+  predictor.Add(1, 3, Same(5, 10));
+  NoProgress progress;
+  const auto predicted = *predictor.Predict({{0, 1}, {1, 2}, {1, 3}}, {1, 90, 16, 1e-3}, 1, progress);
+  ASSERT_THAT(IdxsOf(predicted), ElementsAre(Pair(0, 2), Pair(0, 3), Pair(2, 3)));
+  EXPECT_EQ(predicted[0].num_expected, 2);
+  EXPECT_EQ(predicted[1].num_expected, 1);
+  EXPECT_EQ(predicted[2].num_expected, 5);
+}
+
+TEST(PredictPairs, AChainByWayOfALaterGenerationThanBothEndsDoesNotCount) {
+  //   0 - 1 - 2, by generations
+  const auto predicted = [](int generation0, int generation1, int generation2) {
+    std::vector<PairPredictor::View> views = {At(0), At(0.01), At(0.02)};
+    views[0].generation = generation0;
+    views[1].generation = generation1;
+    views[2].generation = generation2;
+    PairPredictor predictor(views);
+    predictor.Add(0, 1, Same(0, 10));
+    predictor.Add(1, 2, Same(0, 10));
+    return Predict(predictor, 10, {{0, 1}, {1, 2}}).size();
+  };
+  EXPECT_EQ(predicted(0, 1, 0), 0u);
+  EXPECT_EQ(predicted(0, 2, 1), 0u);
+  EXPECT_EQ(predicted(0, 1, 1), 1u);
+  EXPECT_EQ(predicted(2, 1, 0), 1u);
+  EXPECT_EQ(predicted(1, 0, 1), 1u);
 }
 
 TEST(PredictPairs, RaysTooFarApartDoNotCount) {
@@ -109,7 +149,7 @@ TEST(PredictPairs, LaterCallsFindWhatAllMatchesAtOncePredict) {
     std::sort(tried.begin(), tried.end());
     PairPredictor at_once(views);
     for (const auto& [i, j, matches] : added) at_once.Add(i, j, matches);
-    const IndexPairs predicted = *in_parts.Predict(tried, {2, 90, 16, 1e-3}, 2, progress);
+    const IndexPairs predicted = IdxsOf(*in_parts.Predict(tried, {2, 90, 16, 1e-3}, 2, progress));
     EXPECT_EQ(predicted, Predict(at_once, 2, tried)) << part;
     num_predicted += static_cast<int>(predicted.size());
     tried.insert(tried.end(), predicted.begin(), predicted.end());

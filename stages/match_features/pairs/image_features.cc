@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/camera/panorama.h"
+#include "core/capture/sessions.h"
 
 namespace cairn::match_features {
 namespace {
@@ -68,6 +69,7 @@ Result<MatchImages> ReadMatchImages(SQLite::Database& database, const Capture* c
     }
     MatchImage match_image{.image_id = image.image_id, .name = image.name, .camera_id = image.camera_id};
     match_image.cam_from_world = FindPose(poses, image.name);
+    if (capture != nullptr) match_image.session = std::max(0, SessionOfImage(capture->sessions, image.name));
     match_image.num_features = static_cast<int>(num_keypoints[image.image_id]);
     result.images.push_back(std::move(match_image));
   }

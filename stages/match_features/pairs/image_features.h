@@ -22,6 +22,7 @@ struct MatchImage {
   std::string name;
   CameraId camera_id = 0;
   std::optional<Pose> cam_from_world;
+  int session = 0;  // of the capture's, in the order of time; those of none are with the first
   int num_features = 0;
 };
 

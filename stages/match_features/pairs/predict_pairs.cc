@@ -77,10 +77,12 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
     const Eigen::Vector3f& ray = Ray(f);
     for (uint64_t i = links.begin[f]; i < links.begin[f + 1]; ++i) {
       const uint32_t middle = links.feature[i];
+      const int generation = views_[view_of_[middle]].generation;
       for (uint64_t k = links.begin[middle]; k < links.begin[middle + 1]; ++k) {
         const uint32_t h = links.feature[k];
         const int other = view_of_[h];
         if (settled[other] || counted[other] == f + 1) continue;
+        if (generation > std::max(views_[idx].generation, views_[other].generation)) continue;
         if (ray.dot(Ray(h)) < min_cosine || !CanMeet(f, h, options)) continue;
         counted[other] = f + 1;
         ++expected[other];
@@ -90,13 +92,14 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
   return expected;
 }
 
-Result<IndexPairs> PairPredictor::Predict(const IndexPairs& tried, const PredictPairsOptions& options,
-                                          int num_threads, Progress& progress) {
+Result<std::vector<PredictedPair>> PairPredictor::Predict(const IndexPairs& known,
+                                                          const PredictPairsOptions& options, int num_threads,
+                                                          Progress& progress) {
   const int num_views = static_cast<int>(views_.size());
   const Links links = CollectLinks(0);
   const bool is_first = num_predicted_from_ == 0;
   const Links new_links = is_first ? Links() : CollectLinks(num_predicted_from_);
-  std::vector<IndexPairs> predicted(views_.size());
+  std::vector<std::vector<PredictedPair>> predicted(views_.size());
   progress.Begin("predict pairs", num_views, "images");
   ParallelFor(num_views, num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
@@ -107,14 +110,15 @@ Result<IndexPairs> PairPredictor::Predict(const IndexPairs& tried, const Predict
       settled.flip();
     }
     std::fill(settled.begin(), settled.begin() + idx + 1, true);
-    for (auto it = std::lower_bound(tried.begin(), tried.end(), std::pair(idx, 0));
-         it != tried.end() && it->first == idx; ++it) {
+    for (auto it = std::lower_bound(known.begin(), known.end(), std::pair(idx, 0));
+         it != known.end() && it->first == idx; ++it) {
       settled[it->second] = true;
     }
     if (std::find(settled.begin(), settled.end(), false) != settled.end()) {
       const std::vector<int> expected = ExpectedMatches(idx, links, settled, options);
       for (int other = idx + 1; other < num_views; ++other) {
-        if (expected[other] >= options.min_num_expected_matches) predicted[i].emplace_back(idx, other);
+        if (expected[other] >= options.min_num_expected_matches)
+          predicted[i].push_back({{idx, other}, expected[other]});
       }
     }
     progress.Advance();
@@ -122,8 +126,9 @@ Result<IndexPairs> PairPredictor::Predict(const IndexPairs& tried, const Predict
   progress.End();
   if (progress.Cancelled()) return MakeError(ErrorCode::kCancelled, "stopped while predicting pairs");
   num_predicted_from_ = matches_.size();
-  IndexPairs pairs;
-  for (const IndexPairs& part : predicted) pairs.insert(pairs.end(), part.begin(), part.end());
+  std::vector<PredictedPair> pairs;
+  for (const std::vector<PredictedPair>& part : predicted)
+    pairs.insert(pairs.end(), part.begin(), part.end());
   return pairs;
 }
 

@@ -24,32 +24,41 @@ struct PredictPairsOptions {
   double min_baseline_m;
 };
 
+// A pair that is predicted, with how many matches it is expected to have.
+struct PredictedPair {
+  std::pair<int, int> idxs;  // ascending
+  int num_expected = 0;
+};
+
 // Predicts which posed images show the same scene from the pairs that are already matched.  View frusta
 // ignore walls; verified matches do not: where a feature f of image i matches one of image k, and that one
 // matches a feature h of image j, f and h most likely show the same thing if the stated poses allow it: their
 // rays meet in front of both cameras, up to the poses' error, at no more than max_ray_angle.  The matches
 // that images i and j are expected to have are the features of i from which such a chain leads to j.  Chains
 // of two matches, not whole tracks: one wrong match joins two tracks, but makes few chains.
+// A chain by way of an image of a later generation than both of i and j does not count, so that what is
+// predicted of them does not change when that generation is added (earlier_partners.h).
 class PairPredictor {
  public:
   struct View {
     Eigen::Vector3d center = Eigen::Vector3d::Zero();  // world frame
     std::vector<Eigen::Vector3f> rays;                 // of each feature, unit vectors, world frame
     double focal_px = 0;
+    int generation = 0;
   };
   explicit PairPredictor(std::vector<View> views);
 
   // Adds the verified matches of two views.
   void Add(int idx1, int idx2, const std::vector<Match>& inliers);
 
-  // Pairs (idx1 < idx2, ascending) of enough expected matches that are not in `tried` (ascending).  Same for
-  // any order of the calls of Add and any number of threads.  A later call only examines pairs that matches
-  // added since the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls
-  // have the same options, and the pairs of earlier calls in `tried`.  Cost: sum over features of
+  // Pairs (ascending) of enough expected matches that are not in `known` (ascending).  Same for any order of
+  // the calls of Add and any number of threads.  A later call only examines pairs that matches added since
+  // the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls have the same
+  // options, and the pairs of earlier calls in `known`.  Cost: sum over features of
   // (matches)^2; later, of images with such pairs.  Memory: 16 bytes per match and 28 per feature.
   // Errors: Cancelled.
-  Result<IndexPairs> Predict(const IndexPairs& tried, const PredictPairsOptions& options, int num_threads,
-                             Progress& progress);
+  Result<std::vector<PredictedPair>> Predict(const IndexPairs& known, const PredictPairsOptions& options,
+                                             int num_threads, Progress& progress);
 
  private:
   // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
