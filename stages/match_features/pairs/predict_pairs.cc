@@ -35,7 +35,10 @@ PairPredictor::Links PairPredictor::CollectLinks(size_t first_match) const {
   }
   for (size_t f = 2; f < links.begin.size(); ++f) links.begin[f] += links.begin[f - 1];
   links.feature.resize(2 * matches.size());
+  links.view.resize(2 * matches.size());
   for (const auto& [f, h] : matches) {
+    links.view[links.begin[f + 1]] = view_of_[h];
+    links.view[links.begin[h + 1]] = view_of_[f];
     links.feature[links.begin[f + 1]++] = h;
     links.feature[links.begin[h + 1]++] = f;
   }
@@ -52,13 +55,12 @@ bool PairPredictor::CanMeet(uint32_t feature1, uint32_t feature2, const PredictP
          RaysConverge(ray1, ray2, baseline, tolerance_rad);
 }
 
-std::vector<bool> PairPredictor::NewlyLinked(int idx, const Links& links, const Links& new_links) const {
-  std::vector<bool> linked(views_.size(), false);
+std::vector<char> PairPredictor::NewlyLinked(int idx, const Links& links, const Links& new_links) const {
+  std::vector<char> linked(views_.size(), 0);
   const auto follow = [&](uint32_t f, const Links& first, const Links& second) {
     for (uint64_t i = first.begin[f]; i < first.begin[f + 1]; ++i) {
       const uint32_t middle = first.feature[i];
-      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k)
-        linked[view_of_[second.feature[k]]] = true;
+      for (uint64_t k = second.begin[middle]; k < second.begin[middle + 1]; ++k) linked[second.view[k]] = 1;
     }
   };
   for (uint32_t f = first_feature_[idx]; f < first_feature_[idx + 1]; ++f) {
@@ -68,7 +70,7 @@ std::vector<bool> PairPredictor::NewlyLinked(int idx, const Links& links, const 
   return linked;
 }
 
-std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, const std::vector<bool>& settled,
+std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, const std::vector<char>& settled,
                                                 const PredictPairsOptions& options) const {
   const auto min_cosine = static_cast<float>(std::cos(RadFromDeg(options.max_ray_angle_deg)));
   std::vector<int> expected(views_.size(), 0);
@@ -77,12 +79,12 @@ std::vector<int> PairPredictor::ExpectedMatches(int idx, const Links& links, con
     const Eigen::Vector3f& ray = Ray(f);
     for (uint64_t i = links.begin[f]; i < links.begin[f + 1]; ++i) {
       const uint32_t middle = links.feature[i];
-      const int generation = views_[view_of_[middle]].generation;
+      const int generation = views_[links.view[i]].generation;
       for (uint64_t k = links.begin[middle]; k < links.begin[middle + 1]; ++k) {
-        const uint32_t h = links.feature[k];
-        const int other = view_of_[h];
+        const int other = links.view[k];
         if (settled[other] || counted[other] == f + 1) continue;
         if (generation > std::max(views_[idx].generation, views_[other].generation)) continue;
+        const uint32_t h = links.feature[k];
         if (ray.dot(Ray(h)) < min_cosine || !CanMeet(f, h, options)) continue;
         counted[other] = f + 1;
         ++expected[other];
@@ -104,17 +106,17 @@ Result<std::vector<PredictedPair>> PairPredictor::Predict(const IndexPairs& know
   ParallelFor(num_views, num_threads, [&](int64_t i) {
     if (progress.Cancelled()) return;
     const int idx = static_cast<int>(i);
-    std::vector<bool> settled(views_.size(), false);
+    std::vector<char> settled(views_.size(), 0);
     if (!is_first) {
       settled = NewlyLinked(idx, links, new_links);
-      settled.flip();
+      for (char& flag : settled) flag = flag == 0;
     }
-    std::fill(settled.begin(), settled.begin() + idx + 1, true);
+    std::fill(settled.begin(), settled.begin() + idx + 1, 1);
     for (auto it = std::lower_bound(known.begin(), known.end(), std::pair(idx, 0));
          it != known.end() && it->first == idx; ++it) {
-      settled[it->second] = true;
+      settled[it->second] = 1;
     }
-    if (std::find(settled.begin(), settled.end(), false) != settled.end()) {
+    if (std::find(settled.begin(), settled.end(), 0) != settled.end()) {
       const std::vector<int> expected = ExpectedMatches(idx, links, settled, options);
       for (int other = idx + 1; other < num_views; ++other) {
         if (expected[other] >= options.min_num_expected_matches)

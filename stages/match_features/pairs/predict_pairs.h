@@ -55,23 +55,25 @@ class PairPredictor {
   // the calls of Add and any number of threads.  A later call only examines pairs that matches added since
   // the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls have the same
   // options, and the pairs of earlier calls in `known`.  Cost: sum over features of
-  // (matches)^2; later, of images with such pairs.  Memory: 16 bytes per match and 28 per feature.
+  // (matches)^2; later, of images with such pairs.  Memory: 24 bytes per match and 28 per feature.
   // Errors: Cancelled.
   Result<std::vector<PredictedPair>> Predict(const IndexPairs& known, const PredictPairsOptions& options,
                                              int num_threads, Progress& progress);
 
  private:
-  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]].
+  // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]], and their
+  // views.
   struct Links {
     std::vector<uint64_t> begin;
     std::vector<uint32_t> feature;
+    std::vector<int> view;
   };
   // Links of the matches from `first_match` on.
   Links CollectLinks(size_t first_match) const;
   // Later images to which a chain leads that has a match of `new_links`, flags per image.
-  std::vector<bool> NewlyLinked(int idx, const Links& links, const Links& new_links) const;
+  std::vector<char> NewlyLinked(int idx, const Links& links, const Links& new_links) const;
   // Expected matches with every later image that is not in `settled`, flags per image.
-  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<bool>& settled,
+  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<char>& settled,
                                    const PredictPairsOptions& options) const;
   bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
   const Eigen::Vector3f& Ray(uint32_t feature) const {
