@@ -19,10 +19,11 @@ namespace cairn::match_features {
 // Before: extract_features.  After: group_classes, link_appearance.
 //
 // Pairs of images are chosen first: all of them; those whose view frusta overlap most in the known poses, and
-// then those that the verified ones predict (predict_pairs.h); those that look alike (retrieve_pairs.h);
-// neighbours in the natural order of names and loop candidates, which look alike without being neighbours; or
-// those of a list.  Descriptors are matched exactly (mutual nearest neighbours, ratio test), then verified
-// with the known intrinsics (verify_pair.h), with a bounded part of the features in memory (match_pairs.h).
+// then those that the verified ones predict (predict_pairs.h), of earlier sessions a bounded number
+// (earlier_partners.h); those that look alike (retrieve_pairs.h); neighbours in the natural order of names
+// and loop candidates, which look alike without being neighbours; or those of a list.  Descriptors are
+// matched exactly (mutual nearest neighbours, ratio test), then verified with the known intrinsics
+// (verify_pair.h), with a bounded part of the features in memory (match_pairs.h).
 struct MatchFeaturesOptions {
   // "auto": frustum where all images have poses, else exhaustive for few images, else retrieval.
   std::string pairs = "auto";

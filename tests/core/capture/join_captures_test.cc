@@ -83,6 +83,7 @@ TEST_F(JoinCapturesTest, ImagesKeepPosesAndFilesUnderTheirSession) {
   ASSERT_TRUE(capture.ok()) << capture.error().message;
   const std::vector<std::string> sessions = {"day1", "day2"};
   EXPECT_EQ(ReadSessionsText(Path("joined/sessions.txt")).value(), sessions);
+  EXPECT_EQ(capture->sessions, sessions);
   ASSERT_EQ(capture->images.size(), 4u);
   EXPECT_THAT(capture->rejects, IsEmpty());
   EXPECT_THAT(capture->warnings, IsEmpty());
