@@ -14,6 +14,7 @@ constexpr int kAngleBits = 13;
 // Odd, so that 0 is one of them: codes 0 .. 8190 are -90 to 90 degrees, both excluded.
 constexpr int kNumAngles = (1 << kAngleBits) - 1;
 constexpr double kQuaternionUnit = 1.0 / 2147483648.0;
+constexpr double kEqualUnits = 64;
 
 uint64_t EncodeAngle(double angle) {
   const double code = std::round(angle / std::numbers::pi * kNumAngles) + (kNumAngles - 1) / 2.0;
@@ -86,9 +87,10 @@ Eigen::Matrix3d DecodeCovariance(uint64_t code) {
 
 void WriteRotation(const Eigen::Quaterniond& rotation, BlobWriter* writer) {
   const double wxyz[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
+  // Of such as are equally large but for rounding, the first: what is read is written as the same again.
   int largest = 0;
   for (int i = 1; i < 4; ++i) {
-    if (std::abs(wxyz[i]) > std::abs(wxyz[largest])) largest = i;
+    if (std::abs(wxyz[i]) > std::abs(wxyz[largest]) + kEqualUnits * kQuaternionUnit) largest = i;
   }
   const double sign = wxyz[largest] < 0 ? -1 : 1;
   writer->UInt8(static_cast<uint8_t>(largest));

@@ -255,37 +255,90 @@ bool CodeDescriptor(Coder& coder, const std::array<int, kDescriptorDim>& order, 
   return true;
 }
 
-}  // namespace
+using Middle = std::array<int64_t, 3>;  // 0.1 mm
 
-std::string PackLandmarks(const PackedLandmarks& block) {
-  std::vector<PackedLandmark> all;
-  for (const MapLandmark& landmark : block.landmarks) all.push_back(PackLandmark(landmark));
-  // The median of what is stored, not of what was given: the same when it is encoded again.
-  std::array<int64_t, 3> middle = {};
-  for (int axis = 0; axis < 3; ++axis) {
+// The median of what is stored, not of what was given: the same when it is encoded again.  None of none: 0.
+Middle MiddleOf(const std::vector<PackedLandmark>& landmarks) {
+  Middle middle = {};
+  for (int axis = 0; axis < 3 && !landmarks.empty(); ++axis) {
     std::vector<int64_t> coordinates;
-    for (const PackedLandmark& packed : all)
+    for (const PackedLandmark& packed : landmarks)
       coordinates.push_back(packed.position[axis] << PositionShift(packed.covariance));
     const auto place = coordinates.begin() + static_cast<std::ptrdiff_t>(coordinates.size() / 2);
     std::nth_element(coordinates.begin(), place, coordinates.end());
     middle[axis] = *place;
   }
+  return middle;
+}
+
+// Codes one landmark after the other, each by what was learnt from those before.
+class LandmarksCoder {
+ public:
+  LandmarksCoder(const TransformCode& code, const Middle& middle) : code_(code), middle_(middle) {}
+
+  void Encode(PackedLandmark landmark, const DescriptorMatrix& descriptors, size_t row, RangeEncoder* coder) {
+    CodeLandmark(*coder, middle_, class_id_, models_.get(), &landmark);
+    class_id_ = landmark.class_id;
+    std::array<uint8_t, kDescriptorDim> descriptor;
+    std::copy_n(descriptors.data() + row * kDescriptorDim, kDescriptorDim, descriptor.begin());
+    CodeDescriptor(*coder, order_, code_, models_.get(), descriptor.data());
+  }
+
+  // False where the bytes are not those of so many landmarks.
+  bool DecodeAll(std::string_view bytes, size_t num, std::vector<MapLandmark>* landmarks,
+                 DescriptorMatrix* descriptors) {
+    landmarks->assign(num, {});
+    *descriptors = DescriptorMatrix::Zero(static_cast<Eigen::Index>(num), kDescriptorDim);
+    RangeDecoder coder(bytes);
+    for (size_t i = 0; i < num && coder.ok(); ++i) {
+      PackedLandmark packed;
+      CodeLandmark(coder, middle_, class_id_, models_.get(), &packed);
+      class_id_ = packed.class_id;
+      if (!UnpackLandmark(packed, &(*landmarks)[i])) return false;
+      if (!CodeDescriptor(coder, order_, code_, models_.get(), descriptors->data() + i * kDescriptorDim))
+        return false;
+    }
+    return coder.Finished();
+  }
+
+ private:
+  TransformCode code_;
+  Middle middle_;
+  int64_t class_id_ = 0;
+  std::unique_ptr<Models> models_ = std::make_unique<Models>();
+  std::array<int, kDescriptorDim> order_ = CoefficientOrder();
+};
+
+std::vector<PackedLandmark> PackEach(const std::vector<MapLandmark>& landmarks, size_t num) {
+  std::vector<PackedLandmark> all;
+  for (size_t i = 0; i < std::min(num, landmarks.size()); ++i) all.push_back(PackLandmark(landmarks[i]));
+  return all;
+}
+
+// What is learnt from more than these is no better.
+constexpr size_t kMaxNumKnown = 4096;
+
+// A coder that knows these landmarks.
+LandmarksCoder CoderAfter(const PackedLandmarks& known) {
+  const std::vector<PackedLandmark> all = PackEach(known.landmarks, kMaxNumKnown);
+  LandmarksCoder landmarks(known.code, MiddleOf(all));
+  RangeEncoder unread;
+  for (size_t i = 0; i < all.size(); ++i) landmarks.Encode(all[i], known.descriptors, i, &unread);
+  return landmarks;
+}
+
+}  // namespace
+
+std::string PackLandmarks(const PackedLandmarks& block) {
+  const std::vector<PackedLandmark> all = PackEach(block.landmarks, block.landmarks.size());
+  const Middle middle = MiddleOf(all);
   BlobWriter writer;
-  const TransformCode& code = block.code;
-  writer.UInt8(static_cast<uint8_t>(code.step));
-  writer.Bytes(code.mean.data(), code.mean.size());
+  writer.UInt8(static_cast<uint8_t>(block.code.step));
+  writer.Bytes(block.code.mean.data(), block.code.mean.size());
   for (const int64_t coordinate : middle) writer.UInt32(static_cast<uint32_t>(coordinate));
   RangeEncoder coder;
-  const auto models = std::make_unique<Models>();
-  const auto order = CoefficientOrder();
-  int64_t class_id = 0;
-  for (size_t i = 0; i < all.size(); ++i) {
-    CodeLandmark(coder, middle, class_id, models.get(), &all[i]);
-    class_id = all[i].class_id;
-    std::array<uint8_t, kDescriptorDim> descriptor;
-    std::copy_n(block.descriptors.data() + i * kDescriptorDim, kDescriptorDim, descriptor.begin());
-    CodeDescriptor(coder, order, code, models.get(), descriptor.data());
-  }
+  LandmarksCoder landmarks(block.code, middle);
+  for (size_t i = 0; i < all.size(); ++i) landmarks.Encode(all[i], block.descriptors, i, &coder);
   writer.Bytes(coder.Take());
   return writer.Take();
 }
@@ -295,26 +348,26 @@ bool UnpackLandmarks(std::string_view bytes, size_t num_landmarks, PackedLandmar
   TransformCode code{.step = reader.UInt8()};
   const std::string_view mean = reader.Bytes(code.mean.size());
   std::copy(mean.begin(), mean.end(), code.mean.begin());
-  std::array<int64_t, 3> middle;
+  Middle middle;
   for (int64_t& coordinate : middle) coordinate = static_cast<int32_t>(reader.UInt32());
   if (!reader.ok() || code.step < 1) return false;
   block->code = code;
-  block->landmarks.assign(num_landmarks, {});
-  block->descriptors =
-      DescriptorMatrix::Zero(static_cast<Eigen::Index>(block->landmarks.size()), kDescriptorDim);
-  RangeDecoder coder(reader.Bytes(reader.num_left()));
-  const auto models = std::make_unique<Models>();
-  const auto order = CoefficientOrder();
-  int64_t class_id = 0;
-  for (size_t i = 0; i < block->landmarks.size() && coder.ok(); ++i) {
-    PackedLandmark packed;
-    CodeLandmark(coder, middle, class_id, models.get(), &packed);
-    class_id = packed.class_id;
-    if (!UnpackLandmark(packed, &block->landmarks[i])) return false;
-    uint8_t* descriptor = block->descriptors.data() + i * kDescriptorDim;
-    if (!CodeDescriptor(coder, order, code, models.get(), descriptor)) return false;
-  }
-  return coder.Finished();
+  return LandmarksCoder(code, middle)
+      .DecodeAll(reader.Bytes(reader.num_left()), num_landmarks, &block->landmarks, &block->descriptors);
+}
+
+std::string PackMoreLandmarks(const PackedLandmarks& known, const PackedLandmarks& more) {
+  LandmarksCoder landmarks = CoderAfter(known);
+  RangeEncoder coder;
+  for (size_t i = 0; i < more.landmarks.size(); ++i)
+    landmarks.Encode(PackLandmark(more.landmarks[i]), more.descriptors, i, &coder);
+  return coder.Take();
+}
+
+bool UnpackMoreLandmarks(const PackedLandmarks& known, std::string_view bytes, size_t num_landmarks,
+                         PackedLandmarks* more) {
+  more->code = known.code;
+  return CoderAfter(known).DecodeAll(bytes, num_landmarks, &more->landmarks, &more->descriptors);
 }
 
 }  // namespace cairn

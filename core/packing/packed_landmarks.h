@@ -24,4 +24,10 @@ std::string PackLandmarks(const PackedLandmarks& packed);
 // False where the bytes are not those of so many landmarks.
 bool UnpackLandmarks(std::string_view bytes, size_t num_landmarks, PackedLandmarks* packed);
 
+// The same for a reader who has others, of the code that is meant: a few landmarks take less then, as what
+// they are like is known.
+std::string PackMoreLandmarks(const PackedLandmarks& known, const PackedLandmarks& more);
+bool UnpackMoreLandmarks(const PackedLandmarks& known, std::string_view bytes, size_t num_landmarks,
+                         PackedLandmarks* more);
+
 }  // namespace cairn

@@ -7,8 +7,8 @@
 #include <set>
 #include <string>
 
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "core/map/map_file.h"
 #include "pipeline/explain/compare_maps.h"
 #include "runtime/map/update_map.h"

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "core/base/no_throw.h"
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
 #include "core/files/file_descriptor.h"
 #include "core/files/file_lock.h"
@@ -17,7 +18,6 @@
 #include "core/files/replacement.h"
 #include "core/files/temporary.h"
 #include "core/files/write_error.h"
-#include "core/map/map_delta.h"
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
 

@@ -9,7 +9,7 @@
 
 namespace cairn {
 
-// Updates a robot's map by the differences to the new one (core/map/map_delta.h).  A robot that has a map
+// Updates a robot's map by the differences to the new one (core/delta/map_delta.h).  A robot that has a map
 // open keeps the old contents: the replaced file exists until nobody has it open.  No exception leaves
 // these functions.
 struct UpdateOptions {

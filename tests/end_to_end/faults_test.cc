@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "core/map/map_file.h"
 #include "tests/end_to_end/program_run.h"
 

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "core/blocks/map_rows.h"
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/localizer.h"
 #include "tests/runtime/localize/poster_scene.h"

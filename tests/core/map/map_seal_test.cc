@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/delta/map_delta.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
 #include "core/map/map_tables.h"

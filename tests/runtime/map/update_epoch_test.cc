@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "runtime/map/map.h"
 #include "tests/runtime/map/update_map_fixture.h"
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/delta/map_delta.h"
 #include "core/files/file.h"
-#include "core/map/map_delta.h"
 #include "core/map/map_file.h"
 #include "runtime/map/update_map.h"
 #include "tests/runtime/localize/synthetic_room.h"

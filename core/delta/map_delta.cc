@@ -1,14 +1,13 @@
-#include "core/map/map_delta.h"
-
-#include <zstd.h>
+#include "core/delta/map_delta.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <memory>
 #include <string_view>
 
 #include "core/base/blob.h"
+#include "core/delta/prefix_compression.h"
+#include "core/delta/row_delta.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_epoch.h"
@@ -18,11 +17,11 @@
 namespace cairn {
 namespace {
 
-constexpr std::string_view kMagic("cairn map delta1", 16);
+// The last byte is the format: 2 where there are rows.
+constexpr std::string_view kMagic("cairn map delta", 15);
+constexpr char kWithoutRows = '1', kWithRows = '2';
 constexpr size_t kLinkBytes = 4;
 constexpr uint32_t kMaxPageSize = 65536;
-// Strong enough to find the common parts; higher levels take several times as long and gain about a percent.
-constexpr int kCompressionLevel = 12;
 
 std::string ShortHex(const Hash& hash) {
   std::string text;
@@ -38,78 +37,41 @@ uint32_t BigEndian32(const char* bytes) {
 
 bool IsPageSize(uint64_t size) { return size >= 512 && size <= kMaxPageSize && std::has_single_bit(size); }
 
+// A page that is the last of its block has 0 for the next one, whatever its own number: with `ends`, it gets
+// a mark of its own, so that two maps of other pages have the same there.  The inverse of itself.
+uint32_t ExchangeEnd(uint32_t link, uint32_t page, bool ends) {
+  constexpr uint32_t kEnd = 0x80000000;
+  const uint32_t end = 0 - page;
+  return !ends ? link : link == end ? kEnd : link == kEnd ? end : link;
+}
+
 // The pages' contents, then what links them.  REQUIRES: whole pages
-std::string UnlinkPages(std::string_view file, size_t page_size) {
+std::string UnlinkPages(std::string_view file, size_t page_size, bool ends) {
   std::string contents(file.substr(0, std::min(page_size, file.size())));
   contents.reserve(file.size());
   BlobWriter links;
   for (size_t page = 1; page * page_size < file.size(); ++page) {
     const std::string_view bytes = file.substr(page * page_size, page_size);
     contents += bytes.substr(kLinkBytes);
-    links.UInt32(BigEndian32(bytes.data()) - static_cast<uint32_t>(page + 1));
+    const auto number = static_cast<uint32_t>(page + 1);
+    links.UInt32(ExchangeEnd(BigEndian32(bytes.data()) - number, number, ends));
   }
   return contents + links.Take();
 }
 
 // The inverse.  REQUIRES: whole pages
-std::string LinkPages(std::string_view unlinked, size_t page_size) {
+std::string LinkPages(std::string_view unlinked, size_t page_size, bool ends) {
   const size_t num_pages = unlinked.size() / page_size;
   std::string file(unlinked.substr(0, page_size));
   file.reserve(unlinked.size());
   BlobReader links(unlinked.substr(unlinked.size() - (num_pages - 1) * kLinkBytes));
   for (size_t page = 1; page < num_pages; ++page) {
-    const uint32_t link = links.UInt32() + static_cast<uint32_t>(page + 1);
+    const auto number = static_cast<uint32_t>(page + 1);
+    const uint32_t link = ExchangeEnd(links.UInt32(), number, ends) + number;
     for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(link >> shift & 0xff);
     file += unlinked.substr(page_size + (page - 1) * (page_size - kLinkBytes), page_size - kLinkBytes);
   }
   return file;
-}
-
-// A window that reaches from the last byte of the new map back to the first of the old one.
-int WindowLog(size_t num_bytes) {
-  const ZSTD_bounds bounds = ZSTD_cParam_getBounds(ZSTD_c_windowLog);
-  return std::clamp<int>(std::bit_width(num_bytes), bounds.lowerBound, bounds.upperBound);
-}
-
-Error ZstdError(const std::string& what, size_t code) {
-  return MakeError(ErrorCode::kFailed, "{}: Zstandard says: {}", what, ZSTD_getErrorName(code));
-}
-
-Result<std::string> Compress(const std::string& from, const std::string& to, const std::string& what) {
-  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
-  for (const auto& [parameter, value] : {std::pair(ZSTD_c_compressionLevel, kCompressionLevel),
-                                         std::pair(ZSTD_c_windowLog, WindowLog(from.size() + to.size())),
-                                         std::pair(ZSTD_c_enableLongDistanceMatching, 1)}) {
-    const size_t code = ZSTD_CCtx_setParameter(context.get(), parameter, value);
-    if (ZSTD_isError(code)) return ZstdError(what, code);
-  }
-  ZSTD_CCtx_refPrefix(context.get(), from.data(), from.size());
-  std::string payload(ZSTD_compressBound(to.size()), '\0');
-  const size_t num_bytes =
-      ZSTD_compress2(context.get(), payload.data(), payload.size(), to.data(), to.size());
-  if (ZSTD_isError(num_bytes)) return ZstdError(what, num_bytes);
-  payload.resize(num_bytes);
-  return payload;
-}
-
-Result<std::string> Decompress(const std::string& from, const std::string& payload, size_t num_bytes,
-                               const std::string& what) {
-  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-  ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax,
-                         ZSTD_dParam_getBounds(ZSTD_d_windowLogMax).upperBound);
-  ZSTD_DCtx_refPrefix(context.get(), from.data(), from.size());
-  std::string to(num_bytes, '\0');
-  const size_t found =
-      ZSTD_decompressDCtx(context.get(), to.data(), to.size(), payload.data(), payload.size());
-  if (ZSTD_isError(found)) {
-    return MakeError(ErrorCode::kCorrupt, "{}: its payload cannot be unpacked: {}", what,
-                     ZSTD_getErrorName(found));
-  }
-  if (found != num_bytes) {
-    return MakeError(ErrorCode::kCorrupt, "{}: its payload has {} bytes, but its head states {}", what, found,
-                     num_bytes);
-  }
-  return to;
 }
 
 // A map's bytes, checked against the file hash of its seal.
@@ -128,6 +90,7 @@ Result<std::string> ReadWholeMap(const std::string& path) {
 std::string SignedHead(const MapDelta& delta) {
   BlobWriter writer;
   writer.Bytes(kMagic);
+  writer.UInt8(static_cast<uint8_t>(delta.has_rows ? kWithRows : kWithoutRows));
   writer.Bytes(delta.old_hash.data(), delta.old_hash.size());
   writer.Bytes(delta.new_hash.data(), delta.new_hash.size());
   writer.UInt64(delta.old_num_bytes);
@@ -138,6 +101,39 @@ std::string SignedHead(const MapDelta& delta) {
   writer.Bytes(hash.data(), hash.size());
   writer.Bytes(delta.public_key.data(), delta.public_key.size());
   return writer.Take();
+}
+
+// What rows of a map may take: as much as a reader of whole maps allows.
+int64_t MaxRowBytes(uint64_t num_bytes) {
+  constexpr int64_t kAlways = 64 << 20, kPerByte = 64;
+  return kAlways + kPerByte * static_cast<int64_t>(num_bytes);
+}
+
+// A payload with the rows, where it is shorter and what a robot makes of it is the new map.
+Status TryRows(const MapFile& old_map, const std::string& old_bytes, const MapFile& new_map,
+               const std::string& new_bytes, MapDelta* delta) {
+  if (std::max(old_bytes.size(), new_bytes.size()) > static_cast<size_t>(MapDelta::kMaxRowMapBytes))
+    return Ok();
+  CAIRN_ASSIGN_OR_RETURN(const MapRows old_rows, ReadMapRows(old_map));
+  CAIRN_ASSIGN_OR_RETURN(const MapRows new_rows, ReadMapRows(new_map));
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<std::string> rows,
+                         MakeRowDelta(old_rows, new_rows, new_map.path()));
+  if (!rows) return Ok();
+  BlobWriter writer;
+  writer.UInt32(static_cast<uint32_t>(rows->size()));
+  writer.Bytes(*rows);
+  CAIRN_ASSIGN_OR_RETURN(
+      const std::string frame,
+      CompressAfter(UnlinkPages(old_bytes, delta->old_page_size, /*ends=*/true) + EncodedBlocks(new_rows),
+                    UnlinkPages(new_bytes, delta->new_page_size, /*ends=*/true), new_map.path()));
+  writer.Bytes(frame);
+  MapDelta with_rows = *delta;
+  with_rows.has_rows = true;
+  with_rows.payload = writer.Take();
+  if (with_rows.payload.size() >= delta->payload.size()) return Ok();
+  const Result<std::string> made = ApplyMapDelta(with_rows, old_bytes, old_map.path(), new_map.path());
+  if (made.ok() && *made == new_bytes) *delta = std::move(with_rows);
+  return Ok();
 }
 
 }  // namespace
@@ -160,8 +156,10 @@ Result<MapDelta> MakeMapDelta(const std::string& old_path, const std::string& ne
   delta.new_num_bytes = new_bytes.size();
   delta.old_page_size = static_cast<uint32_t>(ParseSqliteHeader(old_bytes).page_size);
   delta.new_page_size = static_cast<uint32_t>(ParseSqliteHeader(new_bytes).page_size);
-  CAIRN_ASSIGN_OR_RETURN(delta.payload, Compress(UnlinkPages(old_bytes, delta.old_page_size),
-                                                 UnlinkPages(new_bytes, delta.new_page_size), new_path));
+  CAIRN_ASSIGN_OR_RETURN(
+      delta.payload, CompressAfter(UnlinkPages(old_bytes, delta.old_page_size, /*ends=*/false),
+                                   UnlinkPages(new_bytes, delta.new_page_size, /*ends=*/false), new_path));
+  CAIRN_RETURN_IF_ERROR(TryRows(old_map, old_bytes, new_map, new_bytes, &delta));
   if (key) {
     CAIRN_ASSIGN_OR_RETURN(delta.public_key, PublicKeyOf(*key));
     CAIRN_ASSIGN_OR_RETURN(delta.signature, SignBytes(SignedHead(delta), *key));
@@ -184,12 +182,12 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
   if (bytes.empty()) return MakeError(ErrorCode::kEmptyFile, "{}: is empty, expected a delta", path);
   const std::string_view magic = std::string_view(bytes).substr(0, kMagic.size());
   if (magic != kMagic.substr(0, magic.size())) {
-    if (magic.substr(0, kMagic.size() - 1) == kMagic.substr(0, kMagic.size() - 1)) {
-      return MakeError(ErrorCode::kUnsupported, "{}: a delta of a later format than this program reads",
-                       path);
-    }
     return MakeError(ErrorCode::kUnsupported,
                      "{}: not a delta of maps; make one with `cairn update delta OLD NEW -o D`", path);
+  }
+  const char format = bytes.size() > kMagic.size() ? bytes[kMagic.size()] : kWithoutRows;
+  if (format != kWithoutRows && format != kWithRows) {
+    return MakeError(ErrorCode::kUnsupported, "{}: a delta of a later format than this program reads", path);
   }
   BlobReader reader(bytes);
   MapDelta delta;
@@ -197,7 +195,8 @@ Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<Publi
     const std::string_view found = reader.Bytes(field->size());
     if (found.size() == field->size()) std::memcpy(field->data(), found.data(), found.size());
   };
-  reader.Bytes(kMagic.size());
+  reader.Bytes(kMagic.size() + 1);
+  delta.has_rows = format == kWithRows;
   read(&delta.old_hash);
   read(&delta.new_hash);
   delta.old_num_bytes = reader.UInt64();
@@ -246,10 +245,21 @@ Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_
                      old_bytes.size(), ShortHex(found), delta_path, delta.old_num_bytes,
                      ShortHex(delta.old_hash), delta.map_name);
   }
+  std::string prefix = UnlinkPages(old_bytes, delta.old_page_size, delta.has_rows);
+  std::string_view frame = delta.payload;
+  if (delta.has_rows) {
+    CAIRN_ASSIGN_OR_RETURN(const MapRows old_rows, ReadMapRows(old_path));
+    BlobReader reader(delta.payload);
+    const std::string_view row_delta = reader.Bytes(reader.UInt32());
+    if (!reader.ok()) return Corrupt(delta_path, "its rows are cut off");
+    CAIRN_ASSIGN_OR_RETURN(const MapRows rows,
+                           ApplyRowDelta(old_rows, row_delta, MaxRowBytes(delta.new_num_bytes), delta_path));
+    prefix += EncodedBlocks(rows);
+    frame = frame.substr(frame.size() - reader.num_left());
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::string unlinked,
-                         Decompress(UnlinkPages(old_bytes, delta.old_page_size), delta.payload,
-                                    delta.new_num_bytes, delta_path));
-  std::string new_bytes = LinkPages(unlinked, delta.new_page_size);
+                         DecompressAfter(prefix, frame, delta.new_num_bytes, delta_path));
+  std::string new_bytes = LinkPages(unlinked, delta.new_page_size, delta.has_rows);
   if (HashOf(new_bytes) != delta.new_hash) {
     return MakeError(ErrorCode::kCorrupt, "{}: gives other bytes than it states; ask for it again",
                      delta_path);

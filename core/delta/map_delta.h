@@ -11,10 +11,11 @@ namespace cairn {
 
 // What a robot that has one map needs to make another, byte for byte: only the differences are sent.  Regions
 // that did not change cost next to nothing, since their blocks are the same bytes in both files, wherever
-// they lie.
+// they lie; of packed blocks that did change, what did not change of their rows costs nothing (row_delta.h).
 //
 //   byte   bytes
-//      0      16   magic
+//      0      15   magic
+//     15       1   '1', or '2': the payload has rows
 //     16      32   BLAKE2b-256 of the whole old map
 //     48      32   BLAKE2b-256 of the whole new map
 //     80       8   number of bytes of the old map, u64
@@ -26,11 +27,15 @@ namespace cairn {
 //    168      64   Ed25519 signature of bytes 0 to 167; 0: not signed
 //    232           length of the name (u32), the new map's name, then the payload
 //
-// Payload: a Zstandard frame with the old file as its prefix.  Both files are taken as their pages without
-// the first four bytes of each but the first, then these as u32 less the page's number: SQLite links the
-// pages of a block by them, so without them a block is contiguous, whatever the pages are.
+// Payload: where it has rows, their length (u32) and they; then a Zstandard frame with the old file as its
+// prefix, behind which stand, where there are rows, the blocks that are made of them.  Both files are taken
+// as their pages without the first four bytes of each but the first, then these as u32 less the page's
+// number: SQLite links the pages of a block by them, so without them a block is contiguous, whatever the
+// pages are.  Where there are rows, 0 less the page's number, the end of a block, is exchanged with 2^31.
 struct MapDelta {
   static constexpr int64_t kMaxMapBytes = int64_t{1} << 30;  // of either map: what Zstandard can look back to
+  // Larger ones are sent without rows, which take several times a map's bytes in memory.
+  static constexpr int64_t kMaxRowMapBytes = int64_t{1} << 26;
 
   Hash old_hash = {};
   Hash new_hash = {};
@@ -40,6 +45,7 @@ struct MapDelta {
   uint32_t new_page_size = 0;
   PublicKey public_key = {};
   Signature signature = {};
+  bool has_rows = false;
   std::string map_name;  // of the new map
   std::string payload;
 
@@ -58,8 +64,9 @@ std::string EncodeMapDelta(const MapDelta& delta);
 // (not a delta, or of a later format), NotSigned (required only), WrongKey.
 Result<MapDelta> ReadMapDelta(const std::string& path, const std::optional<PublicKey>& required);
 
-// The bytes of the new map, from those of the old one; the paths are for messages.  Takes twice the memory of
-// both.  Errors: InvalidArgument (it is not the map that the delta leads from: names both), Corrupt.
+// The bytes of the new map, from those of the old one, which is read again from `old_path` where the delta
+// has rows.  Takes twice the memory of both, and that of the rows.  Errors: InvalidArgument (it is not the
+// map that the delta leads from: names both), Corrupt; those of ReadMapRows.
 Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_bytes,
                                   const std::string& old_path, const std::string& delta_path);
 

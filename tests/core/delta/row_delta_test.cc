@@ -1,0 +1,155 @@
+#include "core/delta/row_delta.h"
+
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/delta/map_delta.h"
+#include "core/files/file.h"
+#include "tests/core/delta/two_maps.h"
+#include "tests/core/map/packed_rows.h"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int64_t kMuch = 1 << 24;
+
+// As ReadMapRows gives them: descriptors are what their levels stand for.
+MapRows Coded(MapRows rows) {
+  rows.descriptor_code = QuantizeByTransform(24, &rows.descriptors);
+  return rows;
+}
+
+std::string Made(const MapRows& from, const MapRows& to) {
+  return MakeRowDelta(from, to, "map").value().value();
+}
+
+TEST(RowDelta, LeadsToTheOtherMapsBlocks) {
+  const MapRows small = Coded(SmallRows()), changed = Coded(ChangedRows());
+  for (const auto& [from, to] :
+       {std::pair(small, changed), std::pair(changed, small), std::pair(small, small)}) {
+    const Result<MapRows> made = ApplyRowDelta(from, Made(from, to), kMuch, "delta");
+    ASSERT_TRUE(made.ok()) << made.error().message;
+    EXPECT_EQ(EncodedBlocks(*made), EncodedBlocks(to));
+  }
+}
+
+TEST(RowDelta, TakesACodeOfItsOwnAlong) {
+  const MapRows from = Coded(SmallRows());
+  MapRows to = from;
+  to.descriptors.setConstant(100);
+  to.descriptor_code = QuantizeByTransform(16, &to.descriptors);
+  const Result<MapRows> made = ApplyRowDelta(from, Made(from, to), kMuch, "delta");
+  ASSERT_TRUE(made.ok()) << made.error().message;
+  EXPECT_EQ(made->descriptor_code, to.descriptor_code);
+  EXPECT_EQ(EncodedBlocks(*made), EncodedBlocks(to));
+}
+
+TEST(RowDelta, IsNoneOfMapsWithoutACode) {
+  MapRows plain = SmallRows();
+  EXPECT_EQ(MakeRowDelta(plain, Coded(plain), "map").value(), std::nullopt);
+  EXPECT_EQ(MakeRowDelta(Coded(plain), plain, "map").value(), std::nullopt);
+}
+
+class PackedMaps : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(WriteMapRows(PackedRows(), Path("old")).ok());
+    rows_ = *ReadMapRows(Path("old"));
+  }
+  static std::string Path(const std::string& name) { return testing::TempDir() + "/row_delta_" + name; }
+
+  // Without the landmark, whose successors have other numbers then.
+  void Remove(LandmarkIdx landmark) {
+    rows_.landmarks.erase(rows_.landmarks.begin() + landmark);
+    const Eigen::Index num_after = rows_.descriptors.rows() - landmark - 1;
+    rows_.descriptors.middleRows(landmark, num_after) = rows_.descriptors.bottomRows(num_after).eval();
+    rows_.descriptors.conservativeResize(rows_.descriptors.rows() - 1, Eigen::NoChange);
+    for (MapImage& image : rows_.images) {
+      std::erase(image.landmarks, landmark);
+      for (LandmarkIdx& other : image.landmarks) other -= other > landmark ? 1 : 0;
+    }
+  }
+
+  MapDelta Delta() {
+    EXPECT_TRUE(WriteMapRows(rows_, Path("new")).ok());
+    return MakeMapDelta(Path("old"), Path("new"), std::nullopt).value();
+  }
+
+  MapRows rows_;
+};
+
+TEST_F(PackedMaps, OneLandmarkLessCostsNextToNothing) {
+  Remove(700);
+  const MapDelta delta = Delta();
+  EXPECT_TRUE(delta.has_rows);
+  EXPECT_LT(delta.payload.size(), 800U) << "blocks that follow are all other bytes";
+  const std::string old_bytes = *ReadFile(Path("old"));
+  EXPECT_EQ(ApplyMapDelta(delta, old_bytes, Path("old"), "delta").value(), *ReadFile(Path("new")));
+  // As a file, too.
+  ASSERT_TRUE(WriteFileAtomically(Path("delta"), EncodeMapDelta(delta)).ok());
+  const Result<MapDelta> read = ReadMapDelta(Path("delta"), std::nullopt);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_TRUE(read->has_rows);
+  EXPECT_EQ(EncodeMapDelta(*read), EncodeMapDelta(delta));
+}
+
+TEST_F(PackedMaps, TheSameMapNeedsNoRows) {
+  const MapDelta delta = Delta();
+  EXPECT_FALSE(delta.has_rows);
+  EXPECT_LT(delta.payload.size(), 100U);
+}
+
+TEST_F(PackedMaps, DeltasOfALaterFormatAreRefused) {
+  Remove(3);
+  std::string bytes = EncodeMapDelta(Delta());
+  EXPECT_EQ(bytes.substr(0, 16), "cairn map delta2");
+  bytes[15] = '3';
+  ASSERT_TRUE(WriteFileAtomically(Path("later"), bytes).ok());
+  const Result<MapDelta> read = ReadMapDelta(Path("later"), std::nullopt);
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(read.error().message, HasSubstr("later format"));
+}
+
+TEST_F(PackedMaps, RowsOfAnUnsignedDeltaMaySayAnything) {
+  Remove(700);
+  const MapDelta good = Delta();
+  const std::string old_bytes = *ReadFile(Path("old"));
+  const auto code = [&](const std::string& payload) {
+    MapDelta bad = good;
+    bad.payload = payload;
+    const Result<std::string> made = ApplyMapDelta(bad, old_bytes, Path("old"), "delta");
+    return made.ok() ? ErrorCode{} : made.error().code;
+  };
+  EXPECT_EQ(code(good.payload), ErrorCode{});
+  EXPECT_EQ(code("abc"), ErrorCode::kCorrupt);
+  EXPECT_EQ(code(std::string("\xff\xff\xff\x7f", 4) + good.payload.substr(4)), ErrorCode::kCorrupt);
+  for (size_t i = 0; i < good.payload.size(); i += 3) {
+    std::string payload = good.payload;
+    payload[i] = static_cast<char>(payload[i] ^ (1 << i % 8));
+    // What a flip in rows changes may lead to the same bytes: a landmark's number that nothing else has, say.
+    const ErrorCode found = code(payload);
+    EXPECT_TRUE(found == ErrorCode::kCorrupt || found == ErrorCode{}) << i;
+  }
+}
+
+TEST(RowDelta, RefusesMoreThanItMayTake) {
+  const MapRows from = Coded(SmallRows()), to = Coded(ChangedRows());
+  const std::string delta = Made(from, to);
+  EXPECT_TRUE(ApplyRowDelta(from, delta, 2000, "delta").ok());
+  for (const int64_t max_num_bytes : {0, 100, 600}) {
+    const Result<MapRows> made = ApplyRowDelta(from, delta, max_num_bytes, "delta");
+    ASSERT_FALSE(made.ok()) << max_num_bytes;
+    EXPECT_EQ(made.error().code, ErrorCode::kCorrupt);
+    EXPECT_THAT(made.error().message, HasSubstr("delta"));
+  }
+  for (size_t length = 0; length < delta.size(); ++length)
+    EXPECT_FALSE(ApplyRowDelta(from, delta.substr(0, length), kMuch, "delta").ok()) << length;
+}
+
+}  // namespace
+}  // namespace cairn
