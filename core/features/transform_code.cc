@@ -96,7 +96,12 @@ TransformCode QuantizeByTransform(int step, DescriptorMatrix* descriptors) {
     const int64_t sum = descriptors->col(i).cast<int64_t>().sum();
     code.mean[i] = static_cast<uint8_t>((sum + count / 2) / count);
   }
-  for (Eigen::Index row = 0; row < count; ++row) {
+  QuantizeByCode(code, descriptors);
+  return code;
+}
+
+void QuantizeByCode(const TransformCode& code, DescriptorMatrix* descriptors) {
+  for (Eigen::Index row = 0; row < descriptors->rows(); ++row) {
     uint8_t* descriptor = descriptors->data() + row * kDescriptorDim;
     TransformLevels levels = LevelsOf(descriptor, code);
     // Values cut off at 0 or 255 change coefficients: usually by less than a level.
@@ -107,7 +112,6 @@ TransformCode QuantizeByTransform(int step, DescriptorMatrix* descriptors) {
       levels = next;
     }
   }
-  return code;
 }
 
 int FrequencyOf(int coefficient) {

@@ -34,6 +34,9 @@ void DescriptorOf(const TransformLevels& levels, const TransformCode& code, uint
 // without a loss.  Returns the code: this step, and the descriptors' mean.
 TransformCode QuantizeByTransform(int step, DescriptorMatrix* descriptors);
 
+// The same with a code that is given.
+void QuantizeByCode(const TransformCode& code, DescriptorMatrix* descriptors);
+
 // Sum of a coefficient's frequencies in y, x and orientation, 0 to 10: natural images have less of higher
 // ones.
 int FrequencyOf(int coefficient);

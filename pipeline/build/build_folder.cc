@@ -79,15 +79,29 @@ Result<std::vector<std::string>> KnownPlaces(const Recipe& recipe, const std::st
   return files;
 }
 
-// The file whose words [build_vocabulary] takes over; empty: none.
-Result<std::string> TreePath(const Recipe& recipe, const BuildPaths& paths) {
-  const std::string file = OptionText(recipe, "build_vocabulary", "tree_from");
+// The file of an earlier compilation that a stage takes over by this option; empty: none.
+Result<std::string> EarlierFile(const Recipe& recipe, const std::string& stage, const std::string& option,
+                                const BuildPaths& paths) {
+  const std::string file = OptionText(recipe, stage, option);
   if (file.empty()) return file;
   const std::string path = (fs::path(paths.recipe).parent_path() / file).lexically_normal().string();
   if (!fs::exists(path)) {
+    return MakeError(ErrorCode::kNotFound,
+                     "[{}] {} = \"{}\": there is no {} (paths are relative to the recipe)", stage, option,
+                     file, path);
+  }
+  return path;
+}
+
+// The map that [emit_map] is to change as little as it can; empty: none.
+Result<std::string> PreviousMapPath(const Recipe& recipe, const BuildPaths& paths) {
+  CAIRN_ASSIGN_OR_RETURN(const std::string path, EarlierFile(recipe, "emit_map", "previous", paths));
+  std::error_code error;
+  if (!path.empty() && fs::equivalent(path, paths.map, error)) {
     return MakeError(
-        ErrorCode::kNotFound,
-        "[build_vocabulary] tree_from = \"{}\": there is no {} (paths are relative to the recipe)", file,
+        ErrorCode::kInvalidArgument,
+        "[emit_map] previous = \"{}\" is the map that is compiled, which it would replace: a later "
+        "run would begin with another one; keep a copy under another name",
         path);
   }
   return path;
@@ -278,7 +292,8 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   if (IsReconstructed(recipe)) {
     CAIRN_ASSIGN_OR_RETURN(known_places, KnownPlaces(recipe, capture));
   }
-  CAIRN_ASSIGN_OR_RETURN(const std::string tree, TreePath(recipe, paths));
+  CAIRN_ASSIGN_OR_RETURN(const std::string tree, EarlierFile(recipe, "build_vocabulary", "tree_from", paths));
+  CAIRN_ASSIGN_OR_RETURN(const std::string previous_map, PreviousMapPath(recipe, paths));
   // Before anything is written, names that make cannot read are refused.
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the build folder", paths.build_dir));
   CAIRN_RETURN_IF_ERROR(CheckMakePath("the program", paths.program));
@@ -303,6 +318,7 @@ Status WriteBuildFolder(const Recipe& recipe, const BuildPaths& paths) {
   CAIRN_RETURN_IF_ERROR(config.Set("SESSIONS_REGISTERED", "", sessions.registered));
   CAIRN_RETURN_IF_ERROR(config.Set("FLOOR_PLAN", "the floor plan", {floor_plan}));
   CAIRN_RETURN_IF_ERROR(config.Set("VOCABULARY_TREE", "[build_vocabulary] tree_from", {tree}));
+  CAIRN_RETURN_IF_ERROR(config.Set("PREVIOUS_MAP", "[emit_map] previous", {previous_map}));
   if (IsReconstructed(recipe) && !is_registered && !recipe.captures.front().queries_path.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "queries = \"{}\": held-out images are given with their poses, but {} has none (no "

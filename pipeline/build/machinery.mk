@@ -22,7 +22,7 @@ $(BUILD)/config.mk: $(if $(MAKE_RESTARTS),,$(RECIPE) $(CAIRN))
 endif
 
 # Sets MAP, CAPTURE, FOOTAGE, FOOTAGE_FILES, FOOTAGE_OPTIONS, SESSIONS, SESSION_QUERIES, SESSIONS_REGISTERED, SIMULATED, RECONSTRUCTED, REGISTERED, KNOWN_PLACES,
-# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
+# QUERIES, LEFT_OUT, FLOOR_PLAN, VOCABULARY_TREE, PREVIOUS_MAP, NAME, SEED and PROGRAM; `cairn stage configure` writes it beside the options.
 include $(BUILD)/config.mk
 
 ifdef RECIPE
@@ -44,6 +44,7 @@ $(BUILD)/%: NAME := $(NAME)
 $(BUILD)/%: SEED := $(SEED)
 $(BUILD)/%: FLOOR_PLAN := $(FLOOR_PLAN)
 $(BUILD)/%: VOCABULARY_TREE := $(VOCABULARY_TREE)
+$(BUILD)/%: PREVIOUS_MAP := $(PREVIOUS_MAP)
 
 # ---- The capture's files
 

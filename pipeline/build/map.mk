@@ -143,10 +143,11 @@ $(BUILD)/%: VIEWS := $(VIEWS)
 CAIRN_EMIT = stage emit-map --matches $(1)/matches.db --classes $(1)/classes.db --world $(1)/world.db --regions $(1)/regions.db \
     --vocabulary $(1)/vocabulary.db --appearance $(1)/appearance.db --name $(NAME) $(if $(FRAME),--frame $(FRAME)) \
     $(addprefix --sessions ,$(SESSION_LIST)) $(addprefix --views ,$(VIEWS)) \
-    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(1)/options/$(stage).toml) --options $(1)/options/emit_map.toml
+    $(foreach stage,$(STAGE_OPTIONS),--stage-options $(stage)=$(1)/options/$(stage).toml) --options $(1)/options/emit_map.toml \
+    $(addprefix --previous ,$(PREVIOUS_MAP))
 EMIT_INPUTS := $(BUILD)/matches.db $(BUILD)/classes.db $(BUILD)/world.db $(BUILD)/regions.db $(BUILD)/vocabulary.db \
     $(BUILD)/appearance.db $(VIEWS) $(STAGE_OPTIONS:%=$(BUILD)/options/%.toml) $(BUILD)/options/name \
-    $(BUILD)/options/floor_plan $(PROGRAM_HASH) $(POSES_READY) $(SESSION_LIST)
+    $(BUILD)/options/floor_plan $(PROGRAM_HASH) $(POSES_READY) $(SESSION_LIST) $(PREVIOUS_MAP)
 $(BUILD)/unsealed.cairn.stamp: $(EMIT_INPUTS)
 	$(CAIRN_WHY)
 	$(CAIRN_LAUNCH) $(CAIRN) $(call CAIRN_EMIT,$(@D)) -o $(@:.stamp=) $(CAIRN_FLAGS)

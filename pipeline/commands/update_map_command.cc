@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 struct UpdateMapArguments {
   std::string map;
   std::string survey;
+  bool anew = false;
   CompileArguments compile;
 };
 
@@ -47,6 +48,14 @@ std::string NameOfSession(const std::string& survey, const std::vector<MapCaptur
   std::string candidate = name;
   for (int number = 2; is_taken(candidate); ++number) candidate = fmt::format("{}-{}", name, number);
   return candidate;
+}
+
+// The options, with the map as the one that is to change as little as it can.
+std::string WithPrevious(std::string options, const std::string& map) {
+  const std::string line = fmt::format("previous = \"{}\"\n", map), table = "[emit_map]\n";
+  const size_t found = options.find(table);
+  if (found == std::string::npos) return options + "\n" + table + line;
+  return options.insert(found + table.size(), line);
 }
 
 // Paths are relative to the recipe.
@@ -79,7 +88,9 @@ Result<std::string> RecipeOfUpdate(const MapRows& rows, const std::vector<MapCap
   const std::vector<StageOptions> all = AllStageOptions();
   for (const StageOptions& stage : all) stages.emplace_back(stage.stage, stage.table);
   CAIRN_ASSIGN_OR_RETURN(const std::string options, OptionsOfMap(rows, stages));
-  return text + options;
+  if (arguments.anew) return text + options;
+  const fs::path map = fs::path(captures[0].folder).parent_path() / kCapturedMapFile;
+  return text + WithPrevious(options, map.lexically_relative(recipe_folder).string());
 }
 
 // Whether a run until this stage finds poses.
@@ -117,7 +128,7 @@ Status UpdateMap(UpdateMapArguments arguments, const CommandEnvironment& environ
   std::vector<MapCapture> captures;
   {
     CAIRN_ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::Acquire(paths.build_dir, NewBuildSession()));
-    CAIRN_ASSIGN_OR_RETURN(captures, WriteMapCaptures(rows, MapFolder(paths, arguments.map)));
+    CAIRN_ASSIGN_OR_RETURN(captures, WriteMapCaptures(rows, MapFolder(paths, arguments.map), arguments.map));
   }
   int num_images = 0;
   int64_t num_keypoints = 0;
@@ -172,6 +183,10 @@ Command UpdateMapCommand() {
                          "Map to write; the recipe NAME.toml is written beside it")
                     .Required()
                     .Type("NAME.cairn");
+                parser.AddFlag(
+                    "--anew", arguments->anew,
+                    "Choose all landmarks anew: a smaller map after many updates, but robots that have "
+                    "the old one are sent nearly all of it [what still holds of the old map stays]");
                 parser
                     .Add("--build-dir", arguments->compile.build_dir,
                          "Folder for the stages' files [NAME.build beside the map]")

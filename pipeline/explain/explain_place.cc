@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/quantiles.h"
+#include "core/blocks/node_poses.h"
 #include "core/geometry/floor_pose.h"
 #include "core/geometry/pose.h"
 #include "pipeline/explain/station_losses.h"
@@ -155,7 +156,7 @@ std::string CoverageText(const MapRows& rows, const StationLosses& losses, Stati
 std::string PromisesText(const MapRows& rows, StationIdx station) {
   if (!rows.findings.promise) return "";
   const MapPromise& promise = *rows.findings.promise;
-  const std::vector<Pose> poses = check_map::NodePoses(rows);
+  const std::vector<Pose> poses = NodePoses(rows);
   std::string text;
   for (size_t i = 0; i < poses.size(); ++i) {
     const NodePromise& node = promise.nodes[i];
@@ -175,7 +176,7 @@ std::string PromisesText(const MapRows& rows, StationIdx station) {
 }
 
 nlohmann::ordered_json PromisesJson(const MapRows& rows, StationIdx station) {
-  const std::vector<Pose> poses = check_map::NodePoses(rows);
+  const std::vector<Pose> poses = NodePoses(rows);
   auto json = nlohmann::ordered_json::array();
   for (size_t i = 0; i < poses.size(); ++i) {
     const NodePromise& node = rows.findings.promise->nodes[i];

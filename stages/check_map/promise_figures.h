@@ -6,14 +6,10 @@
 
 #include "core/blocks/map_findings.h"
 #include "core/blocks/map_rows.h"
-#include "core/geometry/pose.h"
 #include "core/promise/promise_model.h"
 #include "stages/check_map/check_map.h"
 
 namespace cairn::check_map {
-
-// cam_from_world of the nodes of the map's promise, in their order.  REQUIRES: rows.findings.promise
-std::vector<Pose> NodePoses(const MapRows& rows);
 
 // What was promised to held-out images with a true pose, and whether it was kept: the promise of the node
 // whose view is nearest, as far as it reaches; images beyond have none.  Kept: localized within the terms'

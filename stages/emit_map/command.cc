@@ -1,14 +1,18 @@
 #include "stages/emit_map/command.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include <spdlog/spdlog.h>
 
 #include "core/capture/sessions.h"
 #include "core/features/sift.h"
@@ -18,12 +22,14 @@
 #include "core/line/program_version.h"
 #include "core/plan/views_database.h"
 #include "core/world/dropped_items.h"
+#include "stages/emit_map/choose/choose_after.h"
 #include "stages/emit_map/choose/fit_size.h"
 #include "stages/emit_map/count_drops.h"
 #include "stages/emit_map/emit_map.h"
 #include "stages/emit_map/learn_fix_noise.h"
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
+#include "stages/emit_map/previous/settle_rows.h"
 #include "stages/emit_map/survey_files.h"
 
 namespace cairn::emit_map {
@@ -70,6 +76,9 @@ Result<MapHead> ReadProvenance(const Arguments& arguments, uint64_t seed) {
   if (!arguments.views_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(head.input_hashes["views.db"], HashFile(arguments.views_path));
   }
+  if (!arguments.options.previous.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(head.input_hashes["previous.cairn"], HashFile(arguments.options.previous));
+  }
   for (const std::string& text : arguments.stage_options) {
     const size_t equals = text.find('=');
     if (equals == 0 || equals == std::string::npos) {
@@ -111,6 +120,7 @@ struct Inputs : SurveyData {
   std::optional<Views> views;
   MapHead provenance;
   std::vector<DroppedItem> dropped;
+  std::optional<PreviousMap> previous;
 };
 
 Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
@@ -121,6 +131,15 @@ Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
   }
   CAIRN_ASSIGN_OR_RETURN(inputs.provenance, ReadProvenance(arguments, seed));
   CAIRN_ASSIGN_OR_RETURN(inputs.dropped, ReadAllDropped(arguments));
+  if (!arguments.options.previous.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(arguments.options.previous));
+    Result<PreviousMatches> matches = MatchPrevious(inputs.classes, rows, arguments.options.previous);
+    if (matches.ok()) {
+      inputs.previous = {std::move(rows), *std::move(matches)};
+    } else {  // no reason to lose what the stages before took hours for
+      spdlog::warn("previous = {}; the map is made anew", matches.error().message);
+    }
+  }
   return inputs;
 }
 
@@ -136,6 +155,7 @@ Status AddDrops(const std::vector<DroppedItem>& dropped, const Inputs& inputs, M
     if (DescribeDropReason(item.reason).kind == DropKind::kStation)
       rows->stations[item.item_id].is_covered = false;
   }
+  if (inputs.previous) SettleDrops(inputs.previous->rows, rows);
   return Ok();
 }
 
@@ -150,24 +170,28 @@ std::vector<DroppedItem> DroppedWith(const Inputs& inputs, const std::vector<cha
   return dropped;
 }
 
-// The whole map except its self-test.  `classes` and `parts` may be those of a part of the survey.
+// The whole map except its self-test.  `classes` and `parts` may be those of a part of the survey, which no
+// earlier map is of.
 Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const SurveyParts& parts,
                          EmitMapOptions options, const std::vector<char>* keep, const Promises* promises,
                          int num_threads) {
+  const bool is_whole = classes.images.size() == inputs.classes.images.size();
+  const PreviousMap* previous = is_whole && inputs.previous ? &*inputs.previous : nullptr;
   CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                          EmitMap(classes, parts.world, parts.decomposition, inputs.vocabulary, options,
-                                 parts.appearance ? &*parts.appearance : nullptr, keep, promises));
+                                 parts.appearance ? &*parts.appearance : nullptr, keep, promises, previous));
   rows.name = inputs.provenance.name;
   rows.writer = inputs.provenance.writer;
   rows.instruction_set = inputs.provenance.instruction_set;
   rows.seed = inputs.provenance.seed;
   rows.input_hashes = inputs.provenance.input_hashes;
   rows.stage_options = inputs.provenance.stage_options;
+  options.previous.clear();  // its hash is among the inputs
   rows.stage_options["emit_map"] = OptionsToml(DescribeOptions(&options));
   rows.frame = inputs.provenance.frame;
   rows.sessions = inputs.provenance.sessions;
   AddChanges(inputs.classes, &rows);
-  if (classes.images.size() == inputs.classes.images.size()) {  // the map itself, not one to be tried
+  if (is_whole) {  // the map itself, not one to be tried
     if (const std::optional<FixNoise> noise = LearnFixNoise(classes, rows, num_threads)) {
       rows.covariance_scale = noise->covariance_scale;
       rows.keypoint_correlation = noise->keypoint_correlation;
@@ -179,6 +203,7 @@ Result<MapRows> MakeRows(const Inputs& inputs, const Classes& classes, const Sur
                            LearnVisualErrors(classes, rows, rows.visual_map, num_threads));
   }
   if (inputs.views) CAIRN_RETURN_IF_ERROR(AddViews(*inputs.views, &rows));
+  if (previous != nullptr) KeepClassIds(classes, previous->rows, previous->matches, &rows);
   return rows;
 }
 
@@ -250,6 +275,21 @@ PromiseOptions PromiseOptionsOf(const EmitMapOptions& options) {
           .max_region_landmarks = static_cast<size_t>(options.max_region_landmarks)};
 }
 
+std::string AfterText(const MapRows& rows, const PreviousMap& previous) {
+  std::set<ClassId> before;
+  for (const MapLandmark& landmark : previous.rows.landmarks) before.insert(landmark.class_id);
+  const auto num_kept = static_cast<size_t>(
+      std::count_if(rows.landmarks.begin(), rows.landmarks.end(),
+                    [&](const MapLandmark& landmark) { return before.contains(landmark.class_id); }));
+  const auto num_moved = std::count(previous.matches.holds.begin(), previous.matches.holds.end(), 0) -
+                         std::count(previous.matches.landmark_of_class.begin(),
+                                    previous.matches.landmark_of_class.end(), PreviousMatches::kNone);
+  return fmt::format(
+      "emit_map: after the previous map: of its {} landmarks {} stay, {} of them with another place or look; "
+      "{} are new\n",
+      previous.rows.landmarks.size(), num_kept, num_moved, rows.landmarks.size() - num_kept);
+}
+
 // The rows of the map with the landmarks that trials choose, and what they found.
 Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& arguments, const Inputs& inputs,
                                                         const CommandEnvironment& environment) {
@@ -276,6 +316,15 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep, reason), inputs, &rows));
     return rows;
   };
+  if (inputs.previous && inputs.previous->rows.findings.promise && options.max_bytes == 0) {
+    const ChosenAfter chosen =
+        ChooseAfter(inputs.classes, may_keep, inputs.previous->rows, inputs.previous->matches,
+                    PromiseOptionsOf(options), environment.num_threads);
+    CAIRN_ASSIGN_OR_RETURN(MapRows rows,
+                           emit(inputs.classes, chosen.keep, options.descriptor_bits, &chosen.promises));
+    std::string text = AfterText(rows, *inputs.previous) + PromiseText(chosen.promises.findings, rows.frame);
+    return std::pair(std::move(rows), std::move(text));
+  }
   const FitSizeOptions fit_options{.max_bytes = options.max_bytes,
                                    .descriptor_bits = options.descriptor_bits,
                                    .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},

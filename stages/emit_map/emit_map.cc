@@ -14,6 +14,8 @@
 #include "core/promise/view_distance.h"
 #include "stages/emit_map/images_of_map.h"
 #include "stages/emit_map/map_vocabulary.h"
+#include "stages/emit_map/previous/keep_roles.h"
+#include "stages/emit_map/previous/settle_rows.h"
 #include "stages/emit_map/quantize_descriptors.h"
 
 namespace cairn::emit_map {
@@ -380,7 +382,12 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
       {.name = "bad_model_px",
        .value = &options->bad_model_px,
        .help = "models that predict left-out sights worse than this count less, px",
-       .min = 0}};
+       .min = 0},
+      {.name = "previous",
+       .value = &options->previous,
+       .help = "map of the same survey before a session was added: what still holds of it stays as it is, so "
+               "that robots that have it are sent little (cairn update delta); absolute or relative to the "
+               "recipe; empty: the map is made anew"}};
   AddCondition({"landmarks", {"fewest"}}, {"min_recall_ratio", "max_error_ratio", "least_error_ratio"},
                &table);
   AddCondition({"max_bytes", {"0"}}, {"min_recall_ratio", "max_error_ratio", "least_error_ratio"}, &table);
@@ -390,8 +397,8 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
-                        const Appearance* appearance, const std::vector<char>* keep,
-                        const Promises* promises) {
+                        const Appearance* appearance, const std::vector<char>* keep, const Promises* promises,
+                        const PreviousMap* previous) {
   EmitMapOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
   if (options.words == "survey" && options.documents == "kept") {
@@ -453,8 +460,10 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     }
   }
   if (appearance) {
-    AddAppearance(
-        images_of_map.ListsAll() ? *appearance : OfListedImages(*appearance, classes, images_of_map), &rows);
+    Appearance listed =
+        images_of_map.ListsAll() ? *appearance : OfListedImages(*appearance, classes, images_of_map);
+    if (previous != nullptr) KeepRoles(WereKept(listed, classes, previous->rows, previous->matches), &listed);
+    AddAppearance(listed, &rows);
   }
   rows.documents = options.documents;
   const std::vector<char> is_document = DocumentImages(rows);
@@ -478,7 +487,12 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
     row.landmarks.erase(std::unique(row.landmarks.begin(), row.landmarks.end()), row.landmarks.end());
     rows.regions.push_back(std::move(row));
   }
-  if (StoresTransform(options)) {
+  const bool stores_transform = StoresTransform(options);
+  if (previous != nullptr && stores_transform == previous->rows.descriptor_code.has_value())
+    SettleRows(classes, previous->rows, previous->matches, &rows);
+  if (rows.descriptor_code) {
+    // by the levels that the earlier map has
+  } else if (stores_transform) {
     rows.descriptor_code = QuantizeByTransform(TransformStep(options.descriptor_bits), &rows.descriptors);
   } else {
     QuantizeDescriptorValues(options.descriptor_bits, &rows.descriptors);

@@ -14,6 +14,7 @@
 #include "core/world/feature_class.h"
 #include "core/world/world.h"
 #include "stages/emit_map/choose/make_promises.h"
+#include "stages/emit_map/previous/match_previous.h"
 
 namespace cairn::emit_map {
 
@@ -76,6 +77,9 @@ struct EmitMapOptions {
   // Models whose errors of left-out sights have a larger standard deviation are marked and count less, px.
   // REQUIRES: >= 0
   double bad_model_px = 20;
+  // An earlier map of the same survey, which the new one differs from as little as what was added allows
+  // (choose/choose_after.h, previous/settle_rows.h); empty: made anew.
+  std::string previous;
 };
 OptionTable DescribeOptions(EmitMapOptions* options);
 
@@ -84,7 +88,10 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // features, with its inverted files for words = "survey".  `appearance` may be null: the map then has no
 // links between images.  Images of `appearance` that `classes` lacks are left out.  `keep`, where given,
 // marks the classes that may be landmarks; a region then has all of them that can be seen from all of its
-// stations.  `promises`, where given, replaces the decomposition's regions by its own.  The result has no
+// stations.  `promises`, where given, replaces the decomposition's regions by its own.
+// `previous`, where given, is an earlier map of the place, which this one is to differ from as little as what
+// the survey now says allows (previous/settle_rows.h); where the descriptors of one have a code and those of
+// the other none, nothing is taken from it.  The result has no
 // name, seed, options or hashes: those are the caller's.  Pure. O(observations).  Errors: InvalidArgument
 // (inputs that do not belong together: a region's feature, a feature's class or a station's image does not
 // exist; documents = "kept" without kept images; landmarks = "fewest" without `keep`: which these are is
@@ -92,7 +99,7 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr,
-                        const Promises* promises = nullptr);
+                        const Promises* promises = nullptr, const PreviousMap* previous = nullptr);
 
 // Per class, whether a map may keep it: one of regions with landmarks = "regions", else every one.  Errors:
 // as EmitMap.

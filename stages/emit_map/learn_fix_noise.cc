@@ -19,7 +19,7 @@ namespace cairn::emit_map {
 namespace {
 
 constexpr int kRunLength = 12;
-constexpr size_t kMaxNumRuns = 40, kMinNumRuns = 3, kMinNumTried = 20;
+constexpr size_t kMaxNumRuns = 40, kMinNumRuns = 3, kMinNumFixesTried = 20;
 constexpr int kMinNumRays = 3;           // of other images, that place a landmark
 constexpr size_t kMinNumKeypoints = 40;  // that an image is placed by
 // Every one of an image's keypoints, every fourth, and every sixteenth.
@@ -165,7 +165,7 @@ class FixNoiseLearner {
           num_inliers += placed.num_inliers;
         }
       }
-      if (squares.size() < kMinNumTried) continue;
+      if (squares.size() < kMinNumFixesTried) continue;
       factors.push_back(
           {num_inliers / static_cast<double>(squares.size()), Quantile(squares, 0.9) / kNineOfTen});
     }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/blocks/node_poses.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn::check_map {

@@ -191,6 +191,47 @@ TEST_F(UpdateMap, NewMapLocalizesAtLeastWhatTheOldOneDoes) {
   EXPECT_GE(NumRight(Path("new.cairn")), by_old);
 }
 
+// Robots that have the old map are sent what changed: what still holds has its bytes and numbers.
+TEST_F(UpdateMap, WhatHoldsOfTheOldMapStaysAsItIs) {
+  ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
+  EXPECT_THAT(ReadFile(Path("new.toml")).value(),
+              ContainsRegex("emit_map.\nprevious = \"new.build/map-yesterday/.map.cairn\""));
+  EXPECT_EQ(HashFile(Path("new.build/map-yesterday/.map.cairn")).value(), HashFile(OldMap()).value());
+  const MapRows old = ReadMapRows(OldMap()).value();
+  const auto num_same = [&](const MapRows& rows) {
+    std::map<ClassId, const MapLandmark*> landmarks;
+    for (const MapLandmark& landmark : rows.landmarks) landmarks[landmark.class_id] = &landmark;
+    return std::count_if(old.landmarks.begin(), old.landmarks.end(), [&](const MapLandmark& landmark) {
+      const auto found = landmarks.find(landmark.class_id);
+      return found != landmarks.end() && found->second->position == landmark.position;
+    });
+  };
+  EXPECT_GE(num_same(ReadMapRows(Path("new.cairn")).value()), 0.8 * old.landmarks.size());
+  const ProgramRun anew = Update("--anew", "anew.cairn");
+  ASSERT_EQ(anew.exit_code, 0) << anew.err;
+  EXPECT_THAT(ReadFile(Path("anew.toml")).value(), Not(HasSubstr("previous")));
+  EXPECT_LT(num_same(ReadMapRows(Path("anew.cairn")).value()), 0.1 * old.landmarks.size());
+}
+
+TEST_F(UpdateMap, PreviousMapThatCannotBeTakenIsRefused) {
+  const auto compile = [&](const std::string& previous) {
+    WriteCaptureRecipe(Path("bare.toml"), {"without_pixels"});
+    ReplaceInFile(Path("bare.toml"), "[emit_map]\n", "[emit_map]\nprevious = \"" + previous + "\"\n");
+    return RunShell("cairn compile " + Path("bare.toml") + " -o " + Path("bare.cairn") + " --progress none");
+  };
+  const ProgramRun missing = compile("nowhere.cairn");
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_THAT(missing.err, HasSubstr("[emit_map] previous = \"nowhere.cairn\": there is no "));
+  std::ofstream(Path("text.cairn")) << "no map";
+  const ProgramRun text = compile("text.cairn");
+  EXPECT_EQ(text.exit_code, 13) << text.err;
+  EXPECT_THAT(text.err, HasSubstr("text.cairn"));
+  fs::copy_file(OldMap(), Path("bare.cairn"), fs::copy_options::overwrite_existing);
+  const ProgramRun itself = compile("bare.cairn");
+  EXPECT_EQ(itself.exit_code, 2) << itself.err;
+  EXPECT_THAT(itself.err, HasSubstr("is the map that is compiled"));
+}
+
 TEST_F(UpdateMap, SelfTestIsOfTheNewImagesAlone) {
   ASSERT_EQ(first_run_->exit_code, 0) << first_run_->err;
   const auto check = nlohmann::json::parse(ReadFile(Path("new.build/check.json")).value());

@@ -29,7 +29,7 @@ stages/decompose_regions/cover stages/decompose_regions/algorithms stages/decomp
 stages/build_vocabulary
 stages/link_appearance/dominating_set stages/link_appearance
 stages/decompose_views/plan stages/decompose_views
-stages/emit_map/choose stages/emit_map stages/emit_map/leave_out
+stages/emit_map/previous stages/emit_map/choose stages/emit_map stages/emit_map/leave_out
 stages/check_map
 pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film
 pipeline/exchange/bags/files pipeline/exchange/bags

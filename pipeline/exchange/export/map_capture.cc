@@ -13,6 +13,7 @@
 #include "core/capture/sessions.h"
 #include "core/colmap/cameras_text.h"
 #include "core/colmap/colmap_database.h"
+#include "core/files/file.h"
 #include "core/files/folder.h"
 #include "core/options/toml_options.h"
 #include "pipeline/exchange/export/colmap_export.h"
@@ -156,7 +157,8 @@ Eigen::Vector3d UpOfMap(const MapHead& head) {
   return head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
 }
 
-Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std::string& folder) {
+Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std::string& folder,
+                                                 const std::string& map_path) {
   CAIRN_RETURN_IF_ERROR(CheckIsSeen(rows));
   const std::vector<LandmarkImage> images = LandmarkImages(rows);
   std::map<std::string, std::vector<const LandmarkImage*>> of_session;
@@ -179,7 +181,9 @@ Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std:
           CAIRN_RETURN_IF_ERROR(WriteCaptureOf(of_session[capture.session], capture.session, rows,
                                                written + "/" + capture.session));
         }
-        return Ok();
+        if (map_path.empty()) return Ok();
+        CAIRN_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(map_path));
+        return WriteFileAtomically(written + "/" + kCapturedMapFile, bytes);
       }));
   return captures;
 }

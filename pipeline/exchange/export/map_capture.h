@@ -26,9 +26,12 @@ struct MapCapture {
 
 // Writes FOLDER/SESSION for each session that has an image with landmarks: images.txt, cameras.txt,
 // frame.json, features.db.  The folder is replaced as a whole (ReplaceFolderAtomically); same map, same
-// bytes. Errors: NoData (no landmark is seen by two images), InvalidArgument (the folder holds something
-// else), Io.
-Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std::string& folder);
+// bytes. With `map_path`, that of the map's file, FOLDER/kCapturedMapFile is a copy of it: a name that no
+// session has.  Errors: NoData (no landmark is seen by two images), InvalidArgument (the folder holds
+// something else), Io.
+inline constexpr const char* kCapturedMapFile = ".map.cairn";
+Result<std::vector<MapCapture>> WriteMapCaptures(const MapRows& rows, const std::string& folder,
+                                                 const std::string& map_path = "");
 
 // What a recipe and a session may be called that are of this map: its name, characters that they must not
 // have became '_'.  (Whoever made the map chose its name.)

@@ -257,7 +257,8 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
   size_t n = num_that_fit[best];
   for (int round = 0; round < kMaxNumPromises && n > 0; ++round) {
     fitted.keep = SizeFitter::FirstOf(order, n, classes.classes.size());
-    fitted.promises = maker.Promise(fitted.keep, trials.fared(), options.promise);
+    fitted.promises =
+        maker.Promise(fitted.keep, PromiseMaker::BasisOf(trials.fared(), options.promise), options.promise);
     CAIRN_ASSIGN_OR_RETURN(MapRows rows,
                            emit(classes, fitted.keep, fitted.descriptor_bits, &*fitted.promises));
     CAIRN_ASSIGN_OR_RETURN(fitted.num_bytes, SealedBytes(std::move(rows), scratch_path));
@@ -327,12 +328,12 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
     break;
   }
   // The maps that were tried make room for what the whole survey takes.
-  const std::vector<PromiseTrial> fared = Trials(*std::move(trials)).fared();
+  const PromiseBasis basis = PromiseMaker::BasisOf(Trials(*std::move(trials)).fared(), options.promise);
   const PromiseMaker maker(classes, num_threads);
   const std::vector<size_t> first =
       num_kept < classes.classes.size() ? maker.Order(Pool(fitted.keep)).First(num_kept) : Pool(fitted.keep);
-  fitted.keep = maker.Complete(first, fared, options.promise);
-  fitted.promises = maker.Promise(fitted.keep, fared, options.promise);
+  fitted.keep = maker.Complete(first, basis.model, options.promise);
+  fitted.promises = maker.Promise(fitted.keep, basis, options.promise);
   progress.Advance();
   progress.End();
   return fitted;

@@ -57,12 +57,22 @@ LandmarkOrder PromiseMaker::Order(std::vector<size_t> pool) const {
   return {classes_, model_.OfViews(num_threads_), std::move(pool), {}, num_threads_};
 }
 
-std::vector<char> PromiseMaker::Complete(const std::vector<size_t>& first,
-                                         const std::vector<PromiseTrial>& fared,
-                                         const PromiseOptions& options) const {
+PromiseBasis PromiseMaker::BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options) {
   const PromiseModel model = FitPromiseModel(fared);
+  return {model, CalibrationCurve(Outcomes(fared, model, options.terms))};
+}
+
+std::vector<char> PromiseMaker::Complete(const std::vector<size_t>& first, const PromiseModel& model,
+                                         const PromiseOptions& options,
+                                         const std::vector<NodeDemand>& demands) const {
   CoverProblem problem{.of_class = &of_class_};
   problem.demands = Demands(of_class_, nodes_.size(), model.NeededMatches(options.terms), kReachableRatio);
+  for (size_t node = 0; node < demands.size(); ++node) {
+    double all = 0;
+    for (const ClassMatch& match : of_node_[node]) all += match.probability;
+    problem.demands[node] = std::max(demands[node].needed_ratio * problem.demands[node],
+                                     std::min(demands[node].least_matches, kReachableRatio * all));
+  }
   std::vector<size_t> taken = first;
   std::sort(taken.begin(), taken.end());
   std::vector<char> keep(classes_.classes.size(), 0);
@@ -70,16 +80,16 @@ std::vector<char> PromiseMaker::Complete(const std::vector<size_t>& first,
   return keep;
 }
 
-Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<PromiseTrial>& fared,
-                               const PromiseOptions& options) const {
-  const PromiseModel model = FitPromiseModel(fared);
+Promises PromiseMaker::Promise(const std::vector<char>& keep, const PromiseBasis& basis,
+                               const PromiseOptions& options, const DivideLike& divide) const {
+  const PromiseModel& model = basis.model;
   const ViewDistance& distance = model_.distance();
   Promises promises;
   promises.findings = {.terms = options.terms,
                        .model = model,
                        .radius_m = distance.radius(),
                        .radius_deg = distance.radius_deg(),
-                       .left_out = CalibrationCurve(Outcomes(fared, model, options.terms))};
+                       .left_out = basis.left_out};
   const std::vector<char> all(keep.size(), 1);
   promises.findings.nodes.resize(nodes_.size());
   ParallelFor(static_cast<int64_t>(nodes_.size()), num_threads_, [&](int64_t node) {
@@ -117,8 +127,12 @@ Promises PromiseMaker::Promise(const std::vector<char>& keep, const std::vector<
     is_lacking = true;
   }
   const int64_t cover_bound = is_lacking ? bound_of(problem) : promises.findings.landmarks_lower_bound;
-  const PromiseRegions divided = DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem, keep,
-                                             options.max_region_landmarks, cover_bound);
+  std::optional<PromiseRegions> likewise;
+  if (divide) likewise = divide(nodes_, problem, cover_bound);
+  const PromiseRegions divided = likewise
+                                     ? *std::move(likewise)
+                                     : DivideNodes(nodes_, distance.radius(), distance.radius_deg(), problem,
+                                                   keep, options.max_region_landmarks, cover_bound);
   promises.regions_lower_bound = divided.lower_bound;
   for (const PromiseRegion& region : divided.regions) {
     for (const int32_t node : region.nodes)

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/blocks/map_findings.h"
@@ -9,6 +11,7 @@
 #include "core/promise/landmark_sights.h"
 #include "core/promise/promise_model.h"
 #include "core/promise/promise_nodes.h"
+#include "core/promise/promise_regions.h"
 #include "core/world/feature_class.h"
 
 namespace cairn::emit_map {
@@ -30,6 +33,22 @@ struct Promises {
   int regions_lower_bound = 0;
 };
 
+// What promises are made by, and how those that were made by it fared.
+struct PromiseBasis {
+  PromiseModel model;
+  std::vector<PromiseBin> left_out;
+};
+
+// What a node is to expect at least, where more is known of it than the promise.
+struct NodeDemand {
+  double least_matches = 0;  // where all classes together give as many
+  double needed_ratio = 1;   // of what the promise takes
+};
+
+// Divides the nodes into regions; nothing: this is left to DivideNodes (core/promise/promise_regions.h).
+using DivideLike = std::function<std::optional<PromiseRegions>(
+    const std::vector<PromiseNode>& nodes, const CoverProblem& problem, int64_t cover_bound)>;
+
 // Makes promises about maps of a survey: at every node, with which probability a robot is localized.
 class PromiseMaker {
  public:
@@ -39,15 +58,21 @@ class PromiseMaker {
   // Of the classes at these positions.
   LandmarkOrder Order(std::vector<size_t> pool) const;
 
+  // `fared`: how left-out images fared in maps of parts of the survey.
+  static PromiseBasis BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options);
+
   // Per class, whether it is one of `first` or is needed besides: the fewest more with which the promise is
-  // kept at every node where all classes together would keep it; elsewhere nearly all that helps. `fared`:
-  // how left-out images fared in maps of parts of the survey.
-  std::vector<char> Complete(const std::vector<size_t>& first, const std::vector<PromiseTrial>& fared,
-                             const PromiseOptions& options) const;
+  // kept at every node where all classes together would keep it; elsewhere nearly all that helps.
+  // `demands`: per node; empty: what the promise takes.
+  std::vector<char> Complete(const std::vector<size_t>& first, const PromiseModel& model,
+                             const PromiseOptions& options,
+                             const std::vector<NodeDemand>& demands = {}) const;
 
   // What a map with these landmarks promises.
-  Promises Promise(const std::vector<char>& keep, const std::vector<PromiseTrial>& fared,
-                   const PromiseOptions& options) const;
+  Promises Promise(const std::vector<char>& keep, const PromiseBasis& basis, const PromiseOptions& options,
+                   const DivideLike& divide = nullptr) const;
+
+  const std::vector<PromiseNode>& nodes() const { return nodes_; }
 
  private:
   const Classes& classes_;

@@ -119,6 +119,15 @@ TEST_F(MapCaptureTest, SameMapGivesTheSameBytesAndKeepsDates) {
   EXPECT_TRUE(bytes == *ReadFile(path));
 }
 
+TEST_F(MapCaptureTest, TheMapItselfIsKeptBesideThem) {
+  const std::string map = testing::TempDir() + "/map_of_captures";
+  ASSERT_TRUE(WriteFileAtomically(map, "the map's bytes").ok());
+  ASSERT_TRUE(WriteMapCaptures(SmallMap(), folder_, map).ok());
+  EXPECT_EQ(*ReadFile(folder_ + "/" + kCapturedMapFile), "the map's bytes");
+  ASSERT_TRUE(WriteMapCaptures(SmallMap(), folder_).ok());
+  EXPECT_FALSE(fs::exists(folder_ + "/" + kCapturedMapFile));
+}
+
 TEST_F(MapCaptureTest, MapOfWhichNothingIsSeenTwiceIsRefused) {
   MapRows rows = SmallMap();
   rows.images[1].landmarks = {2};

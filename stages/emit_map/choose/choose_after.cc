@@ -1,0 +1,173 @@
+#include "stages/emit_map/choose/choose_after.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "core/base/quantiles.h"
+#include "core/blocks/node_poses.h"
+#include "core/promise/promise_nodes.h"
+#include "core/promise/view_distance.h"
+
+namespace cairn::emit_map {
+namespace {
+
+constexpr int32_t kNone = PreviousMatches::kNone;
+// A place keeps this part of the matches that it expected, as far as a robot needs them to be localized for
+// certain: less, and more landmarks come in.
+constexpr double kKeptRatio = 0.9;
+// What was enough for the promise is, while it is this part of what is enough now: how probable matches are
+// is learnt anew from a survey with a few more images.
+constexpr double kMetRatio = 0.97;
+// A region grows by this factor before all are divided anew.
+constexpr double kMaxGrowth = 1.5;
+
+// Per node of the survey the nearest one of the earlier map's promise, as far as that reaches.
+std::vector<int32_t> NodesBefore(const std::vector<PromiseNode>& nodes, const MapRows& previous, bool any) {
+  const MapPromise& promise = *previous.findings.promise;
+  const std::vector<Pose> poses = NodePoses(previous);
+  std::vector<int32_t> before;
+  for (const PromiseNode& node : nodes) {
+    int32_t nearest = kNone;
+    double least = 0;
+    for (size_t i = 0; i < poses.size(); ++i) {
+      const double squared =
+          ViewDistanceSquared(node.cam_from_world, poses[i], promise.radius_m, promise.radius_deg);
+      if (nearest == kNone || squared < least) least = squared, nearest = static_cast<int32_t>(i);
+    }
+    before.push_back(any || least <= kNodeReach * kNodeReach ? nearest : kNone);
+  }
+  return before;
+}
+
+// Nearly as many matches as there were, where the earlier map looked from about there, and what the promise
+// takes as far as that is known; else as many as in half of its places.
+std::vector<NodeDemand> DemandsAfter(const std::vector<PromiseNode>& nodes, const MapRows& previous) {
+  const MapPromise& promise = *previous.findings.promise;
+  if (!(promise.model.match_ratio > 0) || promise.nodes.empty()) return {};
+  std::vector<double> expected;
+  for (const NodePromise& node : promise.nodes)
+    expected.push_back(node.num_matches / promise.model.match_ratio);
+  const double elsewhere = Median(expected);
+  std::vector<NodeDemand> demands;
+  for (const int32_t before : NodesBefore(nodes, previous, /*any=*/false)) {
+    const bool is_new = before == kNone;
+    demands.push_back({.least_matches = std::min(LandmarkOrderOptions().enough_matches,
+                                                 kKeptRatio * (is_new ? elsewhere : expected[before])),
+                       .needed_ratio = is_new ? 1 : kMetRatio});
+  }
+  return demands;
+}
+
+// The earlier map's regions with what was added, and what nodes lack that others of the map show.
+class RegionsAfter {
+ public:
+  RegionsAfter(const MapRows& previous, const PreviousMatches& matches, const std::vector<char>& keep,
+               size_t max_landmarks)
+      : previous_(previous), matches_(matches), keep_(keep), max_landmarks_(max_landmarks) {}
+
+  std::optional<PromiseRegions> Divide(const std::vector<PromiseNode>& nodes, const CoverProblem& problem,
+                                       int64_t cover_bound) const {
+    const MapPromise& promise = *previous_.findings.promise;
+    std::vector<PromiseRegion> regions(previous_.regions.size());
+    const std::vector<int32_t> before = NodesBefore(nodes, previous_, /*any=*/true);
+    std::vector<RegionIdx> region_of_node;
+    for (size_t node = 0; node < nodes.size(); ++node) {
+      if (before[node] == kNone) return std::nullopt;
+      region_of_node.push_back(promise.nodes[before[node]].region);
+      regions[region_of_node.back()].nodes.push_back(static_cast<int32_t>(node));
+    }
+    std::vector<std::vector<char>> has(regions.size(), std::vector<char>(keep_.size(), 0));
+    KeepLandmarks(&has);
+    AddNew(*problem.of_class, region_of_node, &has);
+    MeetDemands(problem, region_of_node, &has);
+    PromiseRegions result;
+    size_t most = max_landmarks_;
+    for (const MapRegion& region : previous_.regions) most = std::max(most, region.landmarks.size());
+    const auto most_now = static_cast<size_t>(kMaxGrowth * static_cast<double>(max_landmarks_));
+    most = std::max(most, most_now);
+    for (size_t r = 0; r < regions.size(); ++r) {
+      for (size_t i = 0; i < keep_.size(); ++i) {
+        if (has[r][i] != 0) regions[r].classes.push_back(i);
+      }
+      // A region that no node is left of goes, and one that grew out of bounds changes all.
+      if (regions[r].classes.size() > most) return std::nullopt;
+      if (!regions[r].nodes.empty()) result.regions.push_back(std::move(regions[r]));
+    }
+    const auto num = static_cast<int64_t>(most);
+    result.lower_bound = static_cast<int>(std::max<int64_t>(1, (cover_bound + num - 1) / num));
+    return result;
+  }
+
+ private:
+  void KeepLandmarks(std::vector<std::vector<char>>* has) const {
+    std::vector<size_t> class_of_landmark(previous_.landmarks.size(), keep_.size());
+    for (size_t i = 0; i < keep_.size(); ++i) {
+      if (keep_[i] != 0 && matches_.landmark_of_class[i] != kNone)
+        class_of_landmark[matches_.landmark_of_class[i]] = i;
+    }
+    for (size_t r = 0; r < previous_.regions.size(); ++r) {
+      for (const LandmarkIdx landmark : previous_.regions[r].landmarks) {
+        if (class_of_landmark[landmark] < keep_.size()) (*has)[r][class_of_landmark[landmark]] = 1;
+      }
+    }
+  }
+
+  void AddNew(const std::vector<std::vector<ExpectedMatch>>& of_class,
+              const std::vector<RegionIdx>& region_of_node, std::vector<std::vector<char>>* has) const {
+    for (size_t i = 0; i < keep_.size(); ++i) {
+      if (keep_[i] == 0 || matches_.landmark_of_class[i] != kNone) continue;
+      for (const ExpectedMatch& match : of_class[i]) (*has)[region_of_node[match.view]][i] = 1;
+    }
+  }
+
+  // Where a region's landmarks are too few for one of its nodes, the fewest others of the map that it takes.
+  void MeetDemands(const CoverProblem& problem, const std::vector<RegionIdx>& region_of_node,
+                   std::vector<std::vector<char>>* has) const {
+    for (size_t r = 0; r < has->size(); ++r) {
+      // Of this region's nodes alone, and what the map keeps.
+      std::vector<std::vector<ExpectedMatch>> of_class(keep_.size());
+      for (size_t i = 0; i < keep_.size(); ++i) {
+        if (keep_[i] == 0) continue;
+        for (const ExpectedMatch& match : (*problem.of_class)[i]) {
+          if (region_of_node[match.view] == static_cast<RegionIdx>(r)) of_class[i].push_back(match);
+        }
+      }
+      CoverProblem of_region{.of_class = &of_class, .demands = problem.demands};
+      for (size_t node = 0; node < region_of_node.size(); ++node)
+        of_region.demands[node] *= region_of_node[node] == static_cast<RegionIdx>(r) ? kMetRatio : 0;
+      std::vector<size_t> taken;
+      for (size_t i = 0; i < keep_.size(); ++i) {
+        if ((*has)[r][i] != 0) taken.push_back(i);
+      }
+      for (const size_t i : CoverFast(of_region, taken)) (*has)[r][i] = 1;
+    }
+  }
+
+  const MapRows& previous_;
+  const PreviousMatches& matches_;
+  const std::vector<char>& keep_;
+  size_t max_landmarks_;
+};
+
+}  // namespace
+
+ChosenAfter ChooseAfter(const Classes& classes, const std::vector<char>& may_keep, const MapRows& previous,
+                        const PreviousMatches& matches, const PromiseOptions& options, int num_threads) {
+  const PromiseMaker maker(classes, num_threads);
+  const PromiseBasis basis{previous.findings.promise->model, previous.findings.promise->left_out};
+  std::vector<size_t> first;
+  for (size_t i = 0; i < may_keep.size(); ++i) {
+    if (may_keep[i] != 0 && matches.landmark_of_class[i] != kNone) first.push_back(i);
+  }
+  ChosenAfter chosen;
+  chosen.keep = maker.Complete(first, basis.model, options, DemandsAfter(maker.nodes(), previous));
+  const RegionsAfter regions(previous, matches, chosen.keep, options.max_region_landmarks);
+  chosen.promises =
+      maker.Promise(chosen.keep, basis, options,
+                    [&](const std::vector<PromiseNode>& nodes, const CoverProblem& problem,
+                        int64_t cover_bound) { return regions.Divide(nodes, problem, cover_bound); });
+  return chosen;
+}
+
+}  // namespace cairn::emit_map
