@@ -37,10 +37,12 @@ class LandmarkOrder::Impl {
     for (size_t n = 0; n < pool_.size(); ++n) heap_[n].n = n;
     size_t num_sights = 0;
     for (const size_t i : pool_) num_sights += matches_.of_class[i].size();
-    if (num_sights > kMaxKeptSights) return;
-    kept_sights_.resize(pool_.size());
-    ParallelFor(static_cast<int64_t>(pool_.size()), num_threads_,
-                [&](int64_t n) { kept_sights_[n] = SightsOf(pool_[n]); });
+    if (num_sights <= kMaxKeptSights) {
+      kept_sights_.resize(pool_.size());
+      ParallelFor(static_cast<int64_t>(pool_.size()), num_threads_,
+                  [&](int64_t n) { kept_sights_[n] = SightsOf(pool_[n]); });
+    }
+    TakeFirst(options.first);
   }
 
   std::vector<size_t> First(size_t num) {
@@ -50,6 +52,17 @@ class LandmarkOrder::Impl {
   }
 
  private:
+  void TakeFirst(const std::vector<size_t>& first) {
+    std::vector<char> is_taken(pool_.size(), 0);
+    for (const size_t i : first) {
+      const auto n = static_cast<size_t>(std::lower_bound(pool_.begin(), pool_.end(), i) - pool_.begin());
+      Take(n);
+      order_.push_back(i);
+      is_taken[n] = 1;
+    }
+    std::erase_if(heap_, [&](const Candidate& candidate) { return is_taken[candidate.n] != 0; });
+  }
+
   struct View {
     Pose cam_from_world;
     double focal;  // px

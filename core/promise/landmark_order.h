@@ -13,6 +13,9 @@ namespace cairn {
 struct LandmarkOrderOptions {
   // As many matches as a robot needs to be localized for certain.  REQUIRES: > 0
   double enough_matches = 20;
+  // Positions in classes.classes that come first, in this order: a map has these already.  REQUIRES: each of
+  // the pool, once
+  std::vector<size_t> first = {};
   KeypointErrors keypoints;
 };
 

@@ -135,6 +135,8 @@ Result<Inputs> ReadInputs(const Arguments& arguments, uint64_t seed) {
     CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(arguments.options.previous));
     Result<PreviousMatches> matches = MatchPrevious(inputs.classes, rows, arguments.options.previous);
     if (matches.ok()) {
+      // Of mostly other images, landmarks have other bytes anyway: each is where the whole survey has it.
+      if (IsMostlyNew(inputs.classes, rows)) std::fill(matches->holds.begin(), matches->holds.end(), 0);
       inputs.previous = {std::move(rows), *std::move(matches)};
     } else {  // no reason to lose what the stages before took hours for
       spdlog::warn("previous = {}; the map is made anew", matches.error().message);
@@ -290,6 +292,12 @@ std::string AfterText(const MapRows& rows, const PreviousMap& previous) {
       previous.rows.landmarks.size(), num_kept, num_moved, rows.landmarks.size() - num_kept);
 }
 
+// With the earlier map's landmarks, their bits.
+int BitsAfter(const EmitMapOptions& options, const std::vector<size_t>& first, const Inputs& inputs) {
+  if (first.empty() || !inputs.previous->rows.descriptor_code) return options.descriptor_bits;
+  return std::min(options.descriptor_bits, BitsOfStep(inputs.previous->rows.descriptor_code->step));
+}
+
 // The rows of the map with the landmarks that trials choose, and what they found.
 Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& arguments, const Inputs& inputs,
                                                         const CommandEnvironment& environment) {
@@ -316,7 +324,9 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
     if (is_whole) CAIRN_RETURN_IF_ERROR(AddDrops(DroppedWith(inputs, may_keep, keep, reason), inputs, &rows));
     return rows;
   };
-  if (inputs.previous && inputs.previous->rows.findings.promise && options.max_bytes == 0) {
+  const bool is_after = inputs.previous && options.max_bytes == 0;
+  if (is_after && inputs.previous->rows.findings.promise &&
+      !IsMostlyNew(inputs.classes, inputs.previous->rows)) {
     const ChosenAfter chosen =
         ChooseAfter(inputs.classes, may_keep, inputs.previous->rows, inputs.previous->matches,
                     PromiseOptionsOf(options), environment.num_threads);
@@ -325,8 +335,10 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
     std::string text = AfterText(rows, *inputs.previous) + PromiseText(chosen.promises.findings, rows.frame);
     return std::pair(std::move(rows), std::move(text));
   }
+  const std::vector<size_t> first =
+      is_after ? StillThere(may_keep, inputs.previous->matches) : std::vector<size_t>();
   const FitSizeOptions fit_options{.max_bytes = options.max_bytes,
-                                   .descriptor_bits = options.descriptor_bits,
+                                   .descriptor_bits = BitsAfter(options, first, inputs),
                                    .limits = {options.left_out_max_error_m, options.left_out_max_error_deg},
                                    .min_recall_ratio = options.min_recall_ratio,
                                    .max_error_ratio = options.max_error_ratio,
@@ -338,10 +350,11 @@ Result<std::pair<MapRows, std::string>> MakeRowsByTrial(const Arguments& argumen
           ? FitSize(inputs.classes, may_keep, arguments.matches_path, emit, fit_options,
                     TemporaryPath(arguments.output_path), environment.num_threads, *environment.progress)
           : ChooseFewest(inputs.classes, arguments.matches_path, emit, fit_options, environment.num_threads,
-                         *environment.progress));
+                         *environment.progress, first));
   CAIRN_ASSIGN_OR_RETURN(MapRows rows, emit(inputs.classes, fitted.keep, fitted.descriptor_bits,
                                             fitted.promises ? &*fitted.promises : nullptr));
   std::string text = GuaranteeText(rows, fitted, arguments.options);
+  if (is_after) text = AfterText(rows, *inputs.previous) + text;
   if (fitted.promises) text += PromiseText(fitted.promises->findings, rows.frame);
   return std::pair(std::move(rows), std::move(text));
 }

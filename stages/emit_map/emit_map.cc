@@ -260,10 +260,8 @@ bool StoresTransform(const EmitMapOptions& options) {
 
 // The step of a coefficient's levels.  At 3 and at 2 bits descriptors err by squares of 42 and 69, as levels
 // of values do between 3 and 2 bits.
-int TransformStep(int descriptor_bits) {
-  constexpr std::array<int, 6> kStepOfBits = {64, 32, 24, 16, 8, 4};
-  return kStepOfBits[descriptor_bits - 1];
-}
+constexpr std::array<int, 6> kStepOfBits = {64, 32, 24, 16, 8, 4};
+int TransformStep(int descriptor_bits) { return kStepOfBits[descriptor_bits - 1]; }
 
 // The mean of the entropies of the images at each region's stations.
 void AddRegionEntropies(MapRows* rows) {
@@ -393,6 +391,12 @@ OptionTable DescribeOptions(EmitMapOptions* options) {
   AddCondition({"max_bytes", {"0"}}, {"min_recall_ratio", "max_error_ratio", "least_error_ratio"}, &table);
   AddCondition({"visual_map", {"true"}}, {"max_num_sights", "bad_model_px"}, &table);
   return table;
+}
+
+int BitsOfStep(int step) {
+  const auto fine =
+      std::find_if(kStepOfBits.begin(), kStepOfBits.end(), [&](int other) { return other <= step; });
+  return static_cast<int>(std::min(fine, kStepOfBits.end() - 1) - kStepOfBits.begin()) + 1;
 }
 
 Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomposition& decomposition,

@@ -101,6 +101,9 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr,
                         const Promises* promises = nullptr, const PreviousMap* previous = nullptr);
 
+// The fewest bits of a descriptor's value whose levels are as fine as those of a transform with this step.
+int BitsOfStep(int step);
+
 // Per class, whether a map may keep it: one of regions with landmarks = "regions", else every one.  Errors:
 // as EmitMap.
 Result<std::vector<char>> KeptClasses(const Classes& classes, const World& world,

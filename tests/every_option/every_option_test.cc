@@ -54,6 +54,7 @@ const std::map<std::string, std::vector<std::string>> kGiven = {
     {"filter_visibility.up", {"\"0,0,1\""}},
     {"build_vocabulary.tree_from", {"\"words.db\""}},
     {"emit_map.max_bytes", {"400000"}},
+    {"emit_map.previous", {"\"before.cairn\""}},
 };
 // clang-format on
 
@@ -404,6 +405,7 @@ TEST_P(EveryOption, IsHonouredOrRefusedWithASentence) {
   ASSERT_EQ(first.exit_code, 0) << first.out << first.err;
   const std::string hash = *HashFile(Path("it.cairn"));
   fs::copy_file(Path("it.build/vocabulary.db"), Path("words.db"));
+  fs::copy_file(Path("it.cairn"), Path("before.cairn"));
   int num_options = 0, num_refused = 0;
   for (const std::vector<Case>& together :
        Compiles(CasesOf(GetParam().stages), GetParam().max_num_compiles)) {

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "core/base/quantiles.h"
 #include "core/blocks/node_poses.h"
+#include "core/capture/sessions.h"
 #include "core/promise/promise_nodes.h"
 #include "core/promise/view_distance.h"
 
@@ -19,6 +22,7 @@ constexpr double kKeptRatio = 0.9;
 // What was enough for the promise is, while it is this part of what is enough now: how probable matches are
 // is learnt anew from a survey with a few more images.
 constexpr double kMetRatio = 0.97;
+constexpr double kMostlyNewRatio = 0.2;
 // A region grows by this factor before all are divided anew.
 constexpr double kMaxGrowth = 1.5;
 
@@ -152,16 +156,35 @@ class RegionsAfter {
 
 }  // namespace
 
+bool IsMostlyNew(const Classes& classes, const MapRows& previous) {
+  const std::set<std::string> before(previous.sessions.begin(), previous.sessions.end());
+  const auto is_new = [&](const SurveyImage& image) {
+    const int session = SessionOfImage(classes.sessions, image.name);
+    // Where it had no names for them, the earlier map is of the first.
+    return before.empty() ? session > 0 : session >= 0 && !before.contains(classes.sessions[session]);
+  };
+  const auto num_new =
+      static_cast<double>(std::count_if(classes.images.begin(), classes.images.end(), is_new));
+  return num_new > kMostlyNewRatio * (num_new + static_cast<double>(previous.images.size()));
+}
+
+std::vector<size_t> StillThere(const std::vector<char>& may_keep, const PreviousMatches& matches) {
+  std::vector<size_t> there;
+  for (size_t i = 0; i < may_keep.size(); ++i) {
+    if (may_keep[i] != 0 && matches.landmark_of_class[i] != kNone) there.push_back(i);
+  }
+  std::sort(there.begin(), there.end(),
+            [&](size_t a, size_t b) { return matches.landmark_of_class[a] < matches.landmark_of_class[b]; });
+  return there;
+}
+
 ChosenAfter ChooseAfter(const Classes& classes, const std::vector<char>& may_keep, const MapRows& previous,
                         const PreviousMatches& matches, const PromiseOptions& options, int num_threads) {
   const PromiseMaker maker(classes, num_threads);
   const PromiseBasis basis{previous.findings.promise->model, previous.findings.promise->left_out};
-  std::vector<size_t> first;
-  for (size_t i = 0; i < may_keep.size(); ++i) {
-    if (may_keep[i] != 0 && matches.landmark_of_class[i] != kNone) first.push_back(i);
-  }
   ChosenAfter chosen;
-  chosen.keep = maker.Complete(first, basis.model, options, DemandsAfter(maker.nodes(), previous));
+  chosen.keep = maker.Complete(StillThere(may_keep, matches), basis.model, options,
+                               DemandsAfter(maker.nodes(), previous));
   const RegionsAfter regions(previous, matches, chosen.keep, options.max_region_landmarks);
   chosen.promises =
       maker.Promise(chosen.keep, basis, options,

@@ -7,6 +7,13 @@
 
 namespace cairn::emit_map {
 
+// Whether images that an earlier map's sessions do not have are more than a fifth of all that a map of today
+// would be of: then what the new places need is found by trials, with the landmarks that are still there
+// first.
+bool IsMostlyNew(const Classes& classes, const MapRows& previous);
+// The classes of landmarks that are still there, in the earlier map's order.
+std::vector<size_t> StillThere(const std::vector<char>& may_keep, const PreviousMatches& matches);
+
 struct ChosenAfter {
   std::vector<char> keep;  // per class
   Promises promises;

@@ -144,10 +144,11 @@ std::vector<int> FewestBitsFirst(int most) {
   return bits_to_try;
 }
 
-// Numbers of landmarks to try, ascending; the last is all.
-std::vector<size_t> Ladder(size_t num_classes) {
+// Numbers of landmarks to try, ascending, from so many on; the last is all.
+std::vector<size_t> Ladder(size_t num_classes, size_t least) {
   std::vector<size_t> sizes;
-  for (double size = kFewestLandmarks; size < static_cast<double>(num_classes); size *= kLadderFactor)
+  for (double size = std::max(kFewestLandmarks, static_cast<double>(least));
+       size < static_cast<double>(num_classes); size *= kLadderFactor)
     sizes.push_back(static_cast<size_t>(size));
   sizes.push_back(num_classes);
   return sizes;
@@ -235,9 +236,9 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
 
   progress.Begin("trying what to keep", static_cast<int64_t>(kMaxNumRounds + 1 + num_that_fit.size()),
                  "steps");
-  CAIRN_ASSIGN_OR_RETURN(
-      Trials trials, Trials::Make(classes, may_keep, matches_path, options.max_num_left_out, options.limits,
-                                  emit, num_threads, progress));
+  CAIRN_ASSIGN_OR_RETURN(Trials trials,
+                         Trials::Make(classes, may_keep, {}, matches_path, options.max_num_left_out,
+                                      options.limits, emit, num_threads, progress));
   CAIRN_ASSIGN_OR_RETURN(fitted.trial_of_all, trials.Try(pool.size(), options.descriptor_bits));
   progress.Advance();
   size_t best = num_that_fit.size();
@@ -276,14 +277,15 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
 }
 
 Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& matches_path, const EmitKept& emit,
-                                const FitSizeOptions& options, int num_threads, Progress& progress) {
+                                const FitSizeOptions& options, int num_threads, Progress& progress,
+                                const std::vector<size_t>& first) {
   FittedSize fitted{.keep = std::vector<char>(classes.classes.size(), 1),
                     .descriptor_bits = options.descriptor_bits};
-  const std::vector<size_t> sizes = Ladder(classes.classes.size());
+  const std::vector<size_t> sizes = Ladder(classes.classes.size(), first.size());
   const auto num_halvings = static_cast<size_t>(std::ceil(std::log2(sizes.size() + 1)));
   progress.Begin("trying how few landmarks will do",
                  static_cast<int64_t>(kMaxNumRounds + 2 * num_halvings + 2 * kNumBeside + 3), "steps");
-  Result<Trials> trials = Trials::Make(classes, fitted.keep, matches_path, options.max_num_left_out,
+  Result<Trials> trials = Trials::Make(classes, fitted.keep, first, matches_path, options.max_num_left_out,
                                        options.limits, emit, num_threads, progress);
   if (!trials.ok()) {
     if (trials.error().code != ErrorCode::kNoData) return trials.error();
@@ -308,7 +310,8 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   const SizeTerms terms{.min_num_right = num_right - may_be_lost,
                         .max_log_error_ratio = std::log(options.max_error_ratio)};
   size_t num_kept = classes.classes.size();
-  for (const int bits : FewestBitsFirst(options.descriptor_bits)) {
+  for (const int bits :
+       first.empty() ? FewestBitsFirst(options.descriptor_bits) : std::vector<int>{options.descriptor_bits}) {
     const auto try_size = [&](size_t n) -> Result<TriedSize> {
       LeftOutTrial trial = fitted.trial_of_all;
       if (n != classes.classes.size() || bits != options.descriptor_bits) {
@@ -330,9 +333,10 @@ Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& match
   // The maps that were tried make room for what the whole survey takes.
   const PromiseBasis basis = PromiseMaker::BasisOf(Trials(*std::move(trials)).fared(), options.promise);
   const PromiseMaker maker(classes, num_threads);
-  const std::vector<size_t> first =
-      num_kept < classes.classes.size() ? maker.Order(Pool(fitted.keep)).First(num_kept) : Pool(fitted.keep);
-  fitted.keep = maker.Complete(first, basis.model, options.promise);
+  const std::vector<size_t> chosen = num_kept < classes.classes.size()
+                                         ? maker.Order(Pool(fitted.keep), first).First(num_kept)
+                                         : Pool(fitted.keep);
+  fitted.keep = maker.Complete(chosen, basis.model, options.promise);
   fitted.promises = maker.Promise(fitted.keep, basis, options.promise);
   progress.Advance();
   progress.End();

@@ -61,9 +61,12 @@ Result<FittedSize> FitSize(const Classes& classes, const std::vector<char>& may_
 // the promise at every node.  All, untried, where the survey is too small to try anything: fewer than twelve
 // images, or fewer than `kMinNumRight` left-out ones that the map of everything localizes.  Errors: those of
 // LeaveOutImages and `emit`; Cancelled.
+// `first`: positions in classes.classes that are among them, in this order, because an earlier map has these;
+// then descriptors have options.descriptor_bits, and no fewer.
 inline constexpr int kMinNumRight = 8;
 Result<FittedSize> ChooseFewest(const Classes& classes, const std::string& matches_path, const EmitKept& emit,
-                                const FitSizeOptions& options, int num_threads, Progress& progress);
+                                const FitSizeOptions& options, int num_threads, Progress& progress,
+                                const std::vector<size_t>& first = {});
 
 // The guarantees of a map: the smallest number of common landmarks of any region, and the stations that see
 // fewer than k.

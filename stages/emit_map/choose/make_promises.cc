@@ -53,8 +53,10 @@ PromiseMaker::PromiseMaker(const Classes& classes, int num_threads)
   }
 }
 
-LandmarkOrder PromiseMaker::Order(std::vector<size_t> pool) const {
-  return {classes_, model_.OfViews(num_threads_), std::move(pool), {}, num_threads_};
+LandmarkOrder PromiseMaker::Order(std::vector<size_t> pool, std::vector<size_t> first) const {
+  LandmarkOrderOptions options;
+  options.first = std::move(first);
+  return {classes_, model_.OfViews(num_threads_), std::move(pool), options, num_threads_};
 }
 
 PromiseBasis PromiseMaker::BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options) {

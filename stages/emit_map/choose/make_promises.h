@@ -55,8 +55,8 @@ class PromiseMaker {
   // `classes` must outlive it.
   PromiseMaker(const Classes& classes, int num_threads);
 
-  // Of the classes at these positions.
-  LandmarkOrder Order(std::vector<size_t> pool) const;
+  // Of the classes at these positions, `first` before the others.
+  LandmarkOrder Order(std::vector<size_t> pool, std::vector<size_t> first = {}) const;
 
   // `fared`: how left-out images fared in maps of parts of the survey.
   static PromiseBasis BasisOf(const std::vector<PromiseTrial>& fared, const PromiseOptions& options);

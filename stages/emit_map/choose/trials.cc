@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <unordered_map>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -27,6 +28,19 @@ std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
   return pool;
 }
 
+// Positions in a survey that lacks some of those of the whole one, in their order.
+std::vector<size_t> FirstIn(const LeftOutSurvey& survey, const Classes& classes,
+                            const std::vector<size_t>& first) {
+  std::unordered_map<ClassId, size_t> index;
+  for (size_t i = 0; i < survey.classes.classes.size(); ++i) index[survey.classes.classes[i].class_id] = i;
+  std::vector<size_t> there;
+  for (const size_t i : first) {
+    const auto found = index.find(classes.classes[i].class_id);
+    if (found != index.end()) there.push_back(found->second);
+  }
+  return there;
+}
+
 }  // namespace
 
 std::vector<char> MarkThese(const std::vector<size_t>& chosen, size_t num_classes) {
@@ -36,9 +50,9 @@ std::vector<char> MarkThese(const std::vector<size_t>& chosen, size_t num_classe
 }
 
 Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may_keep,
-                            const std::string& matches_path, size_t max_num_left_out,
-                            const LeftOutLimits& limits, const EmitKept& emit, int num_threads,
-                            Progress& progress) {
+                            const std::vector<size_t>& first, const std::string& matches_path,
+                            size_t max_num_left_out, const LeftOutLimits& limits, const EmitKept& emit,
+                            int num_threads, Progress& progress) {
   Trials trials(emit, limits, num_threads);
   CAIRN_ASSIGN_OR_RETURN(const auto never_tried, NeverTried(classes, matches_path));
   const size_t num_sessions = std::clamp<size_t>(classes.sessions.size(), 1, kMaxNumSessionsTried);
@@ -58,7 +72,9 @@ Result<Trials> Trials::Make(const Classes& classes, const std::vector<char>& may
       part.matches[i] = model.At(survey.images[i].camera, survey.images[i].cam_from_world,
                                  survey.images[i].session, MatchModel::Where::kThere);
     });
-    part.order.emplace(survey.classes, model.OfViews(threads), part.pool, LandmarkOrderOptions(), threads);
+    LandmarkOrderOptions of_order;
+    of_order.first = FirstIn(survey, classes, first);
+    part.order.emplace(survey.classes, model.OfViews(threads), part.pool, of_order, threads);
     part.sights.emplace(survey.classes, KeypointErrors());
     part.depth = model.distance().depth();
     progress.Advance();

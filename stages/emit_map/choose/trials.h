@@ -35,12 +35,13 @@ class Trials {
  public:
   // At most about `max_num_left_out` images are tried, times the number of sessions up to three: more
   // sessions localize better, and what less does to that is seen in few images.  `may_keep`: per class,
-  // whether a map may have it. Advances `progress` by kMaxNumRounds.  Errors: those of ChooseLeftOut,
+  // whether a map may have it; `first`: positions of those that come first in LandmarkOrder.  Advances
+  // `progress` by kMaxNumRounds.  Errors: those of ChooseLeftOut,
   // LeaveOutImages; Cancelled.
   static Result<Trials> Make(const Classes& classes, const std::vector<char>& may_keep,
-                             const std::string& matches_path, size_t max_num_left_out,
-                             const LeftOutLimits& limits, const EmitKept& emit, int num_threads,
-                             Progress& progress);
+                             const std::vector<size_t>& first, const std::string& matches_path,
+                             size_t max_num_left_out, const LeftOutLimits& limits, const EmitKept& emit,
+                             int num_threads, Progress& progress);
 
   // One result per tried image; images of a part that has no class at all are not localized.  What was
   // expected of each image is kept beside it.
