@@ -6,11 +6,12 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "core/delta/map_delta.h"
+#include "core/delta/renumbering.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
-#include "pipeline/explain/compare_maps.h"
 #include "runtime/map/update_map.h"
 
 namespace cairn::pipeline {
@@ -48,13 +49,14 @@ Status MakeDelta(const DeltaArguments& arguments, const CommandEnvironment& envi
   CAIRN_ASSIGN_OR_RETURN(const MapRows old_rows, ReadMapRows(old_map));
   CAIRN_ASSIGN_OR_RETURN(const MapRows new_rows, ReadMapRows(new_map));
   const size_t num_blocks = new_map.directory().blocks().size();
-  const std::string told =
-      fmt::format("{}: {} bytes, {:.2f} % of {}'s {}; {} of {} regions and {} of {} blocks differ{}\n",
-                  arguments.delta_path, bytes.size(),
-                  100.0 * static_cast<double>(bytes.size()) / static_cast<double>(delta.new_num_bytes),
-                  arguments.new_path, delta.new_num_bytes, NumChangedRegions(CompareMaps(old_rows, new_rows)),
-                  new_rows.regions.size(), num_blocks - NumSharedBlocks(new_map, old_map), num_blocks,
-                  delta.is_signed() ? "" : "; not signed");
+  const std::vector<int32_t> origins = FindSame(old_rows, new_rows).landmarks;
+  const std::string told = fmt::format(
+      "{}: {} bytes, {:.2f} % of {}'s {}; {} of {} landmarks and {} of {} blocks are not {}'s{}\n",
+      arguments.delta_path, bytes.size(),
+      100.0 * static_cast<double>(bytes.size()) / static_cast<double>(delta.new_num_bytes),
+      arguments.new_path, delta.new_num_bytes, std::count(origins.begin(), origins.end(), Renumbering::kNew),
+      origins.size(), num_blocks - NumSharedBlocks(new_map, old_map), num_blocks, arguments.old_path,
+      delta.is_signed() ? "" : "; not signed");
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.delta_path, bytes));
   *environment.out << told;
   return Ok();

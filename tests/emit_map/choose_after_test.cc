@@ -162,5 +162,32 @@ TEST_F(ChooseAfterTest, PlacesTheMapDidNotKnowGetAsMuchAsOthers) {
   for (const Promises::Region& region : after.promises.regions) EXPECT_FALSE(region.classes.empty());
 }
 
+TEST_F(ChooseAfterTest, ALandmarkIsStillThereWhereItsClassMayBeKept) {
+  may_keep_ = {1, 1, 0, 1, 1};
+  matches_.landmark_of_class = {7, kNone, 3, 0, 5};
+  EXPECT_THAT(StillThere(may_keep_, matches_), testing::ElementsAre(3, 4, 0)) << "in the earlier map's order";
+}
+
+TEST(IsMostlyNew, CountsImagesOfSessionsThatTheEarlierMapDoesNotHave) {
+  Classes classes;
+  MapRows previous;
+  const auto images = [&](const std::string& session, int num) {
+    for (int i = 0; i < num; ++i) classes.images.push_back({.name = session + "/" + std::to_string(i)});
+  };
+  previous.images.resize(20);
+  classes.sessions = {"a", "b", "c"};
+  images("a", 15);  // five of the past are not in it
+  images("b", 5);
+  EXPECT_FALSE(IsMostlyNew(classes, previous)) << "5 of 25";
+  images("b", 1);
+  EXPECT_TRUE(IsMostlyNew(classes, previous)) << "6 of 26";
+  previous.sessions = {"a", "b"};
+  EXPECT_FALSE(IsMostlyNew(classes, previous));
+  images("c", 6);
+  EXPECT_TRUE(IsMostlyNew(classes, previous));
+  classes.sessions.clear();
+  EXPECT_FALSE(IsMostlyNew(classes, previous)) << "images of no session";
+}
+
 }  // namespace
 }  // namespace cairn::emit_map

@@ -264,5 +264,15 @@ TEST(EmitMap, PartsOfOneClassAreOneLandmark) {
   EXPECT_THAT(Emit(example)->regions[0].landmarks, ElementsAre(0));
 }
 
+TEST(BitsOfStep, AreThoseWhoseLevelsAreAsFine) {
+  EXPECT_EQ(BitsOfStep(100), 1);
+  EXPECT_EQ(BitsOfStep(64), 1);
+  EXPECT_EQ(BitsOfStep(63), 2);
+  EXPECT_EQ(BitsOfStep(24), 3);
+  EXPECT_EQ(BitsOfStep(16), 4);
+  EXPECT_EQ(BitsOfStep(4), 6);
+  EXPECT_EQ(BitsOfStep(1), 6) << "the most that there are";
+}
+
 }  // namespace
 }  // namespace cairn::emit_map

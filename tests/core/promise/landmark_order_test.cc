@@ -161,6 +161,23 @@ TEST(LandmarkOrder, OrdersThePoolAlone) {
   EXPECT_THAT(OrderLandmarks(classes, matches, {}, {}, 1), IsEmpty());
 }
 
+TEST(LandmarkOrder, ThoseThatAMapHasComeFirstAndOthersAreOrderedByWhatTheyGive) {
+  // Two at a place in view 0, and two in view 1: whichever of one view is there, the other view's come next.
+  Classes classes = WallSurvey(2, 5);
+  for (int i = 0; i < 2; ++i) AddClass({0, 0, 2}, {1}, 3, &classes);
+  for (int i = 0; i < 2; ++i) AddClass({5, 0, 2}, {2}, 3, &classes);
+  const auto matches = MatchesOf(classes, {{{0, 0.9F}}, {{0, 0.9F}}, {{1, 0.8F}}, {{1, 0.8F}}});
+  LandmarkOrderOptions options;
+  EXPECT_THAT(OrderLandmarks(classes, matches, All(classes), options, 1), ElementsAre(0, 2, 1, 3));
+  options.first = {3};
+  EXPECT_THAT(OrderLandmarks(classes, matches, All(classes), options, 1), ElementsAre(3, 0, 1, 2));
+  options.first = {2, 1};
+  EXPECT_THAT(OrderLandmarks(classes, matches, All(classes), options, 1), ElementsAre(2, 1, 0, 3));
+  EXPECT_THAT(LandmarkOrder(classes, matches, {1, 2, 3}, options, 1).First(3), ElementsAre(2, 1, 3));
+  options.first = {0, 1, 2, 3};
+  EXPECT_THAT(LandmarkOrder(classes, matches, All(classes), options, 1).First(3), ElementsAre(0, 1, 2));
+}
+
 // An observation in an image that the survey lacks has no size, and a camera that it lacks no focal length.
 TEST(LandmarkOrder, ObservationsOfUnknownImagesDoNotCount) {
   Classes classes = WallSurvey(1, 1);
