@@ -206,6 +206,9 @@ TEST_F(Previous, MapsOfAnotherSurveyOrFrameAreRefused) {
   for (SurveyImage& image : classes_.images) image.name += ".jpg";
   EXPECT_THAT(MatchError().message,
               HasSubstr("old.cairn: none of its 4 images (such as i0) is among the 4 of"));
+  previous_.images.clear();
+  EXPECT_THAT(MatchError().message, HasSubstr("none of its 0 images (such as none)"));
+  previous_ = Stored(RowsOf(WallClasses()));
   classes_ = WallClasses();
   previous_.descriptors.setConstant(255);
   EXPECT_THAT(MatchError().message, HasSubstr("none of its 20 landmarks is among the 20 classes"));

@@ -166,11 +166,12 @@ Result<PreviousMatches> MatchPrevious(const Classes& classes, const MapRows& pre
   const auto none = static_cast<size_t>(
       std::count(matches.row_of_image.begin(), matches.row_of_image.end(), PreviousMatches::kNone));
   if (none == matches.row_of_image.size()) {
+    const auto example = [](const auto& images) { return images.empty() ? "none" : images[0].name; };
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: none of its {} images (such as {}) is among the {} of this survey (such as {}): a "
                      "previous map is one of the same survey, before something was added to it",
-                     path, previous.images.size(), previous.images[0].name, classes.images.size(),
-                     classes.images.empty() ? "none" : classes.images[0].name);
+                     path, previous.images.size(), example(previous.images), classes.images.size(),
+                     example(classes.images));
   }
   matches.landmark_of_class = PairUp(CountVotes(classes, previous, matches.row_of_image), classes, previous);
   matches.holds.assign(classes.classes.size(), 0);

@@ -37,7 +37,9 @@ TEST(PackedMap, IsReadAsItWasWrittenUpToStatedErrors) {
     const MapLandmark &a = rows.landmarks[i], &b = read->landmarks[i];
     EXPECT_EQ(a.class_id, b.class_id);
     EXPECT_EQ(a.num_observations, b.num_observations);
-    if (a.scale_m > 0) EXPECT_NEAR(b.scale_m / a.scale_m, 1, 0.092);
+    if (a.scale_m > 0) {
+      EXPECT_NEAR(b.scale_m / a.scale_m, 1, 0.092);
+    }
     // Half a unit, which is at most 0.4 of the least conditional standard deviation, plus the grid of 0.1 mm.
     const Eigen::Matrix3d factor = a.covariance.llt().matrixL();
     EXPECT_LE((a.position - b.position).cwiseAbs().maxCoeff(),

@@ -85,8 +85,12 @@ TEST_F(UpdateMapTest, TruncatedAndFlippedDeltasMakeNothing) {
     return ReadMapDelta(Path("broken"), std::nullopt).error().message;
   };
   std::string later = bytes;
-  later[15] = '2';
+  later[15] = '3';
   EXPECT_THAT(reading(later), HasSubstr("a delta of a later format"));
+  // One that says it has rows, and has none.
+  std::string with_rows = bytes;
+  with_rows[15] = '2';
+  EXPECT_TRUE(refused(with_rows));
   std::string other = bytes;
   other[14] = 'A';
   EXPECT_THAT(reading(other), HasSubstr("not a delta of maps"));
