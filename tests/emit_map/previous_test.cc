@@ -328,5 +328,24 @@ TEST_F(Previous, FiguresStayWhereTheyHardlyDiffer) {
   EXPECT_EQ(nodes[4].probability, 0.95);
 }
 
+TEST_F(Previous, NumbersOfWhatWasDroppedStayWhereTheyHardlyDiffer) {
+  MapRows rows = RowsOf(classes_);
+  rows.stations.push_back({.position = {9, 9}, .heading_deg = 90});
+  previous_.findings.drops = {{1, "s", "feature", "a", "", 300, {100, 10}},
+                              {2, "s", "feature", "b", "", 9, {5, 4}}};
+  rows.findings.drops = {{1, "s", "feature", "a", "", 310, {105, 13, 7}},
+                         {2, "s", "feature", "b", "", 3, {3, 1, 0}},
+                         {3, "s", "feature", "c", "", 2, {2, 0, 0}}};
+  SettleDrops(previous_, &rows);
+  EXPECT_THAT(rows.findings.drops[0].at_stations, ElementsAre(100, 10, 7));
+  EXPECT_EQ(rows.findings.drops[0].num_dropped, 310);
+  EXPECT_THAT(rows.findings.drops[1].at_stations, ElementsAre(3, 1, 0)) << "no more than in all";
+  EXPECT_THAT(rows.findings.drops[2].at_stations, ElementsAre(2, 0, 0));
+  // Beyond a twentieth, and three.
+  rows.findings.drops[0].at_stations = {106, 14, 7};
+  SettleDrops(previous_, &rows);
+  EXPECT_THAT(rows.findings.drops[0].at_stations, ElementsAre(106, 14, 7));
+}
+
 }  // namespace
 }  // namespace cairn::emit_map

@@ -281,7 +281,8 @@ void SettleDrops(const MapRows& previous, MapRows* rows) {
       if (station == station_before.end()) continue;
       const int32_t number = before->second->at_stations[station->second];
       const double most = std::max(kHeldDrops, kHeldRatio * number);
-      if (std::abs(drop.at_stations[i] - number) <= most) drop.at_stations[i] = number;
+      if (std::abs(drop.at_stations[i] - number) <= most && number <= drop.num_dropped)
+        drop.at_stations[i] = number;
     }
   }
 }
