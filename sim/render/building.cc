@@ -7,6 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "sim/render/furniture.h"
 #include "sim/render/paint.h"
 
 namespace cairn::sim {
@@ -174,27 +175,52 @@ class BuildingMaker {
     building_.num_repeated_panels = num_repeated;
   }
 
-  // All pieces but those that a change took away.  These leave their textures' numbers unused: whatever else
-  // there is is painted as before.
+  // All pieces but those that a change took away, some of them elsewhere.  Those that are gone leave their
+  // textures' numbers unused: whatever else there is is painted as before.
   void FurnishRooms() {
-    std::vector<Furniture> left;
-    const std::vector<Furniture>& all = building_.layout.furniture;
+    const std::vector<Furniture> all = building_.layout.furniture;
+    std::vector<char> is_gone(all.size(), 0), is_moved(all.size(), 0);
     for (size_t i = 0; i < all.size(); ++i) {
-      const Furniture& piece = all[i];
+      if (options_.change == 0 || all[i].is_pillar) continue;
       Random random(MixSeed(MixSeed(MixSeed(seed_, 7), options_.change), i));
-      const bool is_gone =
-          options_.change > 0 && !piece.is_pillar && random.Uniform() < options_.removed_furniture_ratio;
-      if (!is_gone) {
-        AddFurniture(piece);
-        left.push_back(piece);
+      is_gone[i] = random.Uniform() < options_.removed_furniture_ratio ? 1 : 0;
+      is_moved[i] = is_gone[i] == 0 && random.Uniform() < options_.moved_furniture_ratio ? 1 : 0;
+    }
+    std::vector<Furniture>& left = building_.layout.furniture;
+    left.clear();
+    std::vector<size_t> place_of(all.size(), 0);  // in `left`
+    for (size_t i = 0; i < all.size(); ++i) {
+      place_of[i] = left.size();
+      if (is_gone[i] == 0) left.push_back(all[i]);
+    }
+    for (size_t i = 0; i < all.size(); ++i) {
+      if (is_gone[i] != 0) {
+        jobs_.resize(jobs_.size() + kNumFurnitureFaces, {Painter::kTrim});
+        building_.changed.push_back(Standing(ChangedSurface::Kind::kFurniture, all[i], all[i].rect));
         continue;
       }
-      jobs_.resize(jobs_.size() + kNumFurnitureFaces, {Painter::kTrim});
-      const Rect& rect = piece.rect;
-      building_.changed.push_back(
-          {ChangedSurface::Kind::kFurniture, {rect.x0, rect.y0, 0}, {rect.x1, rect.y1, piece.height_m}});
+      Furniture& piece = left[place_of[i]];
+      const std::optional<Rect> rect =
+          is_moved[i] == 0 ? std::nullopt
+                           : PlaceElsewhere(options_, building_.layout, place_of[i],
+                                            MixSeed(MixSeed(MixSeed(seed_, 9), options_.change), i));
+      if (rect) {
+        building_.changed.push_back(Standing(ChangedSurface::Kind::kMovedFurniture, piece, *rect));
+        piece.rect = *rect;
+      }
+      AddFurniture(piece);
     }
-    building_.layout.furniture = std::move(left);
+  }
+
+  // A piece, and where it stands now.
+  static ChangedSurface Standing(ChangedSurface::Kind kind, const Furniture& piece, const Rect& now) {
+    const Rect& rect = piece.rect;
+    ChangedSurface surface{
+        .kind = kind, .min = {rect.x0, rect.y0, 0}, .max = {rect.x1, rect.y1, piece.height_m}};
+    if (kind != ChangedSurface::Kind::kMovedFurniture) return surface;
+    surface.now_min = {now.x0, now.y0, 0};
+    surface.now_max = {now.x1, now.y1, piece.height_m};
+    return surface;
   }
 
   // A texture of its own, painted for this change, for some of the panels.

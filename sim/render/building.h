@@ -31,15 +31,16 @@ struct Box {
 };
 
 // A piece of a building's surface that shows something else than when it was built, or a piece of furniture
-// that is gone: what lay on it has vanished.
+// that is gone, or stands elsewhere: what lay on it has vanished there.
 struct ChangedSurface {
   enum class Kind {
     kPanel,
     kFurniture,
-    kMovedPanel,  // what it showed is elsewhere now
+    kMovedPanel,      // what it showed is elsewhere now
+    kMovedFurniture,  // it stands elsewhere now
   } kind = Kind::kPanel;
   Eigen::Vector3d min, max;  // of the panel flat
-  // Of a moved panel: where what it showed is now.
+  // Of what moved: where it is now.
   Eigen::Vector3d now_min = Eigen::Vector3d::Zero(), now_max = Eigen::Vector3d::Zero();
 };
 

@@ -115,6 +115,20 @@ Furniture ProposePillar(const Rect& room, double height_m, Random& random) {
   return {{x, y, x + kPillarEdgeM, y + kPillarEdgeM}, height_m, true};
 }
 
+// Whether a piece may stand there beside what the room has.
+bool Fits(const Rect& rect, const Rect& room, const std::vector<Rect>& obstacles,
+          const std::vector<Rect>& approaches, double clearance) {
+  if (rect.x1 > room.x1 || rect.y1 > room.y1) return false;
+  const auto overlaps = [](const Rect& a) { return [&a](const Rect& b) { return a.Overlaps(b); }; };
+  const Rect grown = rect.Grown(kGapM);
+  if (std::any_of(obstacles.begin(), obstacles.end(), overlaps(grown)) ||
+      std::any_of(approaches.begin(), approaches.end(), overlaps(rect)))
+    return false;
+  std::vector<Rect> all = obstacles;
+  all.push_back(rect);
+  return StaysConnected(room, all, approaches, clearance);
+}
+
 }  // namespace
 
 void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layout) {
@@ -125,20 +139,9 @@ void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layou
     const std::vector<Rect> approaches = DoorApproaches(*layout, room.rect);
     std::vector<Rect> obstacles;
     const auto place = [&](const Furniture& piece) {
-      const Rect& rect = piece.rect;
-      if (rect.x1 > room.rect.x1 || rect.y1 > room.rect.y1) return false;
       if (piece.height_m >= options.height_m && !piece.is_pillar) return false;
-      for (const Rect& other : obstacles) {
-        if (rect.Grown(kGapM).Overlaps(other)) return false;
-      }
-      for (const Rect& approach : approaches) {
-        if (rect.Overlaps(approach)) return false;
-      }
-      obstacles.push_back(rect);
-      if (!StaysConnected(room.rect, obstacles, approaches, options.clearance_m)) {
-        obstacles.pop_back();
-        return false;
-      }
+      if (!Fits(piece.rect, room.rect, obstacles, approaches, options.clearance_m)) return false;
+      obstacles.push_back(piece.rect);
       layout->furniture.push_back(piece);
       return true;
     };
@@ -154,6 +157,32 @@ void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layou
       }
     }
   }
+}
+
+std::optional<Rect> PlaceElsewhere(const SimulateOptions& options, const Layout& layout, size_t piece,
+                                   uint64_t seed) {
+  const Rect& old = layout.furniture[piece].rect;
+  const auto room = std::find_if(layout.rooms.begin(), layout.rooms.end(),
+                                 [&](const Room& other) { return other.rect.Overlaps(old); });
+  if (room == layout.rooms.end()) return std::nullopt;
+  const Rect& in = room->rect;
+  std::vector<Rect> obstacles;
+  for (size_t i = 0; i < layout.furniture.size(); ++i) {
+    if (i != piece && layout.furniture[i].rect.Overlaps(in)) obstacles.push_back(layout.furniture[i].rect);
+  }
+  const std::vector<Rect> approaches = DoorApproaches(layout, in);
+  const bool at_wall_x = old.x0 == in.x0 || old.x1 == in.x1, at_wall_y = old.y0 == in.y0 || old.y1 == in.y1;
+  Random random(seed);
+  for (int attempt = 0; attempt < kMaxAttemptsPerRoom; ++attempt) {
+    double x = random.Uniform(in.x0, std::max(in.x0, in.x1 - old.width()));
+    double y = random.Uniform(in.y0, std::max(in.y0, in.y1 - old.depth()));
+    const bool at_far_end = random.Uniform() < 0.5;
+    if (at_wall_x) x = at_far_end ? in.x1 - old.width() : in.x0;
+    if (at_wall_y && !at_wall_x) y = at_far_end ? in.y1 - old.depth() : in.y0;
+    const Rect rect = {x, y, x + old.width(), y + old.depth()};
+    if (!rect.Overlaps(old) && Fits(rect, in, obstacles, approaches, options.clearance_m)) return rect;
+  }
+  return std::nullopt;
 }
 
 }  // namespace cairn::sim

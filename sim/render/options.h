@@ -58,6 +58,9 @@ struct SimulateOptions {
   // REQUIRES: in [0, 1]
   double changed_panel_ratio = 0.3;
   double removed_furniture_ratio = 0;
+  // Share of the pieces that are left which stand elsewhere in their rooms then, where there is a place.
+  // REQUIRES: in [0, 1]
+  double moved_furniture_ratio = 0;
   // Share of wall panels that exchange what they show with another then: things that were moved.
   // REQUIRES: in [0, 1]
   double moved_panel_ratio = 0;

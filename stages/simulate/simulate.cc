@@ -82,12 +82,14 @@ std::string ChangesJson(const sim::Building& building) {
     const auto json = [](const Eigen::Vector3d& point) {
       return nlohmann::ordered_json{point.x(), point.y(), point.z()};
     };
-    nlohmann::ordered_json row = {{"kind", changed.kind == Kind::kPanel       ? "panel"
-                                           : changed.kind == Kind::kFurniture ? "furniture"
-                                                                              : "moved panel"},
+    const bool is_moved = changed.kind == Kind::kMovedPanel || changed.kind == Kind::kMovedFurniture;
+    nlohmann::ordered_json row = {{"kind", changed.kind == Kind::kPanel        ? "panel"
+                                           : changed.kind == Kind::kFurniture  ? "furniture"
+                                           : changed.kind == Kind::kMovedPanel ? "moved panel"
+                                                                               : "moved furniture"},
                                   {"min", json(changed.min)},
                                   {"max", json(changed.max)}};
-    if (changed.kind == Kind::kMovedPanel) {
+    if (is_moved) {
       row["now_min"] = json(changed.now_min);
       row["now_max"] = json(changed.now_max);
     }

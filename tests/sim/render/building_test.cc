@@ -284,6 +284,47 @@ TEST(ChangedBuilding, LacksSomeFurniture) {
   for (const Furniture& piece : Make(options).layout.furniture) EXPECT_TRUE(piece.is_pillar);
 }
 
+TEST(ChangedBuilding, HasSomeFurnitureElsewhereInItsRoom) {
+  SimulateOptions options = QuickOptions();
+  const Building before = Make(options);
+  options.change = 1;
+  options.changed_panel_ratio = 0;
+  options.moved_furniture_ratio = 1;
+  const Building after = Make(options);
+  ASSERT_GT(after.changed.size(), 0u);
+  ASSERT_EQ(after.layout.furniture.size(), before.layout.furniture.size());
+  EXPECT_EQ(after.boxes.size(), before.boxes.size());
+  EXPECT_EQ(DifferentFaces(before, after).size(), 0u) << "they look as they did";
+  size_t num_moved = 0;
+  for (size_t i = 0; i < after.layout.furniture.size(); ++i) {
+    const Furniture& now = after.layout.furniture[i];
+    const Furniture& was = before.layout.furniture[i];
+    if (now.rect.x0 == was.rect.x0 && now.rect.y0 == was.rect.y0) continue;
+    const ChangedSurface& moved = after.changed[num_moved++];
+    EXPECT_EQ(moved.kind, ChangedSurface::Kind::kMovedFurniture);
+    EXPECT_FALSE(now.is_pillar);
+    EXPECT_FALSE(now.rect.Overlaps(was.rect));
+    EXPECT_NEAR(now.rect.width(), was.rect.width(), 1e-9);
+    EXPECT_NEAR(now.rect.depth(), was.rect.depth(), 1e-9);
+    EXPECT_EQ(moved.min, Eigen::Vector3d(was.rect.x0, was.rect.y0, 0));
+    EXPECT_EQ(moved.max, Eigen::Vector3d(was.rect.x1, was.rect.y1, was.height_m));
+    EXPECT_EQ(moved.now_min, Eigen::Vector3d(now.rect.x0, now.rect.y0, 0));
+    EXPECT_EQ(moved.now_max, Eigen::Vector3d(now.rect.x1, now.rect.y1, now.height_m));
+    const auto room_of = [&](const Rect& rect) {
+      return std::find_if(after.layout.rooms.begin(), after.layout.rooms.end(),
+                          [&](const Room& room) { return room.rect.Overlaps(rect); });
+    };
+    EXPECT_EQ(room_of(now.rect), room_of(was.rect));
+    for (size_t k = 0; k < i; ++k) EXPECT_FALSE(now.rect.Overlaps(after.layout.furniture[k].rect));
+  }
+  EXPECT_EQ(num_moved, after.changed.size());
+  // Another change moves others, and none without a change.
+  options.moved_furniture_ratio = 0.5;
+  EXPECT_LT(Make(options).changed.size(), after.changed.size());
+  options.change = 0;
+  EXPECT_EQ(Make(options).changed.size(), 0u);
+}
+
 SimulateOptions TwinOptions() {
   SimulateOptions options = QuickOptions();
   options.width_m = 12;
