@@ -103,12 +103,6 @@ std::string SignedHead(const MapDelta& delta) {
   return writer.Take();
 }
 
-// What rows of a map may take: as much as a reader of whole maps allows.
-int64_t MaxRowBytes(uint64_t num_bytes) {
-  constexpr int64_t kAlways = 64 << 20, kPerByte = 64;
-  return kAlways + kPerByte * static_cast<int64_t>(num_bytes);
-}
-
 // A payload with the rows, where it is shorter and what a robot makes of it is the new map.
 Status TryRows(const MapFile& old_map, const std::string& old_bytes, const MapFile& new_map,
                const std::string& new_bytes, MapDelta* delta) {
@@ -253,7 +247,8 @@ Result<std::string> ApplyMapDelta(const MapDelta& delta, const std::string& old_
     const std::string_view row_delta = reader.Bytes(reader.UInt32());
     if (!reader.ok()) return Corrupt(delta_path, "its rows are cut off");
     CAIRN_ASSIGN_OR_RETURN(const MapRows rows,
-                           ApplyRowDelta(old_rows, row_delta, MaxRowBytes(delta.new_num_bytes), delta_path));
+                           ApplyRowDelta(old_rows, row_delta,
+                                         MaxRowBytes(static_cast<int64_t>(delta.new_num_bytes)), delta_path));
     prefix += EncodedBlocks(rows);
     frame = frame.substr(frame.size() - reader.num_left());
   }

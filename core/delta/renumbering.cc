@@ -80,6 +80,10 @@ std::vector<MapAppearanceNode> RenumberedNodes(const MapRows& from, const Renumb
                                                const std::vector<int32_t>& new_images) {
   const std::vector<int32_t> new_nodes = Inverse(renumbering.nodes, from.appearance.size());
   std::vector<MapAppearanceNode> nodes(renumbering.nodes.size());
+  // All nodes of a map have an entropy, or none has.
+  if (!from.appearance.empty() && from.appearance[0].entropy) {
+    for (MapAppearanceNode& node : nodes) node.entropy = 0;
+  }
   for (size_t i = 0; i < from.appearance.size(); ++i) {
     const int32_t node = new_nodes[i];
     if (node == Renumbering::kNew) continue;
@@ -170,12 +174,16 @@ Renumbering FindSame(const MapRows& from, const MapRows& to) {
   }
   const auto image_id = [](const MapImage& image) { return image.image_id; };
   same.images = FindByKey(Keys(from.images, image_id), Keys(to.images, image_id));
-  same.stations = FindByKey(Keys(from.stations, KeyOf), Keys(to.stations, KeyOf));
+  same.stations = FindSameStations(from, to);
   const auto first_image = [](const MapRows& rows) {
     return [&rows](const MapAppearanceNode& node) { return rows.images[node.images[0]].image_id; };
   };
   same.nodes = FindByKey(Keys(from.appearance, first_image(from)), Keys(to.appearance, first_image(to)));
   return same;
+}
+
+std::vector<int32_t> FindSameStations(const MapRows& from, const MapRows& to) {
+  return FindByKey(Keys(from.stations, KeyOf), Keys(to.stations, KeyOf));
 }
 
 MapRows Renumbered(const MapRows& from, const Renumbering& renumbering) {

@@ -21,7 +21,11 @@ struct Renumbering {
 // nodes of the appearance graph by their first image.  O(n log n).
 Renumbering FindSame(const MapRows& from, const MapRows& to);
 
-// The first map's elements that the other one has, under the other one's numbers, and new ones empty: what
+// Renumbering::stations of FindSame.
+std::vector<int32_t> FindSameStations(const MapRows& from, const MapRows& to);
+
+// The first map's elements that the other one has, under the other one's numbers, and new ones empty (nodes
+// with an entropy of 0, where its nodes have one): what
 // both have in common is then equal.  Images, stations, station edges, regions (by their index), appearance
 // nodes; what names an element that the other lacks is left out.
 MapRows Renumbered(const MapRows& from, const Renumbering& renumbering);

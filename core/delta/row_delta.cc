@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 #include "core/base/blob.h"
@@ -25,26 +26,32 @@ std::vector<int32_t> SymmetricDifference(const std::vector<int32_t>& a, const st
 }
 
 // The lists of a map that name its elements by number, ascending: what images see, what regions have.
+// `List`: a std::vector<int32_t>, const or not.
+template <class List>
 struct Lists {
-  std::vector<std::vector<int32_t>*> lists;
+  std::vector<List*> lists;
   int64_t num_elements = 0;
   size_t max_length = 0;
 };
 
-std::vector<Lists> ListsOf(MapRows* rows, int64_t num_landmarks) {
+template <class List, class Rows>
+std::vector<Lists<List>> ListsOf(Rows* rows, int64_t num_landmarks) {
   const auto num_stations = static_cast<int64_t>(rows->stations.size());
-  std::vector<Lists> lists = {{{}, num_landmarks, kMaxImageLandmarks},
-                              {{}, num_landmarks, static_cast<size_t>(num_landmarks)},
-                              {{}, num_stations, static_cast<size_t>(num_stations)}};
-  for (MapImage& image : rows->images) lists[0].lists.push_back(&image.landmarks);
-  for (MapRegion& region : rows->regions) {
+  std::vector<Lists<List>> lists = {{{}, num_landmarks, kMaxImageLandmarks},
+                                    {{}, num_landmarks, static_cast<size_t>(num_landmarks)},
+                                    {{}, num_stations, static_cast<size_t>(num_stations)}};
+  for (auto& image : rows->images) lists[0].lists.push_back(&image.landmarks);
+  for (auto& region : rows->regions) {
     lists[1].lists.push_back(&region.landmarks);
     lists[2].lists.push_back(&region.stations);
   }
   return lists;
 }
 
-void WriteDifferences(const Lists& from, const Lists& to, BlobWriter* writer) {
+using GivenLists = Lists<const std::vector<int32_t>>;
+using MadeLists = Lists<std::vector<int32_t>>;
+
+void WriteDifferences(const GivenLists& from, const GivenLists& to, BlobWriter* writer) {
   for (size_t begin = 0; begin < to.lists.size(); begin += kListsAtOnce) {
     SightLists differences;
     for (size_t i = begin; i < std::min(begin + kListsAtOnce, to.lists.size()); ++i)
@@ -56,7 +63,7 @@ void WriteDifferences(const Lists& from, const Lists& to, BlobWriter* writer) {
 }
 
 // Makes the lists of the first map those of the other.  `num_left`: of the elements that lists may have.
-bool ReadDifferences(const Lists& lists, BlobReader* reader, int64_t* num_left) {
+bool ReadDifferences(const MadeLists& lists, BlobReader* reader, int64_t* num_left) {
   for (size_t begin = 0; begin < lists.lists.size(); begin += kListsAtOnce) {
     SightLists differences(std::min(kListsAtOnce, lists.lists.size() - begin));
     const std::string_view packed = reader->Bytes(reader->Varint());
@@ -87,8 +94,12 @@ PackedLandmarks NewLandmarks(const MapRows& to, const Renumbering& same) {
 
 // What both sides know of landmarks in this code.
 PackedLandmarks Known(const MapRows& from, const TransformCode& code) {
-  if (from.descriptor_code != code) return {.landmarks = {}, .descriptors = {}, .code = code};
-  return {.landmarks = from.landmarks, .descriptors = from.descriptors, .code = code};
+  PackedLandmarks known{.landmarks = {}, .descriptors = {}, .code = code};
+  if (from.descriptor_code != code) return known;
+  const auto num = static_cast<std::ptrdiff_t>(std::min(from.landmarks.size(), kMaxNumKnownLandmarks));
+  known.landmarks.assign(from.landmarks.begin(), from.landmarks.begin() + num);
+  known.descriptors = from.descriptors.topRows(num);
+  return known;
 }
 
 void WriteCode(const TransformCode& code, const TransformCode& of_first, BlobWriter* writer) {
@@ -138,7 +149,6 @@ Result<std::optional<std::string>> MakeRowDelta(const MapRows& from, const MapRo
   const Renumbering same = FindSame(from, to);
   MapRows old = Renumbered(from, same);
   old.regions.resize(to.regions.size());
-  MapRows target = to;  // lists are named by pointers that may write
   BlobWriter writer;
   WriteRenumbering(same, &writer);
   writer.Varint(to.regions.size());
@@ -147,7 +157,8 @@ Result<std::optional<std::string>> MakeRowDelta(const MapRows& from, const MapRo
   writer.Varint(packed.size());
   writer.Bytes(packed);
   const auto num_landmarks = static_cast<int64_t>(to.landmarks.size());
-  const std::vector<Lists> old_lists = ListsOf(&old, num_landmarks), lists = ListsOf(&target, num_landmarks);
+  const auto old_lists = ListsOf<const std::vector<int32_t>>(&std::as_const(old), num_landmarks);
+  const auto lists = ListsOf<const std::vector<int32_t>>(&to, num_landmarks);
   for (size_t i = 0; i < lists.size(); ++i) WriteDifferences(old_lists[i], lists[i], &writer);
   const std::string text = WriteRowText(to);
   CAIRN_ASSIGN_OR_RETURN(const std::string frame, CompressAfter(WriteRowText(old), text, what));
@@ -169,7 +180,8 @@ Result<MapRows> ApplyRowDelta(const MapRows& from, std::string_view delta, int64
   rows.regions.resize(num_regions);
   if (!ReadLandmarks(from, renumbering, &reader, &rows)) return corrupt("landmarks");
   int64_t num_left = max_num_bytes / static_cast<int64_t>(sizeof(int32_t));
-  for (const Lists& lists : ListsOf(&rows, static_cast<int64_t>(rows.landmarks.size()))) {
+  for (const MadeLists& lists :
+       ListsOf<std::vector<int32_t>>(&rows, static_cast<int64_t>(rows.landmarks.size()))) {
     if (!ReadDifferences(lists, &reader, &num_left)) return corrupt("lists");
   }
   const uint64_t num_text_bytes = reader.Varint();
@@ -177,8 +189,7 @@ Result<MapRows> ApplyRowDelta(const MapRows& from, std::string_view delta, int64
   const std::string old_text = WriteRowText(rows);
   CAIRN_ASSIGN_OR_RETURN(const std::string text,
                          DecompressAfter(old_text, reader.Bytes(reader.num_left()), num_text_bytes, what));
-  for (MapAppearanceNode& node : rows.appearance) node = {};
-  if (!ReadRowText(text, &rows)) return corrupt("stations, images or nodes");
+  CAIRN_RETURN_IF_ERROR(ReadRowText(text, what, &rows));
   return rows;
 }
 

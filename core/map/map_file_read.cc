@@ -6,15 +6,10 @@
 namespace cairn {
 namespace {
 
-// Memory that a map's blocks may take, in bytes per byte of the file, beyond a start; the largest ratio seen
-// in compiled maps is 20, of a block of stations.
-constexpr int64_t kMostUnfolding = 64;
-constexpr int64_t kSmallMapBytes = int64_t{64} << 20;
-
 class RowsReader {
  public:
   RowsReader(const MapFile& file, MapRows* rows)
-      : file_(file), rows_(*rows), num_bytes_left_(kSmallMapBytes + kMostUnfolding * file.num_bytes()) {}
+      : file_(file), rows_(*rows), num_bytes_left_(MaxRowBytes(file.num_bytes())) {}
 
   Status Read() {
     static_cast<MapHead&>(rows_) = file_.head();

@@ -315,12 +315,9 @@ std::vector<PackedLandmark> PackEach(const std::vector<MapLandmark>& landmarks, 
   return all;
 }
 
-// What is learnt from more than these is no better.
-constexpr size_t kMaxNumKnown = 4096;
-
 // A coder that knows these landmarks.
 LandmarksCoder CoderAfter(const PackedLandmarks& known) {
-  const std::vector<PackedLandmark> all = PackEach(known.landmarks, kMaxNumKnown);
+  const std::vector<PackedLandmark> all = PackEach(known.landmarks, kMaxNumKnownLandmarks);
   LandmarksCoder landmarks(known.code, MiddleOf(all));
   RangeEncoder unread;
   for (size_t i = 0; i < all.size(); ++i) landmarks.Encode(all[i], known.descriptors, i, &unread);

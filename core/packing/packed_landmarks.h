@@ -25,7 +25,8 @@ std::string PackLandmarks(const PackedLandmarks& packed);
 bool UnpackLandmarks(std::string_view bytes, size_t num_landmarks, PackedLandmarks* packed);
 
 // The same for a reader who has others, of the code that is meant: a few landmarks take less then, as what
-// they are like is known.
+// they are like is known.  Of these the first so many count: what is learnt from more is no better.
+inline constexpr size_t kMaxNumKnownLandmarks = 4096;
 std::string PackMoreLandmarks(const PackedLandmarks& known, const PackedLandmarks& more);
 bool UnpackMoreLandmarks(const PackedLandmarks& known, std::string_view bytes, size_t num_landmarks,
                          PackedLandmarks* more);

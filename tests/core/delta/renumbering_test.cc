@@ -71,7 +71,7 @@ TEST(Renumbered, NamesElementsByTheirNewNumbers) {
   EXPECT_EQ(rows.appearance[0].entropy, 0.25);
   EXPECT_THAT(rows.appearance[0].links, ElementsAre(MapAppearanceNode::Link{2, 30}));
   EXPECT_THAT(rows.appearance[0].look_alikes, ElementsAre(MapAppearanceNode::LookAlike{2, 0.5}));
-  EXPECT_EQ(rows.appearance[1], MapAppearanceNode());
+  EXPECT_EQ(rows.appearance[1], (MapAppearanceNode{.entropy = 0})) << "new";
   EXPECT_THAT(rows.appearance[2].images, ElementsAre(2, 3));
 }
 
