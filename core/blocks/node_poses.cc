@@ -1,6 +1,7 @@
 #include "core/blocks/node_poses.h"
 
 #include "core/promise/promise_nodes.h"
+#include "core/promise/view_distance.h"
 
 namespace cairn {
 
@@ -21,6 +22,17 @@ std::vector<Pose> NodePoses(const MapRows& rows) {
     i = end;
   }
   return poses;
+}
+
+std::optional<NearestNode> FindNearestNode(const MapPromise& promise, const std::vector<Pose>& poses,
+                                           const Pose& cam_from_world) {
+  std::optional<NearestNode> nearest;
+  for (size_t node = 0; node < poses.size(); ++node) {
+    const double squared =
+        ViewDistanceSquared(cam_from_world, poses[node], promise.radius_m, promise.radius_deg);
+    if (!nearest || squared < nearest->squared_distance) nearest = {node, squared};
+  }
+  return nearest;
 }
 
 }  // namespace cairn

@@ -232,6 +232,33 @@ std::vector<size_t> CoverFast(const CoverProblem& problem, const std::vector<siz
   return cover.Taken();
 }
 
+std::vector<size_t> CoverNodes(const ClassesOfNodes& of_node, const std::vector<double>& demands,
+                               const std::vector<int32_t>& nodes, const std::vector<size_t>& taken) {
+  std::vector<size_t> classes;
+  for (const int32_t node : nodes) {
+    for (const auto& [i, probability] : of_node[node]) classes.push_back(i);
+  }
+  std::sort(classes.begin(), classes.end());
+  classes.erase(std::unique(classes.begin(), classes.end()), classes.end());
+  const auto place_of = [&](size_t i) {
+    return static_cast<size_t>(std::lower_bound(classes.begin(), classes.end(), i) - classes.begin());
+  };
+  std::vector<std::vector<ExpectedMatch>> of_class(classes.size());
+  CoverProblem problem{.of_class = &of_class};
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    problem.demands.push_back(demands[nodes[n]]);
+    for (const auto& [i, probability] : of_node[nodes[n]])
+      of_class[place_of(i)].push_back({static_cast<int32_t>(n), probability});
+  }
+  std::vector<size_t> taken_places;
+  for (const size_t i : taken) {
+    if (std::binary_search(classes.begin(), classes.end(), i)) taken_places.push_back(place_of(i));
+  }
+  std::vector<size_t> cover = CoverFast(problem, taken_places);
+  for (size_t& i : cover) i = classes[i];
+  return cover;
+}
+
 LandmarkCover CoverBest(const CoverProblem& problem, const CoverOptions& options) {
   LandmarkCover best{.chosen = CoverFast(problem)};
   Dual dual(problem, options.num_threads);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/promise/expected_matches.h"
@@ -22,6 +23,14 @@ struct CoverProblem {
 // Demands `needed` where all classes together give it, else `reachable_ratio` of what they give.
 std::vector<double> Demands(const std::vector<std::vector<ExpectedMatch>>& of_class, size_t num_nodes,
                             double needed, double reachable_ratio);
+
+// Per node, the classes that it expects, ascending, with their probabilities.
+using ClassesOfNodes = std::vector<std::vector<std::pair<size_t, float>>>;
+
+// CoverFast of these nodes alone, by the classes that they expect, at the cost of these.  Of `taken`
+// (ascending) those are in it that one of the nodes expects.
+std::vector<size_t> CoverNodes(const ClassesOfNodes& of_node, const std::vector<double>& demands,
+                               const std::vector<int32_t>& nodes, const std::vector<size_t>& taken = {});
 
 struct CoverOptions {
   int num_iterations = 500;  // of the lower bound

@@ -169,27 +169,7 @@ class Divider {
 
   // A small cover of these nodes alone.
   std::vector<size_t> CoverOf(const std::vector<int32_t>& nodes) const {
-    std::vector<size_t> num_sights(keep_.size(), 0);
-    for (const int32_t node : nodes) {
-      for (const auto& [i, probability] : of_node_[node]) ++num_sights[i];
-    }
-    std::vector<size_t> classes, place(keep_.size());
-    for (size_t i = 0; i < num_sights.size(); ++i) {
-      if (num_sights[i] == 0) continue;
-      place[i] = classes.size();
-      classes.push_back(i);
-    }
-    std::vector<std::vector<ExpectedMatch>> of_class(classes.size());
-    for (size_t n = 0; n < classes.size(); ++n) of_class[n].reserve(num_sights[classes[n]]);
-    CoverProblem problem{.of_class = &of_class};
-    for (size_t n = 0; n < nodes.size(); ++n) {
-      problem.demands.push_back(problem_.demands[nodes[n]]);
-      for (const auto& [i, probability] : of_node_[nodes[n]])
-        of_class[place[i]].push_back({static_cast<int32_t>(n), probability});
-    }
-    std::vector<size_t> cover = CoverFast(problem);
-    for (size_t& i : cover) i = classes[i];
-    return cover;
+    return CoverNodes(of_node_, problem_.demands, nodes);
   }
 
   // A region that grows gets another.
@@ -240,7 +220,7 @@ class Divider {
   const CoverProblem& problem_;
   const std::vector<char>& keep_;
   size_t max_landmarks_;
-  std::vector<std::vector<std::pair<size_t, float>>> of_node_;
+  ClassesOfNodes of_node_;
   std::vector<char> is_divided_;
   std::vector<double> lacking_;  // per node, of the region that grows
   std::vector<char> is_in_;      // per class, the same

@@ -5,7 +5,6 @@
 
 #include "core/blocks/node_poses.h"
 #include "core/promise/promise_nodes.h"
-#include "core/promise/view_distance.h"
 
 namespace cairn::check_map {
 namespace {
@@ -28,15 +27,9 @@ std::vector<PromiseOutcome> PromiseOutcomes(const MapRows& rows, const std::vect
   for (const HeldOutResult& image : images) {
     if (!image.true_cam_from_world || !image.rejected.empty()) continue;
     const Pose cam_from_world = rows.camera_from_given * *image.true_cam_from_world;
-    std::optional<size_t> nearest;
-    double least = kNodeReach * kNodeReach;
-    for (size_t node = 0; node < poses.size(); ++node) {
-      const double squared =
-          ViewDistanceSquared(cam_from_world, poses[node], promise.radius_m, promise.radius_deg);
-      if (squared < least) least = squared, nearest = node;
-    }
-    if (!nearest) continue;
-    outcomes.push_back({promise.nodes[*nearest].probability,
+    const std::optional<NearestNode> nearest = FindNearestNode(promise, poses, cam_from_world);
+    if (!nearest || nearest->squared_distance >= kNodeReach * kNodeReach) continue;
+    outcomes.push_back({promise.nodes[nearest->node].probability,
                         image.has_fix() && image.localization.num_inliers >= promise.terms.min_matches &&
                             image.error_m <= promise.terms.max_error_m &&
                             image.error_deg <= promise.terms.max_error_deg});

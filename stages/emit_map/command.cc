@@ -30,6 +30,7 @@
 #include "stages/emit_map/learn_visual_errors.h"
 #include "stages/emit_map/model_landmarks.h"
 #include "stages/emit_map/previous/settle_rows.h"
+#include "stages/emit_map/quantize_descriptors.h"
 #include "stages/emit_map/survey_files.h"
 
 namespace cairn::emit_map {
@@ -285,7 +286,7 @@ std::string AfterText(const MapRows& rows, const PreviousMap& previous) {
                     [&](const MapLandmark& landmark) { return before.contains(landmark.class_id); }));
   const auto num_moved = std::count(previous.matches.holds.begin(), previous.matches.holds.end(), 0) -
                          std::count(previous.matches.landmark_of_class.begin(),
-                                    previous.matches.landmark_of_class.end(), PreviousMatches::kNone);
+                                    previous.matches.landmark_of_class.end(), kNotBefore);
   return fmt::format(
       "emit_map: after the previous map: of its {} landmarks {} stay, {} of them with another place or look; "
       "{} are new\n",

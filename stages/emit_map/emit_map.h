@@ -91,7 +91,7 @@ OptionTable DescribeOptions(EmitMapOptions* options);
 // stations.  `promises`, where given, replaces the decomposition's regions by its own.
 // `previous`, where given, is an earlier map of the place, which this one is to differ from as little as what
 // the survey now says allows (previous/settle_rows.h); where the descriptors of one have a code and those of
-// the other none, nothing is taken from it.  The result has no
+// the other none, its rows are not taken.  The result has no
 // name, seed, options or hashes: those are the caller's.  Pure. O(observations).  Errors: InvalidArgument
 // (inputs that do not belong together: a region's feature, a feature's class or a station's image does not
 // exist; documents = "kept" without kept images; landmarks = "fewest" without `keep`: which these are is
@@ -100,9 +100,6 @@ Result<MapRows> EmitMap(const Classes& classes, const World& world, const Decomp
                         const Vocabulary& vocabulary, const EmitMapOptions& options,
                         const Appearance* appearance = nullptr, const std::vector<char>* keep = nullptr,
                         const Promises* promises = nullptr, const PreviousMap* previous = nullptr);
-
-// The fewest bits of a descriptor's value whose levels are as fine as those of a transform with this step.
-int BitsOfStep(int step);
 
 // Per class, whether a map may keep it: one of regions with landmarks = "regions", else every one.  Errors:
 // as EmitMap.

@@ -7,17 +7,9 @@
 #include "core/base/ids.h"
 #include "core/world/appearance.h"
 #include "core/world/feature_class.h"
+#include "stages/emit_map/previous/positions.h"
 
 namespace cairn::emit_map {
-
-// The position of the image with this id, by which they ascend; -1: there is none.
-template <class Image>
-int32_t PositionOf(const std::vector<Image>& images, ImageId image_id) {
-  const auto found = std::lower_bound(images.begin(), images.end(), image_id,
-                                      [](const Image& image, ImageId id) { return image.image_id < id; });
-  if (found == images.end() || found->image_id != image_id) return -1;
-  return static_cast<int32_t>(found - images.begin());
-}
 
 // Which images a map lists.  A place that is surveyed again and again has ever more images, of the same
 // views: those of today (core/promise/later_views.h) stand for them.  So do those that prove a change, and

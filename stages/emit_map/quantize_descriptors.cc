@@ -1,5 +1,6 @@
 #include "stages/emit_map/quantize_descriptors.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -8,6 +9,8 @@ namespace cairn::emit_map {
 namespace {
 
 using Histogram = std::array<int64_t, 256>;
+
+constexpr std::array<int, kMostTransformBits> kStepOfBits = {64, 32, 24, 16, 8, 4};
 
 // The level nearest to every value, the smaller one on a tie.  REQUIRES: ascending levels
 std::array<uint8_t, 256> NearestLevels(const std::vector<double>& levels) {
@@ -63,6 +66,14 @@ void QuantizeDescriptorValues(int num_bits, DescriptorMatrix* descriptors) {
     uint8_t& value = descriptors->data()[i];
     value = static_cast<uint8_t>(std::lround(levels[nearest[value]]));
   }
+}
+
+int TransformStep(int num_bits) { return kStepOfBits[num_bits - 1]; }
+
+int BitsOfStep(int step) {
+  const auto fine =
+      std::find_if(kStepOfBits.begin(), kStepOfBits.end(), [&](int other) { return other <= step; });
+  return static_cast<int>(std::min(fine, kStepOfBits.end() - 1) - kStepOfBits.begin()) + 1;
 }
 
 }  // namespace cairn::emit_map

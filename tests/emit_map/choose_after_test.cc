@@ -11,7 +11,7 @@
 namespace cairn::emit_map {
 namespace {
 
-constexpr int32_t kNone = PreviousMatches::kNone;
+constexpr int32_t kNone = kNotBefore;
 constexpr int kNumThreads = 1;
 
 // A map of a wall of 12 m, made as emit_map makes it, and the same survey again.

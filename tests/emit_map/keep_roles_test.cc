@@ -97,7 +97,7 @@ TEST(WereKept, ByTheFirstImageOfANode) {
   previous.appearance = {{.images = {0, 2}, .is_kept = true}, {.images = {1}}};
   Classes classes;
   for (const ImageId id : {5u, 7u, 8u, 9u}) classes.images.push_back({.image_id = id});
-  const PreviousMatches matches{.row_of_image = {1, 2, PreviousMatches::kNone, 0}};
+  const PreviousMatches matches{.row_of_image = {1, 2, kNotBefore, 0}};
   Appearance appearance;
   appearance.nodes = {
       {.images = {7, 8}}, {.images = {5}}, {.images = {8, 9}}, {.images = {9}}, {.images = {77}}};

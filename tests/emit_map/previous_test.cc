@@ -16,7 +16,7 @@ using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr int32_t kNone = PreviousMatches::kNone;
+constexpr int32_t kNone = kNotBefore;
 constexpr size_t kNumClasses = 20, kNumImages = 4;
 
 // Twenty classes on a wall 2 m away, 0.1 m apart, and four images that look at it from 0.1 m apart and see

@@ -1,6 +1,7 @@
 #include "stages/emit_map/choose/choose_after.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <string>
@@ -10,12 +11,10 @@
 #include "core/blocks/node_poses.h"
 #include "core/capture/sessions.h"
 #include "core/promise/promise_nodes.h"
-#include "core/promise/view_distance.h"
 
 namespace cairn::emit_map {
 namespace {
 
-constexpr int32_t kNone = PreviousMatches::kNone;
 // A place keeps this part of the matches that it expected, as far as a robot needs them to be localized for
 // certain: less, and more landmarks come in.
 constexpr double kKeptRatio = 0.9;
@@ -32,14 +31,9 @@ std::vector<int32_t> NodesBefore(const std::vector<PromiseNode>& nodes, const Ma
   const std::vector<Pose> poses = NodePoses(previous);
   std::vector<int32_t> before;
   for (const PromiseNode& node : nodes) {
-    int32_t nearest = kNone;
-    double least = 0;
-    for (size_t i = 0; i < poses.size(); ++i) {
-      const double squared =
-          ViewDistanceSquared(node.cam_from_world, poses[i], promise.radius_m, promise.radius_deg);
-      if (nearest == kNone || squared < least) least = squared, nearest = static_cast<int32_t>(i);
-    }
-    before.push_back(any || least <= kNodeReach * kNodeReach ? nearest : kNone);
+    const std::optional<NearestNode> nearest = FindNearestNode(promise, poses, node.cam_from_world);
+    const bool reaches = nearest && (any || nearest->squared_distance <= kNodeReach * kNodeReach);
+    before.push_back(reaches ? static_cast<int32_t>(nearest->node) : kNotBefore);
   }
   return before;
 }
@@ -55,7 +49,7 @@ std::vector<NodeDemand> DemandsAfter(const std::vector<PromiseNode>& nodes, cons
   const double elsewhere = Median(expected);
   std::vector<NodeDemand> demands;
   for (const int32_t before : NodesBefore(nodes, previous, /*any=*/false)) {
-    const bool is_new = before == kNone;
+    const bool is_new = before == kNotBefore;
     demands.push_back({.least_matches = std::min(LandmarkOrderOptions().enough_matches,
                                                  kKeptRatio * (is_new ? elsewhere : expected[before])),
                        .needed_ratio = is_new ? 1 : kMetRatio});
@@ -77,26 +71,21 @@ class RegionsAfter {
     const std::vector<int32_t> before = NodesBefore(nodes, previous_, /*any=*/true);
     std::vector<RegionIdx> region_of_node;
     for (size_t node = 0; node < nodes.size(); ++node) {
-      if (before[node] == kNone) return std::nullopt;
+      if (before[node] == kNotBefore) return std::nullopt;
       region_of_node.push_back(promise.nodes[before[node]].region);
       regions[region_of_node.back()].nodes.push_back(static_cast<int32_t>(node));
     }
-    std::vector<std::vector<char>> has(regions.size(), std::vector<char>(keep_.size(), 0));
-    KeepLandmarks(&has);
-    AddNew(*problem.of_class, region_of_node, &has);
-    MeetDemands(problem, region_of_node, &has);
+    KeepLandmarks(&regions);
+    AddNew(*problem.of_class, region_of_node, &regions);
+    MeetDemands(problem, &regions);
     PromiseRegions result;
-    size_t most = max_landmarks_;
+    size_t most =
+        std::max(max_landmarks_, static_cast<size_t>(kMaxGrowth * static_cast<double>(max_landmarks_)));
     for (const MapRegion& region : previous_.regions) most = std::max(most, region.landmarks.size());
-    const auto most_now = static_cast<size_t>(kMaxGrowth * static_cast<double>(max_landmarks_));
-    most = std::max(most, most_now);
-    for (size_t r = 0; r < regions.size(); ++r) {
-      for (size_t i = 0; i < keep_.size(); ++i) {
-        if (has[r][i] != 0) regions[r].classes.push_back(i);
-      }
+    for (PromiseRegion& region : regions) {
       // A region that no node is left of goes, and one that grew out of bounds changes all.
-      if (regions[r].classes.size() > most) return std::nullopt;
-      if (!regions[r].nodes.empty()) result.regions.push_back(std::move(regions[r]));
+      if (region.classes.size() > most) return std::nullopt;
+      if (!region.nodes.empty()) result.regions.push_back(std::move(region));
     }
     const auto num = static_cast<int64_t>(most);
     result.lower_bound = static_cast<int>(std::max<int64_t>(1, (cover_bound + num - 1) / num));
@@ -104,47 +93,48 @@ class RegionsAfter {
   }
 
  private:
-  void KeepLandmarks(std::vector<std::vector<char>>* has) const {
+  void KeepLandmarks(std::vector<PromiseRegion>* regions) const {
     std::vector<size_t> class_of_landmark(previous_.landmarks.size(), keep_.size());
     for (size_t i = 0; i < keep_.size(); ++i) {
-      if (keep_[i] != 0 && matches_.landmark_of_class[i] != kNone)
+      if (keep_[i] != 0 && matches_.landmark_of_class[i] != kNotBefore)
         class_of_landmark[matches_.landmark_of_class[i]] = i;
     }
     for (size_t r = 0; r < previous_.regions.size(); ++r) {
       for (const LandmarkIdx landmark : previous_.regions[r].landmarks) {
-        if (class_of_landmark[landmark] < keep_.size()) (*has)[r][class_of_landmark[landmark]] = 1;
+        if (class_of_landmark[landmark] < keep_.size())
+          (*regions)[r].classes.push_back(class_of_landmark[landmark]);
       }
     }
   }
 
   void AddNew(const std::vector<std::vector<ExpectedMatch>>& of_class,
-              const std::vector<RegionIdx>& region_of_node, std::vector<std::vector<char>>* has) const {
+              const std::vector<RegionIdx>& region_of_node, std::vector<PromiseRegion>* regions) const {
     for (size_t i = 0; i < keep_.size(); ++i) {
-      if (keep_[i] == 0 || matches_.landmark_of_class[i] != kNone) continue;
-      for (const ExpectedMatch& match : of_class[i]) (*has)[region_of_node[match.view]][i] = 1;
+      if (keep_[i] == 0 || matches_.landmark_of_class[i] != kNotBefore) continue;
+      for (const ExpectedMatch& match : of_class[i]) {
+        std::vector<size_t>& classes = (*regions)[region_of_node[match.view]].classes;
+        if (classes.empty() || classes.back() != i) classes.push_back(i);
+      }
     }
+    for (PromiseRegion& region : *regions) std::sort(region.classes.begin(), region.classes.end());
   }
 
   // Where a region's landmarks are too few for one of its nodes, the fewest others of the map that it takes.
-  void MeetDemands(const CoverProblem& problem, const std::vector<RegionIdx>& region_of_node,
-                   std::vector<std::vector<char>>* has) const {
-    for (size_t r = 0; r < has->size(); ++r) {
-      // Of this region's nodes alone, and what the map keeps.
-      std::vector<std::vector<ExpectedMatch>> of_class(keep_.size());
-      for (size_t i = 0; i < keep_.size(); ++i) {
-        if (keep_[i] == 0) continue;
-        for (const ExpectedMatch& match : (*problem.of_class)[i]) {
-          if (region_of_node[match.view] == static_cast<RegionIdx>(r)) of_class[i].push_back(match);
-        }
-      }
-      CoverProblem of_region{.of_class = &of_class, .demands = problem.demands};
-      for (size_t node = 0; node < region_of_node.size(); ++node)
-        of_region.demands[node] *= region_of_node[node] == static_cast<RegionIdx>(r) ? kMetRatio : 0;
-      std::vector<size_t> taken;
-      for (size_t i = 0; i < keep_.size(); ++i) {
-        if ((*has)[r][i] != 0) taken.push_back(i);
-      }
-      for (const size_t i : CoverFast(of_region, taken)) (*has)[r][i] = 1;
+  void MeetDemands(const CoverProblem& problem, std::vector<PromiseRegion>* regions) const {
+    ClassesOfNodes of_node(problem.demands.size());
+    for (size_t i = 0; i < keep_.size(); ++i) {
+      if (keep_[i] == 0) continue;
+      for (const ExpectedMatch& match : (*problem.of_class)[i])
+        of_node[match.view].push_back({i, match.probability});
+    }
+    std::vector<double> demands = problem.demands;
+    for (double& demand : demands) demand *= kMetRatio;
+    for (PromiseRegion& region : *regions) {
+      const std::vector<size_t> cover = CoverNodes(of_node, demands, region.nodes, region.classes);
+      std::vector<size_t> all;
+      std::set_union(region.classes.begin(), region.classes.end(), cover.begin(), cover.end(),
+                     std::back_inserter(all));
+      region.classes = std::move(all);
     }
   }
 
@@ -171,7 +161,7 @@ bool IsMostlyNew(const Classes& classes, const MapRows& previous) {
 std::vector<size_t> StillThere(const std::vector<char>& may_keep, const PreviousMatches& matches) {
   std::vector<size_t> there;
   for (size_t i = 0; i < may_keep.size(); ++i) {
-    if (may_keep[i] != 0 && matches.landmark_of_class[i] != kNone) there.push_back(i);
+    if (may_keep[i] != 0 && matches.landmark_of_class[i] != kNotBefore) there.push_back(i);
   }
   std::sort(there.begin(), there.end(),
             [&](size_t a, size_t b) { return matches.landmark_of_class[a] < matches.landmark_of_class[b]; });

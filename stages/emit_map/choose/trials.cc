@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <set>
-#include <unordered_map>
 #include <utility>
 
 #include "core/base/parallel.h"
 #include "core/promise/expectation.h"
+#include "stages/emit_map/previous/positions.h"
 
 namespace cairn::emit_map {
 namespace {
@@ -31,8 +31,7 @@ std::vector<size_t> PoolIn(const LeftOutSurvey& survey, const Classes& classes,
 // Positions in a survey that lacks some of those of the whole one, in their order.
 std::vector<size_t> FirstIn(const LeftOutSurvey& survey, const Classes& classes,
                             const std::vector<size_t>& first) {
-  std::unordered_map<ClassId, size_t> index;
-  for (size_t i = 0; i < survey.classes.classes.size(); ++i) index[survey.classes.classes[i].class_id] = i;
+  const auto index = IndexClasses(survey.classes);
   std::vector<size_t> there;
   for (const size_t i : first) {
     const auto found = index.find(classes.classes[i].class_id);

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <deque>
-#include <unordered_map>
+
+#include "stages/emit_map/previous/positions.h"
 
 namespace cairn::emit_map {
 namespace {
@@ -141,14 +142,11 @@ std::vector<char> WereKept(const Appearance& appearance, const Classes& classes,
   for (const MapAppearanceNode& node : previous.appearance) {
     for (const int32_t image : node.images) is_kept[image] = node.is_kept ? 1 : 0;
   }
-  std::unordered_map<ImageId, int32_t> row_of_id;
-  for (size_t i = 0; i < classes.images.size(); ++i)
-    row_of_id[classes.images[i].image_id] = matches.row_of_image[i];
   std::vector<char> were_kept;
   for (const AppearanceNode& node : appearance.nodes) {
-    const auto row = row_of_id.find(node.images[0]);
-    were_kept.push_back(row != row_of_id.end() && row->second != PreviousMatches::kNone ? is_kept[row->second]
-                                                                                        : 0);
+    const int32_t image = PositionOf(classes.images, node.images[0]);
+    const int32_t row = image < 0 ? kNotBefore : matches.row_of_image[image];
+    were_kept.push_back(row == kNotBefore ? 0 : is_kept[row]);
   }
   return were_kept;
 }

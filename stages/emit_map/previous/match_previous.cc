@@ -42,7 +42,7 @@ std::vector<int32_t> RowsOfImages(const Classes& classes, const MapRows& previou
   for (const SurveyImage& image : classes.images) {
     const bool is_of_first = image.name.starts_with(first);
     const auto found = row_of_name.find(is_of_first ? image.name.substr(first.size()) : image.name);
-    rows.push_back(found == row_of_name.end() ? PreviousMatches::kNone : found->second);
+    rows.push_back(found == row_of_name.end() ? kNotBefore : found->second);
   }
   return rows;
 }
@@ -75,7 +75,7 @@ Votes CountVotes(const Classes& classes, const MapRows& previous, const std::vec
   const auto sightings = SightingsByImage(classes);
   Votes votes;
   for (size_t i = 0; i < row_of_image.size(); ++i) {
-    if (row_of_image[i] == PreviousMatches::kNone) continue;
+    if (row_of_image[i] == kNotBefore) continue;
     const MapImage& image = previous.images[row_of_image[i]];
     const Camera& camera = *cameras.at(image.camera_id);
     for (const LandmarkIdx landmark : image.landmarks) {
@@ -110,10 +110,10 @@ std::vector<int32_t> PairUp(const Votes& votes, const Classes& classes, const Ma
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     return a.num != b.num ? a.num > b.num : a.distance < b.distance;
   });
-  std::vector<int32_t> landmark_of_class(classes.classes.size(), PreviousMatches::kNone);
+  std::vector<int32_t> landmark_of_class(classes.classes.size(), kNotBefore);
   std::vector<char> is_taken(previous.landmarks.size(), 0);
   for (const Pair& pair : pairs) {
-    if (is_taken[pair.landmark] != 0 || landmark_of_class[pair.i] != PreviousMatches::kNone) continue;
+    if (is_taken[pair.landmark] != 0 || landmark_of_class[pair.i] != kNotBefore) continue;
     landmark_of_class[pair.i] = pair.landmark;
     is_taken[pair.landmark] = 1;
   }
@@ -132,7 +132,7 @@ double FrameErrorRatio(const Classes& classes, const MapRows& previous,
   std::vector<double> ratios;
   for (size_t i = 0; i < landmark_of_class.size(); ++i) {
     const int32_t landmark = landmark_of_class[i];
-    if (landmark == PreviousMatches::kNone) continue;
+    if (landmark == kNotBefore) continue;
     ratios.push_back((classes.classes[i].position - previous.landmarks[landmark].position).norm() /
                      distances[landmark]);
   }
@@ -157,14 +157,14 @@ bool IsThere(const FeatureClass& feature_class, const MapLandmark& landmark) {
 
 size_t PreviousMatches::NumMatched() const {
   return landmark_of_class.size() -
-         static_cast<size_t>(std::count(landmark_of_class.begin(), landmark_of_class.end(), kNone));
+         static_cast<size_t>(std::count(landmark_of_class.begin(), landmark_of_class.end(), kNotBefore));
 }
 
 Result<PreviousMatches> MatchPrevious(const Classes& classes, const MapRows& previous,
                                       const std::string& path) {
   PreviousMatches matches{.row_of_image = RowsOfImages(classes, previous)};
-  const auto none = static_cast<size_t>(
-      std::count(matches.row_of_image.begin(), matches.row_of_image.end(), PreviousMatches::kNone));
+  const auto none =
+      static_cast<size_t>(std::count(matches.row_of_image.begin(), matches.row_of_image.end(), kNotBefore));
   if (none == matches.row_of_image.size()) {
     const auto example = [](const auto& images) { return images.empty() ? "none" : images[0].name; };
     return MakeError(ErrorCode::kInvalidArgument,
@@ -193,7 +193,7 @@ Result<PreviousMatches> MatchPrevious(const Classes& classes, const MapRows& pre
   }
   for (size_t i = 0; i < matches.holds.size(); ++i) {
     const int32_t landmark = matches.landmark_of_class[i];
-    if (landmark == PreviousMatches::kNone) continue;
+    if (landmark == kNotBefore) continue;
     const FeatureClass& feature_class = classes.classes[i];
     const bool holds =
         IsThere(feature_class, previous.landmarks[landmark]) && LooksSo(previous, landmark, feature_class);

@@ -9,10 +9,11 @@
 
 namespace cairn::emit_map {
 
+// Of an image, a landmark or a node: the earlier map has none such.
+inline constexpr int32_t kNotBefore = -1;
+
 // What a survey has of an earlier map of the same place, in the same frame.
 struct PreviousMatches {
-  static constexpr int32_t kNone = -1;
-
   std::vector<int32_t> row_of_image;       // per Classes::images: its index in the map's images
   std::vector<int32_t> landmark_of_class;  // per Classes::classes; no landmark is of two classes
   // Per class that has a landmark: whether what the map stores of it still holds, so that it may stay as it

@@ -4,17 +4,17 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 
 #include "core/base/quantiles.h"
+#include "core/delta/renumbering.h"
 #include "core/features/transform_code.h"
+#include "stages/emit_map/previous/positions.h"
 
 namespace cairn::emit_map {
 namespace {
 
-constexpr int32_t kNone = PreviousMatches::kNone;
 // An image keeps its pose while its landmarks move by less than this in it, px (median).
 constexpr double kMaxShiftPx = 3;
 // Places and lengths stay while they differ by less than this part of the distance of what images see.
@@ -23,25 +23,21 @@ constexpr double kHeldHeadingDeg = 1;
 // Figures of the promise, of entropies (nats) and of look-alikes: far within what they are known to.
 constexpr double kHeldProbability = 0.02, kHeldRatio = 0.05, kHeldMatches = 0.5, kHeldSigmaRatio = 0.002,
                  kHeldEntropy = 0.03, kHeldScore = 0.03;
-constexpr double kHeldDrops = 3;        // at a station
-constexpr double kNoHeadingDeg = 1000;  // no station has it
+constexpr double kHeldDrops = 3;  // at a station
 
 // Numbers of images, or landmarks, of a map by those of the earlier one, and what is near.
 class Settler {
  public:
   Settler(const Classes& classes, const MapRows& previous, const PreviousMatches& matches, MapRows* rows)
       : previous_(previous), rows_(*rows) {
-    std::unordered_map<ClassId, size_t> class_index;
-    for (size_t i = 0; i < classes.classes.size(); ++i) class_index[classes.classes[i].class_id] = i;
+    const auto class_index = IndexClasses(classes);
     for (const MapLandmark& landmark : rows_.landmarks) {
       const size_t i = class_index.at(landmark.class_id);
       landmark_before_.push_back(matches.landmark_of_class[i]);
       holds_.push_back(matches.holds[i]);
     }
-    std::unordered_map<ImageId, int32_t> row_of_id;
-    for (size_t i = 0; i < classes.images.size(); ++i)
-      row_of_id[classes.images[i].image_id] = matches.row_of_image[i];
-    for (const MapImage& image : rows_.images) image_before_.push_back(row_of_id.at(image.image_id));
+    for (const MapImage& image : rows_.images)
+      image_before_.push_back(matches.row_of_image[PositionOf(classes.images, image.image_id)]);
     std::vector<double> distances;
     for (const MapImage& image : previous_.images) {
       for (const LandmarkIdx landmark : image.landmarks)
@@ -66,7 +62,7 @@ class Settler {
     for (const Camera& camera : rows_.cameras) cameras[camera.camera_id] = &camera;
     for (size_t i = 0; i < rows_.images.size(); ++i) {
       MapImage& image = rows_.images[i];
-      if (image_before_[i] == kNone || image.landmarks.empty()) continue;
+      if (image_before_[i] == kNotBefore || image.landmarks.empty()) continue;
       const Pose& before = previous_.images[image_before_[i]].cam_from_world;
       const Camera& camera = *cameras.at(image.camera_id);
       std::vector<double> shifts;
@@ -83,7 +79,7 @@ class Settler {
   void SettleLandmarks() {
     if (previous_.descriptor_code) QuantizeByCode(*previous_.descriptor_code, &rows_.descriptors);
     for (size_t i = 0; i < rows_.landmarks.size(); ++i) {
-      if (landmark_before_[i] == kNone || holds_[i] == 0) continue;
+      if (landmark_before_[i] == kNotBefore || holds_[i] == 0) continue;
       const ClassId class_id = rows_.landmarks[i].class_id;  // by which its class is found
       rows_.landmarks[i] = previous_.landmarks[landmark_before_[i]];
       rows_.landmarks[i].class_id = class_id;
@@ -99,16 +95,16 @@ class Settler {
     for (int32_t region = no_region; region-- > 0;) {
       for (const LandmarkIdx landmark : rows_.regions[region].landmarks) home[landmark] = region;
     }
-    std::vector<int32_t> last_of_home(rows_.regions.size() + 1, kNone);
+    std::vector<int32_t> last_of_home(rows_.regions.size() + 1, kNotBefore);
     for (size_t i = 0; i < num; ++i)
       last_of_home[home[i]] = std::max(last_of_home[home[i]], landmark_before_[i]);
     std::vector<int32_t> order(num);
     for (size_t i = 0; i < num; ++i) order[i] = static_cast<int32_t>(i);
     const auto key = [&](int32_t i) {
-      const bool is_new = landmark_before_[i] == kNone;
+      const bool is_new = landmark_before_[i] == kNotBefore;
       const int32_t last = last_of_home[home[i]];
       const int32_t place =
-          is_new ? (last == kNone ? std::numeric_limits<int32_t>::max() : last) : landmark_before_[i];
+          is_new ? (last == kNotBefore ? std::numeric_limits<int32_t>::max() : last) : landmark_before_[i];
       return std::pair(place, is_new);
     };
     std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return key(a) < key(b); });
@@ -190,7 +186,7 @@ class Settler {
   }
 
   void SettleAppearance() {
-    std::vector<int32_t> node_of_image(previous_.images.size(), kNone);
+    std::vector<int32_t> node_of_image(previous_.images.size(), kNotBefore);
     for (size_t node = 0; node < previous_.appearance.size(); ++node) {
       for (const int32_t image : previous_.appearance[node].images)
         node_of_image[image] = static_cast<int32_t>(node);
@@ -198,10 +194,10 @@ class Settler {
     std::vector<int32_t> node_before;
     for (const MapAppearanceNode& node : rows_.appearance) {
       const int32_t image = image_before_[node.images[0]];
-      node_before.push_back(image == kNone ? kNone : node_of_image[image]);
+      node_before.push_back(image == kNotBefore ? kNotBefore : node_of_image[image]);
     }
     for (size_t i = 0; i < rows_.appearance.size(); ++i) {
-      if (node_before[i] == kNone) continue;
+      if (node_before[i] == kNotBefore) continue;
       MapAppearanceNode& node = rows_.appearance[i];
       const MapAppearanceNode& before = previous_.appearance[node_before[i]];
       if (node.entropy && before.entropy && std::abs(*node.entropy - *before.entropy) <= kHeldEntropy)
@@ -265,21 +261,15 @@ void SettleRows(const Classes& classes, const MapRows& previous, const PreviousM
 }
 
 void SettleDrops(const MapRows& previous, MapRows* rows) {
-  const auto key_of = [](const MapStation& station) {
-    return std::tuple(station.position.x(), station.position.y(),
-                      station.heading_deg.value_or(kNoHeadingDeg));
-  };
-  std::map<std::tuple<double, double, double>, size_t> station_before;
-  for (size_t i = 0; i < previous.stations.size(); ++i) station_before[key_of(previous.stations[i])] = i;
+  const std::vector<int32_t> station_before = FindSameStations(previous, *rows);
   std::map<int, const DropCount*> known;
   for (const DropCount& drop : previous.findings.drops) known[drop.reason_id] = &drop;
   for (DropCount& drop : rows->findings.drops) {
     const auto before = known.find(drop.reason_id);
     if (before == known.end() || before->second->at_stations.empty()) continue;
     for (size_t i = 0; i < drop.at_stations.size(); ++i) {
-      const auto station = station_before.find(key_of(rows->stations[i]));
-      if (station == station_before.end()) continue;
-      const int32_t number = before->second->at_stations[station->second];
+      if (station_before[i] == Renumbering::kNew) continue;
+      const int32_t number = before->second->at_stations[station_before[i]];
       const double most = std::max(kHeldDrops, kHeldRatio * number);
       if (std::abs(drop.at_stations[i] - number) <= most && number <= drop.num_dropped)
         drop.at_stations[i] = number;
@@ -289,13 +279,12 @@ void SettleDrops(const MapRows& previous, MapRows* rows) {
 
 void KeepClassIds(const Classes& classes, const MapRows& previous, const PreviousMatches& matches,
                   MapRows* rows) {
-  std::unordered_map<ClassId, size_t> class_index;
-  for (size_t i = 0; i < classes.classes.size(); ++i) class_index[classes.classes[i].class_id] = i;
+  const auto class_index = IndexClasses(classes);
   ClassId next = 0;
   for (const MapLandmark& landmark : previous.landmarks) next = std::max(next, landmark.class_id + 1);
   for (MapLandmark& landmark : rows->landmarks) {
     const int32_t before = matches.landmark_of_class[class_index.at(landmark.class_id)];
-    landmark.class_id = before == kNone ? next++ : previous.landmarks[before].class_id;
+    landmark.class_id = before == kNotBefore ? next++ : previous.landmarks[before].class_id;
   }
 }
 
