@@ -178,38 +178,23 @@ class BuildingMaker {
   // All pieces but those that a change took away, some of them elsewhere.  Those that are gone leave their
   // textures' numbers unused: whatever else there is is painted as before.
   void FurnishRooms() {
-    const std::vector<Furniture> all = building_.layout.furniture;
-    std::vector<char> is_gone(all.size(), 0), is_moved(all.size(), 0);
-    for (size_t i = 0; i < all.size(); ++i) {
-      if (options_.change == 0 || all[i].is_pillar) continue;
-      Random random(MixSeed(MixSeed(MixSeed(seed_, 7), options_.change), i));
-      is_gone[i] = random.Uniform() < options_.removed_furniture_ratio ? 1 : 0;
-      is_moved[i] = is_gone[i] == 0 && random.Uniform() < options_.moved_furniture_ratio ? 1 : 0;
-    }
-    std::vector<Furniture>& left = building_.layout.furniture;
-    left.clear();
-    std::vector<size_t> place_of(all.size(), 0);  // in `left`
-    for (size_t i = 0; i < all.size(); ++i) {
-      place_of[i] = left.size();
-      if (is_gone[i] == 0) left.push_back(all[i]);
-    }
-    for (size_t i = 0; i < all.size(); ++i) {
-      if (is_gone[i] != 0) {
+    const std::vector<std::optional<Furniture>> pieces =
+        FurnitureAfterChange(options_, seed_, building_.layout);
+    std::vector<Furniture> left;
+    for (size_t i = 0; i < pieces.size(); ++i) {
+      const Furniture& before = building_.layout.furniture[i];
+      if (!pieces[i]) {
         jobs_.resize(jobs_.size() + kNumFurnitureFaces, {Painter::kTrim});
-        building_.changed.push_back(Standing(ChangedSurface::Kind::kFurniture, all[i], all[i].rect));
+        building_.changed.push_back(Standing(ChangedSurface::Kind::kFurniture, before, before.rect));
         continue;
       }
-      Furniture& piece = left[place_of[i]];
-      const std::optional<Rect> rect =
-          is_moved[i] == 0 ? std::nullopt
-                           : PlaceElsewhere(options_, building_.layout, place_of[i],
-                                            MixSeed(MixSeed(MixSeed(seed_, 9), options_.change), i));
-      if (rect) {
-        building_.changed.push_back(Standing(ChangedSurface::Kind::kMovedFurniture, piece, *rect));
-        piece.rect = *rect;
-      }
-      AddFurniture(piece);
+      const Rect& now = pieces[i]->rect;
+      if (now.x0 != before.rect.x0 || now.y0 != before.rect.y0)
+        building_.changed.push_back(Standing(ChangedSurface::Kind::kMovedFurniture, before, now));
+      AddFurniture(*pieces[i]);
+      left.push_back(*pieces[i]);
     }
+    building_.layout.furniture = std::move(left);
   }
 
   // A piece, and where it stands now.

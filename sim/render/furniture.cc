@@ -129,6 +129,35 @@ bool Fits(const Rect& rect, const Rect& room, const std::vector<Rect>& obstacles
   return StaysConnected(room, all, approaches, clearance);
 }
 
+// `pieces`: all that stand in the building by now.  Nothing where no place is found, or the piece is in no
+// room.
+std::optional<Rect> PlaceElsewhere(const SimulateOptions& options, const Layout& layout,
+                                   const std::vector<std::optional<Furniture>>& pieces, size_t piece,
+                                   uint64_t seed) {
+  const Rect& old = pieces[piece]->rect;
+  const auto room = std::find_if(layout.rooms.begin(), layout.rooms.end(),
+                                 [&](const Room& other) { return other.rect.Overlaps(old); });
+  if (room == layout.rooms.end()) return std::nullopt;
+  const Rect& in = room->rect;
+  std::vector<Rect> obstacles;
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    if (i != piece && pieces[i] && pieces[i]->rect.Overlaps(in)) obstacles.push_back(pieces[i]->rect);
+  }
+  const std::vector<Rect> approaches = DoorApproaches(layout, in);
+  const bool at_wall_x = old.x0 == in.x0 || old.x1 == in.x1, at_wall_y = old.y0 == in.y0 || old.y1 == in.y1;
+  Random random(seed);
+  for (int attempt = 0; attempt < kMaxAttemptsPerRoom; ++attempt) {
+    double x = random.Uniform(in.x0, std::max(in.x0, in.x1 - old.width()));
+    double y = random.Uniform(in.y0, std::max(in.y0, in.y1 - old.depth()));
+    const bool at_far_end = random.Uniform() < 0.5;
+    if (at_wall_x) x = at_far_end ? in.x1 - old.width() : in.x0;
+    if (at_wall_y && !at_wall_x) y = at_far_end ? in.y1 - old.depth() : in.y0;
+    const Rect rect = {x, y, x + old.width(), y + old.depth()};
+    if (!rect.Overlaps(old) && Fits(rect, in, obstacles, approaches, options.clearance_m)) return rect;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layout) {
@@ -159,30 +188,26 @@ void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layou
   }
 }
 
-std::optional<Rect> PlaceElsewhere(const SimulateOptions& options, const Layout& layout, size_t piece,
-                                   uint64_t seed) {
-  const Rect& old = layout.furniture[piece].rect;
-  const auto room = std::find_if(layout.rooms.begin(), layout.rooms.end(),
-                                 [&](const Room& other) { return other.rect.Overlaps(old); });
-  if (room == layout.rooms.end()) return std::nullopt;
-  const Rect& in = room->rect;
-  std::vector<Rect> obstacles;
-  for (size_t i = 0; i < layout.furniture.size(); ++i) {
-    if (i != piece && layout.furniture[i].rect.Overlaps(in)) obstacles.push_back(layout.furniture[i].rect);
+std::vector<std::optional<Furniture>> FurnitureAfterChange(const SimulateOptions& options, uint64_t seed,
+                                                           const Layout& layout) {
+  std::vector<std::optional<Furniture>> pieces(layout.furniture.begin(), layout.furniture.end());
+  if (options.change == 0) return pieces;
+  std::vector<size_t> moved;
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i]->is_pillar) continue;
+    Random random(MixSeed(MixSeed(MixSeed(seed, 7), options.change), i));
+    if (random.Uniform() < options.removed_furniture_ratio) {
+      pieces[i].reset();
+    } else if (random.Uniform() < options.moved_furniture_ratio) {
+      moved.push_back(i);
+    }
   }
-  const std::vector<Rect> approaches = DoorApproaches(layout, in);
-  const bool at_wall_x = old.x0 == in.x0 || old.x1 == in.x1, at_wall_y = old.y0 == in.y0 || old.y1 == in.y1;
-  Random random(seed);
-  for (int attempt = 0; attempt < kMaxAttemptsPerRoom; ++attempt) {
-    double x = random.Uniform(in.x0, std::max(in.x0, in.x1 - old.width()));
-    double y = random.Uniform(in.y0, std::max(in.y0, in.y1 - old.depth()));
-    const bool at_far_end = random.Uniform() < 0.5;
-    if (at_wall_x) x = at_far_end ? in.x1 - old.width() : in.x0;
-    if (at_wall_y && !at_wall_x) y = at_far_end ? in.y1 - old.depth() : in.y0;
-    const Rect rect = {x, y, x + old.width(), y + old.depth()};
-    if (!rect.Overlaps(old) && Fits(rect, in, obstacles, approaches, options.clearance_m)) return rect;
+  for (const size_t i : moved) {
+    const std::optional<Rect> rect =
+        PlaceElsewhere(options, layout, pieces, i, MixSeed(MixSeed(MixSeed(seed, 9), options.change), i));
+    if (rect) pieces[i]->rect = *rect;
   }
-  return std::nullopt;
+  return pieces;
 }
 
 }  // namespace cairn::sim

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "sim/render/layout.h"
 
@@ -13,9 +13,10 @@ namespace cairn::sim {
 // clearance_m, doors included.
 void PlaceFurniture(const SimulateOptions& options, uint64_t seed, Layout* layout);
 
-// Another place for a piece of furniture in its room, turned as it is and off its old place, on the same
-// terms; at a wall where it stands at one.  Nothing where none is found, or the piece is in no room.
-std::optional<Rect> PlaceElsewhere(const SimulateOptions& options, const Layout& layout, size_t piece,
-                                   uint64_t seed);
+// The pieces after options.change, per piece of the layout; nothing where it is gone.  Pillars stay.  A piece
+// that moves gets another place in its room, turned as it is and off its old place, on the same terms, and at
+// a wall where it stood at one; where none is found, it stays.
+std::vector<std::optional<Furniture>> FurnitureAfterChange(const SimulateOptions& options, uint64_t seed,
+                                                           const Layout& layout);
 
 }  // namespace cairn::sim
