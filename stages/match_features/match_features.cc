@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -109,6 +110,52 @@ Result<std::vector<PairPredictor::View>> ReadViews(SQLite::Database& features, c
   return views;
 }
 
+// What was predicted of earlier sessions may be known.
+Result<PredictionReuse> ReusePredictions(const PredictPairsOptions& options, MatchRun* run) {
+  std::vector<ContentHash> image_keys;
+  std::vector<int> generations;
+  for (const MatchImage& image : run->images.images) {
+    CAIRN_ASSIGN_OR_RETURN(const ContentHash image_key,
+                           run->keys.OfImage(static_cast<int>(image_keys.size())));
+    ContentHasher hasher;
+    hasher.Hash(image_key);
+    for (const double value : image.cam_from_world->rotation.coeffs()) hasher.Double(value);
+    for (const double value : image.cam_from_world->translation) hasher.Double(value);
+    image_keys.push_back(hasher.Finish());
+    generations.push_back(GenerationOfSession(image.session));
+  }
+  return PredictionReuse(image_keys, std::move(generations), options);
+}
+
+// Pairs, ascending, that the matches so far predict, and that are not known.
+Result<std::vector<PredictedPair>> PredictOrTakeOver(const IndexPairs& known,
+                                                     const PredictPairsOptions& options,
+                                                     PairPredictor* predictor, SQLite::Database& database,
+                                                     MatchRun* run) {
+  if (!run->predictions) return predictor->Predict(known, options, run->num_threads, run->progress);
+  std::vector<PredictedPair> pairs;
+  std::set<int> taken_over;
+  const std::vector<int> generations = run->predictions->EndRound();
+  for (const int generation : generations) {
+    for (ReuseSources* const sources : {&run->named, &run->previous}) {
+      const auto found = run->predictions->Find(generation, sources);
+      if (!found) continue;
+      pairs.insert(pairs.end(), found->begin(), found->end());
+      taken_over.insert(generation);
+      ++run->summary.num_predictions_taken_over;
+      break;
+    }
+  }
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<PredictedPair> computed,
+                         predictor->Predict(known, options, run->num_threads, run->progress, taken_over));
+  pairs.insert(pairs.end(), computed.begin(), computed.end());
+  std::sort(pairs.begin(), pairs.end(),
+            [](const PredictedPair& a, const PredictedPair& b) { return a.idxs < b.idxs; });
+  for (const int generation : generations)
+    run->entries.push_back(run->predictions->Write(generation, pairs, database));
+  return pairs;
+}
+
 EarlierPartners PartnersBySession(const MatchImages& images, double ratio) {
   std::vector<int> sessions;
   for (const MatchImage& image : images.images) sessions.push_back(image.session);
@@ -137,12 +184,16 @@ Status MatchFrustum(SQLite::Database& database, MatchRun* run) {
       .max_ray_angle_deg = options.matching.verification.max_ray_angle_deg,
       .max_prior_error_px = options.matching.verification.max_prior_error_px,
       .min_baseline_m = options.matching.verification.min_baseline_m};
+  if (!run->reuse.shard) {
+    CAIRN_ASSIGN_OR_RETURN(run->predictions, ReusePredictions(prediction, run));
+    CreatePredictionTable(database);
+  }
   IndexPairs known = next;
   while (!next.empty()) {
     CAIRN_ASSIGN_OR_RETURN(const bool goes_on, MatchRound(next, &predictor, database, run));
     if (!goes_on) break;
     CAIRN_ASSIGN_OR_RETURN(const std::vector<PredictedPair> predicted,
-                           predictor.Predict(known, prediction, num_threads, progress));
+                           PredictOrTakeOver(known, prediction, &predictor, database, run));
     for (const PredictedPair& pair : predicted) known.push_back(pair.idxs);
     std::sort(known.begin(), known.end());
     next = partners.Choose(predicted);

@@ -72,7 +72,8 @@ struct MatchFeaturesSummary {
   DropCounts dropped_pairs;    // of those tried: why they were not verified (core/world/drop_reason.h)
   std::string pairs;           // how pairs were chosen
   int64_t num_taken_over = 0;  // of num_pairs_tried: unchanged since an earlier run
-  int num_rounds = 0;          // of pairs; after a shard's last round the pairs of the next are not known yet
+  int num_predictions_taken_over = 0;  // rounds of a generation (pairs/earlier_partners.h)
+  int num_rounds = 0;  // of pairs; after a shard's last round the pairs of the next are not known yet
   // What a shard worked on instead of pairs, to choose them: "words" or "partners" of images; empty: nothing.
   std::string image_step;
   int num_image_results = 0;

@@ -42,6 +42,7 @@ Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, Pai
                   SQLite::Database& database, MatchRun* run) {
   CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pair));
   run->entries.push_back(EntryOf(key, result));
+  if (run->predictions) run->predictions->Add(pair, run->entries.back().contents);
   MatchFeaturesSummary& summary = run->summary;
   ++summary.num_pairs_tried;
   summary.num_putative += result.num_putative;

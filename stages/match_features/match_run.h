@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/base/progress.h"
@@ -8,6 +9,7 @@
 #include "stages/match_features/match_features.h"
 #include "stages/match_features/pair_reuse.h"
 #include "stages/match_features/pairs/image_features.h"
+#include "stages/match_features/prediction_reuse.h"
 
 namespace cairn::match_features {
 
@@ -22,8 +24,9 @@ struct MatchRun {
   int num_threads;
   Progress& progress;
   PairKeys keys;
-  ReuseSources named;     // reuse.files
-  ReuseSources previous;  // the output's earlier state
+  ReuseSources named;                          // reuse.files
+  ReuseSources previous;                       // the output's earlier state
+  std::optional<PredictionReuse> predictions;  // where pairs are predicted; a shard has none
   std::vector<ReuseEntry> entries;
   std::vector<DroppedItem> dropped_pairs;  // those tried and not verified
   MatchFeaturesSummary summary;

@@ -58,21 +58,25 @@ PairKeys::PairKeys(SQLite::Database& features, const MatchImages& images, const 
   options_ = ContentHasher().Text("pair").Text(OptionsToml(DescribeOptions(&described))).Finish();
 }
 
+Result<ContentHash> PairKeys::OfImage(int idx) {
+  if (image_keys_[idx]) return *image_keys_[idx];
+  const MatchImage& image = images_.images[idx];
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
+                         ReadDatabaseKeypoints(features_, image.image_id));
+  CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
+                         ReadDatabaseDescriptors(features_, image.image_id));
+  image_keys_[idx] = ContentHasher()
+                         .Hash(HashFeatures(keypoints, descriptors))
+                         .Hash(HashCamera(images_.cameras.at(image.camera_id)))
+                         .Finish();
+  return *image_keys_[idx];
+}
+
 Result<ContentHash> PairKeys::Of(const std::pair<int, int>& pair) {
-  for (const int idx : {pair.first, pair.second}) {
-    if (image_keys_[idx]) continue;
-    const MatchImage& image = images_.images[idx];
-    CAIRN_ASSIGN_OR_RETURN(const std::vector<Keypoint> keypoints,
-                           ReadDatabaseKeypoints(features_, image.image_id));
-    CAIRN_ASSIGN_OR_RETURN(const DescriptorMatrix descriptors,
-                           ReadDatabaseDescriptors(features_, image.image_id));
-    image_keys_[idx] = ContentHasher()
-                           .Hash(HashFeatures(keypoints, descriptors))
-                           .Hash(HashCamera(images_.cameras.at(image.camera_id)))
-                           .Finish();
-  }
+  CAIRN_ASSIGN_OR_RETURN(const ContentHash image_key1, OfImage(pair.first));
+  CAIRN_ASSIGN_OR_RETURN(const ContentHash image_key2, OfImage(pair.second));
   ContentHasher key;
-  key.Hash(options_).Hash(*image_keys_[pair.first]).Hash(*image_keys_[pair.second]);
+  key.Hash(options_).Hash(image_key1).Hash(image_key2);
   const std::optional<Pose> stated = StatedRelativePose(images_.images[pair.first].cam_from_world,
                                                         images_.images[pair.second].cam_from_world);
   if (stated) {

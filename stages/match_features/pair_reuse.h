@@ -29,6 +29,8 @@ class PairKeys {
   // Of a pair of indices into images.images.  Reads the features of an image when it is first named.  Errors:
   // Corrupt; throws SQLite::Exception as the readers do.
   Result<ContentHash> Of(const std::pair<int, int>& pair);
+  // Of one image: its features and its camera.  Errors: as Of.
+  Result<ContentHash> OfImage(int idx);
 
  private:
   SQLite::Database& features_;

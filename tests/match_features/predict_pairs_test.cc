@@ -94,6 +94,55 @@ TEST(PredictPairs, AChainByWayOfALaterGenerationThanBothEndsDoesNotCount) {
   EXPECT_EQ(predicted(1, 0, 1), 1u);
 }
 
+TEST(PredictPairs, APairIsExpectedTheSameWhicheverImageIsOfTheLaterGeneration) {
+  //   features 0 .. 9      point 0 of image 0 goes by way of image 1 to features 0 and 1 of image 2, which
+  //   show the same point: of image 0 one feature leads there, of image 2 two
+  const auto num_expected = [](int generation0, int generation2) {
+    std::vector<PairPredictor::View> views = {At(0), At(0.01), At(0.02)};
+    views[2].rays[1] = views[2].rays[0];
+    views[0].generation = generation0;
+    views[2].generation = generation2;
+    PairPredictor predictor(views);
+    predictor.Add(0, 1, Same(0, 1));
+    predictor.Add(1, 2, {{0, 0}, {0, 1}});
+    NoProgress progress;
+    return predictor.Predict({{0, 1}, {1, 2}}, {1, 90, 16, 1e-3}, 1, progress)->at(0).num_expected;
+  };
+  EXPECT_EQ(num_expected(0, 0), 1);
+  EXPECT_EQ(num_expected(0, 1), 1);
+  EXPECT_EQ(num_expected(1, 0), 1);
+}
+
+TEST(PredictPairs, WhatIsKnownOfAGenerationIsNotLookedForAndLeavesTheOthersAlone) {
+  //   generation  0 0 0 1 1      0 - 1 - 2 and 1 - 3 - 4
+  std::vector<PairPredictor::View> views;
+  for (int i = 0; i < 5; ++i) {
+    views.push_back(At(0.01 * i));
+    views.back().generation = i < 3 ? 0 : 1;
+  }
+  const auto predict = [&](const std::set<int>& without, PairPredictor* predictor, const IndexPairs& known) {
+    NoProgress progress;
+    return IdxsOf(*predictor->Predict(known, {1, 90, 16, 1e-3}, 2, progress, without));
+  };
+  const IndexPairs tried = {{0, 1}, {1, 2}, {1, 3}, {3, 4}};
+  const auto matched = [&] {
+    PairPredictor predictor(views);
+    for (const auto& [i, j] : tried) predictor.Add(i, j, Same(0, 10));
+    return predictor;
+  };
+  PairPredictor all = matched(), later = matched(), earlier = matched(), none = matched();
+  EXPECT_THAT(predict({}, &all, tried), ElementsAre(Pair(0, 2), Pair(0, 3), Pair(1, 4), Pair(2, 3)));
+  EXPECT_THAT(predict({0}, &later, tried), ElementsAre(Pair(0, 3), Pair(1, 4), Pair(2, 3)));
+  EXPECT_THAT(predict({1}, &earlier, tried), ElementsAre(Pair(0, 2)));
+  EXPECT_THAT(predict({0, 1}, &none, tried), IsEmpty());
+  // The next round predicts the same, whichever was known in this one.
+  const IndexPairs known = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {1, 4}, {2, 3}, {3, 4}};
+  for (PairPredictor* predictor : {&all, &later, &earlier, &none}) {
+    predictor->Add(0, 3, Same(0, 10));
+    EXPECT_THAT(predict({}, predictor, known), ElementsAre(Pair(0, 4)));
+  }
+}
+
 TEST(PredictPairs, RaysTooFarApartDoNotCount) {
   // From 3 m aside the rays to the wall at 3 m differ by 45 degrees, 49 at its far end.
   PairPredictor predictor({At(0), At(0.01), At(3)});

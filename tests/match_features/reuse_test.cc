@@ -132,6 +132,39 @@ TEST_F(MatchFeaturesReuse, CamerasPosesAndOptionsCount) {
   EXPECT_EQ(Computed(false), 28);
 }
 
+TEST_F(MatchFeaturesReuse, WhatWasPredictedOfEarlierSessionsIsTakenOver) {
+  //   session    a a b b c c d d     of the first two, one generation, of c and of d in each round
+  options_.num_frustum_seeds = 1;
+  options_.num_frustum_scouts = 0;
+  capture_.sessions = {"a", "b", "c", "d"};
+  for (int i = 0; i < 8; ++i) {
+    capture_.images[i].name = fmt::format("{}/{}.png", capture_.sessions[i / 2], i);
+    Edit(fmt::format("UPDATE images SET name = '{}' WHERE image_id = {}", capture_.images[i].name, i + 1));
+  }
+  fs::copy_file(folder_ + "/features.db", folder_ + "/four.db");
+  Edit("DELETE FROM images WHERE image_id > 6");
+  ASSERT_TRUE(Match(true).ok());
+  const auto same = MatchTo("matches.db", true, {.previous = true});
+  const int num_of_three = same->num_predictions_taken_over;
+  EXPECT_GT(num_of_three, 2);
+  fs::copy_file(folder_ + "/four.db", folder_ + "/features.db", fs::copy_options::overwrite_existing);
+  const auto added = MatchTo("matches.db", true, {.previous = true});
+  EXPECT_EQ(added->num_predictions_taken_over, num_of_three);
+  EXPECT_LT(added->num_taken_over, added->num_pairs_tried);
+  ExpectAsClean("matches.db", true);
+  // Of another place of an image of c, c and d are predicted anew.
+  capture_.images[5].cam_from_world->translation.y() += 0.001;
+  const auto moved = MatchTo("matches.db", true, {.previous = true});
+  EXPECT_GT(moved->num_predictions_taken_over, 0);
+  EXPECT_LT(moved->num_predictions_taken_over, num_of_three);
+  ExpectAsClean("matches.db", true);
+  SQLite::Database(folder_ + "/matches.db", SQLite::OPEN_READWRITE)
+      .exec("UPDATE cairn_predicted_pairs SET pairs = zeroblob(12)");
+  EXPECT_EQ(MatchTo("matches.db", true, {.previous = true})->num_predictions_taken_over, 0)
+      << "not what it was";
+  ExpectAsClean("matches.db", true);
+}
+
 TEST_F(MatchFeaturesReuse, PairsThatWereTriedInVainAreNotTriedAgain) {
   Edit("UPDATE descriptors SET data = zeroblob(80 * 128) WHERE image_id = 5");
   const auto first = Match(false);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -37,7 +38,8 @@ struct PredictedPair {
 // that images i and j are expected to have are the features of i from which such a chain leads to j.  Chains
 // of two matches, not whole tracks: one wrong match joins two tracks, but makes few chains.
 // A chain by way of an image of a later generation than both of i and j does not count, so that what is
-// predicted of them does not change when that generation is added (earlier_partners.h).
+// predicted of them does not change when that generation is added (earlier_partners.h).  A pair is of the
+// later one of its images' generations, and looked for from the image of that one.
 class PairPredictor {
  public:
   struct View {
@@ -51,14 +53,16 @@ class PairPredictor {
   // Adds the verified matches of two views.
   void Add(int idx1, int idx2, const std::vector<Match>& inliers);
 
-  // Pairs (ascending) of enough expected matches that are not in `known` (ascending).  Same for any order of
+  // Pairs (ascending) of enough expected matches that are not in `known` (ascending), without those of the
+  // generations in `without`: what they predict is known from elsewhere.  Same for any order of
   // the calls of Add and any number of threads.  A later call only examines pairs that matches added since
   // the last call lead to: the expected matches of others are unchanged.  REQUIRES: later calls have the same
-  // options, and the pairs of earlier calls in `known`.  Cost: sum over features of
-  // (matches)^2; later, of images with such pairs.  Memory: 24 bytes per match and 28 per feature.
-  // Errors: Cancelled.
+  // options, and the pairs of earlier calls in `known`.  Cost: sum over the features of the generations that
+  // are looked for of (matches)^2; later, of images with such pairs.  Memory: 24 bytes per match, twice that
+  // for a moment, and 28 per feature.  Errors: Cancelled.
   Result<std::vector<PredictedPair>> Predict(const IndexPairs& known, const PredictPairsOptions& options,
-                                             int num_threads, Progress& progress);
+                                             int num_threads, Progress& progress,
+                                             const std::set<int>& without = {});
 
  private:
   // The features that each feature is matched with: feature[begin[f]] to feature[begin[f + 1]], and their
@@ -70,10 +74,20 @@ class PairPredictor {
   };
   // Links of the matches from `first_match` on.
   Links CollectLinks(size_t first_match) const;
-  // Later images to which a chain leads that has a match of `new_links`, flags per image.
-  std::vector<char> NewlyLinked(int idx, const Links& links, const Links& new_links) const;
-  // Expected matches with every later image that is not in `settled`, flags per image.
-  std::vector<int> ExpectedMatches(int idx, const Links& links, const std::vector<char>& settled,
+  // All matches that were added are linked.
+  void LinkAll();
+  // Per image, whether it has pairs to look for: those of its generation are asked for, and matches of it or
+  // of earlier ones were added since the last call.
+  std::vector<char> ImagesToExamine(const std::set<int>& without) const;
+  // Whether the pair is looked for from `idx`.
+  bool IsFrom(int idx, int other) const {
+    const int generation = views_[idx].generation, other_generation = views_[other].generation;
+    return generation != other_generation ? generation > other_generation : idx < other;
+  }
+  // Images to which a chain leads that has a match of `new_links`, flags per image.
+  std::vector<char> NewlyLinked(int idx, const Links& new_links) const;
+  // Expected matches with every image that is not in `settled`, flags per image.
+  std::vector<int> ExpectedMatches(int idx, const std::vector<char>& settled,
                                    const PredictPairsOptions& options) const;
   bool CanMeet(uint32_t feature1, uint32_t feature2, const PredictPairsOptions& options) const;
   const Eigen::Vector3f& Ray(uint32_t feature) const {
@@ -85,6 +99,8 @@ class PairPredictor {
   std::vector<uint32_t> first_feature_;  // of each view, counted over all; one more than views
   std::vector<int> view_of_;             // of each feature
   std::vector<std::pair<uint32_t, uint32_t>> matches_;
+  Links links_;                    // of the first of matches_
+  size_t num_linked_ = 0;          // so many
   size_t num_predicted_from_ = 0;  // of matches_, at the last call of Predict
 };
 
