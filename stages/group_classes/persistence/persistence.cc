@@ -35,6 +35,8 @@ constexpr double kMinYieldRatio = 0.5;
 // or a wrong match would outweigh all that is missed around it.
 constexpr double kNeighbourRadius = 0.15;
 constexpr size_t kMaxNumNeighbours = 80;
+// Mostly there are as many within this part of the radius: then none is looked for beyond it.
+constexpr double kNearRatio = 0.5;
 constexpr double kNumIndependent = 10;
 constexpr double kMaxLogRatio = 3;
 // Then they say again what each thinks by now, in so many rounds: so the edge of what is gone comes to lie
@@ -219,14 +221,19 @@ class SessionMixture {
 
   // Of each point.
   void FindNeighbours() {
-    const PointGrid grid(points_, radius_);
+    const PointGrid grid(points_, radius_), near_grid(points_, kNearRatio * radius_);
     neighbours_.resize(points_.size());
     ForPoints([&](int64_t k) {
       std::vector<std::pair<double, int>> near;
-      grid.ForNear(points_[k], [&](int other, double distance) {
+      const auto add = [&](int other, double distance) {
         if (other != k && sides_[k].dot(sides_[other]) > kMinSideCosine)
           near.emplace_back(distance * distance, other);
-      });
+      };
+      near_grid.ForNear(points_[k], add);
+      if (near.size() < kMaxNumNeighbours) {
+        near.clear();
+        grid.ForNear(points_[k], add);
+      }
       if (near.size() > kMaxNumNeighbours) {
         std::nth_element(near.begin(), near.begin() + kMaxNumNeighbours, near.end());
         near.resize(kMaxNumNeighbours);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 #include "core/base/parallel.h"
@@ -48,7 +49,9 @@ struct View {
   bool shows_landmarks_only = false;
   double typical_distance = 0;  // of the classes that it sees
   std::vector<int> neighbours;
-  std::vector<std::vector<float>> depths;  // of the classes that it sees, by cell
+  // Of the classes that it sees, cell by cell, row after row: those of cell c from first_depth[c] on.
+  std::vector<float> depths;
+  std::vector<int> first_depth;
 };
 
 // Of the angle between a camera's axis and the corners of its image; -1 where one has no ray, or beyond 80
@@ -94,16 +97,25 @@ std::optional<Sight> SightOf(const View& view, const Eigen::Vector3d& point) {
 bool IsHidden(const View& view, const Sight& sight) {
   const CellOfPixel at = CellOf(*view.camera, sight.pixel);
   int num = 0, num_nearer = 0;
+  const double hiding_depth = kHidingDepthRatio * sight.distance;
+  const int first_column = std::max(0, at.column - 1),
+            last_column = std::min(kDepthColumns - 1, at.column + 1);
   for (int row = std::max(0, at.row - 1); row <= std::min(kDepthRows - 1, at.row + 1); ++row) {
-    for (int column = std::max(0, at.column - 1); column <= std::min(kDepthColumns - 1, at.column + 1);
-         ++column) {
-      for (const float depth : view.depths[row * kDepthColumns + column]) {
-        ++num;
-        if (depth < kHidingDepthRatio * sight.distance) ++num_nearer;
-      }
-    }
+    const int begin = view.first_depth[row * kDepthColumns + first_column];
+    const int end = view.first_depth[row * kDepthColumns + last_column + 1];
+    num += end - begin;
+    for (int i = begin; i < end; ++i) num_nearer += view.depths[i] < hiding_depth ? 1 : 0;
   }
   return num >= kMinNumHiding && num_nearer >= kMinHidingShare * num;
+}
+
+void SortDepths(const std::vector<double>& distances, const std::vector<int>& cells, View* view) {
+  view->first_depth.assign(kDepthColumns * kDepthRows + 1, 0);
+  for (const int cell : cells) ++view->first_depth[cell + 1];
+  std::partial_sum(view->first_depth.begin(), view->first_depth.end(), view->first_depth.begin());
+  std::vector<int> next = view->first_depth;
+  view->depths.resize(distances.size());
+  for (size_t k = 0; k < cells.size(); ++k) view->depths[next[cells[k]]++] = static_cast<float>(distances[k]);
 }
 
 std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, int num_threads) {
@@ -127,9 +139,9 @@ std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, i
     views[i].session = images.session[i];
     views[i].shows_landmarks_only =
         !images.shows_landmarks_only.empty() && images.shows_landmarks_only[i] != 0;
-    views[i].depths.resize(kDepthColumns * kDepthRows);
   }
   std::vector<std::vector<double>> distances(views.size());
+  std::vector<std::vector<int>> cells(views.size());  // of each of these
   for (const FeatureClass& feature : classes.classes) {
     for (const Observation& observation : feature.observations) {
       const int i = idx_of_id.at(observation.image_id);
@@ -137,9 +149,10 @@ std::vector<View> ViewsOf(const Classes& classes, const ImageSessions& images, i
       const double distance = (feature.position - view.center).norm();
       distances[i].push_back(distance);
       const CellOfPixel cell = CellOf(*view.camera, {observation.keypoint.x, observation.keypoint.y});
-      view.depths[cell.row * kDepthColumns + cell.column].push_back(static_cast<float>(distance));
+      cells[i].push_back(cell.row * kDepthColumns + cell.column);
     }
   }
+  for (size_t i = 0; i < views.size(); ++i) SortDepths(distances[i], cells[i], &views[i]);
   // An image that sees nothing sees as far as the others do.
   std::vector<double> typical;
   for (size_t i = 0; i < views.size(); ++i) {
