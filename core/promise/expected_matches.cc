@@ -108,12 +108,15 @@ class Learner {
   }
   // The sights of a class: the images that look at it, those that see it first, ascending each.
   struct Lookers {
-    size_t class_position = 0;
     std::vector<int32_t> images;
     std::vector<Direction> seen_from;  // of those that see it
+    // Of each, the probability that it could see the class: it was there; 1 where the image sees it.  Empty:
+    // 1 of each, there are no sessions.
+    std::vector<float> could_see;
   };
-  Lookers LookersOf(size_t i) const {
-    Lookers lookers{.class_position = i, .images = Looking(i), .seen_from = {}};
+  // `is_candidate`: per image 0, before and after; it is used.
+  Lookers LookersOf(size_t i, std::vector<char>* is_candidate) const {
+    Lookers lookers{.images = Looking(i, is_candidate), .seen_from = {}, .could_see = {}};
     const auto sees = [&](int32_t image) {
       return std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image);
     };
@@ -121,6 +124,10 @@ class Learner {
     lookers.seen_from.reserve(static_cast<size_t>(rest - lookers.images.begin()));
     for (auto image = lookers.images.begin(); image != rest; ++image)
       lookers.seen_from.push_back(DirectionTo(i, views_[*image].center));
+    if (!evidence_.HasSeveral()) return lookers;
+    lookers.could_see.resize(lookers.images.size(), 1);
+    for (size_t j = lookers.seen_from.size(); j < lookers.images.size(); ++j)
+      lookers.could_see[j] = static_cast<float>(evidence_.There(i, lookers.images[j]));
     return lookers;
   }
 
@@ -182,9 +189,8 @@ class Learner {
         lookers, from, evidence_.SessionOf(image), prior, which,
         [&](int32_t other) { return Weight(image, other); }, features);
   }
-  // The probability that the j-th image could see the class: it was there; 1 where the image sees it.
-  double CouldSee(const Lookers& lookers, size_t j) const {
-    return j < lookers.seen_from.size() ? 1 : evidence_.There(lookers.class_position, lookers.images[j]);
+  static double CouldSee(const Lookers& lookers, size_t j) {
+    return lookers.could_see.empty() ? 1 : lookers.could_see[j];
   }
   // How much what the j-th image sees counts for an image of this session.
   double Tells(const Lookers& lookers, size_t j, int session) const {
@@ -219,15 +225,19 @@ class Learner {
   }
 
   // Images that look at a class, ascending: those that see it and those near them in whose view it lies.
-  std::vector<int32_t> Looking(size_t i) const {
+  std::vector<int32_t> Looking(size_t i, std::vector<char>* is_candidate) const {
     std::vector<int32_t> candidates;
+    const auto add = [&](int32_t image) {
+      if ((*is_candidate)[image] == 0) candidates.push_back(image);
+      (*is_candidate)[image] = 1;
+    };
     for (const int32_t image : seen_by_[i])
-      candidates.insert(candidates.end(), views_[image].near.begin(), views_[image].near.end());
-    std::sort(candidates.begin(), candidates.end());
-    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+      std::for_each(views_[image].near.begin(), views_[image].near.end(), add);
+    for (const int32_t image : candidates) (*is_candidate)[image] = 0;
     std::erase_if(candidates, [&](int32_t image) {
       return !std::binary_search(seen_by_[i].begin(), seen_by_[i].end(), image) && !LooksAt(image, i);
     });
+    std::sort(candidates.begin(), candidates.end());
     return {candidates.begin(), candidates.end()};  // without the room of all candidates
   }
 
@@ -297,7 +307,12 @@ class MatchModel::Impl {
   Impl(const Classes& classes, const ViewOptions& options, int num_threads)
       : classes_(classes), learner_(classes, options, num_threads), lookers_(classes.classes.size()) {
     const auto num_classes = static_cast<int64_t>(lookers_.size());
-    ParallelFor(num_classes, num_threads, [&](int64_t i) { lookers_[i] = learner_.LookersOf(i); });
+    constexpr int64_t kBlock = 256;
+    ParallelFor((num_classes + kBlock - 1) / kBlock, num_threads, [&](int64_t block) {
+      std::vector<char> is_candidate(classes.images.size(), 0);
+      for (int64_t i = block * kBlock; i < std::min(num_classes, (block + 1) * kBlock); ++i)
+        lookers_[i] = learner_.LookersOf(i, &is_candidate);
+    });
     seen_in_.resize(classes.images.size());
     int64_t num_looking = 0, num_seen = 0;
     for (int64_t i = 0; i < num_classes; ++i) {

@@ -72,8 +72,4 @@ void SessionEvidence::Learn() {
   }
 }
 
-double SessionEvidence::Weight(int s, int t) const {
-  return s < 0 || t < 0 || weights_.empty() ? 1 : weights_[Pair(s, t)];
-}
-
 }  // namespace cairn

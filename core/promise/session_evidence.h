@@ -35,7 +35,7 @@ class SessionEvidence {
   // counted agree as any two do.
   void Learn();
   // How much a look of session `t` weighs for an image of session `s`, in [0, 1].
-  double Weight(int s, int t) const;
+  double Weight(int s, int t) const { return s < 0 || t < 0 || weights_.empty() ? 1 : weights_[Pair(s, t)]; }
 
  private:
   // Weights of pairs of looks: both see the class, the earlier session's alone, the later's, none.
