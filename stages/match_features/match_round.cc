@@ -16,16 +16,30 @@ std::optional<PairResult> FindIn(const std::vector<ReuseSources*>& sources, cons
   return std::nullopt;
 }
 
-// Indices of the pairs that no source has.
-Result<std::vector<size_t>> FindMissing(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources,
-                                        MatchRun* run) {
-  std::vector<size_t> missing;
+// What is found while it is asked which pairs are missing is held until it is taken over, as far as it fits
+// into this part of the memory that features may take, the first pairs first; the others are read again.
+constexpr double kHeldRatio = 0.5;
+
+struct Found {
+  std::vector<size_t> missing;   // indices of the pairs that no source has
+  std::vector<PairResult> held;  // of the first pairs, empty where one is missing
+};
+
+Result<Found> FindPairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources, MatchRun* run) {
+  Found found;
+  const double max_num_bytes = kHeldRatio * (1 << 20) * run->options.matching.memory_budget_mib;
+  double num_bytes = 0;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (run->progress.Cancelled()) return Stopped();
     CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pairs[i]));
-    if (!FindIn(sources, key, pairs[i], *run)) missing.push_back(i);
+    std::optional<PairResult> result = FindIn(sources, key, pairs[i], *run);
+    if (!result) found.missing.push_back(i);
+    if (num_bytes > max_num_bytes) continue;
+    found.held.push_back(std::move(result).value_or(PairResult()));
+    num_bytes +=
+        static_cast<double>(sizeof(PairResult) + found.held.back().geometry.inliers.size() * sizeof(Match));
   }
-  return missing;
+  return found;
 }
 
 void TellPredictor(const std::pair<int, int>& pair, const PairResult& result, PairPredictor* predictor) {
@@ -62,12 +76,17 @@ Status TakeResult(const std::pair<int, int>& pair, const PairResult& result, Pai
   return Ok();
 }
 
-// Hands pairs [begin, end), which the sources have, to `take`.
+// Hands pairs [begin, end), which the sources have, to `take`.  `held`: what is held of the first pairs; it
+// is given up.
 template <typename Take>
 Status TakeOver(const IndexPairs& pairs, size_t begin, size_t end, const std::vector<ReuseSources*>& sources,
-                MatchRun* run, const Take& take) {
+                std::vector<PairResult>* held, MatchRun* run, const Take& take) {
   for (size_t i = begin; i < end; ++i) {
     if (run->progress.Cancelled()) return Stopped();
+    if (i < held->size()) {
+      CAIRN_RETURN_IF_ERROR(take(pairs[i], std::exchange((*held)[i], PairResult())));
+      continue;
+    }
     CAIRN_ASSIGN_OR_RETURN(const ContentHash key, run->keys.Of(pairs[i]));
     const auto result = FindIn(sources, key, pairs[i], *run);
     if (!result) {
@@ -83,7 +102,8 @@ Status TakeOver(const IndexPairs& pairs, size_t begin, size_t end, const std::ve
 // were taken over.
 Status WritePairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sources,
                   PairPredictor* predictor, SQLite::Database& database, MatchRun* run) {
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<size_t> missing, FindMissing(pairs, sources, run));
+  CAIRN_ASSIGN_OR_RETURN(Found found, FindPairs(pairs, sources, run));
+  const std::vector<size_t>& missing = found.missing;
   run->summary.num_taken_over += static_cast<int64_t>(pairs.size() - missing.size());
   const auto take_result = [&](const std::pair<int, int>& pair, const PairResult& result) {
     return TakeResult(pair, result, predictor, database, run);
@@ -95,7 +115,7 @@ Status WritePairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sou
     Status status;
     const auto take = [&](const TwoViewGeometry& geometry, int num_putative) {
       const size_t i = missing[num_computed++];
-      if (status.ok()) status = TakeOver(pairs, num_taken, i, sources, run, take_result);
+      if (status.ok()) status = TakeOver(pairs, num_taken, i, sources, &found.held, run, take_result);
       if (status.ok()) status = take_result(pairs[i], {geometry, num_putative});
       num_taken = i + 1;
     };
@@ -105,7 +125,7 @@ Status WritePairs(const IndexPairs& pairs, const std::vector<ReuseSources*>& sou
     run->progress.End();
     CAIRN_RETURN_IF_ERROR(status);
   }
-  return TakeOver(pairs, num_taken, pairs.size(), sources, run, take_result);
+  return TakeOver(pairs, num_taken, pairs.size(), sources, &found.held, run, take_result);
 }
 
 }  // namespace
@@ -118,9 +138,10 @@ Result<bool> MatchRound(IndexPairs pairs, PairPredictor* predictor, SQLite::Data
     CAIRN_RETURN_IF_ERROR(WritePairs(pairs, {&run->named, &run->previous}, predictor, database, run));
     return true;
   }
-  CAIRN_ASSIGN_OR_RETURN(const std::vector<size_t> missing, FindMissing(pairs, {&run->named}, run));
+  CAIRN_ASSIGN_OR_RETURN(Found found, FindPairs(pairs, {&run->named}, run));
+  const std::vector<size_t>& missing = found.missing;
   if (missing.empty()) {
-    CAIRN_RETURN_IF_ERROR(TakeOver(pairs, 0, pairs.size(), {&run->named}, run,
+    CAIRN_RETURN_IF_ERROR(TakeOver(pairs, 0, pairs.size(), {&run->named}, &found.held, run,
                                    [&](const std::pair<int, int>& pair, const PairResult& result) {
                                      TellPredictor(pair, result, predictor);
                                      return Ok();

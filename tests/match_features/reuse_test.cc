@@ -176,6 +176,18 @@ TEST_F(MatchFeaturesReuse, PairsThatWereTriedInVainAreNotTriedAgain) {
   EXPECT_EQ(Computed(false), 0);
 }
 
+TEST_F(MatchFeaturesReuse, ResultsThatTheMemoryDoesNotHoldAreReadAgain) {
+  //   780 pairs, each of 80 matches and three matrices: 0.7 MiB, of which a budget of 1 MiB holds the half
+  capture_ = {};
+  fs::remove(folder_ + "/features.db");
+  WriteFeatures(40);
+  options_.matching.memory_budget_mib = 1;
+  ASSERT_TRUE(Match(false).ok());
+  EXPECT_EQ(Computed(false), 0);
+  Replace(40);
+  EXPECT_EQ(Computed(false), 39);
+}
+
 TEST_F(MatchFeaturesReuse, DamagedFilesAreComputedAnew) {
   ASSERT_TRUE(Match(false).ok());
   const std::string path = folder_ + "/matches.db.reuse";
