@@ -12,6 +12,7 @@
 #include "pipeline/program/json_text.h"
 #include "runtime/drive/place_model.h"
 #include "runtime/drive/route.h"
+#include "runtime/map/appearance_map.h"
 #include "runtime/map/map.h"
 #include "sim/render/building.h"
 #include "sim/robot/robot_drive.h"

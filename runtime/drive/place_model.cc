@@ -1,13 +1,30 @@
 #include "runtime/drive/place_model.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/no_throw.h"
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
+#include "core/vocabulary/document_scores.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
+#include "runtime/map/map.h"
 
 namespace cairn {
+
+static_assert(PlaceModelOptions().score_exponent == kScoreExponent);
+
+struct PlaceModel::Impl {
+  std::vector<double> ImageScores(const BagOfWords& bag) const;  // 0 for images of no node
+  PlaceScores OfNodes(const std::vector<double>& image_scores) const;
+
+  std::shared_ptr<const AppearanceMap> appearance;
+  Vocabulary vocabulary;  // documents: the map's images, by index
+  std::vector<BagOfWords> bags;
+  PlaceModelOptions options;
+};
 
 OptionTable DescribeOptions(PlaceModelOptions* options) {
   return {
@@ -23,10 +40,10 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
   return WithoutExceptions("place model", [&]() -> Result<PlaceModel> {
     PlaceModelOptions checked = options;
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-    PlaceModel model;
-    model.options_ = options;
-    CAIRN_ASSIGN_OR_RETURN(model.appearance_, map.Appearance());
-    if (model.appearance_->is_kept.empty() || !map.has_words()) {
+    auto model = std::make_shared<Impl>();
+    model->options = options;
+    CAIRN_ASSIGN_OR_RETURN(model->appearance, map.Appearance());
+    if (model->appearance->is_kept.empty() || !map.has_words()) {
       return MakeError(
           ErrorCode::kNotFound,
           "map '{}' has {}: places cannot be told apart by looking; compile it with [emit_map] words = "
@@ -34,19 +51,34 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
           map.head().name, map.has_words() ? "no appearance graph" : "no visual words");
     }
     CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
-    model.vocabulary_ = *tree;
+    model->vocabulary = *tree;
     for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kWords); ++ordinal) {
       CAIRN_ASSIGN_OR_RETURN(const auto words, map.Words(ordinal));
       std::copy(words->postings.begin(), words->postings.end(),
-                model.vocabulary_.inverted_files.begin() + words->first);
+                model->vocabulary.inverted_files.begin() + words->first);
     }
-    model.vocabulary_.document_ids.resize(map.num_images());
-    for (size_t i = 0; i < model.vocabulary_.document_ids.size(); ++i)
-      model.vocabulary_.document_ids[i] = static_cast<ImageId>(i);
-    WeightVocabulary(&model.vocabulary_);
-    model.bags_ = DocumentWords(model.vocabulary_);
-    return model;
+    model->vocabulary.document_ids.resize(map.num_images());
+    for (size_t i = 0; i < model->vocabulary.document_ids.size(); ++i)
+      model->vocabulary.document_ids[i] = static_cast<ImageId>(i);
+    WeightVocabulary(&model->vocabulary);
+    model->bags = DocumentWords(model->vocabulary);
+    return PlaceModel(std::move(model));
   });
+}
+
+PlaceModel::PlaceModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+
+int PlaceModel::num_nodes() const { return static_cast<int>(impl_->appearance->is_kept.size()); }
+
+const AppearanceMap& PlaceModel::appearance() const { return *impl_->appearance; }
+
+NodeIdx PlaceModel::NodeOfImage(int32_t image) const {
+  const std::vector<NodeIdx>& nodes = impl_->appearance->node_of_image;
+  return image < 0 || image >= static_cast<int32_t>(nodes.size()) ? -1 : nodes[image];
+}
+
+const std::vector<int32_t>& PlaceModel::ImagesOfNode(NodeIdx node) const {
+  return impl_->appearance->node_images[node];
 }
 
 Result<PlaceView> ViewOfImage(const Map& map, int32_t image) {
@@ -59,20 +91,21 @@ Result<PlaceView> ViewOfImage(const Map& map, int32_t image) {
   return view;
 }
 
-std::vector<double> PlaceModel::ImageScores(const BagOfWords& bag) const {
-  std::vector<double> scores = ScoreDocuments(vocabulary_, bag);
+std::vector<double> PlaceModel::Impl::ImageScores(const BagOfWords& bag) const {
+  std::vector<double> scores = ScoreDocuments(vocabulary, bag);
   for (size_t image = 0; image < scores.size(); ++image) {
-    if (appearance_->node_of_image[image] < 0) scores[image] = 0;
+    if (appearance->node_of_image[image] < 0) scores[image] = 0;
   }
   return scores;
 }
 
-PlaceScores PlaceModel::OfNodes(const std::vector<double>& scores) const {
-  const std::vector<double> probabilities = ProbabilitiesOfScores(scores, options_.score_exponent);
-  PlaceScores places{std::vector<double>(num_nodes(), 0.0), std::vector<double>(num_nodes(), 0.0)};
+PlaceScores PlaceModel::Impl::OfNodes(const std::vector<double>& scores) const {
+  const std::vector<double> probabilities = ProbabilitiesOfScores(scores, options.score_exponent);
+  const size_t num_nodes = appearance->is_kept.size();
+  PlaceScores places{std::vector<double>(num_nodes, 0.0), std::vector<double>(num_nodes, 0.0)};
   double sum = 0;
   for (size_t image = 0; image < scores.size(); ++image) {
-    const NodeIdx node = appearance_->node_of_image[image];
+    const NodeIdx node = appearance->node_of_image[image];
     if (node < 0) continue;
     places.scores[node] = std::max(places.scores[node], scores[image]);
     places.probabilities[node] += probabilities[image];
@@ -83,13 +116,14 @@ PlaceScores PlaceModel::OfNodes(const std::vector<double>& scores) const {
 }
 
 PlaceScores PlaceModel::Look(const DescriptorMatrix& descriptors) const {
-  return OfNodes(ImageScores(CountWords(vocabulary_, descriptors)));
+  return impl_->OfNodes(impl_->ImageScores(CountWords(impl_->vocabulary, descriptors)));
 }
 
 Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
                                            const RerankOptions& options) const {
   return WithoutExceptions("place model", [&]() -> Result<PlaceScores> {
-    const std::vector<double> by_words = ImageScores(CountWords(vocabulary_, query.features.descriptors));
+    const std::vector<double> by_words =
+        impl_->ImageScores(CountWords(impl_->vocabulary, query.features.descriptors));
     const std::vector<int32_t> order = BestFirst(by_words);
     std::vector<PlaceView> views;
     for (const int32_t image : order) {
@@ -101,19 +135,20 @@ Result<PlaceScores> PlaceModel::LookCloser(const Map& map, const Query& query,
     for (const PlaceView& view : views) candidates.push_back(&view);
     CAIRN_ASSIGN_OR_RETURN(const auto places,
                            RerankPlaces(MakePlaceView(query.features, query.camera), candidates, options, 1));
-    if (places.empty() || !places.front().is_verified()) return OfNodes(by_words);
+    if (places.empty() || !places.front().is_verified()) return impl_->OfNodes(by_words);
     std::vector<double> verified(by_words.size(), 0.0);
     for (const RerankedPlace& place : places) verified[order[place.candidate]] = place.score;
-    return OfNodes(verified);
+    return impl_->OfNodes(verified);
   });
 }
 
 std::vector<double> PlaceModel::Expected(NodeIdx node) const {
   // [Mariottini11 eq. 6] h' = p(X | Z of the node's own images), the mean where it has several
-  const std::vector<int32_t>& images = appearance_->node_images[node];
+  const std::vector<int32_t>& images = impl_->appearance->node_images[node];
   std::vector<double> mean(num_nodes(), 0.0);
   for (const int32_t image : images) {
-    const std::vector<double> probabilities = OfNodes(ImageScores(bags_[image])).probabilities;
+    const std::vector<double> probabilities =
+        impl_->OfNodes(impl_->ImageScores(impl_->bags[image])).probabilities;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += probabilities[i] / static_cast<double>(images.size());
   }
   return mean;

@@ -4,18 +4,21 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/features/features.h"
 #include "core/options/options.h"
-#include "core/vocabulary/document_scores.h"
 #include "core/vocabulary/rerank_places.h"
-#include "runtime/localize/measurement.h"
-#include "runtime/map/appearance_map.h"
-#include "runtime/map/map.h"
 
 namespace cairn {
 
+class Map;             // runtime/map/map.h
+struct Query;          // runtime/localize/measurement.h
+struct AppearanceMap;  // runtime/map/appearance_map.h
+
 struct PlaceModelOptions {
-  // Exponent of ProbabilitiesOfScores.  REQUIRES: > 0
-  double score_exponent = kScoreExponent;
+  // p_j = s_j^score_exponent / sum_k s_k^score_exponent, that of the map's own entropies
+  // (kScoreExponent in core/vocabulary/document_scores.h says why).  REQUIRES: > 0
+  double score_exponent = 4;
 };
 OptionTable DescribeOptions(PlaceModelOptions* options);
 
@@ -33,15 +36,19 @@ Result<PlaceView> ViewOfImage(const Map& map, int32_t image);
 
 // Scores images against the places of a map by its visual words [Mariottini11 §IV].  Holds the whole
 // vocabulary and its inverted files: unlike a Localizer it uses the whole map for every image.  Immutable,
-// shareable between threads.
+// shareable between threads; a copy shares all of it, and the map may be closed.
 class PlaceModel {
  public:
   // Errors: NotFound (a map without appearance graph or without words: says how to get one), InvalidArgument
   // (an option), Corrupt.
   static Result<PlaceModel> Make(const Map& map, const PlaceModelOptions& options = {});
 
-  int num_nodes() const { return static_cast<int>(appearance_->is_kept.size()); }
-  const AppearanceMap& appearance() const { return *appearance_; }
+  int num_nodes() const;
+  const AppearanceMap& appearance() const;
+  // The node of a survey image, by its index; -1: in no node, or no such image.
+  NodeIdx NodeOfImage(int32_t image) const;
+  // The survey images of a place, ascending, at least one.  REQUIRES: a node
+  const std::vector<int32_t>& ImagesOfNode(NodeIdx node) const;
 
   // Scores an image by its descriptors (n x 128); without any, nothing is known.  Reads shared words only.
   PlaceScores Look(const DescriptorMatrix& descriptors) const;
@@ -52,18 +59,14 @@ class PlaceModel {
   // option), and as Map::Landmarks.  No exception leaves it.
   Result<PlaceScores> LookCloser(const Map& map, const Query& query, const RerankOptions& options = {}) const;
   // h' = p(X | Z of a node) [Mariottini11 eq. 6]: what a robot at the node expects to get, the mean over
-  // its images.
+  // its images.  REQUIRES: a node
   std::vector<double> Expected(NodeIdx node) const;
 
  private:
-  PlaceModel() = default;
-  std::vector<double> ImageScores(const BagOfWords& bag) const;  // 0 for images of no node
-  PlaceScores OfNodes(const std::vector<double>& image_scores) const;
+  struct Impl;
+  explicit PlaceModel(std::shared_ptr<const Impl> impl);
 
-  std::shared_ptr<const AppearanceMap> appearance_;
-  Vocabulary vocabulary_;  // documents: the map's images, by index
-  std::vector<BagOfWords> bags_;
-  PlaceModelOptions options_;
+  std::shared_ptr<const Impl> impl_;
 };
 
 }  // namespace cairn

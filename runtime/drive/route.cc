@@ -62,6 +62,11 @@ Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& o
   return ways;
 }
 
+Status CheckImage(const Map& map, int32_t image) {
+  if (image >= 0 && image < map.num_images()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "route: image {} of {}", image, map.num_images());
+}
+
 }  // namespace
 
 OptionTable DescribeOptions(RouteOptions* options) {
@@ -94,11 +99,7 @@ Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appe
 }
 
 Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOptions& options) {
-  for (const int32_t image : {from, to}) {
-    if (image < 0 || image >= map.num_images()) {
-      return MakeError(ErrorCode::kInvalidArgument, "route: image {} of {}", image, map.num_images());
-    }
-  }
+  for (const int32_t image : {from, to}) CAIRN_RETURN_IF_ERROR(CheckImage(map, image));
   CAIRN_ASSIGN_OR_RETURN(const auto appearance, map.Appearance());
   if (appearance->is_kept.empty()) {
     return MakeError(
@@ -140,6 +141,12 @@ Result<int32_t> FindImage(const Map& map, const std::string& name) {
   return MakeError(ErrorCode::kNotFound,
                    "map '{}' has no survey image '{}'; `cairn export` lists their names", map.head().name,
                    name);
+}
+
+Result<Pose> PoseOfImage(const Map& map, int32_t image) {
+  CAIRN_RETURN_IF_ERROR(CheckImage(map, image));
+  CAIRN_ASSIGN_OR_RETURN(const auto of_map, map.Image(image));
+  return map.head().camera_from_given.Inverse() * of_map->cam_from_world;
 }
 
 }  // namespace cairn

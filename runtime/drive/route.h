@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ids.h"
+#include "core/geometry/pose.h"
 #include "core/options/options.h"
 
 namespace cairn {
@@ -53,5 +54,9 @@ Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOpt
 
 // The index of a survey image by its name.  O(images).  Errors: NotFound (no such image), Corrupt.
 Result<int32_t> FindImage(const Map& map, const std::string& name);
+
+// Where a survey image was taken: cam_from_world, as a fix of the same pixels states it.  Errors:
+// InvalidArgument (no such image), Corrupt.
+Result<Pose> PoseOfImage(const Map& map, int32_t image);
 
 }  // namespace cairn

@@ -7,6 +7,10 @@
 #include <numbers>
 #include <set>
 
+#include "core/vocabulary/document_scores.h"
+#include "core/world/appearance_graph.h"
+#include "runtime/map/appearance_map.h"
+
 namespace cairn {
 namespace {
 
@@ -53,6 +57,18 @@ std::vector<double> Restrict(const std::vector<double>& probabilities, const std
 }
 
 }  // namespace
+
+const char* VerdictName(HypothesisVerdict verdict) {
+  switch (verdict) {
+    case HypothesisVerdict::kFollow:
+      return "follow";
+    case HypothesisVerdict::kSwitch:
+      return "switch";
+    case HypothesisVerdict::kLost:
+      break;
+  }
+  return "lost";
+}
 
 OptionTable DescribeOptions(StartHypothesesOptions* options) {
   OptionTable table = {
@@ -165,13 +181,13 @@ void StartHypotheses::Restart() {
 const std::vector<NodeIdx>& StartHypotheses::Reach(NodeIdx node) {
   const auto found = reach_.find(node);
   if (found != reach_.end()) return found->second;
-  return reach_[node] = WithinReach(model_->appearance().graph, node, options_.reach_links);
+  return reach_[node] = WithinReach(model_.appearance().graph, node, options_.reach_links);
 }
 
 double StartHypotheses::LogLikelihood(const std::vector<double>& seen, NodeIdx node,
                                       const std::vector<NodeIdx>& bins) {
   auto found = expected_.find(node);
-  if (found == expected_.end()) found = expected_.emplace(node, model_->Expected(node)).first;
+  if (found == expected_.end()) found = expected_.emplace(node, model_.Expected(node)).first;
   // [Mariottini11 eq. 6] J between what is seen, h, and what is expected at the node, h'
   const double divergence = JeffreyDivergence(
       seen, bins.empty() ? found->second : Restrict(found->second, bins), options_.uniform_ratio);
@@ -271,7 +287,7 @@ NodeIdx StartHypotheses::Whereabouts(int hypothesis) const {
 }
 
 std::optional<NodePath> StartHypotheses::Replan(int hypothesis) const {
-  const auto paths = FindPaths(model_->appearance(), {Whereabouts(hypothesis)}, goal_, options_.route);
+  const auto paths = FindPaths(model_.appearance(), {Whereabouts(hypothesis)}, goal_, options_.route);
   return paths.ok() ? (*paths)[0] : std::nullopt;  // Make has checked the options
 }
 

@@ -61,6 +61,8 @@ enum class HypothesisVerdict {
   kSwitch,  // another start is followed from now on
   kLost,    // no hypothesis explains the image: localize again
 };
+// "follow", "switch", "lost".
+const char* VerdictName(HypothesisVerdict verdict);
 
 // Which of several places a lost robot started at, found out while it is under way to a goal [Mariottini11
 // §VI]. Image by image, over nodes of the appearance graph:
@@ -71,13 +73,13 @@ enum class HypothesisVerdict {
 // of what the image says, h, and what an image at X would, h'.
 class StartHypotheses {
  public:
-  // From the first image.  Keeps a reference to the model.  Errors: InvalidArgument (an option, no such
-  // goal), NoData (the first image shares nothing with the map; nothing is said about the scores), NotFound
-  // (no way leads from any candidate to the goal; RouteOptions).
+  // From the first image.  Shares the model, which need not be kept.  Errors: InvalidArgument (an option, no
+  // such goal), NoData (the first image shares nothing with the map; nothing is said about the scores),
+  // NotFound (no way leads from any candidate to the goal; RouteOptions).
   static Result<StartHypotheses> Make(const PlaceModel& model, const PlaceScores& first, NodeIdx goal,
                                       const StartHypothesesOptions& options = {});
 
-  // An image at the next node of the way.
+  // An image at the next node of the way.  REQUIRES: as many probabilities as the model has nodes
   HypothesisVerdict Observe(const PlaceScores& image);
   // The robot does not see what the next image of the followed way shows, so it did not start there.  Follows
   // the likeliest other start; false where there is none.
@@ -95,7 +97,7 @@ class StartHypotheses {
 
  private:
   StartHypotheses(const PlaceModel& model, NodeIdx goal, const StartHypothesesOptions& options)
-      : model_(&model), goal_(goal), options_(options) {}
+      : model_(model), goal_(goal), options_(options) {}
   using Belief = std::map<NodeIdx, double>;  // sums to the hypothesis's posterior
   const std::vector<NodeIdx>& Reach(NodeIdx node);
   // `seen`: an image's probabilities of `bins`; without bins, of all nodes.
@@ -103,7 +105,7 @@ class StartHypotheses {
   Belief Predict(const Belief& belief);
   void Normalise();
 
-  const PlaceModel* model_;
+  PlaceModel model_;
   NodeIdx goal_;
   StartHypothesesOptions options_;
   std::vector<StartHypothesis> hypotheses_;

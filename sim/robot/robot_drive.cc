@@ -4,22 +4,12 @@
 #include <cmath>
 
 #include "core/geometry/pose.h"
+#include "core/vocabulary/document_scores.h"
+#include "runtime/map/appearance_map.h"
 #include "sim/survey/drive_way.h"
 
 namespace cairn::sim {
 namespace {
-
-const char* VerdictName(HypothesisVerdict verdict) {
-  switch (verdict) {
-    case HypothesisVerdict::kFollow:
-      return "follow";
-    case HypothesisVerdict::kSwitch:
-      return "switch";
-    case HypothesisVerdict::kLost:
-      break;
-  }
-  return "lost";
-}
 
 ServoTarget TargetOfFeatures(const Features& features, const PlanarPose& pose) {
   ServoTarget target{{}, features.descriptors, pose};

@@ -39,8 +39,9 @@ c++ -std=c++20 where.cc -o where_cc $(pkg-config --cflags --libs cairn-runtime)
 expect ./where_cc
 
 # Every header that is installed, together, and calls whose types come from several of them; no more than fit on a screen.
+# A robot that is lost needs three that no other does: place_model.h, start_hypotheses.h, and rerank_places.h for a closer look.
 headers=$(cd "$root/include/cairn" && find . -name '*.h' | sed 's,^\./,,' | LC_ALL=C sort -r)
-if [ "$(echo "$headers" | wc -l)" -gt 45 ]; then
+if [ "$(echo "$headers" | wc -l)" -gt 48 ]; then
   echo "more headers are installed than fit on a screen:" $headers >&2
   exit 1
 fi
@@ -56,6 +57,8 @@ int main(int, char** argv) {
   const auto query = cairn::Localizer(*map).QueryFromImage(cv::Mat(), (*map)->head().cameras[0]);
   if (visual.ok() && query.ok()) (void)(*visual)->Match(*query);
   const auto rolled = cairn::RollBackMap("none.cairn");
+  const auto model = cairn::PlaceModel::Make(**map);  // the poster has words, but no appearance graph
+  if (model.ok()) return 1;
   return !name.ok() || name->empty() || (*map)->num_regions() != 0 || (*map)->num_kept_bytes() <= 0 || route.ok() || rolled.ok();
 }
 END

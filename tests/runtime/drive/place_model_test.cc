@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/localize/measurement.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
 namespace cairn {

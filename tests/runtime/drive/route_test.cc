@@ -90,6 +90,17 @@ TEST(PlanRoute, SeveralImagesOfOnePlaceNeedNoLink) {
   EXPECT_EQ(PlanRoute(*map, 4, 5)->num_links, 0);
 }
 
+TEST(PoseOfImage, IsWhatAFixOfItsPixelsStates) {
+  MapRows rows = PathRows();
+  rows.camera_from_given = {Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY())),
+                            {0.1, 0, 0}};
+  const auto map = *Map::FromRows(rows);
+  const Pose camera = map->head().camera_from_given * *PoseOfImage(*map, 3);  // of the map's own camera
+  EXPECT_LT(CenterErrorM(camera, rows.images[3].cam_from_world), 1e-9);
+  EXPECT_NEAR(camera.rotation.angularDistance(rows.images[3].cam_from_world.rotation), 0, 1e-7);
+  EXPECT_EQ(PoseOfImage(*map, 7).error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(Retrieve, SparseMapsLeadToKeptImagesAlone) {
   MapRows rows = PathRows();
   Features features;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <numeric>
 
@@ -9,6 +10,9 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/vocabulary/document_scores.h"
+#include "core/world/appearance_graph.h"
+#include "runtime/map/appearance_map.h"
 #include "tests/runtime/visual_map/visual_memory.h"
 
 namespace cairn {
@@ -65,6 +69,22 @@ TEST(PlaceModel, ExpectsWhatAnImageOfThePlaceSays) {
     EXPECT_EQ(model.Expected(node), LookAt(model, node).probabilities);
 }
 
+TEST(PlaceModel, SaysWhichImagesShowAPlaceAndWhichPlaceAnImage) {
+  MapRows rows = Wings();
+  rows.appearance[3].images = {3, 4};  // two images of one place
+  rows.appearance[3].links = rows.appearance[4].links;
+  rows.appearance.erase(rows.appearance.begin() + 4);
+  for (MapAppearanceNode& node : rows.appearance) {
+    for (auto& link : node.links) link.node -= link.node > 4 ? 1 : 0;
+  }
+  const PlaceModel model = ModelOf(rows);
+  EXPECT_THAT(model.ImagesOfNode(3), ElementsAre(3, 4));
+  EXPECT_EQ(model.NodeOfImage(4), 3);
+  EXPECT_EQ(model.NodeOfImage(5), 4);
+  EXPECT_EQ(model.NodeOfImage(12), -1);
+  EXPECT_EQ(model.NodeOfImage(-1), -1);
+}
+
 TEST(PlaceModel, AnImageWithoutFeaturesCouldBeAnywhere) {
   const PlaceModel model = ModelOf(Wings());
   const PlaceScores nothing = model.Look(DescriptorMatrix(0, kDescriptorDim));
@@ -80,6 +100,17 @@ TEST(PlaceModel, NeedsWordsAndAGraph) {
   rows = Wings();
   rows.vocabulary = {};
   EXPECT_THAT(PlaceModel::Make(**Map::FromRows(rows)).error().message, HasSubstr("words = \"survey\""));
+}
+
+TEST(StartHypotheses, OutliveTheModelThatTheyWereMadeOf) {
+  auto model = std::make_unique<PlaceModel>(ModelOf(Wings()));
+  const PlaceScores first = LookAt(*model, 6), second = LookAt(*model, 7);
+  StartHypotheses starts = *StartHypotheses::Make(*model, first, 11);
+  StartHypotheses same = starts;
+  model.reset();
+  EXPECT_EQ(starts.Observe(second), same.Observe(second));
+  EXPECT_GT(starts.hypotheses()[starts.followed()].posterior, 0.9);
+  EXPECT_EQ(starts.hypotheses()[0].posterior, same.hypotheses()[0].posterior);
 }
 
 TEST(StartHypotheses, TwinsAreToldApartWhereTheyDiffer) {
