@@ -1,5 +1,5 @@
 /* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, or a tracker for frames
- * in order, and hand it grey pixels.
+ * in order, and hand it grey pixels.  Where did it start?  Several starts, kept in mind on the way to a goal.
  *
  * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
  * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
@@ -10,10 +10,10 @@
  * added.  Structs begin with their size and only grow at their end: set `size` to sizeof the struct before
  * every call (CAIRN_FIX_INIT and the like do), and the library touches no more than that.
  *
- * Threads: a map is shared by all, a localizer or tracker is for one thread at a time.
- * Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x right, y down;
- * poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the frame of the
- * surveyed capture.
+ * Threads: a map is shared by all; a localizer, a tracker, a place model or starts are for one thread at a
+ * time. Frames and units: metres, radians unless a name says otherwise; the camera looks along +z, x right, y
+ * down; poses are cam_from_world (point_in_camera = rotation * point_in_world + translation) in the frame of
+ * the surveyed capture.
  */
 #ifndef CAIRN_RUNTIME_CAIRN_H_
 #define CAIRN_RUNTIME_CAIRN_H_
@@ -83,12 +83,21 @@ enum {
   CAIRN_SCOPE_VOTES = 5    /* a tracker's, lost: of the regions that landmarks in view vote for */
 };
 
+/* What a robot that does not know its start should do after an image.  Append-only. */
+enum {
+  CAIRN_VERDICT_FOLLOW = 0, /* go on */
+  CAIRN_VERDICT_SWITCH = 1, /* another start is followed from now on */
+  CAIRN_VERDICT_LOST = 2    /* no possible start explains the image: localize again */
+};
+
 /* Handles.  They are numbers, not addresses: a closed one is never mistaken for another. */
 typedef struct cairn_map cairn_map;
 typedef struct cairn_localizer cairn_localizer;
 typedef struct cairn_tracker cairn_tracker;
 typedef struct cairn_visual_tracker cairn_visual_tracker;
 typedef struct cairn_log cairn_log;
+typedef struct cairn_place_model cairn_place_model;
+typedef struct cairn_start_hypotheses cairn_start_hypotheses;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -213,6 +222,45 @@ typedef struct cairn_log_options {
 #define CAIRN_LOG_OPTIONS_INIT \
   { sizeof(cairn_log_options), 50 }
 
+/* An image of the survey. */
+typedef struct cairn_survey_image {
+  size_t size;
+  char name[256];          /* cut to fit, always with a NUL */
+  double rotation_wxyz[4]; /* cam_from_world, as a fix of its pixels states it */
+  double translation_m[3];
+  double center_m[3]; /* where the camera stood, world frame */
+} cairn_survey_image;
+#define CAIRN_SURVEY_IMAGE_INIT                               \
+  {                                                           \
+    sizeof(cairn_survey_image), {0}, {1, 0, 0, 0}, {0}, { 0 } \
+  }
+
+/* What an image says about where it was taken: for each place of the map (cairn_place_model_num_places), in
+ * arrays of the caller's.  A function that fills it in leaves out an array that is NULL. */
+typedef struct cairn_place_scores {
+  size_t size;
+  int32_t num_places; /* how many there is room for, or are given; another number than the map's is refused */
+  int32_t reserved;   /* 0 */
+  double* scores;     /* in [0, 1]; all 0: the image shares nothing with the map */
+  double* probabilities; /* sum to 1; all equal where all scores are 0 */
+} cairn_place_scores;
+#define CAIRN_PLACE_SCORES_INIT \
+  { sizeof(cairn_place_scores), 0, 0, NULL, NULL }
+
+/* Where the robot may have started. */
+typedef struct cairn_start_hypothesis {
+  size_t size;
+  int32_t start;          /* a place */
+  int32_t whereabouts;    /* the place where the robot most likely is by now if it started there */
+  int32_t num_way_places; /* on the way from the start to the goal, both among them */
+  int32_t is_followed;    /* 1: its way is the one to follow */
+  double score;           /* of the first image */
+  double posterior;       /* p(start | all images); those of all starts sum to 1 */
+  double way_cost;        /* of the way's links */
+} cairn_start_hypothesis;
+#define CAIRN_START_HYPOTHESIS_INIT \
+  { sizeof(cairn_start_hypothesis), 0, 0, 0, 0, 0, 0, 0 }
+
 /* "0.1.0". */
 CAIRN_API const char* cairn_version(void);
 /* "corrupt" for CAIRN_CORRUPT, "too_few_matches" for CAIRN_TOO_FEW_MATCHES, "track" for CAIRN_SCOPE_TRACK;
@@ -220,6 +268,8 @@ CAIRN_API const char* cairn_version(void);
 CAIRN_API const char* cairn_error_name(int32_t code);
 CAIRN_API const char* cairn_reason_name(int32_t reason);
 CAIRN_API const char* cairn_scope_name(int32_t scope);
+/* "follow", "switch", "lost". */
+CAIRN_API const char* cairn_verdict_name(int32_t verdict);
 /* The message of this thread's last failed call: says what was found and what to do.  Never NULL; valid until
  * this thread's next call of the library. */
 CAIRN_API const char* cairn_last_error(void);
@@ -304,6 +354,79 @@ CAIRN_API int32_t cairn_tracker_set_log(cairn_tracker* tracker, const cairn_log*
 CAIRN_API int32_t cairn_log_num_kept(const cairn_log* log, int64_t* num_kept);
 /* Its localizers and trackers go on without it.  NULL is allowed. */
 CAIRN_API int32_t cairn_log_close(cairn_log* log);
+
+/* Images of the survey are numbered from 0 (cairn_map_description.num_images); cairn_map_find_image finds the
+ * number of a name, O(images).  CAIRN_NOT_FOUND: the survey has no such image. */
+CAIRN_API int32_t cairn_map_find_image(const cairn_map* map, const char* name, int32_t* image);
+CAIRN_API int32_t cairn_map_describe_image(const cairn_map* map, int32_t image,
+                                           cairn_survey_image* description);
+
+/* A way from survey image to survey image along which each shows what the next one shows, for a robot that
+ * steers by its camera.  `weight`: what the way minimises: "links" (NULL: the same), "matches" (the sum of
+ * 1 / matches of the links) or "entropy" (it leads through places that are like no other).  Writes the
+ * numbers of at most `capacity` images, the first of them `from`, the last `to`; *num_images says how many
+ * there are, also where that is more.  `images` may be NULL with a capacity of 0, `cost` (the sum of the
+ * links' weights) may be NULL.  CAIRN_NOT_FOUND: no way, an image that is not in the map's appearance graph,
+ * or a map that has none. */
+CAIRN_API int32_t cairn_route(const cairn_map* map, int32_t from, int32_t to, const char* weight,
+                              int32_t* images, int32_t capacity, int32_t* num_images, double* cost);
+
+/* Which places an image may show, by the map's visual words (docs/active.md).  Places are the nodes of the
+ * map's appearance graph, numbered from 0.  CAIRN_NOT_FOUND: the map has no words, or no appearance graph. */
+CAIRN_API int32_t cairn_place_model_create(const cairn_map* map, cairn_place_model** model);
+/* How places are scored ("score_exponent"), what is looked for in images ("max_image_side_px",
+ * "max_num_features", ...) and how a closer look verifies ("num_candidates", "max_ratio", ...).  After an
+ * error the model is as before. */
+CAIRN_API int32_t cairn_place_model_set_option(cairn_place_model* model, const char* name, const char* value);
+CAIRN_API int32_t cairn_place_model_num_places(const cairn_place_model* model, int32_t* num_places);
+/* The place of a survey image (*place -1: of none), and the first survey image of a place. */
+CAIRN_API int32_t cairn_place_model_place_of_image(const cairn_place_model* model, int32_t image,
+                                                   int32_t* place);
+CAIRN_API int32_t cairn_place_model_image_of_place(const cairn_place_model* model, int32_t place,
+                                                   int32_t* image);
+/* What an image says, by its words. */
+CAIRN_API int32_t cairn_place_model_look(cairn_place_model* model, const cairn_image* image,
+                                         cairn_place_scores* places);
+/* The same of features that the caller has: `num_features` rows of 128 bytes, RootSIFT as the survey's. */
+CAIRN_API int32_t cairn_place_model_look_at_features(cairn_place_model* model, const uint8_t* descriptors,
+                                                     int32_t num_features, cairn_place_scores* places);
+/* A closer look, for a robot that stands still because it is lost: the best places are verified by geometry,
+ * in some tenths of a second.  `camera` NULL: the survey's camera of the image's size. */
+CAIRN_API int32_t cairn_place_model_look_closer(cairn_place_model* model, const cairn_image* image,
+                                                const cairn_camera* camera, cairn_place_scores* places);
+/* What an image taken at a place should say: its probabilities. */
+CAIRN_API int32_t cairn_place_model_expected(cairn_place_model* model, int32_t place, double* probabilities,
+                                             int32_t num_places);
+CAIRN_API int32_t cairn_place_model_destroy(cairn_place_model* model);
+
+/* Which of several places a robot started at, found out while it is under way to a goal (docs/active.md).  Of
+ * the first image, of which scores are read.  CAIRN_NO_DATA: it shares nothing with the map; CAIRN_NOT_FOUND:
+ * no way leads from any possible start to the goal.  The model may be destroyed meanwhile. */
+CAIRN_API int32_t cairn_start_hypotheses_create(const cairn_place_model* model,
+                                                const cairn_place_scores* first, int32_t goal_place,
+                                                cairn_start_hypotheses** starts);
+/* Any option of the starts that `cairn drive --help` lists: ("min_score_ratio", "0.8"), ("weight",
+ * "entropy").  They begin anew with the first image; after an error they are as before. */
+CAIRN_API int32_t cairn_start_hypotheses_set_option(cairn_start_hypotheses* starts, const char* name,
+                                                    const char* value);
+/* An image at the next place of the followed way, of which probabilities are read. */
+CAIRN_API int32_t cairn_start_hypotheses_observe(cairn_start_hypotheses* starts,
+                                                 const cairn_place_scores* places, int32_t* verdict);
+/* The robot does not see what the next image of the followed way shows, so it did not start there.  *is_other
+ * 1: the likeliest other start is followed now; 0: there is none. */
+CAIRN_API int32_t cairn_start_hypotheses_refute(cairn_start_hypotheses* starts, int32_t* is_other);
+/* The robot is back at its start: what it has learnt about starts is kept. */
+CAIRN_API int32_t cairn_start_hypotheses_restart(cairn_start_hypotheses* starts);
+CAIRN_API int32_t cairn_start_hypotheses_count(const cairn_start_hypotheses* starts, int32_t* num_starts);
+/* The start of this number, from 0 on, best score of the first image first. */
+CAIRN_API int32_t cairn_start_hypotheses_get(const cairn_start_hypotheses* starts, int32_t number,
+                                             cairn_start_hypothesis* start);
+/* Its way to the goal, or (`from_whereabouts` 1) the way from where the robot would be by now: places, as
+ * cairn_route writes images.  CAIRN_NOT_FOUND: no way leads from there. */
+CAIRN_API int32_t cairn_start_hypotheses_way(const cairn_start_hypotheses* starts, int32_t number,
+                                             int32_t from_whereabouts, int32_t* places, int32_t capacity,
+                                             int32_t* num_places);
+CAIRN_API int32_t cairn_start_hypotheses_destroy(cairn_start_hypotheses* starts);
 
 /* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
  * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one

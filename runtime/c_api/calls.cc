@@ -10,10 +10,9 @@ std::string& LastError() {
   return message;
 }
 
-Status SetOptionByName(const OptionTable& table, const char* name, const char* value) {
+Status SetOptionByName(const OptionTable& table, const char* name, const char* value, const char* help) {
   if (name == nullptr || value == nullptr) return Misuse("{} is NULL", name == nullptr ? "name" : "value");
-  CAIRN_ASSIGN_OR_RETURN(const Option* const option,
-                         FindOption(table, name, "`cairn localize --help` lists them"));
+  CAIRN_ASSIGN_OR_RETURN(const Option* const option, FindOption(table, name, help));
   return SetOption(*option, value);
 }
 

@@ -67,8 +67,10 @@ void CopyText(const std::string& text, char (&to)[kNumBytes]) {
   to[length] = 0;
 }
 
-// Errors: InvalidArgument (NULL, an unknown name, a value out of range).
-Status SetOptionByName(const OptionTable& table, const char* name, const char* value);
+// `help`: where the options are listed.  Errors: InvalidArgument (NULL, an unknown name, a value out of
+// range).
+Status SetOptionByName(const OptionTable& table, const char* name, const char* value,
+                       const char* help = "`cairn localize --help` lists them");
 
 Handles<cairn_map, const Map, HandleKind::kMap>& OpenMaps();
 Result<std::shared_ptr<const Map>> FindMap(const cairn_map* handle);

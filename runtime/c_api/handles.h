@@ -8,8 +8,16 @@
 namespace cairn {
 
 // How many kinds of handles there are, and the number of each, which differ modulo that.
-inline constexpr uint64_t kNumHandleKinds = 5;
-enum class HandleKind : uint64_t { kMap = 1, kLocalizer = 2, kTracker = 3, kVisualTracker = 4, kLog = 5 };
+inline constexpr uint64_t kNumHandleKinds = 7;
+enum class HandleKind : uint64_t {
+  kMap = 1,
+  kLocalizer = 2,
+  kTracker = 3,
+  kVisualTracker = 4,
+  kLog = 5,
+  kPlaceModel = 6,
+  kStartHypotheses = 7
+};
 
 // Handles that another language holds: `Handle` is an opaque C type, never defined.  A handle is a number
 // that is given out once, not an address: a closed handle is recognised as closed, even when its memory is

@@ -121,4 +121,13 @@ cairn_floor_fix FloorFixFrom(const VisualPose& found, Scope scope) {
   return fix;
 }
 
+cairn_survey_image SurveyImageFrom(const std::string& name, const Pose& cam_from_world) {
+  cairn_survey_image image = CAIRN_SURVEY_IMAGE_INIT;
+  CopyText(name, image.name);
+  CopyPose(cam_from_world, image.rotation_wxyz, image.translation_m);
+  const Eigen::Vector3d center = cam_from_world.Center();
+  for (int i = 0; i < 3; ++i) image.center_m[i] = center[i];
+  return image;
+}
+
 }  // namespace cairn

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <opencv2/core/mat.hpp>
 
@@ -29,5 +30,7 @@ Status CheckFix(const cairn_fix* fix);
 Status CheckFix(const cairn_floor_fix* fix);
 cairn_fix FixFrom(const Localization& found);
 cairn_floor_fix FloorFixFrom(const VisualPose& found, Scope scope);
+
+cairn_survey_image SurveyImageFrom(const std::string& name, const Pose& cam_from_world);
 
 }  // namespace cairn

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cmath>
+
+#include "core/features/sift.h"
+#include "core/options/options.h"
+#include "runtime/drive/place_model.h"
+
+// What place models have in common that callers in C and Python make.  Inline, since Python's module has a
+// copy of its own: the shared library exports none of this.
+namespace cairn {
+
+// All options that a look reads, and no others.
+struct LookOptions {
+  PlaceModelOptions model;
+  SiftOptions sift;
+  RerankOptions closer;
+};
+inline OptionTable DescribeOptions(LookOptions* options) {
+  OptionTable all = DescribeOptions(&options->model);
+  for (const OptionTable& part : {DescribeOptions(&options->sift), DescribeOptions(&options->closer)})
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+// For a name that is near to none.
+inline constexpr const char* kLookOptionsHelp =
+    "place_model.h, sift.h and rerank_places.h below include/cairn list them";
+inline constexpr const char* kStartOptionsHelp = "`cairn drive --help` lists them";
+
+// Whether a caller's numbers can be scores of places; empty ones are not checked.  Errors: InvalidArgument.
+inline Status CheckPlaceScores(const PlaceScores& given, int num_places) {
+  for (const std::vector<double>* numbers : {&given.scores, &given.probabilities}) {
+    if (numbers->empty()) continue;
+    const char* name = numbers == &given.scores ? "scores" : "probabilities";
+    if (numbers->size() != static_cast<size_t>(num_places))
+      return MakeError(ErrorCode::kInvalidArgument, "places: {} {} for {} places", numbers->size(), name,
+                       num_places);
+    double sum = 0;
+    for (const double number : *numbers) {
+      if (!std::isfinite(number) || number < 0)
+        return MakeError(ErrorCode::kInvalidArgument, "places: {} are not all finite and at least 0", name);
+      sum += number;
+    }
+    if (numbers == &given.probabilities && !(std::abs(sum - 1) < 1e-6))
+      return MakeError(ErrorCode::kInvalidArgument, "places: probabilities sum to {}; expected 1", sum);
+  }
+  return Ok();
+}
+
+}  // namespace cairn
