@@ -58,10 +58,9 @@ cv::Mat PixelsOf(const py::array& image) {
                  const_cast<void*>(image.data()), stride);
 }
 
-void SetFromPython(const OptionTable& table, const py::kwargs& given) {
+void SetFromPython(const OptionTable& table, const py::kwargs& given, const char* help) {
   for (const auto& [key, value] : given) {
-    const Option* const option =
-        ValueOrThrow(FindOption(table, py::cast<std::string>(key), "`cairn localize --help` lists them"));
+    const Option* const option = ValueOrThrow(FindOption(table, py::cast<std::string>(key), help));
     const std::string text = py::isinstance<py::bool_>(value) ? (py::cast<bool>(value) ? "true" : "false")
                                                               : py::cast<std::string>(py::str(value));
     ThrowIfError(SetOption(*option, text));
@@ -108,6 +107,12 @@ py::array_t<double> MatrixArray(const Eigen::Ref<const Eigen::MatrixXd>& matrix)
   return numbers;
 }
 
+py::array_t<double> HomogeneousArray(const Pose& pose) {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  matrix.topRows<3>() = pose.Matrix();
+  return MatrixArray(matrix);
+}
+
 py::object RotationOf(const Localization& found) {
   if (!found.has_fix()) return py::none();
   return RotationArray(found.cam_from_world.rotation);
@@ -120,9 +125,7 @@ py::object VectorOf(const Localization& found, const Eigen::Vector3d& vector) {
 
 py::object MatrixOf(const Localization& found) {
   if (!found.has_fix()) return py::none();
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  matrix.topRows<3>() = found.cam_from_world.Matrix();
-  return MatrixArray(matrix);
+  return HomogeneousArray(found.cam_from_world);
 }
 
 py::object CovarianceOf(const Localization& found) {

@@ -41,8 +41,10 @@ void BindErrors(pybind11::module_& module);
 // another dtype and a ValueError for another shape or order, which say what was found.
 cv::Mat PixelsOf(const pybind11::array& image);
 
-// Sets options from keyword arguments.  Throws cairn.Error for an unknown name or a value out of range.
-void SetFromPython(const OptionTable& table, const pybind11::kwargs& given);
+// Sets options from keyword arguments; `help` says where they are listed.  Throws cairn.Error for an unknown
+// name or a value out of range.
+void SetFromPython(const OptionTable& table, const pybind11::kwargs& given,
+                   const char* help = "`cairn localize --help` lists them");
 
 // None given: the survey's camera of the image's size.  Throws cairn.Error where the map has none, or
 // several.
@@ -52,10 +54,11 @@ Camera CameraFor(const Map& map, const cv::Mat& grey, const std::optional<Camera
 PosePrior MakePrior(const std::vector<double>& rotation_wxyz, const std::vector<double>& translation,
                     double sigma_m, double sigma_deg);
 
-// New arrays: w x y z, (n,) and (m, n).
+// New arrays: w x y z, (n,), (m, n) and (4, 4).
 pybind11::array_t<double> RotationArray(const Eigen::Quaterniond& rotation);
 pybind11::array_t<double> VectorArray(const Eigen::Ref<const Eigen::VectorXd>& vector);
 pybind11::array_t<double> MatrixArray(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
+pybind11::array_t<double> HomogeneousArray(const Pose& pose);
 
 // Of a fix, as new arrays; None without a fix.
 pybind11::object RotationOf(const Localization& found);

@@ -7,11 +7,13 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "runtime/drive/route.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/update_map.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
+#include "runtime/python/places.h"
 #include "runtime/python/trackers.h"
 
 namespace py = pybind11;
@@ -144,6 +146,30 @@ void BindMap(py::module_& module) {
             return ValueOrThrow(self.map->CameraForSize(width, height));
           },
           py::arg("width"), py::arg("height"))
+      .def(
+          "find_image",
+          [](const PyMap& self, const std::string& name) { return ValueOrThrow(FindImage(*self.map, name)); },
+          py::arg("name"))
+      .def(
+          "image_name",
+          [](const PyMap& self, int32_t image) {
+            ValueOrThrow(PoseOfImage(*self.map, image));  // there is such an image
+            return ValueOrThrow(self.map->ImageName(image));
+          },
+          py::arg("image"))
+      .def(
+          "image_pose",
+          [](const PyMap& self, int32_t image) {
+            return HomogeneousArray(ValueOrThrow(PoseOfImage(*self.map, image)));
+          },
+          py::arg("image"))
+      .def(
+          "route",
+          [](const PyMap& self, int32_t start, int32_t goal, const std::string& weight) {
+            const py::gil_scoped_release release;
+            return ValueOrThrow(PlanRoute(*self.map, start, goal, {.weight = weight}));
+          },
+          py::arg("start"), py::arg("goal"), py::arg("weight") = RouteOptions().weight)
       .def_property_readonly("name", [](const PyMap& self) { return self.map->head().name; })
       .def_property_readonly("epoch", [](const PyMap& self) { return self.map->head().epoch; })
       .def_property_readonly("num_landmarks", [](const PyMap& self) { return self.map->num_landmarks(); })
@@ -252,4 +278,5 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindLog(module);
   cairn::BindLocalizer(module);
   cairn::BindTrackers(module);
+  cairn::BindPlaces(module);
 }

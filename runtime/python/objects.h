@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <pybind11/pybind11.h>
 
+#include "runtime/drive/start_hypotheses.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/python/convert.h"
 #include "runtime/robot_log/shared_log.h"
@@ -79,5 +80,11 @@ template <>
 struct type_caster<cairn::Localization> : ConstructedCaster<cairn::Localization> {};
 template <>
 struct type_caster<cairn::TrackedVisualPose> : ConstructedCaster<cairn::TrackedVisualPose> {};
+template <>
+struct type_caster<cairn::Route> : ConstructedCaster<cairn::Route> {};
+template <>
+struct type_caster<cairn::PlaceScores> : ConstructedCaster<cairn::PlaceScores> {};
+template <>
+struct type_caster<cairn::StartHypothesis> : ConstructedCaster<cairn::StartHypothesis> {};
 
 }  // namespace pybind11::detail

@@ -1,5 +1,6 @@
 // Writes the poster's map and two pictures, of it and of nothing, and the map, pictures (0.pgm, 1.pgm, ...)
-// and odometry of a drive:  make_poster_map FOLDER
+// and odometry of a drive, and the map and pictures (wing0.pgm, ...) of two wings that look alike:
+// make_poster_map FOLDER
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,7 @@
 
 #include "core/blocks/map_rows.h"
 #include "tests/install/poster_drive.h"
+#include "tests/install/poster_wings.h"
 
 namespace {
 
@@ -23,6 +25,14 @@ bool WriteDrive(const std::string& folder) {
   return odometry.flush() && cairn::WriteMapRows(drive.rows(), folder + "/drive.cairn").ok();
 }
 
+bool WriteWings(const std::string& folder) {
+  const cairn::PosterWings wings;
+  for (size_t i = 0; i < wings.pictures().size(); ++i) {
+    if (!cv::imwrite(folder + "/wing" + std::to_string(i) + ".pgm", wings.pictures()[i])) return false;
+  }
+  return cairn::WriteMapRows(wings.rows(), folder + "/wings.cairn").ok();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -35,6 +45,6 @@ int main(int argc, char** argv) {
     return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 1;
   const cv::Mat blank(scene.camera.height, scene.camera.width, CV_8UC1, cv::Scalar(90));
   const bool written = cv::imwrite(folder + "/poster.pgm", RenderPoster(scene, PosterQueryPose())) &&
-                       cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder);
+                       cv::imwrite(folder + "/blank.pgm", blank) && WriteDrive(folder) && WriteWings(folder);
   return written ? 0 : 1;
 }

@@ -107,6 +107,148 @@ class Logging(unittest.TestCase):
                 wrong()
 
 
+class Starting(unittest.TestCase):
+    """The wings of tests/install/poster_wings.h: a0 to a3 are places 0 to 3, b0 to b3 4 to 7, h0 to h2 8 to 10."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.map = cairn.Map.open(POSTER / "wings.cairn")
+        cls.model = cairn.PlaceModel(cls.map)
+        cls.pictures = [read_pgm(POSTER / f"wing{i}.pgm") for i in range(7)]  # b0 to b3, h0 to h2
+
+    def route(self, *arguments):
+        printed = subprocess.run([PROGRAM, "route", POSTER / "wings.cairn", *arguments[:2], "--json", *arguments[2:]],
+                                 capture_output=True, check=True, text=True).stdout
+        return json.loads(printed)
+
+    def test_routes_are_the_programs(self):
+        for weight in "links", "matches", "entropy":
+            for start, goal in ("h0", "h2"), ("a0", "h1"), ("b2", "a1"):
+                expected = self.route(start, goal, "--weight", weight)
+                route = self.map.route(self.map.find_image(start), self.map.find_image(goal), weight)
+                self.assertEqual([self.map.image_name(image) for image in route.images],
+                                 [image["name"] for image in expected["images"]])
+                self.assertEqual((route.num_links, route.cost), (expected["num_links"], expected["cost"]))
+        self.assertEqual(self.map.route(8, 10).images, [8, 10])
+        self.assertEqual(self.map.route(8, 10, "matches").images, [8, 9, 10])
+
+    def test_survey_images_have_poses(self):
+        pose = self.map.image_pose(self.map.find_image("b2"))
+        self.assertEqual(pose.shape, (4, 4))
+        numpy.testing.assert_allclose(-pose[:3, :3].T @ pose[:3, 3], [0, 60.3, 1.5], atol=1e-6)
+
+    def test_twins_are_told_apart_where_they_differ(self):
+        looks = [self.model.look(picture) for picture in self.pictures]
+        starts = cairn.StartHypotheses(self.model, looks[0], 9)
+        self.assertEqual([start.posterior for start in starts.hypotheses], [0.5, 0.5])
+        self.assertEqual(sorted(start.start for start in starts.hypotheses), [0, 4])
+        self.assertEqual(starts.hypotheses[starts.followed].way, [0, 1, 2, 3, 8, 9])
+        self.assertEqual([starts.observe(look) for look in looks[1:3]], ["follow", "switch"])
+        followed = starts.hypotheses[starts.followed]
+        self.assertEqual((followed.start, followed.way), (4, [4, 5, 6, 7, 8, 9]))
+        self.assertGreater(followed.posterior, 0.9)
+        self.assertGreater(followed.way_cost, 0)
+        self.assertEqual(starts.num_images, 2)
+        self.assertEqual(starts.whereabouts(starts.followed), 6)
+        self.assertEqual(starts.replan(starts.followed), [6, 7, 8, 9])
+        starts.restart()
+        self.assertEqual(starts.num_images, 0)
+        self.assertEqual(starts.whereabouts(starts.followed), 4)
+        self.assertEqual(starts.observe(looks[6]), "lost")  # h2, right after b0
+        self.assertTrue(starts.refute())
+        self.assertEqual(starts.hypotheses[starts.followed].start, 0)
+        self.assertFalse(starts.refute())
+
+    def test_looks_and_expectations_are_one_number_for_each_place(self):
+        look = self.model.look(self.pictures[2])
+        self.assertEqual(self.model.num_places, 11)
+        self.assertEqual((look.scores.shape, look.probabilities.dtype), ((11,), numpy.float64))
+        self.assertEqual(look.probabilities.argmax(), 6)
+        self.assertAlmostEqual(look.probabilities.sum(), 1)
+        self.assertEqual(self.model.expected(6).argmax(), 6)
+        self.assertEqual(self.model.look_closer(self.pictures[2]).scores.argmax(), 6)
+        self.assertEqual((self.model.place_of_image(6), self.model.images_of_place(6)), (6, [6]))
+        nothing = self.model.look_at_features(numpy.zeros((0, 128), numpy.uint8))
+        self.assertEqual(set(nothing.scores), {0})
+        sharp = cairn.PlaceModel(self.map, score_exponent=20).look(self.pictures[2])
+        self.assertEqual(sharp.scores.tolist(), look.scores.tolist())
+        self.assertGreater(sharp.probabilities[6], look.probabilities[6])
+
+    def test_scores_of_a_callers_own(self):
+        scores = numpy.zeros(11)
+        scores[[2, 6]] = 1, 0.9
+        starts = cairn.StartHypotheses(self.model, cairn.PlaceScores(scores, scores / scores.sum()), 9)
+        self.assertEqual([start.start for start in starts.hypotheses], [2, 6])
+        only = cairn.StartHypotheses(self.model, cairn.PlaceScores(scores, scores / scores.sum()), 9, min_score_ratio=0.95)
+        self.assertEqual([start.start for start in only.hypotheses], [2])
+        for wrong in (scores[:3], -scores, scores * numpy.nan):
+            with self.assertRaises((cairn.Error, ValueError)):
+                cairn.StartHypotheses(self.model, cairn.PlaceScores(wrong, wrong), 9)
+        short = cairn.PlaceScores(numpy.array([1.0]), numpy.array([1.0]))
+        with self.assertRaisesRegex(cairn.Error, "1 scores for 11 places"):
+            starts.observe(short)
+        with self.assertRaisesRegex(ValueError, "dimensions"):
+            cairn.PlaceScores(numpy.ones((2, 2)), scores)
+        with self.assertRaisesRegex(ValueError, "empty"):
+            cairn.PlaceScores(scores, [])
+
+    def test_what_cannot_be_is_refused(self):
+        model, first = self.model, self.model.look(self.pictures[0])
+        starts = cairn.StartHypotheses(model, first, 9)
+        for code, wrong in (("not_found", lambda: cairn.PlaceModel(cairn.Map.open(POSTER / "poster.cairn"))),
+                            ("not_found", lambda: self.map.find_image("c0")),
+                            ("invalid_argument", lambda: self.map.image_name(11)),
+                            ("invalid_argument", lambda: self.map.image_pose(-1)),
+                            ("invalid_argument", lambda: self.map.route(0, 11)),
+                            ("invalid_argument", lambda: self.map.route(0, 9, "metres")),
+                            ("invalid_argument", lambda: cairn.StartHypotheses(model, first, 11)),
+                            ("invalid_argument", lambda: cairn.StartHypotheses(model, first, 9, min_score=1)),
+                            ("invalid_argument", lambda: cairn.PlaceModel(self.map, keypoint_sigma_px=1)),
+                            ("no_data", lambda: cairn.StartHypotheses(
+                                model, model.look_at_features(numpy.zeros((0, 128), numpy.uint8)), 9))):
+            with self.assertRaises(cairn.Error) as caught:
+                wrong()
+            self.assertEqual(caught.exception.name, code)
+        for error, wrong in ((IndexError, lambda: model.images_of_place(11)), (IndexError, lambda: model.expected(-1)),
+                             (IndexError, lambda: model.place_of_image(11)), (IndexError, lambda: starts.whereabouts(2)),
+                             (IndexError, lambda: starts.replan(-1)), (TypeError, lambda: model.look([[1, 2]])),
+                             (TypeError, lambda: model.look(self.pictures[0].astype(float))),
+                             (TypeError, lambda: model.look_at_features(numpy.zeros((1, 128)))),
+                             (ValueError, lambda: model.look_at_features(numpy.zeros((1, 127), numpy.uint8))),
+                             (TypeError, lambda: starts.observe(first.scores))):
+            with self.assertRaises(error):
+                wrong()
+
+    def test_threads_share_a_model_and_starts_outlive_it(self):
+        model = cairn.PlaceModel(self.map)
+        expected = model.look(self.pictures[1]).scores.tolist()
+        found = []
+        threads = [threading.Thread(target=lambda: found.append(model.look(self.pictures[1]).scores.tolist()))
+                   for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(found, [expected] * 4)
+        starts = cairn.StartHypotheses(model, model.look(self.pictures[0]), 9)
+        look = model.look(self.pictures[1])
+        del model
+        self.assertEqual(starts.observe(look), "follow")
+
+    def test_objects_that_no_constructor_has_made(self):
+        look = self.model.look(self.pictures[0])
+        starts = cairn.StartHypotheses(self.model, look, 9)
+        for example in self.map.route(8, 10), look, self.model, starts.hypotheses[0], starts:
+            kind = type(example)
+            empty = kind.__new__(kind)
+            for name, value in vars(kind).items():
+                if isinstance(value, property):
+                    with self.assertRaises(TypeError):
+                        getattr(empty, name)
+            with self.assertRaises(TypeError):
+                cairn.StartHypotheses(self.model, empty, 9)
+
+
 class Localizing(Poster):
     def test_gives_the_programs_pose_bit_for_bit(self):
         printed = subprocess.run([PROGRAM, "localize", POSTER / "poster.cairn", POSTER / "poster.pgm"],

@@ -6,6 +6,8 @@
     if fix:
         print(fix.center, fix.covariance)   # metres; rotation (rad), translation (m)
 
+A robot that was switched on anywhere keeps several starts in mind: StartHypotheses, of what a PlaceModel says of its images.
+
 Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
@@ -18,7 +20,12 @@ from ._cairn import (
     Localizer,
     Log,
     Map,
+    PlaceModel,
+    PlaceScores,
     Prior,
+    Route,
+    StartHypotheses,
+    StartHypothesis,
     Tracker,
     VisualTracker,
     __version__,
@@ -34,7 +41,12 @@ __all__ = [
     "Localizer",
     "Log",
     "Map",
+    "PlaceModel",
+    "PlaceScores",
     "Prior",
+    "Route",
+    "StartHypotheses",
+    "StartHypothesis",
     "Tracker",
     "VisualTracker",
     "__version__",

@@ -42,6 +42,17 @@ class Map:
         """
     def camera_for_size(self, width: int, height: int) -> Camera:
         """The survey's camera of this image size.  Raises Error (not_found) when none or more than one has it."""
+    def find_image(self, name: str) -> int:
+        """The number of a survey image, from 0.  O(images).  Raises Error (not_found)."""
+    def image_name(self, image: int) -> str: ...
+    def image_pose(self, image: int) -> NDArray[np.float64]:
+        """Where a survey image was taken: cam_from_world as a fix of its pixels states it, homogeneous, (4, 4)."""
+    def route(self, start: int, goal: int, weight: Literal["links", "matches", "entropy"] = "links") -> Route:
+        """A way from survey image to survey image along which each shows what the next one shows.
+
+        `weight`: what it minimises: links, the sum of 1 / matches of the links, or the entropy of places.  Raises Error:
+        not_found (no way, an image that is not in the map's appearance graph, or a map that has none).
+        """
     @property
     def name(self) -> str: ...
     @property
@@ -66,6 +77,110 @@ class Map:
     @property
     def scale_centre(self) -> NDArray[np.float64]:
         """The place of the world frame that stays where it is when the scale errs: (3,)."""
+
+@final
+class Route:
+    """A way for a robot that steers by its camera, from image to image."""
+
+    @property
+    def images(self) -> list[int]:
+        """The start, one per place on the way, the goal"""
+    @property
+    def num_links(self) -> int: ...
+    @property
+    def cost(self) -> float:
+        """Sum of the links' weights"""
+
+@final
+class PlaceScores:
+    """What an image says about where it was taken: one number for each place of the map."""
+
+    def __init__(self, scores: NDArray[np.float64], probabilities: NDArray[np.float64]) -> None:
+        """Of a caller who knows better than words do, such as by matches."""
+    @property
+    def scores(self) -> NDArray[np.float64]:
+        """In [0, 1]: (places,); all 0: the image shares nothing with the map"""
+    @property
+    def probabilities(self) -> NDArray[np.float64]:
+        """Sum to 1: (places,); all equal where all scores are 0"""
+
+@final
+class PlaceModel:
+    """Which places an image may show, by the map's visual words.  Immutable, shared by all threads.
+
+    Places are the nodes of the map's appearance graph, numbered from 0: images that show the same.
+    """
+
+    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
+        """`options`: score_exponent, those of features (max_image_side_px=512), of a closer look (num_candidates=10).
+
+        Raises Error: not_found (the map has no words, or no appearance graph).
+        """
+    @property
+    def num_places(self) -> int: ...
+    def place_of_image(self, image: int) -> int:
+        """The place of a survey image; -1: of none."""
+    def images_of_place(self, place: int) -> list[int]:
+        """Survey images, ascending, at least one."""
+    def look(self, image: NDArray[np.uint8]) -> PlaceScores:
+        """What an image says, by its words.  Grey pixels, as Localizer.localize takes them."""
+    def look_at_features(self, descriptors: NDArray[np.uint8]) -> PlaceScores:
+        """The same of features that the caller has: RootSIFT as the survey's, (n, 128)."""
+    def look_closer(self, image: NDArray[np.uint8], camera: Camera | None = None) -> PlaceScores:
+        """For a robot that stands still because it is lost: the best places are verified by geometry."""
+    def expected(self, place: int) -> NDArray[np.float64]:
+        """The probabilities that an image taken there should have: (places,)"""
+
+@final
+class StartHypothesis:
+    """Where the robot may have started."""
+
+    @property
+    def start(self) -> int:
+        """A place"""
+    @property
+    def score(self) -> float:
+        """Of the first image"""
+    @property
+    def posterior(self) -> float:
+        """p(start | all images); those of all starts sum to 1"""
+    @property
+    def way(self) -> list[int]:
+        """Places, from the start to the goal"""
+    @property
+    def way_cost(self) -> float: ...
+
+@final
+class StartHypotheses:
+    """Which of several places a robot started at, found out while it is under way to a goal.
+
+    One per robot: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, model: PlaceModel, first: PlaceScores, goal: int, **options: bool | int | float | str) -> None:
+        """From what the first image says; `goal`: a place; `options`: those of the starts in `cairn drive --help`.
+
+        Raises Error: no_data (the image shares nothing with the map), not_found (no way leads to the goal).
+        """
+    def observe(self, places: PlaceScores) -> Literal["follow", "switch", "lost"]:
+        """An image at the next place of the followed way: go on; another start leads; none explains the image."""
+    def refute(self) -> bool:
+        """The robot does not see what the next image of the followed way shows.  False: no other start is left."""
+    def restart(self) -> None:
+        """The robot is back at its start: what it has learnt about starts is kept."""
+    @property
+    def hypotheses(self) -> list[StartHypothesis]:
+        """Best score of the first image first."""
+    @property
+    def followed(self) -> int:
+        """Its index among the hypotheses."""
+    @property
+    def num_images(self) -> int:
+        """Since the first one, or the last restart()."""
+    def whereabouts(self, hypothesis: int) -> int:
+        """The place where the robot most likely is by now if it started there."""
+    def replan(self, hypothesis: int) -> list[int] | None:
+        """The way from there to the goal; None where there is none."""
 
 @final
 class Prior:
