@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The code that README.md and docs/robots.md show is that of the examples, which the tests build and run.
+"""The code that README.md, docs/robots.md and docs/active.md show is that of the examples, which the tests build and run.
 
 check_readme.py SOURCES: every line of a c, cpp or python block between the marks "<!-- example: FILE -->" and the block's end
 is a line of FILE, in its order.
@@ -10,7 +10,7 @@ from pathlib import Path
 
 sources = Path(sys.argv[1])
 num_blocks = 0
-for page in ("README.md", "docs/robots.md"):
+for page in ("README.md", "docs/robots.md", "docs/active.md"):
     text = (sources / page).read_text()
     for example, block in re.findall(r"<!-- example: (\S+) -->\n```\w+\n(.*?)```", text, re.S):
         lines = iter([" ".join(line.split()) for line in (sources / example).read_text().splitlines()])

@@ -31,6 +31,8 @@ module=$(find "$root" -type d -name cairn -path '*-packages/cairn')
 PYTHONPATH=$(dirname "$module") expect "$folder/robot/where.py"
 PYTHONPATH=$(dirname "$module") "$folder/robot/follow.py" "$poster/drive.cairn" "$poster"/[0-4].pgm | grep -q ', track$'
 "$folder/robot/build/follow_c" "$poster/drive.cairn" 0.1 "$poster"/[0-4].pgm | grep -q ', track$'
+"$(dirname "$0")/check_starts.sh" "$poster" "$folder/robot/build/start_cc" "$folder/robot/build/start_c"
+PYTHONPATH=$(dirname "$module") "$(dirname "$0")/check_starts.sh" "$poster" "$folder/robot/start.py"
 export PKG_CONFIG_PATH="$lib/pkgconfig" LD_LIBRARY_PATH="$lib"
 cd "$folder/robot"
 cc -std=c11 -Wall -Wextra -Werror -pedantic where.c -o where_c $(pkg-config --cflags --libs cairn-runtime)
