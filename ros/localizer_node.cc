@@ -8,9 +8,12 @@
 #include <vector>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
+#include <sensor_msgs/PointCloud.h>
+#include <std_msgs/String.h>
 
 #include "ros/map_localizer.h"
 
@@ -92,6 +95,18 @@ diagnostic_msgs::KeyValue KeyValue(const std::string& key, const std::string& va
   return pair;
 }
 
+geometry_msgs::Pose PoseMessage(const double (&position)[3], const double (&orientation_xyzw)[4]) {
+  geometry_msgs::Pose pose;
+  pose.position.x = position[0];
+  pose.position.y = position[1];
+  pose.position.z = position[2];
+  pose.orientation.x = orientation_xyzw[0];
+  pose.orientation.y = orientation_xyzw[1];
+  pose.orientation.z = orientation_xyzw[2];
+  pose.orientation.w = orientation_xyzw[3];
+  return pose;
+}
+
 class LocalizerNode {
  public:
   LocalizerNode(NodeParameters parameters, MapLocalizer* localizer)
@@ -99,15 +114,23 @@ class LocalizerNode {
     ros::NodeHandle node;
     poses_ = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", 1);
     diagnostics_ = node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 1);
+    starts_ = node.advertise<sensor_msgs::PointCloud>("starts", 1, true);
+    way_ = node.advertise<geometry_msgs::PoseArray>("way", 1, true);
+    verdicts_ = node.advertise<std_msgs::String>("verdict", 10);
+    goals_ = node.subscribe("goal", 1, &LocalizerNode::OnGoal, this);
+    progress_ = node.subscribe("progress", 10, &LocalizerNode::OnProgress, this);
     // Only the newest image: queued ones would be old.
     images_ = node.subscribe("image", 1, &LocalizerNode::OnImage, this, ros::TransportHints().tcpNoDelay());
   }
 
  private:
   void OnImage(const sensor_msgs::Image::ConstPtr& image) {
+    const Image pixels = {image->encoding, image->width,       image->height,
+                          image->step,     image->data.data(), image->data.size()};
+    if (localizer_->IsLooking() && (image->header.stamp.isZero() || image->header.stamp >= asked_))
+      PublishStarts(localizer_->Look(pixels), image->header.stamp);
     const steady_clock::time_point begin = steady_clock::now();
-    const Answer answer = localizer_->Locate(
-        {image->encoding, image->width, image->height, image->step, image->data.data(), image->data.size()});
+    const Answer answer = localizer_->Locate(pixels);
     ++num_images_;
     if (answer.has_fix) {
       ++num_fixes_;
@@ -117,17 +140,51 @@ class LocalizerNode {
     PublishDiagnostics(*image, answer, in_all.count());
   }
 
+  // An image that was taken before does not count.
+  void OnGoal(const std_msgs::String::ConstPtr& image) {
+    asked_ = ros::Time::now();
+    PublishStarts(localizer_->SetGoal(image->data), asked_);
+  }
+
+  void OnProgress(const std_msgs::String::ConstPtr& word) {
+    asked_ = ros::Time::now();
+    PublishStarts(localizer_->Report(word->data), asked_);
+  }
+
+  void PublishStarts(const Starts& found, const ros::Time& stamp) {
+    if (!found.error.empty()) ROS_ERROR("%s", found.error.c_str());
+    sensor_msgs::PointCloud starts;
+    starts.header.stamp = stamp;
+    starts.header.frame_id = parameters_.map_frame;
+    starts.channels.resize(2);
+    starts.channels[0].name = "posterior";
+    starts.channels[1].name = "is_followed";
+    for (size_t i = 0; i < found.starts.size(); ++i) {
+      const Starts::Start& start = found.starts[i];
+      geometry_msgs::Point32 point;
+      point.x = static_cast<float>(start.pose.position[0]);
+      point.y = static_cast<float>(start.pose.position[1]);
+      point.z = static_cast<float>(start.pose.position[2]);
+      starts.points.push_back(point);
+      starts.channels[0].values.push_back(static_cast<float>(start.posterior));
+      starts.channels[1].values.push_back(static_cast<int>(i) == found.followed ? 1 : 0);
+    }
+    geometry_msgs::PoseArray way;
+    way.header = starts.header;
+    for (const SurveyPose& pose : found.way)
+      way.poses.push_back(PoseMessage(pose.position, pose.orientation_xyzw));
+    std_msgs::String verdict;
+    verdict.data = found.error.empty() ? found.verdict : "error: " + found.error;
+    starts_.publish(starts);
+    way_.publish(way);
+    verdicts_.publish(verdict);
+  }
+
   void PublishPose(const Answer& answer, const ros::Time& stamp) {
     geometry_msgs::PoseWithCovarianceStamped message;
     message.header.stamp = stamp;
     message.header.frame_id = parameters_.map_frame;
-    message.pose.pose.position.x = answer.position[0];
-    message.pose.pose.position.y = answer.position[1];
-    message.pose.pose.position.z = answer.position[2];
-    message.pose.pose.orientation.x = answer.orientation_xyzw[0];
-    message.pose.pose.orientation.y = answer.orientation_xyzw[1];
-    message.pose.pose.orientation.z = answer.orientation_xyzw[2];
-    message.pose.pose.orientation.w = answer.orientation_xyzw[3];
+    message.pose.pose = PoseMessage(answer.position, answer.orientation_xyzw);
     for (int i = 0; i < 36; ++i) message.pose.covariance[i] = answer.covariance[i];
     poses_.publish(message);
   }
@@ -167,8 +224,9 @@ class LocalizerNode {
 
   NodeParameters parameters_;
   MapLocalizer* localizer_;
-  ros::Publisher poses_, diagnostics_;
-  ros::Subscriber images_;
+  ros::Publisher poses_, diagnostics_, starts_, way_, verdicts_;
+  ros::Subscriber images_, goals_, progress_;
+  ros::Time asked_;  // when a goal or a report came last
   int64_t num_images_ = 0, num_fixes_ = 0;
   int last_level_ = -1;
   steady_clock::time_point last_published_;

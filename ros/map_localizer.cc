@@ -6,6 +6,7 @@
 
 #include "ros/grey_pixels.h"
 #include "ros/robot_pose.h"
+#include "ros/start_finder.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/region_tracker.h"
 #include "runtime/robot_log/shared_log.h"
@@ -42,6 +43,10 @@ Result<std::shared_ptr<const Map>> OpenMap(const Parameters& parameters) {
   return Map::Open(parameters.map, options);
 }
 
+Result<cv::Mat> GreyPixelsOf(const Image& image) {
+  return GreyPixels({image.encoding, image.width, image.height, image.step, image.bytes, image.num_bytes});
+}
+
 }  // namespace
 
 struct MapLocalizer::State {
@@ -50,13 +55,15 @@ struct MapLocalizer::State {
         map(std::move(opened)),
         robot_from_camera(mounting),
         localizer(map),
-        tracker(map) {}
+        tracker(map),
+        starts(map, mounting) {}
 
   Parameters parameters;
   std::shared_ptr<const Map> map;
   Pose robot_from_camera;
   Localizer localizer;
   RegionTracker tracker;
+  StartFinder starts;
   std::shared_ptr<SharedLog> log;  // null: none
 
   Result<Camera> CameraFor(const cv::Mat& grey) const {
@@ -79,8 +86,7 @@ struct MapLocalizer::State {
   }
 
   Result<Localization> Locate(const Image& image, double* library_ms) {
-    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixels({image.encoding, image.width, image.height,
-                                                           image.step, image.bytes, image.num_bytes}));
+    CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, GreyPixelsOf(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, CameraFor(grey));
     const auto begin = std::chrono::steady_clock::now();
     Result<Localization> found = log                 ? LocateAndLog(grey, camera)
@@ -135,6 +141,35 @@ Answer MapLocalizer::Locate(const Image& image) {
   std::copy_n(pose.orientation.coeffs().data(), 4, answer.orientation_xyzw);  // Eigen's order too
   for (int i = 0; i < 36; ++i) answer.covariance[i] = pose.covariance(i / 6, i % 6);
   return answer;
+}
+
+namespace {
+
+// What is known after something was done.
+Starts AnswerOf(const StartFinder& finder, const Status& done) {
+  Result<Starts> found = finder.Found();
+  Starts starts = found.ok() ? std::move(found).value() : Starts();
+  if (!done.ok()) starts.error = done.error().message;
+  if (!found.ok()) starts.error = found.error().message;
+  return starts;
+}
+
+}  // namespace
+
+Starts MapLocalizer::SetGoal(const std::string& image) {
+  return AnswerOf(state_->starts, state_->starts.SetGoal(image));
+}
+
+Starts MapLocalizer::Report(const std::string& word) {
+  return AnswerOf(state_->starts, state_->starts.Report(word));
+}
+
+bool MapLocalizer::IsLooking() const { return state_->starts.IsWaiting(); }
+
+Starts MapLocalizer::Look(const Image& image) {
+  const Result<cv::Mat> grey = GreyPixelsOf(image);
+  if (!grey.ok()) return AnswerOf(state_->starts, grey.error());
+  return AnswerOf(state_->starts, state_->starts.Look(*grey));
 }
 
 std::string MapLocalizer::map_name() const { return state_->map->head().name; }

@@ -44,6 +44,26 @@ struct Answer {
   double library_ms = 0;  // in the runtime: the rest is the node's
 };
 
+// Where a survey image was taken: the robot's base there, or the camera without a mounting.
+struct SurveyPose {
+  std::string image;
+  double position[3] = {0, 0, 0};
+  double orientation_xyzw[4] = {0, 0, 0, 1};
+};
+
+// Where a robot may have started.
+struct Starts {
+  std::string error;    // why the last goal, report or image was not taken; empty: it was
+  std::string verdict;  // "follow", "switch" or "lost"; empty before the first image
+  struct Start {
+    SurveyPose pose;
+    double posterior = 0;
+  };
+  std::vector<Start> starts;
+  int followed = -1;
+  std::vector<SurveyPose> way;  // from the followed start to the goal
+};
+
 class MapLocalizer {
  public:
   // Null on failure; `code` and `message` then say why.
@@ -51,6 +71,13 @@ class MapLocalizer {
   ~MapLocalizer();
 
   Answer Locate(const Image& image);
+
+  // For a robot that does not know where it starts, on its way to a survey image (start_finder.h).
+  Starts SetGoal(const std::string& image);
+  Starts Report(const std::string& word);
+  bool IsLooking() const;  // whether the next image is to go to Look
+  Starts Look(const Image& image);
+
   std::string map_name() const;
   int64_t num_landmarks() const;
   int64_t num_kept_bytes() const;  // of the map, in memory

@@ -49,8 +49,9 @@ os.environ.update(ROS_MASTER_URI=f"http://localhost:{PORT}", ROS_HOSTNAME="local
 import rosgraph  # noqa: E402
 import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import PoseWithCovarianceStamped  # noqa: E402
-from sensor_msgs.msg import Image  # noqa: E402
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped  # noqa: E402
+from sensor_msgs.msg import Image, PointCloud  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
 
 
 def image_message(pixels, encoding, stamp):
@@ -175,6 +176,64 @@ class Node(unittest.TestCase):
         self.assertEqual(status.level, 2)
         self.assertIn("100", status.message)
         self.assertIsNone(pose)
+
+    @unittest.skipUnless(IS_POSTER, "of the poster's wings")
+    def test_finds_out_where_it_started(self):
+        """tests/install/poster_wings.h: a robot drives along wing b; places are 10 m apart in y, a0 at 0, b0 at 40.3."""
+        topics = ("image", "goal", "progress", "starts", "way", "verdict", "pose")
+        node = self.start("__name:=starter", f"_map:={POSTER / 'wings.cairn'}", *[f"{topic}:=wing_{topic}" for topic in topics])
+        self.addCleanup(node.wait)
+        self.addCleanup(node.terminate)
+        said = {}
+        subscribers = [rospy.Subscriber(f"wing_{topic}", kind, lambda message, topic=topic: said.setdefault(topic, []).append(message))
+                       for topic, kind in (("starts", PointCloud), ("way", PoseArray), ("verdict", String))]
+        publishers = {topic: rospy.Publisher(f"wing_{topic}", kind, queue_size=1)
+                      for topic, kind in (("image", Image), ("goal", String), ("progress", String))}
+
+        def wait(condition):
+            for _ in range(500):
+                if condition():
+                    return
+                time.sleep(0.02)
+            self.fail(f"no answer: {said}")
+
+        def ask(topic, message):
+            """What starts, way and verdict are after a message."""
+            said.clear()
+            publishers[topic].publish(message)
+            wait(lambda: len(said) == 3)
+            starts, way = said["starts"][-1], said["way"][-1]
+            channels = {channel.name: channel.values for channel in starts.channels}
+            posterior = {round(point.y): value for point, value in zip(starts.points, channels["posterior"])}
+            followed = [round(point.y) for point, value in zip(starts.points, channels["is_followed"]) if value == 1]
+            return posterior, followed, [round(pose.position.y) for pose in way.poses], said["verdict"][-1].data
+
+        def look(number):
+            stamp = rospy.Time.from_sec(time.time())
+            return ask("image", image_message(read_pgm(POSTER / f"wing{number}.pgm"), "mono8", stamp))
+
+        wait(lambda: all(each.get_num_connections() > 0 for each in (*publishers.values(), *subscribers)))
+        self.assertEqual(ask("progress", "arrived")[3][:6], "error:")
+        self.assertIn("no survey image 'c0'", ask("goal", "c0")[3])
+        self.assertEqual(ask("goal", "h1"), ({}, [], [], ""))
+        self.assertEqual(look(0), ({0: 0.5, 40: 0.5}, [0], [0, 10, 20, 30, 80, 90], "follow"))
+        said.clear()
+        stamp = rospy.Time.from_sec(time.time())
+        publishers["image"].publish(image_message(read_pgm(POSTER / "wing1.pgm"), "mono8", stamp))
+        time.sleep(0.5)
+        self.assertEqual(said, {})  # it has not arrived anywhere
+        ask("progress", "arrived")
+        posterior, followed, _, verdict = look(1)
+        self.assertEqual((followed, verdict), ([0], "follow"))
+        self.assertAlmostEqual(sum(posterior.values()), 1, 5)
+        ask("progress", "arrived")
+        posterior, followed, way, verdict = look(2)
+        self.assertEqual((followed, way, verdict), ([40], [40, 50, 60, 70, 80, 90], "switch"))
+        self.assertGreater(posterior[40], 0.9)
+        self.assertEqual(ask("progress", "restarted")[1], [40])
+        self.assertEqual(ask("progress", "refuted")[3], "switch")
+        self.assertEqual(ask("progress", "refuted")[3], "lost")
+        self.assertIn("expected 'arrived'", ask("progress", "tired")[3])
 
     def test_bad_parameters_end_the_node_with_a_sentence(self):
         for arguments, words, code in ((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
