@@ -38,7 +38,7 @@ int32_t CallLook(const char* function, cairn_place_model* model, cairn_place_sco
   return Call(function, [&]() -> Status {
     CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenPlaceModel>::Begin(OpenPlaceModels(), model));
     CAIRN_RETURN_IF_ERROR(CheckRoom(*used->model, places));
-    CAIRN_ASSIGN_OR_RETURN(const PlaceScores found, look(*used.operator->()));
+    CAIRN_ASSIGN_OR_RETURN(const PlaceScores found, look(used));
     Fill(found, places);
     return Ok();
   });
@@ -47,7 +47,10 @@ int32_t CallLook(const char* function, cairn_place_model* model, cairn_place_sco
 }  // namespace
 
 Status OpenPlaceModel::Begin(const LookOptions& given) {
-  CAIRN_ASSIGN_OR_RETURN(model, PlaceModel::Make(*map, given.model));
+  // Its words are many: they are not read again for options of features.
+  if (!model || given.model.score_exponent != options.model.score_exponent) {
+    CAIRN_ASSIGN_OR_RETURN(model, PlaceModel::Make(*map, given.model));
+  }
   options = given;
   return Ok();
 }
@@ -159,35 +162,35 @@ int32_t cairn_place_model_image_of_place(const cairn_place_model* model, int32_t
 int32_t cairn_place_model_look(cairn_place_model* model, const cairn_image* image,
                                cairn_place_scores* places) {
   return CallLook("cairn_place_model_look", model, places,
-                  [&](const OpenPlaceModel& used) -> Result<PlaceScores> {
+                  [&](const Use<OpenPlaceModel>& used) -> Result<PlaceScores> {
                     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
-                    CAIRN_ASSIGN_OR_RETURN(const Features features, ExtractSift(grey, used.options.sift));
-                    return used.model->Look(features.descriptors);
+                    CAIRN_ASSIGN_OR_RETURN(const Features features, ExtractSift(grey, used->options.sift));
+                    return used->model->Look(features.descriptors);
                   });
 }
 
 int32_t cairn_place_model_look_at_features(cairn_place_model* model, const uint8_t* descriptors,
                                            int32_t num_features, cairn_place_scores* places) {
   return CallLook("cairn_place_model_look_at_features", model, places,
-                  [&](const OpenPlaceModel& used) -> Result<PlaceScores> {
+                  [&](const Use<OpenPlaceModel>& used) -> Result<PlaceScores> {
                     if (num_features < 0)
                       return Misuse("num_features is {}; must not be negative", num_features);
                     if (descriptors == nullptr && num_features > 0) return Misuse("descriptors is NULL");
                     DescriptorMatrix rows(num_features, kDescriptorDim);
                     std::copy_n(descriptors, rows.size(), rows.data());
-                    return used.model->Look(rows);
+                    return used->model->Look(rows);
                   });
 }
 
 int32_t cairn_place_model_look_closer(cairn_place_model* model, const cairn_image* image,
                                       const cairn_camera* camera, cairn_place_scores* places) {
   return CallLook("cairn_place_model_look_closer", model, places,
-                  [&](const OpenPlaceModel& used) -> Result<PlaceScores> {
+                  [&](const Use<OpenPlaceModel>& used) -> Result<PlaceScores> {
                     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, PixelsOf(image));
-                    CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used.map, grey));
-                    const Localizer localizer(used.map, {.sift = used.options.sift});
+                    CAIRN_ASSIGN_OR_RETURN(const Camera chosen, CameraOf(camera, *used->map, grey));
+                    const Localizer localizer(used->map, {.sift = used->options.sift});
                     CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, chosen));
-                    return used.model->LookCloser(*used.map, query, used.options.closer);
+                    return used->model->LookCloser(*used->map, query, used->options.closer);
                   });
 }
 

@@ -208,6 +208,44 @@ static void CheckTrackers(const char* path, const cairn_image* image) {
   CHECK_ERROR(cairn_tracker_destroy(tracker), CAIRN_INVALID_ARGUMENT, "destroyed");
 }
 
+/* The poster's map has words, but no appearance graph. */
+static void CheckPlaces(const char* path, const cairn_image* image) {
+  cairn_map* map = NULL;
+  cairn_place_model* model = (cairn_place_model*)&map;
+  cairn_start_hypotheses* starts = (cairn_start_hypotheses*)&map;
+  cairn_survey_image survey = CAIRN_SURVEY_IMAGE_INIT;
+  cairn_place_scores places = CAIRN_PLACE_SCORES_INIT;
+  cairn_start_hypothesis start = CAIRN_START_HYPOTHESIS_INIT;
+  int32_t number = -1, way[3] = {-1, -1, -1};
+  CHECK(cairn_map_open(path, NULL, &map) == CAIRN_OK);
+  CHECK(cairn_map_find_image(map, "view1", &number) == CAIRN_OK && number == 1);
+  CHECK_ERROR(cairn_map_find_image(map, "view3", &number), CAIRN_NOT_FOUND, "view3");
+  CHECK_ERROR(cairn_map_find_image(map, "view1", NULL), CAIRN_INVALID_ARGUMENT, "image is NULL");
+  CHECK(cairn_map_describe_image(map, 1, &survey) == CAIRN_OK && strcmp(survey.name, "view1") == 0);
+  CHECK(fabs(survey.center_m[1]) < 1e-6 && fabs(survey.center_m[2] - 1.5) < 1e-6);
+  survey.size = 3;
+  CHECK_ERROR(cairn_map_describe_image(map, 1, &survey), CAIRN_INVALID_ARGUMENT, "description->size is 3");
+  CHECK_ERROR(cairn_map_describe_image(map, 3, &survey), CAIRN_INVALID_ARGUMENT, "description->size");
+  CHECK_ERROR(cairn_route(map, 0, 2, NULL, way, 3, &number, NULL), CAIRN_NOT_FOUND, "no appearance graph");
+  CHECK(number == 0 && way[0] == -1);
+  CHECK_ERROR(cairn_place_model_create(map, NULL), CAIRN_INVALID_ARGUMENT, "model is NULL");
+  CHECK_ERROR(cairn_place_model_create(NULL, &model), CAIRN_INVALID_ARGUMENT, "map is NULL");
+  CHECK(model == NULL);
+  CHECK_ERROR(cairn_place_model_create(map, &model), CAIRN_NOT_FOUND, "no appearance graph");
+  CHECK_ERROR(cairn_place_model_look((cairn_place_model*)map, image, &places), CAIRN_INVALID_ARGUMENT,
+              "not a place model");
+  CHECK_ERROR(cairn_place_model_look(NULL, image, &places), CAIRN_INVALID_ARGUMENT, "place model is NULL");
+  CHECK_ERROR(cairn_start_hypotheses_create(NULL, &places, 0, &starts), CAIRN_INVALID_ARGUMENT,
+              "place model is NULL");
+  CHECK(starts == NULL);
+  CHECK_ERROR(cairn_start_hypotheses_get((cairn_start_hypotheses*)map, 0, &start), CAIRN_INVALID_ARGUMENT,
+              "not a set of starts");
+  CHECK(cairn_place_model_destroy(NULL) == CAIRN_OK && cairn_start_hypotheses_destroy(NULL) == CAIRN_OK);
+  CHECK(strcmp(cairn_verdict_name(CAIRN_VERDICT_SWITCH), "switch") == 0);
+  CHECK(strcmp(cairn_verdict_name(-1), "unknown") == 0);
+  CHECK(cairn_map_close(map) == CAIRN_OK);
+}
+
 int main(int argc, char** argv) {
   int width = 0, height = 0;
   uint8_t* pixels = argc == 3 ? ReadPgm(argv[2], &width, &height) : NULL;
@@ -232,6 +270,7 @@ int main(int argc, char** argv) {
   CheckBadImages(localizer, &image);
   CheckFixes(localizer, &image);
   CheckTrackers(argv[1], &image);
+  CheckPlaces(argv[1], &image);
 
   CHECK_ERROR(cairn_localizer_set_option(localizer, "min_num_inlier", "9"), CAIRN_INVALID_ARGUMENT,
               "'min_num_inliers'");
