@@ -212,6 +212,7 @@ class LocalizerNode {
                      KeyValue("features", answer.num_features),
                      KeyValue("inliers", answer.num_inliers),
                      KeyValue("region", answer.region),
+                     KeyValue("probability", answer.probability),
                      KeyValue("library_ms", answer.library_ms),
                      KeyValue("node_ms", node_ms),
                      KeyValue("kept_bytes", localizer_->num_kept_bytes()),

@@ -135,6 +135,7 @@ Answer MapLocalizer::Locate(const Image& image) {
   answer.num_features = found->num_features;
   answer.num_inliers = found->num_inliers;
   answer.region = found->region;
+  answer.probability = found->probability;
   if (!answer.has_fix) return answer;
   const RobotPose pose = RobotPoseOf(*found, state_->robot_from_camera);
   std::copy_n(pose.position.data(), 3, answer.position);

@@ -275,6 +275,7 @@ nlohmann::ordered_json PnpJson(const Answer& answer) {
     json["translation_m"] = {t.x(), t.y(), t.z()};
     json["center_m"] = {center.x(), center.y(), center.z()};
     json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
+    json["probability"] = found.probability;
     json["region"] = found.region;
   } else {
     json["reason"] = NoFixName(found.reason);

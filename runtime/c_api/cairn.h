@@ -70,7 +70,8 @@ enum {
   CAIRN_POOR_SPREAD = 6,
   CAIRN_UNCERTAIN = 7,
   CAIRN_FAR_FROM_SURVEY = 8,
-  CAIRN_AMBIGUOUS = 9 /* another place explains the image nearly as well */
+  CAIRN_AMBIGUOUS = 9,  /* another place explains the image nearly as well */
+  CAIRN_IMPROBABLE = 10 /* most of what an image from there would show is missing */
 };
 
 /* Which landmarks an image was matched with.  Append-only. */
@@ -191,9 +192,12 @@ typedef struct cairn_fix {
       message[CAIRN_MESSAGE_BYTES]; /* why there is no fix: found and needed; cut to fit, always with a NUL */
   int32_t scope;                    /* CAIRN_SCOPE_ALL, ...: which landmarks it was matched with */
   int32_t reserved;                 /* 0 */
+  /* P(the fix is right), by how much of what an image from there should show is found, and by what other
+   * places explain.  Without a fix 0, but for CAIRN_IMPROBABLE. */
+  double probability;
 } cairn_fix;
 #define CAIRN_FIX_INIT \
-  { sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, {0}, 0, 0 }
+  { sizeof(cairn_fix), 0, 0, {0}, {0}, {0}, {0}, 0, 0, 0, 0, {0}, 0, 0, 0 }
 
 /* A place on the floor, from how landmarks look from different places (maps with a visual map). */
 typedef struct cairn_floor_fix {

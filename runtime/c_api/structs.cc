@@ -10,7 +10,7 @@
 namespace cairn {
 namespace {
 
-static_assert(CAIRN_AMBIGUOUS == static_cast<int>(NoFix::kAmbiguous));
+static_assert(CAIRN_IMPROBABLE == static_cast<int>(NoFix::kImprobable));
 static_assert(CAIRN_SCOPE_VOTES == static_cast<int>(Scope::kVotes));
 
 // A longer stride is an overflowed sum, not a distance between rows.
@@ -95,6 +95,7 @@ cairn_fix FixFrom(const Localization& found) {
   fix.num_matches = found.num_matches;
   fix.num_inliers = found.num_inliers;
   fix.scope = static_cast<int32_t>(found.scope);
+  fix.probability = found.probability;
   CopyText(found.message, fix.message);
   if (!found.has_fix()) return fix;
   CopyPose(found.cam_from_world, fix.rotation_wxyz, fix.translation_m);

@@ -87,6 +87,8 @@ const char* NoFixName(NoFix reason) {
       return "far_from_survey";
     case NoFix::kAmbiguous:
       return "ambiguous";
+    case NoFix::kImprobable:
+      return "improbable";
   }
   return "none";
 }
@@ -120,16 +122,13 @@ OptionTable DescribeOptions(AcceptOptions* o) {
            "fewest landmarks found where the pose says above those found beside these places, in standard "
            "deviations of the latter; 0: not tested",
        .min = 0},
-      {.name = "min_found_ratio",
-       .value = &o->min_found_ratio,
-       .help =
-           "where fewer than sure_num_unguided_inliers matches led to a pose: the part of the landmarks in "
-           "view that a right one finds at least; 0: not tested",
+      {.name = "min_probability",
+       .value = &o->min_probability,
+       .help = "smallest probability that the pose is right, by what an image from there should show and "
+               "does not; "
+               "0: not tested",
        .min = 0,
-       .max = 0.99},
-      {.name = "min_found_log_odds",
-       .value = &o->min_found_log_odds,
-       .help = "how much likelier, as a natural logarithm, what it finds must be so than by chance"},
+       .max = 1},
       {.name = "spread_grid",
        .value = &o->spread_grid,
        .help = "cells per side of the image for the spread",
@@ -149,8 +148,8 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .min = 0},
       {.name = "max_second_pose_ratio",
        .value = &o->max_second_pose_ratio,
-       .help = "a second pose elsewhere with this part of the first one's inliers, before and after guided "
-               "matching, makes it ambiguous; 0: not looked for",
+       .help = "a second pose elsewhere with half this part of the first one's inliers, and with this part "
+               "after guided matching, makes it ambiguous; 0: not looked for",
        .min = 0,
        .max = 1},
       {.name = "num_second_pose_iterations",
@@ -166,43 +165,18 @@ OptionTable DescribeOptions(AcceptOptions* o) {
        .help = "poses this far apart are different, degrees",
        .min = 1e-6},
   };
-  AddCondition({"min_found_ratio", {"not 0"}}, {"min_found_log_odds"}, &table);
   AddCondition({"max_second_pose_ratio", {"not 0"}},
                {"num_second_pose_iterations", "second_pose_distance_m", "second_pose_angle_deg"}, &table);
   return table;
 }
 
-double FoundLogOdds(int num_found, int num_in_view, double num_by_chance, double min_found_ratio) {
-  // No landmark found by chance does not make it impossible.
-  constexpr double kFewestByChance = 0.5;
-  if (num_in_view <= 0) return -std::numeric_limits<double>::infinity();
-  const double num = num_in_view;
-  const auto log_likelihood = [&](double rate) {
-    return num_found * std::log(rate) + (num - num_found) * std::log1p(-rate);
-  };
-  // The likeliest rate that is large enough; neither is quite 0 or 1.
-  const double largest = 1 - kFewestByChance / (num + 1);
-  const double if_right = std::min(largest, std::max(min_found_ratio, num_found / num));
-  const double by_chance = std::min(largest, std::max(kFewestByChance, num_by_chance) / (num + 1));
-  return log_likelihood(if_right) - log_likelihood(by_chance);
-}
-
-Verdict JudgeGuided(const GuidedEvidence& evidence, const AcceptOptions& options) {
-  const double by_chance = evidence.num_by_chance;
+Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& options) {
   if (options.min_guided_sigmas > 0 &&
-      evidence.num_found < by_chance + options.min_guided_sigmas * std::sqrt(by_chance)) {
+      num_found < num_by_chance + options.min_guided_sigmas * std::sqrt(num_by_chance)) {
     return {NoFix::kTooFewInliers,
             fmt::format("{} landmarks are where the pose says, and beside it there are {:.0f}: no more than "
                         "by chance",
-                        evidence.num_found, by_chance)};
-  }
-  if (!evidence.is_sure && options.min_found_ratio > 0 &&
-      !(FoundLogOdds(evidence.num_found, evidence.num_in_view, by_chance, options.min_found_ratio) >=
-        options.min_found_log_odds)) {
-    return {NoFix::kTooFewInliers,
-            fmt::format("of {} landmarks in view {} are where the pose says, and {:.0f} beside it: a right "
-                        "pose finds more",
-                        evidence.num_in_view, evidence.num_found, by_chance)};
+                        num_found, num_by_chance)};
   }
   return {};
 }

@@ -27,21 +27,9 @@ struct Verdict {
   std::string message;  // what was found and what was needed; empty for kNone
 };
 
-// How much likelier it is to find `num_found` of `num_in_view` landmarks where a right pose finds each with a
-// probability of `min_found_ratio` or more, the likeliest, than where as many are found as beside their
-// places: natural logarithm of the ratio of two binomial likelihoods.  -infinity where none is in view.
-// REQUIRES: min_found_ratio in (0, 1)
-double FoundLogOdds(int num_found, int num_in_view, double num_by_chance, double min_found_ratio);
-
-// What guided matching says of a pose (match.h).
-struct GuidedEvidence {
-  int num_found = 0;
-  int num_in_view = 0;       // landmarks that it looked for within the image
-  double num_by_chance = 0;  // found beside their places
-  bool is_sure = false;      // enough matches led to the pose: sure_num_unguided_inliers
-};
-// Whether that is more than chance, or than a part of the image that looks like another place.
-Verdict JudgeGuided(const GuidedEvidence& evidence, const AcceptOptions& options);
+// Whether what guided matching found at a pose, `num_found`, is more than what it finds beside the landmarks'
+// places by chance.
+Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& options);
 
 // Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey.
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,

@@ -31,6 +31,7 @@ enum class NoFix {
   kUncertain,       // they leave the pose too uncertain
   kFarFromSurvey,   // they put the camera where nobody surveyed
   kAmbiguous,       // another pose is nearly as good
+  kImprobable,      // most of what an image from there would show is missing
 };
 // Stable lower-case name ("too_few_matches"); "none" for kNone.
 const char* NoFixName(NoFix reason);
@@ -55,6 +56,9 @@ struct Localization {
   // part of the covariance.  The scale errs once: every fix of the map by the same multiple, so that it does
   // not average out, and no difference of near fixes shows it.  Zero where poses were stated, or no metres.
   Eigen::Vector3d scale_sigma_m = Eigen::Vector3d::Zero();
+  // P(the fix is right): by how much of what an image from there should show is found, and by what other
+  // places explain (place_evidence.h).  Without a fix: 0, but for kImprobable.
+  double probability = 0;
   RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
   Scope scope = Scope::kAll;
 

@@ -14,6 +14,7 @@
 #include "runtime/localize/estimate.h"
 #include "runtime/localize/match.h"
 #include "runtime/localize/measurement.h"
+#include "runtime/localize/place_evidence.h"
 #include "runtime/localize/refine.h"
 #include "runtime/localize/region_votes.h"
 #include "runtime/localize/retrieve.h"
@@ -57,6 +58,20 @@ bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept) {
          RotationErrorDeg(a, b) > accept.second_pose_angle_deg;
 }
 
+// Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
+// not by different places.  Ascending by keypoint.
+bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspondence>& b) {
+  size_t num_shared = 0;
+  for (size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    num_shared += a[i].keypoint == b[j].keypoint && a[i].landmark == b[j].landmark ? 1 : 0;
+    a[i].keypoint < b[j].keypoint ? ++i : ++j;
+  }
+  return 2 * num_shared >= std::min(a.size(), b.size());
+}
+
+// Of probabilities short of 1 by rounding, too.
+double OddsOf(double probability) { return probability / std::max(1e-12, 1 - probability); }
+
 // The better of two answers.  Of two fixes the one with more inliers, unless they are at different places and
 // nearly equally good; of two failures the one that came farther says more.
 Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
@@ -68,10 +83,15 @@ Localization Better(Localization first, Localization second, const AcceptOptions
   if (!first.has_fix()) return second;
   if (!second.has_fix()) return first;
   if (second.num_unguided_inliers > first.num_unguided_inliers) std::swap(first, second);
-  const bool differ = AreFarApart(first.cam_from_world, second.cam_from_world, accept);
+  if (!AreFarApart(first.cam_from_world, second.cam_from_world, accept)) return first;
   const double needed = accept.max_second_pose_ratio * first.num_unguided_inliers;
-  if (accept.max_second_pose_ratio <= 0 || !differ || second.num_unguided_inliers < needed) return first;
+  if (accept.max_second_pose_ratio <= 0) return first;
+  if (second.num_unguided_inliers < needed) {
+    first.probability = ProbabilityAmong(OddsOf(first.probability), OddsOf(second.probability));
+    return first;
+  }
   first.reason = NoFix::kAmbiguous;
+  first.probability = 0;
   first.message = fmt::format("{} and {} matches agree on poses at different places",
                               first.num_unguided_inliers, second.num_unguided_inliers);
   return first;
@@ -363,6 +383,13 @@ Result<Localizer::FollowedUp> Localizer::FollowUp(const Query& query,
   return FollowedUp{own.num_unguided_inliers, std::move(covisible), std::move(guided)};
 }
 
+Result<PlaceEvidence> Localizer::EvidenceOf(const Query& query, const LandmarkSet& matched,
+                                            const FollowedUp& followed_up) const {
+  return EvidenceOfPlace(*map_, query, followed_up.found.cam_from_world,
+                         followed_up.covisible ? *followed_up.covisible : matched, followed_up.found.matches,
+                         followed_up.num_unguided_inliers, options_.accept.spread_grid);
+}
+
 Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& matched,
                                        const std::vector<Correspondence>& matches,
                                        const std::vector<PoseEstimate>& firsts,
@@ -370,6 +397,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   const auto fail = [&](NoFix reason, std::string message) {
     localization.reason = reason;
     localization.message = std::move(message);
+    if (reason != NoFix::kImprobable) localization.probability = 0;
     return localization;
   };
   std::vector<FollowedUp> followed_up;
@@ -383,27 +411,39 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   const FollowedUp& best = followed_up[most];
   const auto num_found = static_cast<double>(best.found.matches.size());
   localization.num_unguided_inliers = best.num_unguided_inliers;
+  double odds_elsewhere = 0;
+  const double max_second_pose_ratio = options_.accept.max_second_pose_ratio;
   for (const FollowedUp& other : followed_up) {
-    const double max_second_pose_ratio = options_.accept.max_second_pose_ratio;
-    if (max_second_pose_ratio > 0 &&
-        static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found &&
-        AreFarApart(other.found.cam_from_world, best.found.cam_from_world, options_.accept)) {
+    if (max_second_pose_ratio <= 0 || ShareMost(other.found.matches, best.found.matches) ||
+        !AreFarApart(other.found.cam_from_world, best.found.cam_from_world, options_.accept))
+      continue;
+    if (static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
       return fail(NoFix::kAmbiguous, fmt::format("{} and {} matches agree on poses at different places",
                                                  best.found.matches.size(), other.found.matches.size()));
     }
+    CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(query, matched, other));
+    odds_elsewhere += OddsOfPlace(evidence);
   }
   const LandmarkSet& landmarks = best.covisible ? *best.covisible : matched;
   if (best.covisible) {
-    Verdict verdict = JudgeGuided(
-        {.num_found = static_cast<int>(best.found.matches.size()),
-         .num_in_view = NumInView(query, landmarks, best.found.cam_from_world),
-         .num_by_chance = GuidedByChance(query, landmarks, best.found.cam_from_world, options_.match),
-         .is_sure = localization.num_unguided_inliers >= options_.sure_num_unguided_inliers},
-        options_.accept);
+    Verdict verdict = JudgeGuided(static_cast<int>(best.found.matches.size()),
+                                  GuidedByChance(query, landmarks, best.found.cam_from_world, options_.match),
+                                  options_.accept);
     if (verdict.reason != NoFix::kNone) {
       localization.num_inliers = 0;
       return fail(verdict.reason, std::move(verdict.message));
     }
+  }
+  CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(query, matched, best));
+  localization.probability = ProbabilityAmong(OddsOfPlace(evidence), odds_elsewhere);
+  if (localization.probability < options_.accept.min_probability) {
+    return fail(
+        NoFix::kImprobable,
+        fmt::format(
+            "an image from there would show {:.0f} landmarks in {} parts of the image; {} are recognized, "
+            "and {} parts show any: right with a probability of {:.2f}, {} is needed",
+            evidence.num_expected, evidence.num_cells_expected, evidence.num_matched,
+            evidence.num_cells_found, localization.probability, options_.accept.min_probability));
   }
   const auto refined = RefinePoseWithCovariance(MakeMeasurements(query, landmarks, best.found.matches),
                                                 best.found.cam_from_world, options_.refine);
@@ -436,7 +476,10 @@ std::optional<PoseEstimate> Localizer::SecondPose(const std::vector<PoseMeasurem
                                                   const PoseEstimate& first) const {
   const AcceptOptions& accept = options_.accept;
   if (accept.max_second_pose_ratio <= 0) return std::nullopt;
-  const double needed = accept.max_second_pose_ratio * static_cast<double>(first.inliers.size());
+  // What it leads to tells more than what it begins with.
+  const double needed =
+      std::max(0.5 * accept.max_second_pose_ratio * static_cast<double>(first.inliers.size()),
+               static_cast<double>(accept.min_num_unguided_inliers));
   if (static_cast<double>(measurements.size() - first.inliers.size()) < needed) return std::nullopt;
   EstimateOptions estimate_options = options_.estimate;
   estimate_options.max_num_ransac_iterations = accept.num_second_pose_iterations;

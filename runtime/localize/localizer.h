@@ -16,11 +16,12 @@
 
 namespace cairn {
 
-// runtime/localize/measurement.h and estimate.h:
+// runtime/localize/measurement.h, estimate.h and place_evidence.h:
 struct Query;
 struct Correspondence;
 struct PoseMeasurement;
 struct PoseEstimate;
+struct PlaceEvidence;
 
 // Finds where a camera is.  One per thread; the map is shared.  Not for concurrent calls.
 class Localizer {
@@ -68,6 +69,9 @@ class Localizer {
   // What a first pose, of these matches, leads to.
   Result<FollowedUp> FollowUp(const Query& query, const std::vector<Correspondence>& matches,
                               const PoseEstimate& first) const;
+  // What the image shows of what it should there.  `matched`: the landmarks that first poses come from.
+  Result<PlaceEvidence> EvidenceOf(const Query& query, const LandmarkSet& matched,
+                                   const FollowedUp& followed_up) const;
   // The fix of that of these first poses which leads to most, unless one at another place leads to nearly as
   // much.
   Result<Localization> Refine(const Query& query, const LandmarkSet& matched,

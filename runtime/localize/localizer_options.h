@@ -129,12 +129,10 @@ struct AcceptOptions {
   // (GuidedByChance), it must find more than c + min_guided_sigmas sqrt(c) at these (as many standard
   // deviations of a Poisson number).  0: not tested.  REQUIRES: >= 0
   double min_guided_sigmas = 5.5;
-  // Where fewer than sure_num_unguided_inliers matches led to the pose: what it finds of the landmarks in
-  // view must be likelier by this, a natural logarithm, if a right pose finds min_found_ratio of them at
-  // least than if it is by chance (FoundLogOdds).  A part of the image alone may look like another place:
-  // then most of what should be around it is missing.  min_found_ratio = 0: not tested.  REQUIRES: in [0, 1)
-  double min_found_ratio = 0.25;
-  double min_found_log_odds = 5;
+  // Least probability that the pose is right, by what near survey images see and by how much of it is found
+  // (place_evidence.h): a part of the image alone may look like another place, and then most of what should
+  // be around it is missing.  0: not tested.  REQUIRES: in [0, 1]
+  double min_probability = 0.5;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells.  REQUIRES: >= 1
   int spread_grid = 6;
@@ -145,8 +143,8 @@ struct AcceptOptions {
   double max_sigma_deg = 5;
   // Largest distance from the nearest survey image, m; 0: any.  REQUIRES: >= 0
   double max_distance_from_survey_m = 5;
-  // A second pose at another place that has this part of the first one's inliers is followed up too; if it
-  // leads to this part of what the better of them leads to, the fix is ambiguous.  0: not looked for.
+  // A second pose at another place that has half this part of the first one's inliers is followed up too; if
+  // it leads to this part of what the better of them leads to, the fix is ambiguous.  0: not looked for.
   // REQUIRES: in [0, 1]
   double max_second_pose_ratio = 0.6;
   // Samples that look for the second pose.  REQUIRES: >= 1

@@ -81,10 +81,6 @@ double GuidedRadius(const MapLandmark& landmark, const Eigen::Vector3d& point, c
                    options.guided_radius_sigmas * options.guided_radius_sigmas * largest);
 }
 
-bool IsInImage(const Eigen::Vector2d& pixel, const Camera& camera) {
-  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width && pixel.y() <= camera.height;
-}
-
 // A landmark where a pose puts it in the image, or beyond its edge.
 struct ProjectedLandmark {
   size_t k = 0;  // position in the set
@@ -289,14 +285,6 @@ double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Po
     sum += static_cast<double>(search.Match(aside).size());
   }
   return sum / 4;
-}
-
-int NumInView(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world) {
-  return static_cast<int>(
-      std::count_if(landmarks.landmarks.begin(), landmarks.landmarks.end(), [&](const MapLandmark& landmark) {
-        const auto pixel = ImageFromCamera(query.camera, cam_from_world * landmark.position);
-        return pixel && IsInImage(*pixel, query.camera);
-      }));
 }
 
 }  // namespace cairn

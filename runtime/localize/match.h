@@ -46,7 +46,4 @@ GuidedMatches MatchGuidedInRounds(const Query& query, const LandmarkSet& landmar
 double GuidedByChance(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world,
                       const MatchOptions& options);
 
-// How many of the landmarks a pose puts into the image, whatever stands before them.
-int NumInView(const Query& query, const LandmarkSet& landmarks, const Pose& cam_from_world);
-
 }  // namespace cairn

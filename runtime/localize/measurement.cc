@@ -37,6 +37,10 @@ OptionTable DescribeOptions(MeasurementOptions* o) {
            .min = 0}};
 }
 
+bool IsInImage(const Eigen::Vector2d& pixel, const Camera& camera) {
+  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width && pixel.y() <= camera.height;
+}
+
 Status CheckQueryCamera(const Camera& camera) {
   CAIRN_RETURN_IF_ERROR(CheckCamera(camera));
   if (camera.model != CameraModel::kEquirectangular) return Ok();

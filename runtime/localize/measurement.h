@@ -24,6 +24,9 @@ Status CheckQueryCamera(const Camera& camera);
 // were stated alike, the one with the same number.
 Camera AsFound(const MapHead& head, const Camera& camera);
 
+// Whether a pixel lies in the image, its edges among it.
+bool IsInImage(const Eigen::Vector2d& pixel, const Camera& camera);
+
 // A keypoint of the query as a ray: the rest of localization needs no camera model, to first order.
 struct QueryRay {
   Eigen::Vector2d ray = Eigen::Vector2d::Zero();  // x/z, y/z

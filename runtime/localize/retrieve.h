@@ -25,6 +25,16 @@ Result<std::vector<Candidate>> RetrieveByWords(const Map& map, const Query& quer
 Result<std::vector<Candidate>> RetrieveByPrior(const Map& map, const PosePrior& prior,
                                                const RetrieveOptions& options);
 
+// A survey image near a pose.
+struct NearView {
+  int32_t image = 0;            // index of the image in the map
+  double squared_distance = 0;  // (metres / radius_m)^2 + (degrees / radius_deg)^2
+};
+// The survey images nearest to a pose of the map's own frame, nearest first, at most so many.
+// REQUIRES: radius_m, radius_deg > 0, max_num >= 1
+Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
+                                           double radius_deg, int max_num);
+
 // Regions of the candidates' stations, those with the largest sum of scores first, at most max_num_regions.
 Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
                                                    const RetrieveOptions& options);

@@ -223,6 +223,7 @@ void BindLocalizer(py::module_& module) {
           "center", [](const Localization& self) { return VectorOf(self, self.cam_from_world.Center()); })
       .def_property_readonly("cam_from_world", [](const Localization& self) { return MatrixOf(self); })
       .def_property_readonly("covariance", [](const Localization& self) { return CovarianceOf(self); })
+      .def_readonly("probability", &Localization::probability)
       .def_readonly("region", &Localization::region)
       .def_property_readonly("scope", [](const Localization& self) { return ScopeName(self.scope); })
       .def_readonly("num_features", &Localization::num_features)
@@ -234,8 +235,8 @@ void BindLocalizer(py::module_& module) {
         if (!self.has_fix())
           return fmt::format("<cairn.Fix: none, {}: {}>", NoFixName(self.reason), self.message);
         const Eigen::Vector3d center = self.cam_from_world.Center();
-        return fmt::format("<cairn.Fix at ({:.3f}, {:.3f}, {:.3f}) m, {} inliers>", center.x(), center.y(),
-                           center.z(), self.num_inliers);
+        return fmt::format("<cairn.Fix at ({:.3f}, {:.3f}, {:.3f}) m, {} inliers, P(right) {:.2f}>",
+                           center.x(), center.y(), center.z(), self.num_inliers, self.probability);
       });
   py::class_<PyLocalizer>(module, "Localizer")
       .def(py::init<const PyMap&, const PyLog*, const py::kwargs&>(), py::arg("map"), py::kw_only(),

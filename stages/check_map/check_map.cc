@@ -119,13 +119,18 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
                      std::map<std::string, double>* figures) {
   std::vector<double> errors_m, errors_deg, nees;
   int within_5cm_5deg = 0, within_10cm_2deg = 0, within_10cm_5deg = 0, num_gross_errors = 0;
-  double sum_nees = 0;
+  double sum_nees = 0, sum_probability = 0;
+  int num_nearly_certain = 0, num_certain_gross_errors = 0;
   for (const HeldOutResult& image : images) {
     if (!image.has_fix()) continue;
     errors_m.push_back(image.error_m);
     errors_deg.push_back(image.error_deg);
     nees.push_back(image.nees);
     sum_nees += image.nees;
+    sum_probability += image.localization.probability;
+    const bool is_nearly_certain = image.localization.probability >= kNearlyCertain;
+    num_nearly_certain += is_nearly_certain ? 1 : 0;
+    num_certain_gross_errors += is_nearly_certain && IsGrossError(image, options) ? 1 : 0;
     within_5cm_5deg += image.error_m <= 0.05 && image.error_deg <= 5 ? 1 : 0;
     within_10cm_2deg += image.error_m <= 0.1 && image.error_deg <= 2 ? 1 : 0;
     within_10cm_5deg += image.error_m <= 0.1 && image.error_deg <= 5 ? 1 : 0;
@@ -144,6 +149,9 @@ void SummarizeErrors(const std::vector<HeldOutResult>& images, const CheckMapOpt
   f["num_gross_errors"] = num_gross_errors;
   if (errors_m.empty()) return;
   f["precision_ratio"] = 1 - num_gross_errors / num_fixes;
+  f["mean_probability"] = sum_probability / num_fixes;
+  f["num_nearly_certain"] = num_nearly_certain;
+  f["num_nearly_certain_gross_errors"] = num_certain_gross_errors;
   f["median_error_m"] = Quantile(errors_m, 0.5);
   f["median_error_deg"] = Quantile(errors_deg, 0.5);
   f["p90_error_m"] = Quantile(errors_m, 0.9);

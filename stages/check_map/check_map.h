@@ -97,6 +97,9 @@ struct MapTrial {
   std::vector<HeldOutImage> images;
 };
 
+// From this probability of being right on a fix counts as nearly certain.
+inline constexpr double kNearlyCertain = 0.99;
+
 // REQUIRES: a fix of an image with a true pose
 bool IsGrossError(const HeldOutResult& result, const CheckMapOptions& options);
 
@@ -106,7 +109,9 @@ struct CheckMapReport {
   // those that need a fix are left out where there is none.
   //   num_held_out, num_localized, localized_ratio, median_error_m, median_error_deg, p90_error_m,
   //   p90_error_deg, within_5cm_5deg_ratio, within_10cm_2deg_ratio, within_10cm_5deg_ratio, num_gross_errors,
-  //   precision_ratio, mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees
+  //   precision_ratio, mean_probability (of the fixes, beside precision_ratio), num_nearly_certain and
+  //   num_nearly_certain_gross_errors (fixes of kNearlyCertain or more, and those of them that are wrong),
+  //   mean_nees, median_nees, nees_low, nees_high (95 % band of the mean for 6 degrees
   //   of freedom); similarity_ and rig_: median and 90th percentile of what remains when a similarity between
   //   the frames of truth and map is fitted, and an offset between their cameras too (truth_fit.h)
   // and of a map whose retrieval finds kept images alone, beside the same map's with all

@@ -49,6 +49,7 @@ nlohmann::json ImagesJson(const CheckMapReport& report, const PrintedReport& pri
       image["num_matches"] = localization.num_matches;
       image["num_unguided_inliers"] = localization.num_unguided_inliers;
       image["num_inliers"] = localization.num_inliers;
+      image["probability"] = localization.probability;
       image["scope"] = ScopeName(localization.scope);
       if (with_times) {
         image["sift_ms"] = result.sift_ms;
@@ -175,6 +176,12 @@ std::string ReportText(const PrintedReport& report) {
       line("precision", fmt::format("{} % ({} wrong fixes)", Text(figure("precision_ratio"), 0.01, 1),
                                     Text(figure("num_gross_errors"), 1, 0)));
     }
+    if (!IsInAnotherFrame(held_out)) {
+      line("P(right)",
+           fmt::format("mean {} %; {} fixes of {:g} % or more, {} of them wrong",
+                       Text(figure("mean_probability"), 0.01, 1), Text(figure("num_nearly_certain"), 1, 0),
+                       100 * kNearlyCertain, Text(figure("num_nearly_certain_gross_errors"), 1, 0)));
+    }
     line("NEES", fmt::format("mean {}, median {} (95 % band of the mean {} to {})",
                              Text(figure("mean_nees"), 1, 2), Text(figure("median_nees"), 1, 2),
                              Text(figure("nees_low"), 1, 2), Text(figure("nees_high"), 1, 2)));
@@ -187,7 +194,14 @@ std::string ReportText(const PrintedReport& report) {
   if (report.held_out != nullptr) text += PlanText(*report.held_out);
   if (report.foreign != nullptr) {
     line("other places",
-         fmt::format("{} images, {} false fixes", report.foreign->images.size(), NumFixes(*report.foreign)));
+         fmt::format("{} images, {} false fixes ({} of P(right) {:g} % or more)",
+                     report.foreign->images.size(), NumFixes(*report.foreign),
+                     std::count_if(report.foreign->images.begin(), report.foreign->images.end(),
+                                   [](const HeldOutResult& image) {
+                                     return image.has_fix() &&
+                                            image.localization.probability >= kNearlyCertain;
+                                   }),
+                     100 * kNearlyCertain));
   }
   return text;
 }

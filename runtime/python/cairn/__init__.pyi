@@ -233,6 +233,9 @@ class Fix:
     def covariance(self) -> NDArray[np.float64] | None:
         """Rotation (rad), translation (m), of the left perturbation of cam_from_world: (6, 6)"""
     @property
+    def probability(self) -> float:
+        """P(the fix is right), by how much of what an image from there should show is found, and by what other places explain; without a fix 0, but for "improbable""""
+    @property
     def region(self) -> int:
         """The one with most inliers; -1: none"""
     @property

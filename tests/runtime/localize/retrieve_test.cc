@@ -1,5 +1,10 @@
 #include "runtime/localize/retrieve.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,6 +56,48 @@ TEST(Retrieve, LandmarksOfRegionsAndImagesAreUnions) {
   EXPECT_THAT(*LandmarksOfRegions(*map, {1, 0}), ElementsAre(0, 1, 2));
   EXPECT_THAT(*LandmarksOfImages(*map, {0, 2}), ElementsAre(0, 1, 2));
   EXPECT_THAT(*LandmarksOfImages(*map, {2}), ElementsAre(2));
+}
+
+TEST(Retrieve, NearestViewsAreNearByPlaceAndAngle) {
+  const auto map = SmallMap();
+  const auto images = [](const std::vector<NearView>& views) {
+    std::vector<int32_t> indices;
+    for (const NearView& view : views) indices.push_back(view.image);
+    return indices;
+  };
+  // Cameras at x = 0, 1, 2, all of heading 90 degrees.
+  const auto views = *NearestViews(*map, PoseAt({0.9, 0, 0}, 105), 0.5, 15, 2);
+  EXPECT_THAT(images(views), ElementsAre(1, 0));
+  EXPECT_NEAR(views[0].squared_distance, 0.2 * 0.2 + 1, 1e-9);  // (0.1 / 0.5)^2 + (15 / 15)^2
+  EXPECT_NEAR(views[1].squared_distance, 1.8 * 1.8 + 1, 1e-9);
+  EXPECT_THAT(images(*NearestViews(*map, PoseAt({3, 0, 0}, 90), 1, 15, 1)), ElementsAre(2));
+  EXPECT_THAT(images(*NearestViews(*map, PoseAt({0.5, 0, 0}, 90), 1, 15, 9)),
+              ElementsAre(0, 1, 2));  // as far
+}
+
+// Each image a block of its own, or nearly: those that cannot be among the nearest are not read.
+TEST(Retrieve, NearestViewsAreThoseOfAllImages) {
+  const SyntheticRoom room = MakeSyntheticRoom(7);
+  const auto map = *Map::FromRows(room.rows);
+  Random random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Pose pose =
+        PoseAt({random.Uniform(-6, 6), random.Uniform(-5, 5), random.Uniform(0, 3)}, random.Uniform(0, 360));
+    std::vector<std::pair<double, int32_t>> all;
+    for (int32_t i = 0; i < map->num_images(); ++i) {
+      const Pose survey = (*map->Image(i))->cam_from_world;
+      all.emplace_back(
+          std::pow(CenterErrorM(survey, pose) / 0.4, 2) + std::pow(RotationErrorDeg(survey, pose) / 15, 2),
+          i);
+    }
+    std::sort(all.begin(), all.end());
+    const auto views = *NearestViews(*map, pose, 0.4, 15, 8);
+    ASSERT_EQ(views.size(), size_t{8});
+    for (size_t k = 0; k < views.size(); ++k) {
+      EXPECT_EQ(views[k].image, all[k].second) << trial;
+      EXPECT_EQ(views[k].squared_distance, all[k].first);
+    }
+  }
 }
 
 TEST(Retrieve, PriorChoosesImagesByPlaceAndAngle) {

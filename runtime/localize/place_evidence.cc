@@ -1,0 +1,82 @@
+#include "runtime/localize/place_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/base/quantiles.h"
+#include "core/blocks/map_blocks.h"
+#include "core/blocks/map_rows.h"
+#include "runtime/localize/retrieve.h"
+
+namespace cairn {
+namespace {
+
+// Two images are about one view where they differ by less than this part of the depth of what they see, or
+// by this angle (ViewOptions of core/promise/view_distance.h).
+constexpr double kSameViewRatio = 0.1;
+constexpr double kSameViewDeg = 15;
+constexpr int kNumNearViews = 8;
+
+int CellOf(const Eigen::Vector2d& pixel, const Camera& camera, int num_cells) {
+  const auto cell = [&](double coordinate, int size) {
+    return std::clamp(static_cast<int>(coordinate * num_cells / size), 0, num_cells - 1);
+  };
+  return cell(pixel.y(), camera.height) * num_cells + cell(pixel.x(), camera.width);
+}
+
+}  // namespace
+
+Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const Pose& cam_from_world,
+                                      const LandmarkSet& landmarks, const std::vector<Correspondence>& found,
+                                      int num_matched, int num_cells) {
+  PlaceEvidence evidence{.num_matched = num_matched};
+  if (found.empty()) return evidence;
+  std::vector<double> depths;
+  std::vector<LandmarkIdx> found_idx;
+  for (const Correspondence& match : found) {
+    depths.push_back(DepthOfScale(query.camera, cam_from_world * landmarks.Find(match.landmark).position));
+    found_idx.push_back(match.landmark);
+  }
+  std::sort(found_idx.begin(), found_idx.end());
+  const double radius_m = kSameViewRatio * UpperMedian(std::move(depths));
+  CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
+                         NearestViews(map, cam_from_world, radius_m, kSameViewDeg, kNumNearViews));
+  std::map<LandmarkIdx, double> seen;  // sum of the weights of the images that see it
+  double sum = 0;
+  for (const NearView& view : near) {
+    const double weight = 1 / (1 + view.squared_distance);
+    sum += weight;
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(view.image));
+    for (const LandmarkIdx landmark : image->landmarks) seen[landmark] += weight;
+  }
+  std::vector<LandmarkIdx> idx;
+  for (const auto& [landmark, weight] : seen) idx.push_back(landmark);
+  CAIRN_ASSIGN_OR_RETURN(const auto expected, map.Gather(std::move(idx), false));
+  std::set<int> cells_expected, cells_found;
+  for (size_t k = 0; k < expected->idx.size(); ++k) {
+    const auto pixel = ImageFromCamera(query.camera, cam_from_world * expected->landmarks[k].position);
+    if (!pixel || !IsInImage(*pixel, query.camera)) continue;
+    evidence.num_expected += seen.at(expected->idx[k]) / sum;
+    const int cell = CellOf(*pixel, query.camera, num_cells);
+    cells_expected.insert(cell);
+    if (std::binary_search(found_idx.begin(), found_idx.end(), expected->idx[k])) cells_found.insert(cell);
+  }
+  evidence.num_cells_expected = static_cast<int>(cells_expected.size());
+  evidence.num_cells_found = static_cast<int>(cells_found.size());
+  return evidence;
+}
+
+double OddsOfPlace(const PlaceEvidence& evidence) {
+  const double found_ratio =
+      std::max(0.5, static_cast<double>(evidence.num_matched)) / std::max(0.5, evidence.num_expected);
+  const double cells_ratio =
+      static_cast<double>(evidence.num_cells_found) / std::max(1, evidence.num_cells_expected);
+  return std::exp(2.6 + 3.4 * std::log(found_ratio) + 8.0 * cells_ratio);
+}
+
+double ProbabilityAmong(double odds, double odds_of_others) { return odds / (1 + odds + odds_of_others); }
+
+}  // namespace cairn
