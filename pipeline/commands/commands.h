@@ -38,6 +38,8 @@ Command ExportCommand();
 // cairn localize MAP IMAGE... [--list FILE] [-o poses.txt] [--camera MODEL,W,H,P... | --cameras FILE]
 // JSON lines on stdout, in the order of the images; IMAGE "-" reads names from stdin, answering one by one.
 Command LocalizeCommand();
+// cairn where MAP IMAGE... [--odometry FILE] [--json]: which places a sequence of images may be of
+Command WhereCommand();
 // cairn plan locate VIEWS SCAN [--scan N] [--svg FILE]
 Command LocateScanCommand();
 // cairn plan path VIEWS --from X,Y [--to X,Y] [--kind short|min-link|search] [--svg FILE]

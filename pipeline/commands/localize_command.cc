@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,13 +12,11 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/base/parallel.h"
-#include "core/base/text.h"
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
-#include "core/colmap/cameras_text.h"
 #include "core/colmap/image_list.h"
-#include "core/files/file.h"
 #include "pipeline/commands/odometry.h"
+#include "pipeline/commands/query_images.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/localize/measurement.h"
@@ -62,50 +58,8 @@ struct Answer {
   std::optional<Query> query;                // where frames are logged
 };
 
-// The camera to use for an image size: given on the command line, else the map's.
-class CameraChoice {
- public:
-  static Result<CameraChoice> Make(const LocalizeArguments& arguments, std::shared_ptr<const Map> map) {
-    CameraChoice choice;
-    choice.map_ = std::move(map);
-    if (!arguments.camera.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(choice.camera_, ParseCamera(arguments.camera));
-    }
-    if (!arguments.cameras_path.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(choice.cameras_, ReadCamerasText(arguments.cameras_path));
-    }
-    return choice;
-  }
-
-  Result<Camera> ForImage(int width, int height) const {
-    if (camera_) return *camera_;
-    if (cameras_.empty()) return map_->CameraForSize(width, height);
-    const Camera* found = nullptr;
-    for (const auto& [camera_id, camera] : cameras_) {
-      if (camera.width != width || camera.height != height) continue;
-      if (found != nullptr) {
-        return MakeError(ErrorCode::kInvalidArgument,
-                         "cameras {} and {} of --cameras both take {} x {} px; use --camera",
-                         found->camera_id, camera_id, width, height);
-      }
-      found = &camera;
-    }
-    if (found != nullptr) return *found;
-    return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
-  }
-
- private:
-  std::shared_ptr<const Map> map_;
-  std::optional<Camera> camera_;
-  std::map<CameraId, Camera> cameras_;
-};
-
 // Refuses options that only another estimator, a sequence or odometry reads.
 Status CheckWhatIsRead(const LocalizeArguments& arguments) {
-  if (!arguments.camera.empty() && !arguments.cameras_path.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--camera is the camera of all images, --cameras has one for each size; leave one out");
-  }
   VoteOptions of_vote;
   RegionTrackerOptions of_tracker;
   VisualMapOptions of_map;
@@ -196,7 +150,10 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
   Answer answer{.image = image};
   const auto locate = [&]() -> Result<TrackedVisualPose> {
     if (trackers->odometry) {  // it drove, whether or not this image can be read
-      CAIRN_RETURN_IF_ERROR(trackers->odometry->MoveToNext(image, &*trackers->on_floor));
+      CAIRN_RETURN_IF_ERROR(
+          trackers->odometry->MoveToNext(image, [&](const Eigen::Vector2d& way_m, double turn_left_rad) {
+            return trackers->on_floor->Move(way_m, turn_left_rad);
+          }));
     }
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
@@ -306,48 +263,6 @@ nlohmann::ordered_json AnswerJson(const Answer& answer, const LocalizeArguments&
   return json;
 }
 
-// Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
-class ImageNames {
- public:
-  static Result<ImageNames> Make(const LocalizeArguments& arguments) {
-    ImageNames names;
-    names.names_ = arguments.images;
-    if (!arguments.list_path.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(const std::string list, ReadFile(arguments.list_path));
-      for (const std::string_view line : SplitLines(list)) {
-        if (!line.empty()) names.names_.emplace_back(line);
-      }
-    }
-    if (names.names_.empty()) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "no image: name images, use --list FILE, or '-' for stdin");
-    }
-    return names;
-  }
-
-  // Up to `count` names; only one at a time from stdin, so that it is answered before the next is read.
-  std::vector<std::string> Next(size_t count) {
-    std::vector<std::string> batch;
-    while (batch.size() < count && position_ < names_.size()) {
-      if (names_[position_] == "-") {
-        if (!batch.empty()) return batch;
-        std::string line;
-        while (std::getline(std::cin, line) && line.empty()) {
-        }
-        if (!line.empty()) return {line};
-        ++position_;
-      } else {
-        batch.push_back(names_[position_++]);
-      }
-    }
-    return batch;
-  }
-
- private:
-  std::vector<std::string> names_;
-  size_t position_ = 0;
-};
-
 // The log, where one is written.
 Result<std::optional<RobotLog>> OpenLog(const LocalizeArguments& arguments, const Map& map) {
   std::optional<RobotLog> log;
@@ -383,8 +298,9 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   if (arguments.estimator != "pnp") {
     CAIRN_ASSIGN_OR_RETURN(visual, VisualMap::Open(map, arguments.visual_options));
   }
-  CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras, CameraChoice::Make(arguments, map));
-  CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments));
+  CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras,
+                         CameraChoice::Make(arguments.camera, arguments.cameras_path, map));
+  CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments.images, arguments.list_path));
 
   std::vector<CaptureImage> poses;
   std::optional<Error> first_error;

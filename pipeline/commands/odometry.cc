@@ -33,14 +33,15 @@ Result<Odometry> Odometry::Read(const std::string& path) {
   return odometry;
 }
 
-Status Odometry::MoveToNext(const std::string& image, VisualTracker* tracker) {
+Status Odometry::MoveToNext(const std::string& image,
+                            const std::function<Status(const Eigen::Vector2d&, double)>& move) {
   if (num_read_ == steps_.size()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: it has lines for {} images, and none for image {}, '{}'; each needs one", path_,
                      steps_.size(), steps_.size() + 1, image);
   }
   const Step& step = steps_[num_read_++];
-  return num_read_ == 1 ? Ok() : tracker->Move(step.way_m, step.turn_left_rad);
+  return num_read_ == 1 ? Ok() : move(step.way_m, step.turn_left_rad);
 }
 
 Status Odometry::CheckAllRead() const {

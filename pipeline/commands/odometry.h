@@ -1,12 +1,12 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "core/base/error.h"
-#include "runtime/visual_map/visual_tracker.h"
 
 namespace cairn::pipeline {
 
@@ -18,8 +18,10 @@ class Odometry {
   // Errors: Io, NotFound; Corrupt, naming the line, where one has not three finite numbers.
   static Result<Odometry> Read(const std::string& path);
 
-  // The next line moves the robot.  Errors: InvalidArgument where there is no line left for the image.
-  Status MoveToNext(const std::string& image, VisualTracker* tracker);
+  // The next line moves the robot: metres ahead and to the left, radians to the left.  Errors:
+  // InvalidArgument where there is no line left for the image, and those of `move`.
+  Status MoveToNext(const std::string& image,
+                    const std::function<Status(const Eigen::Vector2d&, double)>& move);
   // Errors: InvalidArgument where there are more lines than there were images.
   Status CheckAllRead() const;
 

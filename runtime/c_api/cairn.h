@@ -193,7 +193,8 @@ typedef struct cairn_fix {
   int32_t scope;                    /* CAIRN_SCOPE_ALL, ...: which landmarks it was matched with */
   int32_t reserved;                 /* 0 */
   /* P(the fix is right), by how much of what an image from there should show is found, and by what other
-   * places explain.  Without a fix 0, but for CAIRN_IMPROBABLE. */
+   * places explain.  Without a fix 0, but for CAIRN_IMPROBABLE, and for CAIRN_AMBIGUOUS: that one of several
+   * poses is right. */
   double probability;
 } cairn_fix;
 #define CAIRN_FIX_INIT \

@@ -57,10 +57,14 @@ struct Localization {
   // not average out, and no difference of near fixes shows it.  Zero where poses were stated, or no metres.
   Eigen::Vector3d scale_sigma_m = Eigen::Vector3d::Zero();
   // P(the fix is right): by how much of what an image from there should show is found, and by what other
-  // places explain (place_evidence.h).  Without a fix: 0, but for kImprobable.
+  // places explain (place_evidence.h).  Without a fix: 0, but for kImprobable, and for kAmbiguous, that one
+  // of the possible poses is right.
   double probability = 0;
   RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
   Scope scope = Scope::kAll;
+
+  // With kAmbiguous: the poses that explain it alike, the best first; as cam_from_world.
+  std::vector<Pose> possible_poses;
 
   int num_features = 0;
   int num_matches = 0;              // without knowing the pose

@@ -91,7 +91,8 @@ Localization Better(Localization first, Localization second, const AcceptOptions
     return first;
   }
   first.reason = NoFix::kAmbiguous;
-  first.probability = 0;
+  first.probability = ProbabilityAmong(OddsOf(first.probability) + OddsOf(second.probability), 0);
+  first.possible_poses = {first.cam_from_world, second.cam_from_world};
   first.message = fmt::format("{} and {} matches agree on poses at different places",
                               first.num_unguided_inliers, second.num_unguided_inliers);
   return first;
@@ -231,8 +232,9 @@ Result<Localization> Localizer::Answer(const Query& query, const std::optional<P
     CAIRN_ASSIGN_OR_RETURN(localization, ExcludeLookAlikes(query, prior, std::move(localization)));
   }
   localization.num_features = static_cast<int>(query.features.keypoints.size());
+  const Pose given_from_camera = map_->head().camera_from_given.Inverse();
+  for (Pose& pose : localization.possible_poses) pose = given_from_camera * pose;
   if (localization.has_fix()) {
-    const Pose given_from_camera = map_->head().camera_from_given.Inverse();
     localization.cam_from_world = given_from_camera * localization.cam_from_world;
     localization.covariance = TransformCovariance(given_from_camera, localization.covariance);
     // The camera's place C is scale_centre + (1 + e) (C - scale_centre), and its translation is -R C.
@@ -397,7 +399,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   const auto fail = [&](NoFix reason, std::string message) {
     localization.reason = reason;
     localization.message = std::move(message);
-    if (reason != NoFix::kImprobable) localization.probability = 0;
+    if (reason != NoFix::kImprobable && reason != NoFix::kAmbiguous) localization.probability = 0;
     return localization;
   };
   std::vector<FollowedUp> followed_up;
@@ -418,6 +420,10 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
         !AreFarApart(other.found.cam_from_world, best.found.cam_from_world, options_.accept))
       continue;
     if (static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
+      localization.possible_poses = {best.found.cam_from_world, other.found.cam_from_world};
+      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(query, matched, best));
+      CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(query, matched, other));
+      localization.probability = ProbabilityAmong(OddsOfPlace(here) + OddsOfPlace(there), 0);
       return fail(NoFix::kAmbiguous, fmt::format("{} and {} matches agree on poses at different places",
                                                  best.found.matches.size(), other.found.matches.size()));
     }

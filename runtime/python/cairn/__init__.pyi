@@ -234,7 +234,7 @@ class Fix:
         """Rotation (rad), translation (m), of the left perturbation of cam_from_world: (6, 6)"""
     @property
     def probability(self) -> float:
-        """P(the fix is right), by how much of what an image from there should show is found, and by what other places explain; without a fix 0, but for "improbable""""
+        """P(the fix is right), by how much of what an image from there should show is found, and by what other places explain; without a fix 0, but for "improbable", and for "ambiguous": that one of several poses is right"""
     @property
     def region(self) -> int:
         """The one with most inliers; -1: none"""
@@ -261,7 +261,7 @@ class FloorFix:
     def __bool__(self) -> bool: ...
     @property
     def reason(self) -> str:
-        """"none" for a fix, else "too_few_matches", "one_spot", "disagree", "outside""""
+        """"none" for a fix, else "too_few_matches", "one_spot", "disagree" or "outside" (the map)"""
     @property
     def message(self) -> str: ...
     @property

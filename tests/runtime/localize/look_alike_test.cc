@@ -52,7 +52,13 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
   const auto localize = [&](const std::optional<PosePrior>& prior) {
     return *Localizer(*Map::FromRows(rows), options).LocalizeFeatures(features, Room().camera, prior);
   };
-  EXPECT_EQ(localize(std::nullopt).reason, NoFix::kAmbiguous);
+  const Localization withheld = localize(std::nullopt);
+  EXPECT_EQ(withheld.reason, NoFix::kAmbiguous);
+  ASSERT_EQ(withheld.possible_poses.size(), size_t{2});  // in the room and in its twin
+  EXPECT_LT(std::min(CenterErrorM(withheld.possible_poses[0], truth),
+                     CenterErrorM(withheld.possible_poses[1], truth)),
+            0.1);
+  EXPECT_NEAR(CenterErrorM(withheld.possible_poses[0], withheld.possible_poses[1]), 30, 0.2);
   const Localization with_prior = localize(PosePrior{truth, 1, 10});
   ASSERT_TRUE(with_prior.has_fix()) << with_prior.message;
   EXPECT_LT(CenterErrorM(with_prior.cam_from_world, truth), 0.1);

@@ -1,0 +1,78 @@
+#include "pipeline/commands/query_images.h"
+
+#include <iostream>
+#include <utility>
+
+#include "core/base/text.h"
+#include "core/colmap/cameras_text.h"
+#include "core/files/file.h"
+
+namespace cairn::pipeline {
+
+Result<CameraChoice> CameraChoice::Make(const std::string& camera, const std::string& cameras_path,
+                                        std::shared_ptr<const Map> map) {
+  if (!camera.empty() && !cameras_path.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--camera is the camera of all images, --cameras has one for each size; leave one out");
+  }
+  CameraChoice choice;
+  choice.map_ = std::move(map);
+  if (!camera.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(choice.camera_, ParseCamera(camera));
+  }
+  if (!cameras_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(choice.cameras_, ReadCamerasText(cameras_path));
+  }
+  return choice;
+}
+
+Result<Camera> CameraChoice::ForImage(int width, int height) const {
+  if (camera_) return *camera_;
+  if (cameras_.empty()) return map_->CameraForSize(width, height);
+  const Camera* found = nullptr;
+  for (const auto& [camera_id, camera] : cameras_) {
+    if (camera.width != width || camera.height != height) continue;
+    if (found != nullptr) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "cameras {} and {} of --cameras both take {} x {} px; use --camera", found->camera_id,
+                       camera_id, width, height);
+    }
+    found = &camera;
+  }
+  if (found != nullptr) return *found;
+  return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
+}
+
+Result<ImageNames> ImageNames::Make(std::vector<std::string> names, const std::string& list_path) {
+  ImageNames all;
+  all.names_ = std::move(names);
+  if (!list_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(const std::string list, ReadFile(list_path));
+    for (const std::string_view line : SplitLines(list)) {
+      if (!line.empty()) all.names_.emplace_back(line);
+    }
+  }
+  if (all.names_.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "no image: name images, use --list FILE, or '-' for stdin");
+  }
+  return all;
+}
+
+std::vector<std::string> ImageNames::Next(size_t count) {
+  std::vector<std::string> batch;
+  while (batch.size() < count && position_ < names_.size()) {
+    if (names_[position_] == "-") {
+      if (!batch.empty()) return batch;
+      std::string line;
+      while (std::getline(std::cin, line) && line.empty()) {
+      }
+      if (!line.empty()) return {line};
+      ++position_;
+    } else {
+      batch.push_back(names_[position_++]);
+    }
+  }
+  return batch;
+}
+
+}  // namespace cairn::pipeline

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/ids.h"
+#include "core/camera/camera.h"
+#include "runtime/map/map.h"
+
+namespace cairn::pipeline {
+
+// The camera to use for an image size: given on the command line, else the map's.
+class CameraChoice {
+ public:
+  // `camera`: as --camera has it, of all images; `cameras_path`: as --cameras, chosen by size; empty: not
+  // given. Errors: InvalidArgument (both, or no camera), and those of ReadCamerasText.
+  static Result<CameraChoice> Make(const std::string& camera, const std::string& cameras_path,
+                                   std::shared_ptr<const Map> map);
+
+  // Errors: InvalidArgument, NotFound: several cameras or none take such images.
+  Result<Camera> ForImage(int width, int height) const;
+
+ private:
+  std::shared_ptr<const Map> map_;
+  std::optional<Camera> camera_;
+  std::map<CameraId, Camera> cameras_;
+};
+
+// Names one by one from the arguments, then the list file; "-" stands for the lines of stdin.
+class ImageNames {
+ public:
+  // Errors: InvalidArgument without any, and those of ReadFile.
+  static Result<ImageNames> Make(std::vector<std::string> names, const std::string& list_path);
+
+  // Up to `count` names; only one at a time from stdin, so that it is answered before the next is read.
+  std::vector<std::string> Next(size_t count);
+
+ private:
+  std::vector<std::string> names_;
+  size_t position_ = 0;
+};
+
+}  // namespace cairn::pipeline

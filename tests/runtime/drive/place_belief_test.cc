@@ -1,0 +1,250 @@
+#include "runtime/drive/place_belief.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/localize/localization.h"
+#include "runtime/localize/measurement.h"
+#include "runtime/map/map.h"
+#include "tests/runtime/localize/synthetic_room.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr int kNumImages = 12;
+
+// A corridor: images 1 m apart that look along it (+x), each seeing ten landmarks 4 to 6 m ahead, half of
+// which the next one sees too.  A view's radius is a tenth of 5 m.
+MapRows Corridor() {
+  MapRows rows;
+  rows.name = "corridor";
+  Camera camera;
+  camera.width = camera.height = 100;
+  camera.params = {100, 50, 50};
+  rows.cameras = {camera};
+  for (int i = 0; i < kNumImages; ++i) {
+    MapImage image{.image_id = static_cast<ImageId>(i + 1),
+                   .name = fmt::format("{:02}.jpg", i),
+                   .camera_id = 1,
+                   .cam_from_world = PoseAt({static_cast<double>(i), 0, 1}, 0)};
+    for (int k = 0; k < 10; ++k) image.landmarks.push_back(5 * i + k);
+    rows.images.push_back(std::move(image));
+  }
+  for (int k = 0; k < 5 * (kNumImages + 1); ++k)
+    rows.landmarks.push_back({.position = {k / 5 + 4.5, 0.1 * (k % 5), 1}});
+  rows.descriptors = DescriptorMatrix::Zero(5 * (kNumImages + 1), kDescriptorDim);
+  return rows;
+}
+
+Localization FixAt(double x_m, double probability = 0.999) {
+  Localization found;
+  found.reason = NoFix::kNone;
+  found.cam_from_world = PoseAt({x_m, 0, 1}, 0);
+  found.probability = probability;
+  return found;
+}
+
+Localization NoFixBy(NoFix reason) {
+  Localization found;
+  found.reason = reason;
+  return found;
+}
+
+Localization Ambiguous(double x_m, double other_x_m) {
+  Localization found = NoFixBy(NoFix::kAmbiguous);
+  found.probability = 0.999;
+  found.possible_poses = {PoseAt({x_m, 0, 1}, 0), PoseAt({other_x_m, 0, 1}, 0)};
+  return found;
+}
+
+PlaceBelief Make(const MapRows& rows = Corridor(), const PlaceBeliefOptions& options = {}) {
+  return *PlaceBelief::Make(*Map::FromRows(rows), options);
+}
+
+double Sum(const PlaceBelief& belief) {
+  return std::accumulate(belief.probabilities().begin(), belief.probabilities().end(), belief.elsewhere());
+}
+
+void See(PlaceBelief* belief, const Localization& found) {
+  const Status status = belief->See(Query(), found);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+  EXPECT_NEAR(Sum(*belief), 1, 1e-9);
+}
+
+PlaceHypothesis Leader(const PlaceBelief& belief) { return belief.Hypotheses(1)->front(); }
+
+TEST(PlaceBelief, StartsAnywhere) {
+  const PlaceBelief belief = Make();
+  EXPECT_DOUBLE_EQ(belief.elsewhere(), 0.5);
+  for (const double probability : belief.probabilities()) EXPECT_DOUBLE_EQ(probability, 0.5 / kNumImages);
+}
+
+TEST(PlaceBelief, ImagesOfTheSameLandmarksAreNeighbours) {
+  const PlaceBelief belief = Make();
+  EXPECT_THAT(belief.Neighbours(0), ElementsAre(1));
+  EXPECT_THAT(belief.Neighbours(4), ElementsAre(3, 5));
+  // Two of ten are not enough, a tenth of thirty is.
+  MapRows rows = Corridor();
+  rows.images[0].landmarks = {0, 1, 2, 3, 4, 10, 11};
+  EXPECT_THAT(Make(rows).Neighbours(0), testing::IsEmpty());
+  rows.images[0].landmarks = {0, 1, 2, 3, 10, 11, 12};
+  EXPECT_THAT(Make(rows).Neighbours(0), ElementsAre(1, 2));
+}
+
+TEST(PlaceBelief, NoSingleImageMakesAPlaceCertain) {
+  PlaceBelief belief = Make();
+  See(&belief, FixAt(5));
+  EXPECT_EQ(Leader(belief).image, 5);
+  EXPECT_EQ(Leader(belief).image_id, 6u);
+  EXPECT_EQ(Leader(belief).name, "05.jpg");
+  EXPECT_GT(Leader(belief).probability, 0.95);
+  EXPECT_LT(Leader(belief).probability, 0.995);
+  See(&belief, FixAt(6));
+  EXPECT_EQ(Leader(belief).image, 6);
+  EXPECT_LT(belief.elsewhere(), 1e-3);
+  EXPECT_GT(Leader(belief).probability, 0.99);
+}
+
+TEST(PlaceBelief, ARobotThatStandsStillLearnsLittleMore) {
+  PlaceBelief still = Make(), moving = Make();
+  const Localization weak = FixAt(5, 0.6);
+  See(&still, weak);
+  See(&moving, weak);
+  EXPECT_EQ(still.elsewhere(), moving.elsewhere());
+  See(&still, weak);
+  See(&moving, FixAt(5.6, 0.6));
+  EXPECT_GT(still.elsewhere(), 3 * moving.elsewhere());
+}
+
+TEST(PlaceBelief, AFixCountsByTheOddsThatItIsRight) {
+  PlaceBelief likely = Make(), unlikely = Make(), certain = Make(), more_certain = Make();
+  See(&likely, FixAt(5, 0.9));
+  See(&unlikely, FixAt(5, 0.6));
+  EXPECT_GT(Leader(likely).probability, Leader(unlikely).probability);
+  EXPECT_LT(likely.elsewhere(), unlikely.elsewhere());
+  // But no more than max_fix_odds.
+  See(&certain, FixAt(5, 0.9999));
+  See(&more_certain, FixAt(5, 1));
+  EXPECT_EQ(certain.probabilities(), more_certain.probabilities());
+}
+
+TEST(PlaceBelief, ImagesWithoutAFixAreOfAnotherPlace) {
+  PlaceBelief belief = Make();
+  See(&belief, NoFixBy(NoFix::kTooFewMatches));
+  EXPECT_GT(belief.elsewhere(), 0.8);
+  const double before = belief.elsewhere();
+  See(&belief, NoFixBy(NoFix::kNoPose));
+  EXPECT_GT(belief.elsewhere(), before);
+  // One without features shows nothing of any place: only that time has passed.
+  PlaceBelief dark = Make();
+  See(&dark, NoFixBy(NoFix::kTooFewFeatures));
+  EXPECT_DOUBLE_EQ(dark.elsewhere(), 0.5);
+  EXPECT_DOUBLE_EQ(dark.probabilities()[3], 0.5 / kNumImages);
+}
+
+TEST(PlaceBelief, OfTwoPlacesThatExplainAnImageBothArePossible) {
+  PlaceBelief belief = Make();
+  See(&belief, Ambiguous(2, 8));
+  const auto places = *belief.Hypotheses(3);
+  ASSERT_EQ(places.size(), size_t{3});
+  EXPECT_NEAR(places[0].probability, places[1].probability, 0.02);
+  EXPECT_THAT((std::vector<int32_t>{places[0].image, places[1].image}), testing::UnorderedElementsAre(2, 8));
+  EXPECT_LT(belief.elsewhere(), 0.05);
+  // Until one is seen that only one of them leads to.
+  See(&belief, FixAt(9));
+  EXPECT_EQ(Leader(belief).image, 9);
+  EXPECT_GT(Leader(belief).probability, 0.98);
+}
+
+TEST(PlaceBelief, WithoutOdometryItReachesWhatImagesShareLandmarksWith) {
+  PlaceBelief belief = Make(Corridor(), {.leave_ratio = 1e-6, .kidnapped_ratio = 1e-6});
+  See(&belief, FixAt(5));
+  See(&belief, FixAt(5.5));
+  See(&belief, NoFixBy(NoFix::kTooFewFeatures));
+  // Two links from there, and the fix was between 5 and 6.
+  EXPECT_GT(belief.probabilities()[4], 0.02);
+  EXPECT_GT(belief.probabilities()[7], 0.02);
+  EXPECT_GT(belief.probabilities()[7], 100 * belief.probabilities()[10]);
+}
+
+TEST(PlaceBelief, OdometryMovesEveryHypothesis) {
+  PlaceBelief belief = Make();
+  See(&belief, Ambiguous(2, 7));
+  ASSERT_TRUE(belief.Move({3, 0}, 0).ok());
+  See(&belief, NoFixBy(NoFix::kTooFewFeatures));
+  const auto& at = belief.probabilities();
+  EXPECT_GT(at[5], 0.25);
+  EXPECT_GT(at[10], 0.25);
+  EXPECT_LT(at[2], 0.05);
+  EXPECT_LT(at[7], 0.05);
+}
+
+TEST(PlaceBelief, ToTheLeftIsToTheLeftOfWhereTheCameraLooks) {
+  MapRows rows = Corridor();
+  // The last two look along +y: 0.5 and 3.5 m to the left of the first.
+  for (const auto& [image, y] : {std::pair(10, 0.5), std::pair(11, 3.5)})
+    rows.images[image].cam_from_world = PoseAt({0, y, 1}, 90);
+  PlaceBelief belief = Make(rows);
+  See(&belief, FixAt(0));
+  ASSERT_TRUE(belief.Move({0, 3.5}, RadFromDeg(90)).ok());
+  See(&belief, NoFixBy(NoFix::kTooFewFeatures));
+  EXPECT_GT(belief.probabilities()[11], 0.5);
+  EXPECT_GT(belief.probabilities()[11], 10 * belief.probabilities()[10]);
+}
+
+TEST(PlaceBelief, ACarriedRobotIsFoundAgain) {
+  PlaceBelief belief = Make();
+  for (const double x : {1.0, 2.0, 3.0}) See(&belief, FixAt(x));
+  EXPECT_GT(Leader(belief).probability, 0.99);
+  See(&belief, FixAt(10));
+  EXPECT_LT(Leader(belief).probability, 0.97);
+  See(&belief, FixAt(10.9));
+  EXPECT_EQ(Leader(belief).image, 11);
+  EXPECT_GT(Leader(belief).probability, 0.97);
+}
+
+TEST(PlaceBelief, HypothesesShareNoImage) {
+  PlaceBelief belief = Make();
+  See(&belief, FixAt(5));
+  const auto places = *belief.Hypotheses(100);
+  double sum = 0;
+  for (const PlaceHypothesis& place : places) sum += place.probability;
+  EXPECT_NEAR(sum + belief.elsewhere(), 1, 1e-9);
+  for (size_t i = 1; i < places.size(); ++i) EXPECT_GE(places[i - 1].probability, places[i].probability);
+}
+
+TEST(PlaceBelief, WhatTellsIsTheNearestImageWithoutALookAlike) {
+  MapRows rows = Corridor();
+  EXPECT_EQ(*Make(rows).NextTellingImage(2), -1);  // the map does not know
+  for (int32_t i = 0; i < kNumImages; ++i)
+    rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.5});
+  for (int32_t i = 0; i < 5; ++i) rows.appearance[i].look_alikes = {{i + 6, 0.9}};  // 0 to 4 and 6 to 10
+  EXPECT_EQ(*Make(rows).NextTellingImage(2), 5);
+  EXPECT_EQ(*Make(rows).NextTellingImage(10), 11);
+  EXPECT_EQ(*Make(rows).NextTellingImage(5), 5);
+}
+
+TEST(PlaceBelief, RefusesWhatItCannotUse) {
+  PlaceBelief belief = Make();
+  EXPECT_EQ(belief.Move({std::numeric_limits<double>::quiet_NaN(), 0}, 0).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(belief.Move({0, 0}, std::numeric_limits<double>::infinity()).error().code,
+            ErrorCode::kInvalidArgument);
+  MapRows unscaled = Corridor();
+  unscaled.frame.unit = "arbitrary";
+  EXPECT_EQ(Make(unscaled).Move({1, 0}, 0).error().code, ErrorCode::kUnsupported);
+  EXPECT_EQ(PlaceBelief::Make(*Map::FromRows(Corridor()), {.fix_ratio = 2}).error().code,
+            ErrorCode::kInvalidArgument);
+  MapRows empty;
+  empty.name = "empty";
+  EXPECT_EQ(PlaceBelief::Make(*Map::FromRows(empty)).error().code, ErrorCode::kNoData);
+}
+
+}  // namespace
+}  // namespace cairn
