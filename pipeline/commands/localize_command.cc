@@ -237,6 +237,11 @@ nlohmann::ordered_json PnpJson(const Answer& answer) {
   } else {
     json["reason"] = NoFixName(found.reason);
     json["message"] = found.message;
+    if (found.probability > 0) json["probability"] = found.probability;
+    for (const Pose& pose : found.possible_poses) {
+      const Eigen::Vector3d center = pose.Center();
+      json["possible_centers_m"].push_back({center.x(), center.y(), center.z()});
+    }
   }
   json["scope"] = ScopeName(found.scope);
   json["num_features"] = found.num_features;

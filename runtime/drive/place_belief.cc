@@ -255,16 +255,23 @@ Status PlaceBelief::See(const Query& query, const Localization& found) {
       const double odds = found.probability / std::max(1e-12, 1 - found.probability);
       const double weight =
           options_.fix_ratio * std::min(options_.max_fix_odds, odds) / static_cast<double>(poses.size());
-      std::vector<double> likelihood(probability_.size(), options_.wrong_fix_ratio / num);
       std::vector<Place> places;
+      double num_of_places = 0;
       for (const Pose& pose : poses) {
         CAIRN_ASSIGN_OR_RETURN(Place place, PlaceAround(camera_from_given * pose));
-        for (const int32_t image : place.images)
-          likelihood[image] = options_.wrong_fix_ratio / num + weight / kNumViewsOfFix;
+        num_of_places += static_cast<double>(place.images.size());
         places.push_back(std::move(place));
       }
+      // A fix that is wrong is at this place as often as at any other.
+      const double by_chance = num_of_places / static_cast<double>(places.size()) / num;
+      std::vector<double> likelihood(probability_.size(), options_.wrong_fix_ratio * by_chance);
+      for (const Place& place : places) {
+        for (const int32_t image : place.images)
+          likelihood[image] = options_.wrong_fix_ratio * by_chance + weight;
+      }
       for (double& value : likelihood) value = std::pow(value, new_ratio);
-      Weigh(likelihood, std::pow(options_.foreign_fix_ratio / num, new_ratio), places);
+      // The odds are against being elsewhere.
+      Weigh(likelihood, std::pow(options_.fix_ratio * by_chance, new_ratio), places);
       return Ok();
     }
     RetrieveOptions all;

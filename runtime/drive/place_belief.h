@@ -27,7 +27,8 @@ struct PlaceBeliefOptions {
   // place. REQUIRES: > 0, their sum < 1
   double fix_ratio = 0.85;
   double wrong_fix_ratio = 0.005;
-  // Share of the images of other buildings that have a fix.  REQUIRES: in (0, 1)
+  // Share of the images of other buildings that have a fix; what one of them says is in its odds.  REQUIRES:
+  // in (0, 1)
   double foreign_fix_ratio = 0.02;
   // Odds that one fix can speak for itself, however much of what it expects is found: a place may have a copy
   // that nobody surveyed.  REQUIRES: >= 1

@@ -44,6 +44,7 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const 
   const double radius_m = kSameViewRatio * UpperMedian(std::move(depths));
   CAIRN_ASSIGN_OR_RETURN(const std::vector<NearView> near,
                          NearestViews(map, cam_from_world, radius_m, kSameViewDeg, kNumNearViews));
+  evidence.squared_distance = near.front().squared_distance;
   std::map<LandmarkIdx, double> seen;  // sum of the weights of the images that see it
   double sum = 0;
   for (const NearView& view : near) {
@@ -70,11 +71,18 @@ Result<PlaceEvidence> EvidenceOfPlace(const Map& map, const Query& query, const 
 }
 
 double OddsOfPlace(const PlaceEvidence& evidence) {
-  const double found_ratio =
-      std::max(0.5, static_cast<double>(evidence.num_matched)) / std::max(0.5, evidence.num_expected);
+  // Logistic regression on fixes of left-out images and on those in maps of other floors (bench/held_out).
+  constexpr double kBias = 2.6, kFoundWeight = 3.4, kCellsWeight = 8;
+  // Fewer are too few to miss.
+  constexpr double kFewestExpected = 20, kFewestMatched = 0.5;
+  // A copy of what is seen may stand where nobody surveyed, however much of it is found.
+  constexpr double kMostOdds = 3000;
+  const double found_ratio = std::max(kFewestMatched, static_cast<double>(evidence.num_matched)) /
+                             std::max(kFewestExpected, evidence.num_expected);
   const double cells_ratio =
       static_cast<double>(evidence.num_cells_found) / std::max(1, evidence.num_cells_expected);
-  return std::exp(2.6 + 3.4 * std::log(found_ratio) + 8.0 * cells_ratio);
+  return std::min(std::exp(kBias + kFoundWeight * std::log(found_ratio) + kCellsWeight * cells_ratio),
+                  kMostOdds / std::pow(1 + evidence.squared_distance, 1.5));
 }
 
 double ProbabilityAmong(double odds, double odds_of_others) { return odds / (1 + odds + odds_of_others); }

@@ -18,6 +18,9 @@ struct PlaceEvidence {
   // little.
   double num_expected = 0;
   int num_matched = 0;  // matches, found without the pose, that agree with it
+  // Square of the distance to the nearest survey image, in views (a tenth of the depth, 15 degrees): far from
+  // all of them nobody knows what should be seen.
+  double squared_distance = 0;
   // Cells of the image in which landmarks are expected, and those of them with one that was found.
   int num_cells_expected = 0;
   int num_cells_found = 0;

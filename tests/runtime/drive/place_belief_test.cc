@@ -113,13 +113,13 @@ TEST(PlaceBelief, NoSingleImageMakesAPlaceCertain) {
 
 TEST(PlaceBelief, ARobotThatStandsStillLearnsLittleMore) {
   PlaceBelief still = Make(), moving = Make();
-  const Localization weak = FixAt(5, 0.6);
+  const Localization weak = FixAt(5, 0.9);
   See(&still, weak);
   See(&moving, weak);
   EXPECT_EQ(still.elsewhere(), moving.elsewhere());
   See(&still, weak);
-  See(&moving, FixAt(5.6, 0.6));
-  EXPECT_GT(still.elsewhere(), 3 * moving.elsewhere());
+  See(&moving, FixAt(5.6, 0.9));
+  EXPECT_GT(still.elsewhere(), 2 * moving.elsewhere());
 }
 
 TEST(PlaceBelief, AFixCountsByTheOddsThatItIsRight) {

@@ -63,6 +63,9 @@ TEST_F(EvidenceOfPlaceTest, NearImagesCountMore) {
   // Weights 1 and 1 / 3: 0 is seen by both, 1 to 3 by the first, 4 by the second.
   EXPECT_NEAR(evidence.num_expected, 1 + 3 * 0.75 + 0.25, 1e-9);
   EXPECT_EQ(evidence.num_cells_expected, 4);
+  EXPECT_NEAR(evidence.squared_distance, 0, 1e-12);
+  rows_.images.erase(rows_.images.begin());
+  EXPECT_NEAR(Evidence({0}).squared_distance, 2, 1e-6);
 }
 
 TEST_F(EvidenceOfPlaceTest, OnlyTheNearestImagesCount) {
@@ -80,10 +83,11 @@ TEST_F(EvidenceOfPlaceTest, WithoutAnythingFoundNothingIsKnown) {
 }
 
 TEST(OddsOfPlace, MoreOfWhatIsExpectedIsLikelier) {
-  const PlaceEvidence half{60, 30, 20, 15};
+  const PlaceEvidence half{
+      .num_expected = 60, .num_matched = 30, .num_cells_expected = 20, .num_cells_found = 10};
   PlaceEvidence fewer = half, emptier = half, richer = half;
   fewer.num_matched = 29;
-  emptier.num_cells_found = 14;
+  emptier.num_cells_found = 9;
   richer.num_expected = 61;
   for (const PlaceEvidence& less : {fewer, emptier, richer}) EXPECT_LT(OddsOfPlace(less), OddsOfPlace(half));
   PlaceEvidence twice = half;
@@ -94,10 +98,32 @@ TEST(OddsOfPlace, MoreOfWhatIsExpectedIsLikelier) {
   EXPECT_TRUE(std::isfinite(OddsOfPlace({.num_expected = 0, .num_matched = 100000})));
 }
 
+TEST(OddsOfPlace, FarFromTheSurveyNothingIsCertain) {
+  PlaceEvidence all{.num_expected = 60, .num_matched = 60, .num_cells_expected = 20, .num_cells_found = 20};
+  EXPECT_DOUBLE_EQ(OddsOfPlace(all), 3000);
+  all.squared_distance = 3;
+  EXPECT_DOUBLE_EQ(OddsOfPlace(all), 3000.0 / 8);
+  PlaceEvidence little{
+      .num_expected = 60, .num_matched = 10, .num_cells_expected = 20, .num_cells_found = 10};
+  const double odds = OddsOfPlace(little);
+  EXPECT_NEAR(odds, std::exp(2.6 + 8 * 0.5) / std::pow(6, 3.4), 1e-9);
+  little.squared_distance = 3;
+  EXPECT_EQ(OddsOfPlace(little), odds);  // no more than before
+}
+
+TEST(OddsOfPlace, FewThatAreAllFoundAreNotMany) {
+  const PlaceEvidence few{.num_expected = 8, .num_matched = 8, .num_cells_expected = 8, .num_cells_found = 4};
+  PlaceEvidence twenty = few;
+  twenty.num_expected = 20;
+  EXPECT_DOUBLE_EQ(OddsOfPlace(few), OddsOfPlace(twenty));
+  twenty.num_expected = 21;
+  EXPECT_GT(OddsOfPlace(few), OddsOfPlace(twenty));
+}
+
 // Measured: the medians of fixes in a map of another floor of the building, and of this one.
 TEST(OddsOfPlace, ADoorOfAnotherFloorIsNoPlace) {
-  EXPECT_LT(ProbabilityAmong(OddsOfPlace({205, 9, 24, 14}), 0), 0.1);
-  EXPECT_GT(ProbabilityAmong(OddsOfPlace({176, 145, 24, 21}), 0), 0.999);
+  EXPECT_LT(ProbabilityAmong(OddsOfPlace({205, 9, 0.03, 24, 14}), 0), 0.1);
+  EXPECT_GT(ProbabilityAmong(OddsOfPlace({176, 145, 0.02, 24, 21}), 0), 0.999);
 }
 
 TEST(ProbabilityAmong, SharesOneAmongExclusiveExplanations) {
