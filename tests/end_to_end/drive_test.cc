@@ -1,4 +1,6 @@
 #include <filesystem>
+#include <sstream>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,6 +39,58 @@ class Drive : public testing::Test {
   static TemporaryFolder* folder_;
 };
 TemporaryFolder* Drive::folder_ = nullptr;
+
+// The survey's own images, in their order.
+TEST_F(Drive, WhereItIsIsKnownAfterSomeImages) {
+  std::string images, odometry = "# ahead left turn\n";
+  for (int i = 30; i < 36; ++i) {
+    images += fmt::format(" {}/d{:04}.jpg", Path("rooms.build/capture/images"), i);
+    odometry += "0.3 0 0\n";
+  }
+  ASSERT_TRUE(WriteFileAtomically(Path("wheels.txt"), odometry).ok());
+  for (const std::string& options : {std::string(), " --odometry " + Path("wheels.txt")}) {
+    const ProgramRun run = RunShell("cairn where " + Path("rooms.cairn") + images + options + " --json");
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    std::istringstream lines(run.out);
+    std::string line;
+    int num_lines = 0;
+    while (std::getline(lines, line)) {
+      const auto step = nlohmann::json::parse(line);
+      double sum = step["elsewhere"];
+      for (const auto& place : step["places"]) sum += place["probability"].get<double>();
+      EXPECT_LE(sum, 1 + 1e-9);
+      // No single image makes a place certain.
+      if (num_lines == 0) EXPECT_LE(step["places"][0]["probability"].get<double>(), 0.991) << line;
+      if (num_lines == 5) {
+        EXPECT_GT(step["places"][0]["probability"].get<double>(), 0.99) << line;
+        EXPECT_THAT(step["places"][0]["image"].get<std::string>(), testing::StartsWith("d003")) << line;
+      }
+      ++num_lines;
+    }
+    EXPECT_EQ(num_lines, 6) << run.out;
+  }
+  const ProgramRun people = RunShell("cairn where " + Path("rooms.cairn") + images);
+  ASSERT_EQ(people.exit_code, 0) << people.err;
+  EXPECT_THAT(people.out, HasSubstr("by itself"));
+  EXPECT_THAT(people.out, HasSubstr("\nat d003"));
+}
+
+TEST_F(Drive, WhereRefusesWhatItCannotUse) {
+  const std::string image = Path("rooms.build/capture/images/d0030.jpg");
+  const auto where = [&](const std::string& arguments) {
+    return RunShell("cairn where " + Path("rooms.cairn") + " " + arguments);
+  };
+  EXPECT_EQ(where("").exit_code, 2);
+  EXPECT_NE(where(Path("none.jpg")).exit_code, 0);
+  ASSERT_TRUE(WriteFileAtomically(Path("short.txt"), "0 0 0\n").ok());
+  const ProgramRun missing = where(image + " " + image + " --odometry " + Path("short.txt"));
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("it has lines for 1 images, and none for image 2"));
+  EXPECT_THAT(where(image + " --odometry " + Path("short.txt") + " --reach-links 3").err,
+              HasSubstr("is for images without odometry"));
+  EXPECT_THAT(where(image + " --way-sigma-m 1").err, HasSubstr("is the error of odometry"));
+  EXPECT_THAT(where(image + " --fix-ratio 2").err, HasSubstr("fix_ratio = 2: must be in"));
+}
 
 TEST_F(Drive, ALostRobotReachesItsGoalAndRecordsTheWay) {
   const std::string arguments = "--start 0.9,0.95,340 --goal d0040.jpg --svg " + Path("run.svg") + " -o ";
