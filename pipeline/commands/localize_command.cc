@@ -60,6 +60,7 @@ struct Answer {
 
 // Refuses options that only another estimator, a sequence or odometry reads.
 Status CheckWhatIsRead(const LocalizeArguments& arguments) {
+  CAIRN_RETURN_IF_ERROR(CheckCameraArguments(arguments.camera, arguments.cameras_path));
   VoteOptions of_vote;
   RegionTrackerOptions of_tracker;
   VisualMapOptions of_map;

@@ -9,12 +9,14 @@
 
 namespace cairn::pipeline {
 
+Status CheckCameraArguments(const std::string& camera, const std::string& cameras_path) {
+  if (camera.empty() || cameras_path.empty()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "--camera is the camera of all images, --cameras has one for each size; leave one out");
+}
+
 Result<CameraChoice> CameraChoice::Make(const std::string& camera, const std::string& cameras_path,
                                         std::shared_ptr<const Map> map) {
-  if (!camera.empty() && !cameras_path.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "--camera is the camera of all images, --cameras has one for each size; leave one out");
-  }
   CameraChoice choice;
   choice.map_ = std::move(map);
   if (!camera.empty()) {

@@ -13,11 +13,14 @@
 
 namespace cairn::pipeline {
 
+// Errors: InvalidArgument where both --camera and --cameras are given.
+Status CheckCameraArguments(const std::string& camera, const std::string& cameras_path);
+
 // The camera to use for an image size: given on the command line, else the map's.
 class CameraChoice {
  public:
   // `camera`: as --camera has it, of all images; `cameras_path`: as --cameras, chosen by size; empty: not
-  // given. Errors: InvalidArgument (both, or no camera), and those of ReadCamerasText.
+  // given. Errors: InvalidArgument (no camera), and those of ReadCamerasText.
   static Result<CameraChoice> Make(const std::string& camera, const std::string& cameras_path,
                                    std::shared_ptr<const Map> map);
 

@@ -93,6 +93,7 @@ Result<std::string> Conclusion(const PlaceBelief& belief, const Step& last, cons
 
 Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  CAIRN_RETURN_IF_ERROR(CheckCameraArguments(arguments.camera, arguments.cameras_path));
   if (arguments.odometry_path.empty()) {
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"way_sigma_ratio", "turn_sigma_ratio", "way_sigma_m", "turn_sigma_deg"},

@@ -99,6 +99,7 @@ typedef struct cairn_visual_tracker cairn_visual_tracker;
 typedef struct cairn_log cairn_log;
 typedef struct cairn_place_model cairn_place_model;
 typedef struct cairn_start_hypotheses cairn_start_hypotheses;
+typedef struct cairn_place_belief cairn_place_belief;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -432,6 +433,29 @@ CAIRN_API int32_t cairn_start_hypotheses_way(const cairn_start_hypotheses* start
                                              int32_t from_whereabouts, int32_t* places, int32_t capacity,
                                              int32_t* num_places);
 CAIRN_API int32_t cairn_start_hypotheses_destroy(cairn_start_hypotheses* starts);
+
+/* Where a robot that woke up may be, image after image (docs/active.md): a probability of each place of the
+ * map, by the survey image that shows it, and of none.  One per robot; any map will do.  CAIRN_NO_DATA: the
+ * map has no images. */
+CAIRN_API int32_t cairn_place_belief_create(const cairn_map* map, cairn_place_belief** belief);
+/* Any option that `cairn where --help` lists: ("elsewhere_ratio", "0.1").  The belief begins anew; after an
+ * error it is as before. */
+CAIRN_API int32_t cairn_place_belief_set_option(cairn_place_belief* belief, const char* name,
+                                                const char* value);
+/* Odometry since the last image, as cairn_visual_tracker_move.  CAIRN_UNSUPPORTED: the map's unit is not the
+ * metre. Without any it may have gone to what shows the same landmarks. */
+CAIRN_API int32_t cairn_place_belief_move(cairn_place_belief* belief, double ahead_m, double left_m,
+                                          double turn_left_rad);
+/* The next image; `camera` as in cairn_localize.  `fix`: what the image says by itself; may be NULL. */
+CAIRN_API int32_t cairn_place_belief_see(cairn_place_belief* belief, const cairn_image* image,
+                                         const cairn_camera* camera, cairn_fix* fix);
+/* The likeliest places, at most `capacity`, the likeliest first: the number of a survey image of each, and
+ * the probability of being about there; *num_places says how many there are of these.  *elsewhere: P(at no
+ * place of the map). */
+CAIRN_API int32_t cairn_place_belief_places(const cairn_place_belief* belief, int32_t* images,
+                                            double* probabilities, int32_t capacity, int32_t* num_places,
+                                            double* elsewhere);
+CAIRN_API int32_t cairn_place_belief_destroy(cairn_place_belief* belief);
 
 /* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
  * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one

@@ -8,7 +8,7 @@
 namespace cairn {
 
 // How many kinds of handles there are, and the number of each, which differ modulo that.
-inline constexpr uint64_t kNumHandleKinds = 7;
+inline constexpr uint64_t kNumHandleKinds = 8;
 enum class HandleKind : uint64_t {
   kMap = 1,
   kLocalizer = 2,
@@ -16,7 +16,8 @@ enum class HandleKind : uint64_t {
   kVisualTracker = 4,
   kLog = 5,
   kPlaceModel = 6,
-  kStartHypotheses = 7
+  kStartHypotheses = 7,
+  kPlaceBelief = 8
 };
 
 // Handles that another language holds: `Handle` is an opaque C type, never defined.  A handle is a number

@@ -4,7 +4,9 @@
 
 #include "core/features/sift.h"
 #include "core/options/options.h"
+#include "runtime/drive/place_belief.h"
 #include "runtime/drive/place_model.h"
+#include "runtime/localize/localizer_options.h"
 
 // What place models have in common that callers in C and Python make.  Inline, since Python's module has a
 // copy of its own: the shared library exports none of this.
@@ -22,6 +24,18 @@ inline OptionTable DescribeOptions(LookOptions* options) {
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }
+// All options of a place belief and of the localizer that it looks with.
+struct BeliefOptions {
+  LocalizerOptions localizer;
+  PlaceBeliefOptions belief;
+};
+inline OptionTable DescribeOptions(BeliefOptions* options) {
+  OptionTable all = DescribeOptions(&options->belief);
+  for (const Option& option : DescribeOptions(&options->localizer)) all.push_back(option);
+  return all;
+}
+inline constexpr const char* kBeliefOptionsHelp = "`cairn where --help-all` lists them";
+
 // For a name that is near to none.
 inline constexpr const char* kLookOptionsHelp =
     "place_model.h, sift.h and rerank_places.h below include/cairn list them";

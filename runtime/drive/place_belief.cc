@@ -189,37 +189,48 @@ Status PlaceBelief::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
                        "odometry is in metres, and the unit of map '{}' is not known; leave the odometry out",
                        head.name);
     }
-    const double radius_m =
-        std::hypot(radius_m_, options_.way_sigma_m, options_.way_sigma_ratio * way_m.norm());
-    const double radius_deg = std::hypot(kSameViewDeg, options_.turn_sigma_deg,
-                                         options_.turn_sigma_ratio * DegFromRad(std::abs(turn_left_rad)));
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_left_rad, Eigen::Vector3d::UnitZ()));
-    constexpr double kNegligible = 1e-7;
-    std::vector<double> next(probability_.size());
-    for (size_t i = 0; i < probability_.size(); ++i) {
-      if (probability_[i] < kNegligible) {
-        next[i] += probability_[i];
-        continue;
-      }
-      // The robot's heading is the camera's over the floor.
-      const Pose floor_from_cam = head.floor_from_world * poses_[i].Inverse();
-      const Eigen::Vector3d ahead3 = floor_from_cam.rotation * Eigen::Vector3d::UnitZ();
-      const Eigen::Vector2d ahead = ahead3.head<2>().normalized(), left(-ahead.y(), ahead.x());
-      Eigen::Vector3d center = floor_from_cam.translation;
-      center.head<2>() += way_m.x() * ahead + way_m.y() * left;
-      const Pose moved{turn * floor_from_cam.rotation, center};
-      CAIRN_ASSIGN_OR_RETURN(
-          const auto near, NearestViews(*map_, (head.floor_from_world.Inverse() * moved).Inverse(), radius_m,
-                                        radius_deg, kNumViewsOfFix));
-      double sum = 0;
-      for (const NearView& view : near) sum += Closeness(view.squared_distance);
-      for (const NearView& view : near)
-        next[view.image] += probability_[i] * Closeness(view.squared_distance) / sum;
-    }
-    probability_ = std::move(next);
+    way_m_ += Eigen::Rotation2Dd(turn_left_rad_) * way_m;
+    turn_left_rad_ += turn_left_rad;
     has_moved_ = true;
     return Ok();
   });
+}
+
+Status PlaceBelief::Drive() {
+  // Shorter ways would be lost between the survey's images: they add up first.
+  if (way_m_.norm() < radius_m_ && std::abs(turn_left_rad_) < RadFromDeg(kSameViewDeg)) return Ok();
+  const Pose& floor_from_world = map_->head().floor_from_world;
+  const double radius_m =
+      std::hypot(radius_m_, options_.way_sigma_m, options_.way_sigma_ratio * way_m_.norm());
+  const double radius_deg = std::hypot(kSameViewDeg, options_.turn_sigma_deg,
+                                       options_.turn_sigma_ratio * DegFromRad(std::abs(turn_left_rad_)));
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_left_rad_, Eigen::Vector3d::UnitZ()));
+  constexpr double kNegligible = 1e-7;
+  std::vector<double> next(probability_.size());
+  for (size_t i = 0; i < probability_.size(); ++i) {
+    if (probability_[i] < kNegligible) {
+      next[i] += probability_[i];
+      continue;
+    }
+    // The robot's heading is the camera's over the floor.
+    const Pose floor_from_cam = floor_from_world * poses_[i].Inverse();
+    const Eigen::Vector3d ahead3 = floor_from_cam.rotation * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector2d ahead = ahead3.head<2>().normalized(), left(-ahead.y(), ahead.x());
+    Eigen::Vector3d center = floor_from_cam.translation;
+    center.head<2>() += way_m_.x() * ahead + way_m_.y() * left;
+    const Pose moved{turn * floor_from_cam.rotation, center};
+    CAIRN_ASSIGN_OR_RETURN(const auto near,
+                           NearestViews(*map_, (floor_from_world.Inverse() * moved).Inverse(), radius_m,
+                                        radius_deg, kNumViewsOfFix));
+    double sum = 0;
+    for (const NearView& view : near) sum += Closeness(view.squared_distance);
+    for (const NearView& view : near)
+      next[view.image] += probability_[i] * Closeness(view.squared_distance) / sum;
+  }
+  probability_ = std::move(next);
+  way_m_.setZero();
+  turn_left_rad_ = 0;
+  return Ok();
 }
 
 void PlaceBelief::LeaveAndReturn() {
@@ -233,7 +244,11 @@ void PlaceBelief::LeaveAndReturn() {
 Status PlaceBelief::See(const Query& query, const Localization& found) {
   return WithoutExceptions("place belief", [&]() -> Status {
     if (has_seen_) {
-      if (!has_moved_) Spread();
+      if (has_moved_) {
+        CAIRN_RETURN_IF_ERROR(Drive());
+      } else {
+        Spread();
+      }
       LeaveAndReturn();
     }
     has_seen_ = true;

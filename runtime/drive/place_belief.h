@@ -101,7 +101,8 @@ class PlaceBelief {
  private:
   PlaceBelief(std::shared_ptr<const Map> map, const PlaceBeliefOptions& options)
       : map_(std::move(map)), options_(options) {}
-  void Spread();  // over links
+  void Spread();   // over links
+  Status Drive();  // by odometry, where it is a view's radius or more by now
   void LeaveAndReturn();
   // Where a fix puts the camera: images around it, ascending, and the share of each of the nearest.
   struct Place {
@@ -121,7 +122,10 @@ class PlaceBelief {
   double radius_m_ = 1;  // of a view
   std::vector<double> probability_;
   double elsewhere_ = 0;
-  bool has_moved_ = false;
+  // Since belief last moved: in the frame of the robot there.
+  Eigen::Vector2d way_m_ = Eigen::Vector2d::Zero();
+  double turn_left_rad_ = 0;
+  bool has_moved_ = false;  // since the last image
   bool has_seen_ = false;
   std::optional<Pose> last_fix_;
 };

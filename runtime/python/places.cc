@@ -11,6 +11,7 @@
 
 #include "core/features/sift.h"
 #include "runtime/c_api/place_options.h"
+#include "runtime/drive/place_belief.h"
 #include "runtime/drive/route.h"
 #include "runtime/drive/start_hypotheses.h"
 #include "runtime/localize/localizer.h"
@@ -167,6 +168,49 @@ class PyStartHypotheses {
   OneThread one_thread_{"set of starts", "robot"};
 };
 
+class PyPlaceBelief {
+ public:
+  PyPlaceBelief(const PyMap& map, const py::kwargs& given) : map_(map.map) {
+    BeliefOptions options;
+    SetFromPython(DescribeOptions(&options), given, kBeliefOptionsHelp);
+    const py::gil_scoped_release release;
+    belief_.emplace(ValueOrThrow(PlaceBelief::Make(map_, options.belief)));
+    localizer_.emplace(map_, options.localizer);
+  }
+
+  void Move(double ahead_m, double left_m, double turn_left_rad) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(belief_->Move({ahead_m, left_m}, turn_left_rad));
+  }
+  Localization See(const py::array& image, const std::optional<Camera>& camera) {
+    const cv::Mat grey = PixelsOf(image);
+    const py::gil_scoped_release release;
+    const auto used = one_thread_.Use();
+    const Query query = ValueOrThrow(localizer_->QueryFromImage(grey, CameraFor(*map_, grey, camera)));
+    Localization found = ValueOrThrow(localizer_->LocalizeQuery(query, std::nullopt));
+    ThrowIfError(belief_->See(query, found));
+    return found;
+  }
+  std::vector<std::pair<int32_t, double>> Places(int max_num) {
+    if (max_num < 0) throw py::value_error(fmt::format("max_num is {}; must not be negative", max_num));
+    const auto used = one_thread_.Use();
+    std::vector<std::pair<int32_t, double>> places;
+    for (const PlaceHypothesis& place : ValueOrThrow(belief_->Hypotheses(max_num)))
+      places.emplace_back(place.image, place.probability);
+    return places;
+  }
+  double elsewhere() {
+    const auto used = one_thread_.Use();
+    return belief_->elsewhere();
+  }
+
+ private:
+  std::shared_ptr<const Map> map_;
+  std::optional<Localizer> localizer_;
+  std::optional<PlaceBelief> belief_;
+  OneThread one_thread_{"place belief", "robot"};
+};
+
 }  // namespace
 }  // namespace cairn
 
@@ -174,6 +218,8 @@ namespace pybind11::detail {
 
 template <>
 struct type_caster<cairn::PyPlaceModel> : ConstructedCaster<cairn::PyPlaceModel> {};
+template <>
+struct type_caster<cairn::PyPlaceBelief> : ConstructedCaster<cairn::PyPlaceBelief> {};
 template <>
 struct type_caster<cairn::PyStartHypotheses> : ConstructedCaster<cairn::PyStartHypotheses> {};
 
@@ -227,6 +273,12 @@ void BindPlaces(py::module_& module) {
       .def_property_readonly("num_images", &PyStartHypotheses::num_images)
       .def("whereabouts", &PyStartHypotheses::Whereabouts, py::arg("hypothesis"))
       .def("replan", &PyStartHypotheses::Replan, py::arg("hypothesis"));
+  py::class_<PyPlaceBelief>(module, "PlaceBelief")
+      .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))
+      .def("move", &PyPlaceBelief::Move, py::arg("ahead_m"), py::arg("left_m"), py::arg("turn_left_rad"))
+      .def("see", &PyPlaceBelief::See, py::arg("image").noconvert(), py::arg("camera") = py::none())
+      .def("places", &PyPlaceBelief::Places, py::arg("max_num") = 3)
+      .def_property_readonly("elsewhere", &PyPlaceBelief::elsewhere);
 }
 
 }  // namespace cairn

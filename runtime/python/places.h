@@ -4,7 +4,8 @@
 
 namespace cairn {
 
-// cairn.Route, cairn.PlaceModel and its cairn.PlaceScores, cairn.StartHypotheses of cairn.StartHypothesis.
+// cairn.Route, cairn.PlaceModel and its cairn.PlaceScores, cairn.StartHypotheses of cairn.StartHypothesis,
+// cairn.PlaceBelief.
 void BindPlaces(pybind11::module_& module);
 
 }  // namespace cairn

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/c_api/cairn.h"
+#include "runtime/drive/place_belief.h"
 #include "runtime/drive/start_hypotheses.h"
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
@@ -375,6 +378,74 @@ TEST_F(CStarts, RefuseWhatCannotBe) {
             CAIRN_INVALID_ARGUMENT);
   EXPECT_THAT(cairn_last_error(), HasSubstr("not a set of starts"));
   EXPECT_STREQ(cairn_verdict_name(3), "unknown");
+}
+
+TEST_F(CPlaces, BeliefsAreThoseOfCxx) {
+  cairn_place_belief* belief = nullptr;
+  ASSERT_EQ(cairn_place_belief_create(opened_, &belief), CAIRN_OK) << cairn_last_error();
+  PlaceBelief expected = *PlaceBelief::Make(map_);
+  const Localizer localizer(map_);
+  std::array<int32_t, 3> images{};
+  std::array<double, 3> probabilities{};
+  int32_t num_places = 0;
+  double elsewhere = 0;
+  for (const int picture : {0, 1, 2, 4, 5}) {
+    const cv::Mat& pixels = Wings().pictures()[picture];
+    const cairn_image image = ImageOf(pixels);
+    cairn_fix fix = CAIRN_FIX_INIT;
+    if (picture == 4) {
+      ASSERT_EQ(cairn_place_belief_move(belief, 0.5, 0.1, 0.2), CAIRN_OK) << cairn_last_error();
+      ASSERT_TRUE(expected.Move({0.5, 0.1}, 0.2).ok());
+    }
+    ASSERT_EQ(cairn_place_belief_see(belief, &image, nullptr, picture == 1 ? nullptr : &fix), CAIRN_OK)
+        << cairn_last_error();
+    const Query query = *localizer.QueryFromImage(pixels, *map_->CameraForSize(pixels.cols, pixels.rows));
+    const Localization found = *localizer.LocalizeQuery(query, std::nullopt);
+    ASSERT_TRUE(expected.See(query, found).ok());
+    if (picture != 1) EXPECT_EQ(fix.probability, found.probability);
+    ASSERT_EQ(
+        cairn_place_belief_places(belief, images.data(), probabilities.data(), 3, &num_places, &elsewhere),
+        CAIRN_OK);
+    const auto places = *expected.Hypotheses(3);
+    ASSERT_EQ(num_places, static_cast<int32_t>(places.size()));
+    for (int32_t i = 0; i < num_places; ++i) {
+      EXPECT_EQ(images[i], places[i].image);
+      EXPECT_EQ(probabilities[i], places[i].probability);
+    }
+    EXPECT_EQ(elsewhere, expected.elsewhere());
+  }
+  // Anew.
+  ASSERT_EQ(cairn_place_belief_set_option(belief, "elsewhere_ratio", "0.25"), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_place_belief_places(belief, nullptr, nullptr, 0, &num_places, &elsewhere), CAIRN_OK);
+  EXPECT_EQ(num_places, 0);
+  EXPECT_EQ(elsewhere, 0.25);
+  EXPECT_EQ(cairn_place_belief_destroy(belief), CAIRN_OK);
+  EXPECT_EQ(cairn_place_belief_move(belief, 0, 0, 0), CAIRN_INVALID_ARGUMENT);
+}
+
+TEST_F(CPlaces, MisuseOfBeliefsIsSaid) {
+  EXPECT_EQ(cairn_place_belief_create(opened_, nullptr), CAIRN_INVALID_ARGUMENT);
+  cairn_place_belief* belief = nullptr;
+  EXPECT_EQ(cairn_place_belief_create(nullptr, &belief), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(belief, nullptr);
+  ASSERT_EQ(cairn_place_belief_create(opened_, &belief), CAIRN_OK);
+  EXPECT_EQ(cairn_place_belief_set_option(belief, "elsewhere", "1"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_set_option(belief, "elsewhere_ratio", "1"), CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("elsewhere_ratio"));
+  EXPECT_EQ(cairn_place_belief_move(belief, std::numeric_limits<double>::quiet_NaN(), 0, 0),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_see(belief, nullptr, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  int32_t num_places = 7, image = 0;
+  EXPECT_EQ(cairn_place_belief_places(belief, nullptr, nullptr, 1, &num_places, nullptr),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(num_places, 0);
+  EXPECT_EQ(cairn_place_belief_places(belief, &image, nullptr, 1, &num_places, nullptr),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_THAT(cairn_last_error(), HasSubstr("probabilities is NULL"));
+  EXPECT_EQ(cairn_place_belief_places(belief, nullptr, nullptr, -1, &num_places, nullptr),
+            CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_places(belief, nullptr, nullptr, 0, nullptr, nullptr), CAIRN_INVALID_ARGUMENT);
+  EXPECT_EQ(cairn_place_belief_destroy(belief), CAIRN_OK);
 }
 
 }  // namespace

@@ -132,6 +132,31 @@ class Starting(unittest.TestCase):
         self.assertEqual(self.map.route(8, 10).images, [8, 10])
         self.assertEqual(self.map.route(8, 10, "matches").images, [8, 9, 10])
 
+    def test_beliefs_are_the_programs(self):
+        names = [POSTER / f"wing{i}.pgm" for i in (0, 1, 2, 4, 5)]
+        printed = subprocess.run([PROGRAM, "where", POSTER / "wings.cairn", *names, "--json", "--places", "4"],
+                                 capture_output=True, check=True, text=True).stdout
+        belief = cairn.PlaceBelief(self.map)
+        self.assertEqual(belief.elsewhere, 0.5)
+        for line, name in zip(printed.splitlines(), names):
+            expected = json.loads(line)
+            fix = belief.see(read_pgm(name))
+            self.assertEqual(bool(fix), expected["fix"])
+            self.assertEqual([(self.map.image_name(image), probability) for image, probability in belief.places(4)],
+                             [(place["image"], place["probability"]) for place in expected["places"]])
+            self.assertEqual(belief.elsewhere, expected["elsewhere"])
+        self.assertEqual(belief.places(0), [])
+        belief.move(0.5, 0, 0.1)
+        self.assertEqual(cairn.PlaceBelief(self.map, elsewhere_ratio=0.25).elsewhere, 0.25)
+        for wrong in (lambda: cairn.PlaceBelief(self.map, elsewhere_ratio=2), lambda: belief.move(float("nan"), 0, 0),
+                      lambda: cairn.PlaceBelief(self.map, elsewhere=0.1)):
+            with self.assertRaises((cairn.Error, ValueError)):
+                wrong()
+        with self.assertRaises(ValueError):
+            belief.places(-1)
+        with self.assertRaises(TypeError):
+            cairn.PlaceBelief.__new__(cairn.PlaceBelief).see(self.pictures[0])
+
     def test_survey_images_have_poses(self):
         pose = self.map.image_pose(self.map.find_image("b2"))
         self.assertEqual(pose.shape, (4, 4))

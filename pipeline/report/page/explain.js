@@ -71,6 +71,7 @@ const remedies = {
   poor_spread: 'The landmarks that agree lie close together in the image: a larger k keeps more of the others.',
   uncertain: 'The landmarks that agree leave the place open: a larger k keeps more of the others.',
   far_from_survey: 'The pose that was found lies where the survey never was.',
+  improbable: 'Most of what an image from there would show is missing: it is another place, or the place has changed.',
   ambiguous: 'Another place looks nearly the same: something distinctive on its walls would help.',
 };
 const outcome = image => image.found ? `${image.wrong ? 'wrong, ' : ''}${lengthText(image.error_m)}, ${degrees(image.error_deg)} off` : `not localized: ${reason(image)}`;

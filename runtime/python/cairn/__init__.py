@@ -6,7 +6,8 @@
     if fix:
         print(fix.center, fix.covariance)   # metres; rotation (rad), translation (m)
 
-A robot that was switched on anywhere keeps several starts in mind: StartHypotheses, of what a PlaceModel says of its images.
+A robot that was switched on anywhere keeps several starts in mind: StartHypotheses, of what a PlaceModel says of its images; or all places, with
+or without a goal: PlaceBelief.
 
 Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
 
@@ -20,6 +21,7 @@ from ._cairn import (
     Localizer,
     Log,
     Map,
+    PlaceBelief,
     PlaceModel,
     PlaceScores,
     Prior,
@@ -41,6 +43,7 @@ __all__ = [
     "Localizer",
     "Log",
     "Map",
+    "PlaceBelief",
     "PlaceModel",
     "PlaceScores",
     "Prior",

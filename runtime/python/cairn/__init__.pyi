@@ -183,6 +183,25 @@ class StartHypotheses:
         """The way from there to the goal; None where there is none."""
 
 @final
+class PlaceBelief:
+    """Where a robot that woke up may be, image after image: a probability of each place of the map and of none.
+
+    One per robot: use by two threads at once raises Error (busy).
+    """
+
+    def __init__(self, map: Map, **options: bool | int | float | str) -> None:
+        """`options`: those that `cairn where --help` lists.  Raises Error: no_data (a map without images)."""
+    def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
+        """Odometry since the last image; calls add up.  Raises Error: unsupported (the map's unit is not the metre)."""
+    def see(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
+        """The next image; returns what it says by itself."""
+    def places(self, max_num: int = 3) -> list[tuple[int, float]]:
+        """The likeliest first: the number of a survey image of each, and P(about there)."""
+    @property
+    def elsewhere(self) -> float:
+        """P(at no place of the map)"""
+
+@final
 class Prior:
     """Where the camera is believed to be: cam_from_world, and its standard deviations."""
 

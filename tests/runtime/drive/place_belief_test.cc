@@ -185,6 +185,30 @@ TEST(PlaceBelief, OdometryMovesEveryHypothesis) {
   EXPECT_LT(at[7], 0.05);
 }
 
+// Half a metre is a view's radius.
+TEST(PlaceBelief, ShortWaysAddUp) {
+  PlaceBelief belief = Make();
+  See(&belief, FixAt(3));
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(belief.Move({0.15, 0}, 0).ok());
+    See(&belief, NoFixBy(NoFix::kTooFewFeatures));
+  }
+  const auto& at = belief.probabilities();
+  double mean = 0, sum = 0;
+  for (int i = 0; i < kNumImages; ++i) {
+    mean += i * at[i];
+    sum += at[i];
+  }
+  EXPECT_NEAR(mean / sum, 6, 0.5);
+  // To the left, after a quarter turn to the right, is ahead.
+  PlaceBelief turned = Make();
+  See(&turned, FixAt(3));
+  ASSERT_TRUE(turned.Move({0, 0}, -RadFromDeg(90)).ok());
+  ASSERT_TRUE(turned.Move({0, 3}, RadFromDeg(90)).ok());
+  See(&turned, NoFixBy(NoFix::kTooFewFeatures));
+  EXPECT_GT(turned.probabilities()[6], 0.5);
+}
+
 TEST(PlaceBelief, ToTheLeftIsToTheLeftOfWhereTheCameraLooks) {
   MapRows rows = Corridor();
   // The last two look along +y: 0.5 and 3.5 m to the left of the first.

@@ -241,6 +241,16 @@ TEST(StartHypotheses, LeastEntropyChoosesTheStartAndTheMeanDoesNotPenaliseLength
   EXPECT_EQ(followed({}), 6);  // 0.2 * 3 + 0.55 + 0.9 + 0.95 + 1 = 4 against 5
   EXPECT_EQ(followed({.route = {.weight = "links"}}), 1);
   EXPECT_EQ(followed({.first_choice = "score"}), 1);
+  // Over a detour that tells less, 0.6 + 1.1 + 2 + 1.5 + 1 = 6.2 of 7 links against 5 of 5.
+  entropies[12] = entropies[13] = 2;
+  const PlaceModel longer = ModelOf(VisualMemory(words, links, entropies));
+  const auto followed_over = [&](const std::string& way_cost) {
+    const StartHypotheses starts =
+        *StartHypotheses::Make(longer, LookAt(longer, 1), 11, {.way_cost = way_cost});
+    return starts.hypotheses()[starts.followed()].start;
+  };
+  EXPECT_EQ(followed_over("total"), 1);
+  EXPECT_EQ(followed_over("mean"), 6);
 }
 
 TEST(StartHypotheses, SaysWhyThereIsNone) {

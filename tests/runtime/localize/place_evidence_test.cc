@@ -93,8 +93,8 @@ TEST(OddsOfPlace, MoreOfWhatIsExpectedIsLikelier) {
   PlaceEvidence twice = half;
   twice.num_expected *= 2;
   twice.num_matched *= 2;
-  EXPECT_DOUBLE_EQ(OddsOfPlace(twice), OddsOfPlace(half));  // ratios alone
-  EXPECT_TRUE(std::isfinite(OddsOfPlace({})));
+  EXPECT_DOUBLE_EQ(OddsOfPlace(twice), OddsOfPlace(half));                // ratios alone
+  EXPECT_NEAR(OddsOfPlace({}), std::exp(2.6) / std::pow(40, 3.4), 1e-9);  // none is half of one, of twenty
   EXPECT_TRUE(std::isfinite(OddsOfPlace({.num_expected = 0, .num_matched = 100000})));
 }
 
