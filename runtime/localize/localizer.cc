@@ -419,7 +419,11 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     if (max_second_pose_ratio <= 0 || ShareMost(other.found.matches, best.found.matches) ||
         !AreFarApart(other.found.cam_from_world, best.found.cam_from_world, options_.accept))
       continue;
-    if (static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
+    // One that begins with little and does not lead to most is less than ambiguous: it shares the
+    // probability.
+    const bool is_weak = best.num_unguided_inliers >= options_.sure_num_unguided_inliers &&
+                         other.num_unguided_inliers < max_second_pose_ratio * best.num_unguided_inliers;
+    if (!is_weak && static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
       localization.possible_poses = {best.found.cam_from_world, other.found.cam_from_world};
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(query, matched, best));
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(query, matched, other));

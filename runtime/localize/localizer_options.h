@@ -132,7 +132,7 @@ struct AcceptOptions {
   // Least probability that the pose is right, by what near survey images see and by how much of it is found
   // (place_evidence.h): a part of the image alone may look like another place, and then most of what should
   // be around it is missing.  0: not tested.  REQUIRES: in [0, 1]
-  double min_probability = 0.5;
+  double min_probability = 0.3;
   // The image is cut into spread_grid x spread_grid cells, of which inliers must lie in at least
   // min_num_cells.  REQUIRES: >= 1
   int spread_grid = 6;
