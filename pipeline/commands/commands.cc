@@ -57,7 +57,8 @@ std::vector<Command> AllCommands() {
         StageFamily()}},
       {"What a map holds",
        {InspectCommand(), check_map::CheckMapCommand(), ReportCommand(), DiffCommand(), ExportCommand()}},
-      {"Where a robot is", {LocalizeCommand(), WhereCommand(), PlanFamily(), RouteCommand(), DriveCommand()}},
+      {"Where a robot is",
+       {LocalizeCommand(), WhereCommand(), AtlasCommand(), PlanFamily(), RouteCommand(), DriveCommand()}},
       {"Releases", {VerifyCommand(), KeygenCommand(), SignCommand(), UpdateFamily(), MigrateCommand()}},
       {"", {ManualCommand()}},
   };

@@ -40,6 +40,8 @@ Command ExportCommand();
 Command LocalizeCommand();
 // cairn where MAP IMAGE... [--odometry FILE] [--json]: which places a sequence of images may be of
 Command WhereCommand();
+// cairn atlas MAP... -o FILE.atlas: one index of many maps
+Command AtlasCommand();
 // cairn plan locate VIEWS SCAN [--scan N] [--svg FILE]
 Command LocateScanCommand();
 // cairn plan path VIEWS --from X,Y [--to X,Y] [--kind short|min-link|search] [--svg FILE]

@@ -11,12 +11,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/atlas/atlas_file.h"
 #include "core/blocks/map_rows.h"
 #include "core/capture/sessions.h"
 #include "core/files/database.h"
 #include "core/files/file.h"
 #include "core/map/map_file.h"
 #include "core/world/decomposition.h"
+#include "pipeline/commands/in_atlas.h"
 #include "pipeline/commands/inspect_ambiguity.h"
 #include "pipeline/commands/inspect_place.h"
 #include "pipeline/explain/block_bytes.h"
@@ -302,6 +304,13 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
 
 Status RunInspect(const InspectArguments& arguments, const CommandEnvironment& environment) {
   const std::string& map_path = arguments.question.map_path;
+  if (IsAtlasFile(map_path)) {
+    if (!arguments.question.is_asked() && arguments.question.build_dir.empty() && arguments.svg_path.empty() &&
+        arguments.ambiguity_svg_path.empty())
+      return InspectAtlas(map_path, arguments.question.json, environment);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: is an atlas, of which only --json can be asked; ask one of its maps", map_path);
+  }
   if (arguments.question.is_asked() || !arguments.question.build_dir.empty()) {
     if (arguments.svg_path.empty() && arguments.ambiguity_svg_path.empty())
       return AnswerPlaceQuestion(arguments.question, environment);

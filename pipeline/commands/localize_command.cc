@@ -11,10 +11,13 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
+#include "core/atlas/atlas_file.h"
 #include "core/base/parallel.h"
 #include "core/capture/capture.h"
 #include "core/capture/image_file.h"
 #include "core/colmap/image_list.h"
+#include "pipeline/commands/in_atlas.h"
+#include "pipeline/commands/localization_json.h"
 #include "pipeline/commands/odometry.h"
 #include "pipeline/commands/query_images.h"
 #include "pipeline/commands/visual_answer.h"
@@ -45,6 +48,7 @@ struct LocalizeArguments {
   RegionTrackerOptions tracker_options;  // its votes are the visual map's too
   VisualTrackerOptions visual_tracker_options;
   VisualFilterOptions filter_options;
+  AtlasLocalizerOptions atlas_options;
   OptionArguments option_arguments;
 };
 
@@ -99,6 +103,23 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
                    "is the error of odometry; give --odometry, or leave it out")
              : arguments.option_arguments.RefuseGiven({"unknown_way_sigma_m", "unknown_turn_sigma_deg"},
                                                       "is for frames without odometry; leave it out");
+}
+
+// Refuses what an atlas of many maps has no use for, or a single map.
+Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
+  if (!is_atlas) {
+    AtlasLocalizerOptions of_atlas;
+    return arguments.option_arguments.RefuseGiven(NamesOf(DescribeOptions(&of_atlas)),
+                                                  "is for an atlas of several maps; leave it out");
+  }
+  const char* refused = !arguments.output_path.empty()          ? "-o: each map of an atlas has a frame of its own"
+                        : arguments.is_sequence                 ? "--sequence: frames are followed in one map"
+                        : arguments.estimator != "pnp"          ? "--estimator: visual maps are asked one by one"
+                        : !arguments.log_folder.empty()         ? "--log: frames are logged for one map"
+                                                                : nullptr;
+  if (refused == nullptr) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}; leave it out, or give the map in which the image turns out to be", refused);
 }
 
 Status CheckEstimator(const LocalizeArguments& arguments) {
@@ -214,42 +235,10 @@ Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& ma
   return answer;
 }
 
-// The answer for an image that could not be tried.
-nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
-  return {
-      {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
-}
-
 nlohmann::ordered_json PnpJson(const Answer& answer) {
-  nlohmann::ordered_json json = {{"image", answer.image}};
   if (!answer.localization.ok()) return ErrorJson(answer.image, answer.localization.error());
-  const Localization& found = *answer.localization;
-  json["fix"] = found.has_fix();
-  if (found.has_fix()) {
-    const Eigen::Quaterniond& q = found.cam_from_world.rotation;
-    const Eigen::Vector3d& t = found.cam_from_world.translation;
-    const Eigen::Vector3d center = found.cam_from_world.Center();
-    json["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
-    json["translation_m"] = {t.x(), t.y(), t.z()};
-    json["center_m"] = {center.x(), center.y(), center.z()};
-    json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
-    json["probability"] = found.probability;
-    json["region"] = found.region;
-  } else {
-    json["reason"] = NoFixName(found.reason);
-    json["message"] = found.message;
-    if (found.probability > 0) json["probability"] = found.probability;
-    for (const Pose& pose : found.possible_poses) {
-      const Eigen::Vector3d center = pose.Center();
-      json["possible_centers_m"].push_back({center.x(), center.y(), center.z()});
-    }
-  }
-  json["scope"] = ScopeName(found.scope);
-  json["num_features"] = found.num_features;
-  json["num_matches"] = found.num_matches;
-  json["num_inliers"] = found.num_inliers;
-  json["candidates"] = found.candidates;
-  if (!found.voted_regions.empty()) json["voted_regions"] = found.voted_regions;
+  nlohmann::ordered_json json = {{"image", answer.image}};
+  json.update(LocalizationJson(*answer.localization));
   return json;
 }
 
@@ -298,7 +287,16 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
   CAIRN_RETURN_IF_ERROR(CheckEstimator(arguments));
   CAIRN_RETURN_IF_ERROR(CheckWhatIsRead(arguments));
+  const bool is_atlas = IsAtlasFile(arguments.map_path);
+  CAIRN_RETURN_IF_ERROR(CheckForAtlas(arguments, is_atlas));
   cv::setNumThreads(1);  // images in parallel, each on one thread
+  if (is_atlas) {
+    CAIRN_ASSIGN_OR_RETURN(ImageNames names, ImageNames::Make(arguments.images, arguments.list_path));
+    CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras,
+                           CameraChoice::Make(arguments.camera, arguments.cameras_path, nullptr));
+    return LocalizeInAtlas(arguments.map_path, cameras, arguments.options, arguments.atlas_options, &names,
+                           environment);
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   std::shared_ptr<const VisualMap> visual;
   if (arguments.estimator != "pnp") {
@@ -365,7 +363,7 @@ Command LocalizeCommand() {
       .summary = "Say where images were taken, as JSON lines",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
-            parser.Add("map", arguments->map_path, "Map").Required().Type("MAP");
+            parser.Add("map", arguments->map_path, "Map, or an atlas of maps").Required().Type("MAP");
             parser.Add("images", arguments->images, "Image files; '-' reads names from stdin").Type("IMAGE");
             parser.Add("--list", arguments->list_path, "File with an image's name per line").Type("FILE");
             parser
@@ -408,7 +406,7 @@ Command LocalizeCommand() {
                   DescribeOptions(&arguments->tracker_options.votes),
                   DescribeOptions(&arguments->visual_options), DescribeOptions(&arguments->estimate_options),
                   DescribeOptions(&arguments->visual_tracker_options),
-                  DescribeOptions(&arguments->filter_options)}) {
+                  DescribeOptions(&arguments->filter_options), DescribeOptions(&arguments->atlas_options)}) {
               options.insert(options.end(), more.begin(), more.end());
             }
             arguments->option_arguments.Add(

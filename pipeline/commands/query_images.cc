@@ -29,8 +29,12 @@ Result<CameraChoice> CameraChoice::Make(const std::string& camera, const std::st
 }
 
 Result<Camera> CameraChoice::ForImage(int width, int height) const {
-  if (camera_) return *camera_;
-  if (cameras_.empty()) return map_->CameraForSize(width, height);
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<Camera> given, GivenForImage(width, height));
+  return given ? Result<Camera>(*given) : map_->CameraForSize(width, height);
+}
+
+Result<std::optional<Camera>> CameraChoice::GivenForImage(int width, int height) const {
+  if (camera_ || cameras_.empty()) return camera_;
   const Camera* found = nullptr;
   for (const auto& [camera_id, camera] : cameras_) {
     if (camera.width != width || camera.height != height) continue;
@@ -41,7 +45,7 @@ Result<Camera> CameraChoice::ForImage(int width, int height) const {
     }
     found = &camera;
   }
-  if (found != nullptr) return *found;
+  if (found != nullptr) return std::optional<Camera>(*found);
   return MakeError(ErrorCode::kNotFound, "no camera of --cameras takes {} x {} px", width, height);
 }
 

@@ -20,12 +20,14 @@ Status CheckCameraArguments(const std::string& camera, const std::string& camera
 class CameraChoice {
  public:
   // `camera`: as --camera has it, of all images; `cameras_path`: as --cameras, chosen by size; empty: not
-  // given. Errors: InvalidArgument (no camera), and those of ReadCamerasText.
+  // given.  `map`: null where there is none.  Errors: InvalidArgument (no camera), and those of ReadCamerasText.
   static Result<CameraChoice> Make(const std::string& camera, const std::string& cameras_path,
                                    std::shared_ptr<const Map> map);
 
-  // Errors: InvalidArgument, NotFound: several cameras or none take such images.
+  // REQUIRES: a map.  Errors: InvalidArgument, NotFound: several cameras or none take such images.
   Result<Camera> ForImage(int width, int height) const;
+  // The same without the map's: nothing where none was given on the command line.
+  Result<std::optional<Camera>> GivenForImage(int width, int height) const;
 
  private:
   std::shared_ptr<const Map> map_;

@@ -5,8 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/atlas/atlas_file.h"
 #include "core/blocks/map_rows.h"
 #include "core/geometry/floor_pose.h"
+#include "pipeline/commands/in_atlas.h"
 #include "pipeline/program/json_text.h"
 #include "runtime/drive/route.h"
 #include "runtime/map/map.h"
@@ -25,6 +27,10 @@ struct RouteArguments {
 
 Status RunRoute(const RouteArguments& arguments, const CommandEnvironment& environment) {
   CAIRN_RETURN_IF_ERROR(arguments.option_arguments.Apply());
+  if (IsAtlasFile(arguments.map_path)) {
+    return RouteInAtlas(arguments.map_path, arguments.from, arguments.to, arguments.options, arguments.json,
+                        environment);
+  }
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const int32_t from, FindImage(*map, arguments.from));
   CAIRN_ASSIGN_OR_RETURN(const int32_t to, FindImage(*map, arguments.to));
@@ -57,9 +63,9 @@ Command RouteCommand() {
       .summary = "List the images on the route from one survey image to another",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
-            parser.Add("map", arguments->map_path, "Map").Required().Type("MAP");
-            parser.Add("from", arguments->from, "Survey image to start at").Required().Type("IMAGE");
-            parser.Add("to", arguments->to, "Survey image to go to").Required().Type("IMAGE");
+            parser.Add("map", arguments->map_path, "Map, or an atlas of maps").Required().Type("MAP");
+            parser.Add("from", arguments->from, "Survey image to start at; of an atlas MAP/IMAGE").Required().Type("IMAGE");
+            parser.Add("to", arguments->to, "Survey image to go to, likewise").Required().Type("IMAGE");
             parser.AddFlag("--json", arguments->json, "Print JSON");
             arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
           },

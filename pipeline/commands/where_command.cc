@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
+#include "core/blocks/map_rows.h"
 #include "core/capture/image_file.h"
 #include "pipeline/commands/odometry.h"
 #include "pipeline/commands/query_images.h"

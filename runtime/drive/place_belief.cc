@@ -250,6 +250,9 @@ Status PlaceBelief::See(const Query& query, const Localization& found) {
         Spread();
       }
       LeaveAndReturn();
+    } else {  // how it drove before is no way from one place to another
+      way_m_.setZero();
+      turn_left_rad_ = 0;
     }
     has_seen_ = true;
     has_moved_ = false;

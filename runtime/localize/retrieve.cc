@@ -245,6 +245,14 @@ Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_
   return views;
 }
 
+Result<int32_t> ImageNearFix(const Map& map, const Localization& found) {
+  constexpr double kRadiusM = 1, kRadiusDeg = 15;
+  const Pose& pose = found.has_fix() ? found.cam_from_world : found.possible_poses.front();
+  CAIRN_ASSIGN_OR_RETURN(
+      const auto near, NearestViews(map, map.head().camera_from_given * pose, kRadiusM, kRadiusDeg, 1));
+  return near.front().image;
+}
+
 Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
                                                    const RetrieveOptions& options) {
   std::map<RegionIdx, double> votes;

@@ -35,6 +35,10 @@ struct NearView {
 Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_world, double radius_m,
                                            double radius_deg, int max_num);
 
+// The survey image nearest to a fix or, where it is ambiguous, to the best of its poses.
+// REQUIRES: it has a pose; the map has images
+Result<int32_t> ImageNearFix(const Map& map, const Localization& found);
+
 // Regions of the candidates' stations, those with the largest sum of scores first, at most max_num_regions.
 Result<std::vector<RegionIdx>> RegionsOfCandidates(const Map& map, const std::vector<Candidate>& candidates,
                                                    const RetrieveOptions& options);

@@ -101,6 +101,7 @@ Map::Map(std::unique_ptr<Store> store) : store_(std::move(store)) {}
 Map::~Map() = default;
 
 const MapHead& Map::head() const { return store_->head; }
+std::array<uint8_t, 32> Map::root_hash() const { return store_->file ? store_->file->seal().root : Hash{}; }
 const MapDirectory& Map::directory() const { return store_->directory; }
 const BlockCache& Map::cache() const { return store_->cache; }
 int64_t Map::num_landmarks() const { return directory().Count(BlockKind::kLandmarks); }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +62,8 @@ class Map {
   ~Map();
 
   const MapHead& head() const;
+  // What seals the file (core/seal/map_seal.h): no two maps have it; zero for a map that was never a file.
+  std::array<uint8_t, 32> root_hash() const;
   // Blocks and numbers of landmarks, images, ...
   const MapDirectory& directory() const;
   int64_t num_landmarks() const;

@@ -16,8 +16,8 @@ import sys
 # What a room is for stands in its CMakeLists.txt.
 ORDER = """
 core/base core/files core/options core/geometry core/picture core/features core/camera core/vocabulary core/colmap core/structure
-core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/delta core/line
-runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/robot_log runtime/c_api
+core/capture core/plan core/world core/promise core/packing core/blocks core/seal core/map core/delta core/atlas core/line
+runtime/map runtime/localize runtime/scans runtime/laser runtime/paths runtime/visual_map runtime/drive runtime/atlas runtime/robot_log runtime/c_api
 sim/render sim/survey sim/robot sim/worlds
 stages/simulate
 stages/extract_features
@@ -33,7 +33,7 @@ stages/emit_map/previous stages/emit_map/choose stages/emit_map stages/emit_map/
 stages/check_map
 pipeline/build pipeline/program pipeline/explain pipeline/report pipeline/exchange/export pipeline/exchange/import pipeline/exchange/film
 pipeline/exchange/bags/files pipeline/exchange/bags
-pipeline/commands pipeline
+pipeline/atlas pipeline/commands pipeline
 """.split()
 # What robots' authors write, and Python's module: nobody includes them.
 CLIENTS = ("runtime/examples", "runtime/examples/robot", "runtime/python")

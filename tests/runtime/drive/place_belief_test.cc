@@ -186,6 +186,18 @@ TEST(PlaceBelief, OdometryMovesEveryHypothesis) {
 }
 
 // Half a metre is a view's radius.
+TEST(PlaceBelief, TheWayToTheFirstImageMovesNothing) {
+  PlaceBelief belief = Make(), other = Make();
+  ASSERT_TRUE(belief.Move({3, 0}, RadFromDeg(90)).ok());
+  for (PlaceBelief* each : {&belief, &other}) {
+    See(each, FixAt(4));
+    ASSERT_TRUE(each->Move({3, 0}, 0).ok());
+    See(each, NoFixBy(NoFix::kTooFewFeatures));
+  }
+  EXPECT_EQ(belief.probabilities(), other.probabilities());
+  EXPECT_EQ(Leader(belief).image, 7);
+}
+
 TEST(PlaceBelief, ShortWaysAddUp) {
   PlaceBelief belief = Make();
   See(&belief, FixAt(3));

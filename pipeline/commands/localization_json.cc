@@ -1,0 +1,42 @@
+#include "pipeline/commands/localization_json.h"
+
+#include <vector>
+
+namespace cairn::pipeline {
+
+nlohmann::ordered_json ErrorJson(const std::string& image, const Error& error) {
+  return {
+      {"image", image}, {"fix", false}, {"reason", ErrorCodeName(error.code)}, {"message", error.message}};
+}
+
+nlohmann::ordered_json LocalizationJson(const Localization& found) {
+  nlohmann::ordered_json json = {{"fix", found.has_fix()}};
+  if (found.has_fix()) {
+    const Eigen::Quaterniond& q = found.cam_from_world.rotation;
+    const Eigen::Vector3d& t = found.cam_from_world.translation;
+    const Eigen::Vector3d center = found.cam_from_world.Center();
+    json["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+    json["translation_m"] = {t.x(), t.y(), t.z()};
+    json["center_m"] = {center.x(), center.y(), center.z()};
+    json["covariance"] = std::vector<double>(found.covariance.data(), found.covariance.data() + 36);
+    json["probability"] = found.probability;
+    json["region"] = found.region;
+  } else {
+    json["reason"] = NoFixName(found.reason);
+    json["message"] = found.message;
+    if (found.probability > 0) json["probability"] = found.probability;
+    for (const Pose& pose : found.possible_poses) {
+      const Eigen::Vector3d center = pose.Center();
+      json["possible_centers_m"].push_back({center.x(), center.y(), center.z()});
+    }
+  }
+  json["scope"] = ScopeName(found.scope);
+  json["num_features"] = found.num_features;
+  json["num_matches"] = found.num_matches;
+  json["num_inliers"] = found.num_inliers;
+  json["candidates"] = found.candidates;
+  if (!found.voted_regions.empty()) json["voted_regions"] = found.voted_regions;
+  return json;
+}
+
+}  // namespace cairn::pipeline

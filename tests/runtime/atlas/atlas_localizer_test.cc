@@ -1,0 +1,198 @@
+#include "runtime/atlas/atlas_localizer.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "runtime/atlas/code_index.h"
+#include "runtime/localize/localizer.h"
+#include "tests/runtime/atlas/three_rooms.h"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+using AtlasLocalizerTest = ThreeRoomsTest;
+
+AtlasAnswer Answer(const std::shared_ptr<const Atlas>& atlas, const Features& features, const Camera& camera,
+                   const AtlasLocalizerOptions& options = {}) {
+  const auto answer =
+      AtlasLocalizer(atlas, {}, options).LocalizeFeatures(features, camera.width, camera.height, camera);
+  EXPECT_TRUE(answer.ok()) << answer.error().message;
+  double sum = answer->elsewhere;
+  for (const AtlasHypothesis& hypothesis : answer->hypotheses) sum += hypothesis.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+  return *answer;
+}
+
+TEST_F(AtlasLocalizerTest, FindsTheRoomAndThePlace) {
+  const auto atlas = Open(Rows());
+  Random random(1);
+  for (int i = 0; i < 30; ++i) {
+    const int room = i % kNumRooms;
+    const Pose truth = RandomPose(random);
+    const Features seen = See(room, truth, i);
+    const AtlasAnswer answer = Answer(atlas, seen, Room(room).camera);
+    ASSERT_THAT(answer.hypotheses, SizeIs(1)) << i;
+    EXPECT_EQ(answer.hypotheses[0].map, room);
+    EXPECT_GT(answer.hypotheses[0].probability, 0.9);
+    EXPECT_LT(CenterErrorM(answer.hypotheses[0].found.cam_from_world, truth), 0.05);
+    EXPECT_EQ(answer.maps_tried[0], room);
+    if (answer.hypotheses[0].probability >= 0.99) EXPECT_THAT(answer.maps_tried, SizeIs(1));
+    // What that map says alone.
+    const auto alone = *Localizer(*atlas->OpenMap(room)).LocalizeFeatures(seen, Room(room).camera);
+    EXPECT_EQ(alone.cam_from_world.translation, answer.hypotheses[0].found.cam_from_world.translation);
+    EXPECT_NEAR(answer.hypotheses[0].probability, alone.probability, 1e-9);
+  }
+}
+
+TEST_F(AtlasLocalizerTest, AnImageOfAnotherBuildingIsOfNoMap) {
+  const auto atlas = Open(Rows());
+  const SyntheticRoom other = MakeUnmappedRoom(99, 1600);
+  Random random(2);
+  for (int i = 0; i < 20; ++i) {
+    const AtlasAnswer answer = Answer(atlas, RenderFeatures(other, RandomPose(random), {}, i), other.camera);
+    EXPECT_THAT(answer.hypotheses, IsEmpty());
+    EXPECT_EQ(answer.elsewhere, 1);
+    EXPECT_FALSE(answer.best_failure.has_fix());
+  }
+}
+
+TEST_F(AtlasLocalizerTest, AnImageWithoutFeaturesIsOfNoMap) {
+  Features none;
+  none.descriptors.resize(0, kDescriptorDim);
+  const AtlasAnswer answer = Answer(Open(Rows()), none, Room(0).camera);
+  EXPECT_THAT(answer.hypotheses, IsEmpty());
+  EXPECT_THAT(answer.maps_tried, IsEmpty());
+  EXPECT_EQ(answer.best_failure.reason, NoFix::kNoCandidates);
+}
+
+// Room 1 again, under another name, elsewhere in the world: another floor that looks the same.
+AtlasRows WithTwin(AtlasRows rows, const MapRows& twin_rows, const std::string& path) {
+  EXPECT_TRUE(WriteMapRows(twin_rows, path).ok());
+  AtlasMap twin = rows.maps[1];
+  twin.name = twin_rows.name;
+  twin.file = std::filesystem::path(path).filename();
+  twin.fingerprint = FingerprintOf(MapFile::Open(path, {})->seal().root);
+  rows.maps.push_back(std::move(twin));
+  return rows;
+}
+
+TEST_F(AtlasLocalizerTest, TwoFloorsThatLookAlikeShareTheProbability) {
+  MapRows twin = Room(1).rows;
+  twin.name = "room 1 upstairs";
+  const auto atlas = Open(WithTwin(Rows(), twin, Path("twin.cairn")));
+  Random random(3);
+  for (int i = 0; i < 10; ++i) {
+    const AtlasAnswer answer = Answer(atlas, See(1, RandomPose(random), i), Room(1).camera);
+    ASSERT_THAT(answer.hypotheses, SizeIs(2)) << i;
+    EXPECT_NEAR(answer.hypotheses[0].probability, 0.5, 0.01);
+    EXPECT_NEAR(answer.hypotheses[1].probability, 0.5, 0.01);
+    EXPECT_NE(answer.hypotheses[0].map, answer.hypotheses[1].map);
+  }
+}
+
+TEST_F(AtlasLocalizerTest, AKnownLookAlikeIsAskedHoweverLittleItsCodesAgree) {
+  MapRows twin = Room(1).rows;
+  twin.name = "room 1 upstairs";
+  AtlasRows rows = WithTwin(Rows(), twin, Path("twin.cairn"));
+  rows.maps[3].places = {{1, 2, 3}};  // the atlas tells none of its landmarks
+  Random random(4);
+  const Pose truth = RandomPose(random);
+  const Features seen = See(1, truth, 0);
+  const AtlasAnswer unaware = Answer(Open(rows), seen, Room(1).camera);
+  ASSERT_THAT(unaware.hypotheses, SizeIs(1));
+  // All images of room 1 look like image 0 of its twin.
+  for (int32_t image = 0; image < rows.maps[1].num_images; ++image) rows.look_alikes.push_back({{1, image}, {3, 0}});
+  const auto atlas = Open(rows);
+  const AtlasAnswer aware = Answer(atlas, seen, Room(1).camera);
+  ASSERT_THAT(aware.hypotheses, SizeIs(2));
+  EXPECT_THAT(aware.maps_tried, ElementsAre(1, 3));
+  EXPECT_NEAR(aware.hypotheses[0].probability, 0.5, 0.01);
+  // Both ways.
+  EXPECT_THAT(atlas->MapsLike(1, 7), ElementsAre(3));
+  EXPECT_THAT(atlas->MapsLike(3, 0), ElementsAre(1));
+  EXPECT_THAT(atlas->MapsLike(3, 1), IsEmpty());
+}
+
+TEST_F(AtlasLocalizerTest, OnlySoManyMapsAreAsked) {
+  AtlasRows rows = Rows();
+  for (const int other : {1, 2}) rows.maps[other].places.push_back(rows.maps[0].places[0]);
+  const auto atlas = Open(rows);
+  Random random(5);
+  // No fix is sure enough: all the maps that know any of it are asked.
+  const Features seen = See(0, RandomPose(random), 0);
+  ASSERT_THAT(atlas->Rank(seen), SizeIs(kNumRooms));
+  EXPECT_EQ(atlas->Rank(seen)[0].map, 0);
+  EXPECT_THAT(Answer(atlas, seen, Room(0).camera, {.sure_probability = 1}).maps_tried, SizeIs(kNumRooms));
+  EXPECT_THAT(Answer(atlas, seen, Room(0).camera, {.max_num_maps = 2, .sure_probability = 1}).maps_tried, SizeIs(2));
+  // Sure, but rivals of any score are asked.
+  EXPECT_THAT(Answer(atlas, seen, Room(0).camera, {.rival_score_ratio = 0}).maps_tried, SizeIs(kNumRooms));
+}
+
+TEST_F(AtlasLocalizerTest, WithoutACameraEachMapHasItsOwn) {
+  const auto atlas = Open(Rows());
+  Random random(6);
+  const Pose truth = RandomPose(random);
+  AtlasLocalizer localizer(atlas);
+  const auto answer = localizer.LocalizeFeatures(See(2, truth, 0), 640, 480);
+  ASSERT_TRUE(answer.ok()) << answer.error().message;
+  ASSERT_THAT(answer->hypotheses, SizeIs(1));
+  EXPECT_EQ(answer->hypotheses[0].map, 2);
+  const auto wrong_size = localizer.LocalizeFeatures(See(2, truth, 0), 100, 100);
+  ASSERT_FALSE(wrong_size.ok());
+  EXPECT_EQ(wrong_size.error().code, ErrorCode::kNotFound);
+  const auto wrong_camera = localizer.Localize(cv::Mat::zeros(10, 10, CV_8U), Room(0).camera);
+  ASSERT_FALSE(wrong_camera.ok());
+  EXPECT_EQ(wrong_camera.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(AtlasLocalizerTest, AnotherFileThanTheAtlasWasMadeOfIsRefused) {
+  AtlasRows rows = Rows();
+  rows.maps[1].file = "rooms_0.cairn";
+  const auto exchanged = Open(rows)->OpenMap(1);
+  ASSERT_FALSE(exchanged.ok());
+  EXPECT_EQ(exchanged.error().code, ErrorCode::kOtherMap);
+  EXPECT_THAT(exchanged.error().message, HasSubstr("make the atlas anew"));
+  rows.maps[1].file = "nowhere.cairn";
+  EXPECT_EQ(Open(rows)->OpenMap(1).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(AtlasLocalizerTest, KeepsTheMapsThatWereAskedForLast) {
+  const auto atlas = Open(Rows(), {.max_num_open_maps = 2});
+  const auto first = *atlas->OpenMap(0);
+  EXPECT_EQ(*atlas->OpenMap(0), first);
+  ASSERT_TRUE(atlas->OpenMap(1).ok());
+  EXPECT_EQ(*atlas->OpenMap(0), first);
+  ASSERT_TRUE(atlas->OpenMap(2).ok());  // in the place of 1
+  EXPECT_EQ(*atlas->OpenMap(0), first);
+  ASSERT_TRUE(atlas->OpenMap(1).ok());
+  ASSERT_TRUE(atlas->OpenMap(2).ok());
+  EXPECT_NE(*atlas->OpenMap(0), first);
+}
+
+TEST_F(AtlasLocalizerTest, IsTheAtlasThatWasAskedFor) {
+  AtlasRows rows = Rows();
+  rows.epoch = 3;
+  ASSERT_TRUE(WriteFileAtomically(Path("of.atlas"), *EncodeAtlas(std::nullopt, &rows)).ok());
+  const auto code = [](const AtlasOptions& options) {
+    const auto opened = Atlas::Open(Path("of.atlas"), options);
+    return opened.ok() ? std::optional<ErrorCode>() : opened.error().code;
+  };
+  EXPECT_EQ(code({.name = "rooms", .min_epoch = 3}), std::nullopt);
+  EXPECT_EQ(code({.name = "halls"}), ErrorCode::kOtherMap);
+  EXPECT_EQ(code({.min_epoch = 4}), ErrorCode::kNotNewer);
+  EXPECT_EQ(code({.max_num_open_maps = 0}), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code({.public_key = MakeKeyPair().public_key}), ErrorCode::kNotSigned);
+  const auto atlas = *Atlas::Open(Path("of.atlas"));
+  EXPECT_EQ(*atlas->FindMap("room 2"), 2);
+  EXPECT_EQ(atlas->FindMap("room 3").error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace cairn
