@@ -82,8 +82,7 @@ void WriteImage(const AtlasImage& image, BlobWriter* writer) {
 
 AtlasImage ReadImage(BlobReader* reader) {
   const auto index = [&] {
-    return static_cast<int32_t>(
-        std::min<uint64_t>(reader->Varint(), std::numeric_limits<int32_t>::max()));
+    return static_cast<int32_t>(std::min<uint64_t>(reader->Varint(), std::numeric_limits<int32_t>::max()));
   };
   const int32_t map = index();
   return {map, index()};
@@ -139,8 +138,8 @@ AtlasMap ReadAtlasMap(BlobReader* reader) {
   const std::string_view fingerprint = reader->Bytes(map.fingerprint.size());
   std::copy(fingerprint.begin(), fingerprint.end(), map.fingerprint.begin());
   map.num_bytes = reader->Varint();
-  map.num_images = static_cast<int64_t>(
-      std::min<uint64_t>(reader->Varint(), std::numeric_limits<int32_t>::max()));
+  map.num_images =
+      static_cast<int64_t>(std::min<uint64_t>(reader->Varint(), std::numeric_limits<int32_t>::max()));
   const uint64_t num_places = reader->Varint();
   const std::string_view bytes = reader->Bytes(reader->Varint());
   if (!reader->ok() || num_places > static_cast<uint64_t>(kMaxAtlasCodes)) {
@@ -229,8 +228,7 @@ Status CheckAtlas(const AtlasRows& atlas) {
     CAIRN_RETURN_IF_ERROR(CheckImage(atlas, passage.from, "a passage"));
     CAIRN_RETURN_IF_ERROR(CheckImage(atlas, passage.to, "a passage"));
     if (!std::isfinite(passage.cost) || passage.cost < 0)
-      return MakeError(ErrorCode::kInvalidArgument, "passage '{}': a cost of {}", passage.name,
-                       passage.cost);
+      return MakeError(ErrorCode::kInvalidArgument, "passage '{}': a cost of {}", passage.name, passage.cost);
   }
   return Ok();
 }
@@ -299,7 +297,8 @@ Result<AtlasRows> ReadAtlas(const std::string& path, const std::optional<PublicK
   }
 #endif
   CAIRN_RETURN_IF_ERROR(CheckSignatureOf(SignedHead(atlas.public_key, hash), atlas.public_key,
-                                         atlas.signature, path, required, "make it with `cairn atlas --key`"));
+                                         atlas.signature, path, required,
+                                         "make it with `cairn atlas --key`"));
   if (!ReadPayload(payload, &atlas)) return Corrupt(path, "its contents make no sense; make it anew");
   if (const Status checked = CheckAtlas(atlas); !checked.ok())
     return Corrupt(path, "{}; make it anew", checked.error().message);

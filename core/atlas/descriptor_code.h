@@ -24,7 +24,8 @@ CodeBook LearnCodeBook(const DescriptorMatrix& descriptors);
 // A descriptor as the code of the landmark that it may show, and how far each bit is from being another.
 struct DescriptorCode {
   uint32_t bits = 0;
-  std::array<int16_t, kNumCodeBits> margins = {};  // distances from the medians, that of the highest bit first
+  std::array<int16_t, kNumCodeBits> margins =
+      {};  // distances from the medians, that of the highest bit first
 };
 DescriptorCode CodeOf(const CodeBook& book, const uint8_t* descriptor);
 

@@ -80,9 +80,8 @@ std::vector<std::vector<uint32_t>> PlacesOf(const MapRows& rows, const std::vect
     const std::vector<int32_t>& seen_in = images[landmark];
     return seen_in.empty() ? -1 : seen_in[seen_in.size() / 2];
   };
-  std::sort(landmarks.begin(), landmarks.end(), [&](LandmarkIdx a, LandmarkIdx b) {
-    return std::pair(place(a), a) < std::pair(place(b), b);
-  });
+  std::sort(landmarks.begin(), landmarks.end(),
+            [&](LandmarkIdx a, LandmarkIdx b) { return std::pair(place(a), a) < std::pair(place(b), b); });
   const size_t num_places = (landmarks.size() + kCodesOfPlace - 1) / kCodesOfPlace;
   std::vector<std::vector<uint32_t>> places(num_places);
   for (size_t i = 0; i < landmarks.size(); ++i)

@@ -130,8 +130,10 @@ Result<AtlasRows> MakeAtlas(const std::vector<std::string>& map_paths, const std
     CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(path, {}));
     CAIRN_ASSIGN_OR_RETURN(MapRows rows, ReadMapRows(file));
     if (rows.images.empty() || rows.landmarks.empty()) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: map '{}' has {} images and {} landmarks: nothing says "
-                       "what its place looks like", path, rows.name, rows.images.size(), rows.landmarks.size());
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: map '{}' has {} images and {} landmarks: nothing says "
+                       "what its place looks like",
+                       path, rows.name, rows.images.size(), rows.landmarks.size());
     }
     atlas.maps.push_back({.name = rows.name,
                           .file = FileFrom(atlas_path, path),
@@ -166,9 +168,8 @@ Result<AtlasRows> MakeAtlas(const std::vector<std::string>& map_paths, const std
     CAIRN_ASSIGN_OR_RETURN(atlas.passages, ReadPassages(passages_path, maps));
   }
   if (options.num_compared_images > 0 && maps.size() > 1) {
-    CAIRN_ASSIGN_OR_RETURN(
-        atlas.look_alikes,
-        FindLookAlikes(atlas, maps, options.num_compared_images, num_threads, progress));
+    CAIRN_ASSIGN_OR_RETURN(atlas.look_alikes,
+                           FindLookAlikes(atlas, maps, options.num_compared_images, num_threads, progress));
   }
   return atlas;
 }

@@ -15,8 +15,7 @@ Result<AtlasImage> FindImageIn(const std::vector<std::shared_ptr<const Map>>& ma
   int32_t found = -1;
   for (size_t map = 0; map < maps.size(); ++map) {
     const std::string& map_name = maps[map]->head().name;
-    if (name.starts_with(map_name + "/") &&
-        (found < 0 || map_name.size() > maps[found]->head().name.size()))
+    if (name.starts_with(map_name + "/") && (found < 0 || map_name.size() > maps[found]->head().name.size()))
       found = static_cast<int32_t>(map);
   }
   if (found < 0) {
@@ -28,7 +27,8 @@ Result<AtlasImage> FindImageIn(const std::vector<std::shared_ptr<const Map>>& ma
   return AtlasImage{found, image};
 }
 
-Result<AtlasPassage> ParsePassage(std::string_view line, const std::vector<std::shared_ptr<const Map>>& maps) {
+Result<AtlasPassage> ParsePassage(std::string_view line,
+                                  const std::vector<std::shared_ptr<const Map>>& maps) {
   const std::vector<std::string> fields = SplitFields(line, ',');
   if ((fields.size() != 3 && fields.size() != 4) || fields[0].empty()) {
     return MakeError(ErrorCode::kInvalidArgument,

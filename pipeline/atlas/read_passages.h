@@ -11,9 +11,9 @@
 namespace cairn::pipeline {
 
 // Lifts, stairs and doors between maps: lines `NAME, MAP/IMAGE, MAP/IMAGE[, COST]`; lines that begin with '#'
-// and empty ones are skipped.  MAP is the name of one of `maps`, IMAGE a survey image of it.  Errors: NotFound
-// (file, map or image), Io, InvalidArgument (another number of fields, a cost that is none); each names the
-// line.
+// and empty ones are skipped.  MAP is the name of one of `maps`, IMAGE a survey image of it.  Errors:
+// NotFound (file, map or image), Io, InvalidArgument (another number of fields, a cost that is none); each
+// names the line.
 Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path,
                                                const std::vector<std::shared_ptr<const Map>>& maps);
 

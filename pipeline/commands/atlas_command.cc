@@ -37,8 +37,8 @@ Status RunAtlas(const AtlasArguments& arguments, const CommandEnvironment& envir
   CAIRN_ASSIGN_OR_RETURN(AtlasRows atlas,
                          MakeAtlas(arguments.map_paths, arguments.output_path, arguments.passages_path,
                                    arguments.options, environment.num_threads, environment.progress));
-  atlas.name = arguments.name.empty() ? std::filesystem::path(arguments.output_path).stem().string()
-                                      : arguments.name;
+  atlas.name =
+      arguments.name.empty() ? std::filesystem::path(arguments.output_path).stem().string() : arguments.name;
   atlas.epoch = arguments.epoch;
   CAIRN_ASSIGN_OR_RETURN(const std::string bytes, EncodeAtlas(key, &atlas));
   CAIRN_RETURN_IF_ERROR(WriteFileAtomically(arguments.output_path, bytes));
@@ -57,9 +57,7 @@ Command AtlasCommand() {
             parser.Add("maps", arguments->map_paths, "Maps of a site; signed ones after they are signed")
                 .Required()
                 .Type("MAP");
-            parser.Add("-o,--output", arguments->output_path, "Atlas to write")
-                .Required()
-                .Type("FILE.atlas");
+            parser.Add("-o,--output", arguments->output_path, "Atlas to write").Required().Type("FILE.atlas");
             parser.Add("--name", arguments->name, "Name of the atlas [that of the file]").Type("NAME");
             parser
                 .Add("--epoch", arguments->epoch,

@@ -132,14 +132,15 @@ Status InspectAtlas(const std::string& path, bool as_json, const CommandEnvironm
                             {"num_images", map.num_images},
                             {"num_codes", num_codes},
                             {"num_code_bytes", NumBytesOfPlaces(map.places)}});
-    maps_text += fmt::format("{:>9}  {:>6}  {:>6}  {:>6}  {}  ({})\n", map.num_bytes, map.num_images, num_codes,
-                             NumBytesOfPlaces(map.places), map.name, map.file);
+    maps_text += fmt::format("{:>9}  {:>6}  {:>6}  {:>6}  {}  ({})\n", map.num_bytes, map.num_images,
+                             num_codes, NumBytesOfPlaces(map.places), map.name, map.file);
   }
-  std::string text = fmt::format(
-      "atlas {}: {} maps, {} bytes, {:.2f} % of theirs; {}\n{:>9}  {:>6}  {:>6}  {:>6}  map\n", atlas.name,
-      atlas.maps.size(), num_bytes, 100.0 * static_cast<double>(num_bytes) / static_cast<double>(num_map_bytes),
-      atlas.is_signed() ? "signed with key " + HexOf(atlas.public_key) : "not signed", "bytes", "images",
-      "codes", "bytes");
+  std::string text =
+      fmt::format("atlas {}: {} maps, {} bytes, {:.2f} % of theirs; {}\n{:>9}  {:>6}  {:>6}  {:>6}  map\n",
+                  atlas.name, atlas.maps.size(), num_bytes,
+                  100.0 * static_cast<double>(num_bytes) / static_cast<double>(num_map_bytes),
+                  atlas.is_signed() ? "signed with key " + HexOf(atlas.public_key) : "not signed", "bytes",
+                  "images", "codes", "bytes");
   text += maps_text;
   json["look_alikes"] = nlohmann::ordered_json::array();
   for (const auto& [maps, count] : pairs) {

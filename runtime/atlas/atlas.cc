@@ -53,8 +53,7 @@ Result<std::shared_ptr<const Atlas>> Atlas::Open(const std::string& path, const 
       return MakeError(ErrorCode::kNotNewer, "{}: has epoch {}, expected {} or later", path, rows.epoch,
                        options.min_epoch);
     }
-    return std::shared_ptr<const Atlas>(
-        new Atlas(std::make_unique<Store>(std::move(rows), path, options)));
+    return std::shared_ptr<const Atlas>(new Atlas(std::make_unique<Store>(std::move(rows), path, options)));
   });
 }
 
@@ -74,7 +73,8 @@ Result<std::shared_ptr<const Map>> Atlas::OpenMap(int map) const {
   return WithoutExceptions(store_->path.c_str(), [&]() -> Result<std::shared_ptr<const Map>> {
     const std::lock_guard lock(store_->mutex);
     auto& open = store_->open;
-    const auto found = std::find_if(open.begin(), open.end(), [&](const auto& kept) { return kept.first == map; });
+    const auto found =
+        std::find_if(open.begin(), open.end(), [&](const auto& kept) { return kept.first == map; });
     if (found != open.end()) {
       open.splice(open.begin(), open, found);
       return open.front().second;
@@ -84,10 +84,11 @@ Result<std::shared_ptr<const Map>> Atlas::OpenMap(int map) const {
     CAIRN_ASSIGN_OR_RETURN(auto opened,
                            Map::Open(path, {.memory_budget_bytes = store_->options.memory_budget_bytes}));
     if (FingerprintOf(opened->root_hash()) != row.fingerprint) {
-      return MakeError(ErrorCode::kOtherMap,
-                       "{}: is not the file that {} was made of (map '{}'): it was updated or exchanged; make "
-                       "the atlas anew",
-                       path, store_->path, row.name);
+      return MakeError(
+          ErrorCode::kOtherMap,
+          "{}: is not the file that {} was made of (map '{}'): it was updated or exchanged; make "
+          "the atlas anew",
+          path, store_->path, row.name);
     }
     open.emplace_front(map, std::move(opened));
     if (open.size() > static_cast<size_t>(store_->options.max_num_open_maps)) open.pop_back();

@@ -12,6 +12,7 @@
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/place_evidence.h"
 #include "runtime/localize/retrieve.h"
+#include "runtime/map/landmark_set.h"
 
 namespace cairn {
 namespace {
@@ -46,12 +47,13 @@ OptionTable DescribeOptions(AtlasLocalizerOptions* o) {
        .max = kMaxAtlasMaps},
       {.name = "sure_probability",
        .value = &o->sure_probability,
-       .help = "a fix with this probability is taken without asking maps that know less of the image",
+       .help =
+           "a fix with this probability is taken without asking maps that know other features of the image",
        .min = 0,
        .max = 1},
-      {.name = "rival_score_ratio",
-       .value = &o->rival_score_ratio,
-       .help = "how much less: this part of what its own map knows",
+      {.name = "rival_ratio",
+       .value = &o->rival_ratio,
+       .help = "others: less than this part of those that its own map knows",
        .min = 0,
        .max = 1},
   };
@@ -79,24 +81,32 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
     const std::vector<MapScore> ranked = atlas_->Rank(features);
     AtlasAnswer answer;
-    std::optional<Error> no_camera;
-    double best_probability = 0, best_score = 0;
-    // In turn those that have most of the image, and, at once, those that look like what was found.
-    std::deque<std::pair<int, double>> next;
-    for (size_t i = 0; i < ranked.size() && i < static_cast<size_t>(options_.max_num_maps); ++i)
-      next.emplace_back(ranked[i].map, ranked[i].score);
+    double best_probability = 0;
+    std::vector<int32_t> best_features;
+    // In turn those with most evidence, and, at once, those that look like what was found.
+    struct Next {
+      int map;
+      std::vector<int32_t> features;  // that it has
+      bool is_look_alike;
+    };
+    std::deque<Next> next;
+    for (const MapScore& each : ranked) next.push_back({each.map, each.features, false});
     while (!next.empty()) {
-      const auto [map_idx, score] = next.front();
+      const Next now = std::move(next.front());
       next.pop_front();
-      if (best_probability >= options_.sure_probability && score < options_.rival_score_ratio * best_score)
-        continue;
-      CAIRN_ASSIGN_OR_RETURN(const auto map, atlas_->OpenMap(map_idx));
+      if (!now.is_look_alike) {
+        if (static_cast<int>(answer.maps_tried.size()) >= options_.max_num_maps) continue;
+        const bool is_rival = NumShared(now.features, best_features) >=
+                              options_.rival_ratio * static_cast<double>(best_features.size());
+        if (best_probability >= options_.sure_probability && !is_rival) continue;
+      }
+      CAIRN_ASSIGN_OR_RETURN(const auto map, atlas_->OpenMap(now.map));
       Result<Camera> own = camera ? Result<Camera>(*camera) : map->CameraForSize(width, height);
       if (!own.ok()) {
-        no_camera = own.error();
+        if (answer.best_failure.message.empty()) answer.best_failure.message = own.error().message;
         continue;
       }
-      answer.maps_tried.push_back(map_idx);
+      answer.maps_tried.push_back(now.map);
       Localizer localizer(map, localizer_options_);
       CAIRN_ASSIGN_OR_RETURN(Localization found, localizer.LocalizeFeatures(features, *own));
       if (found.probability <= 0 || (!found.has_fix() && found.possible_poses.empty())) {
@@ -105,19 +115,17 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
       }
       if (found.probability > best_probability) {
         best_probability = found.probability;
-        best_score = score;
+        best_features = now.features;
       }
       CAIRN_ASSIGN_OR_RETURN(const int32_t image, ImageNearFix(*map, found));
-      for (const int other : atlas_->MapsLike(map_idx, image)) {
+      for (const int other : atlas_->MapsLike(now.map, image)) {
         const bool is_known =
             std::find(answer.maps_tried.begin(), answer.maps_tried.end(), other) != answer.maps_tried.end();
-        std::erase_if(next, [&](const auto& queued) { return queued.first == other; });
-        // As much of the image as this map has, so that it is asked.
-        if (!is_known) next.emplace_front(other, best_score);
+        std::erase_if(next, [&](const Next& queued) { return queued.map == other; });
+        if (!is_known) next.push_front({other, {}, true});
       }
-      answer.hypotheses.push_back({.map = map_idx, .found = std::move(found)});
+      answer.hypotheses.push_back({.map = now.map, .found = std::move(found)});
     }
-    if (answer.maps_tried.empty() && no_camera) return *no_camera;
     ShareProbability(&answer);
     return answer;
   });

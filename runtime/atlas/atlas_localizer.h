@@ -17,13 +17,13 @@
 namespace cairn {
 
 struct AtlasLocalizerOptions {
-  // Most maps in which an image is localized: those that have most of its features.  Maps of which a place is
-  // known that looks like the one found come on top.  REQUIRES: >= 1
-  int max_num_maps = 3;
-  // A fix with this probability is taken without asking maps that have less than `rival_score_ratio` of what
-  // its own map has of the image.  REQUIRES: both in [0, 1]
+  // Most maps in which an image is localized, those with most evidence first.  Maps of which a place is known
+  // that looks like the one found come on top.  REQUIRES: >= 1
+  int max_num_maps = 8;
+  // Once a map has a fix of this probability, only those are asked that have at least `rival_ratio` of the
+  // image's features that it has.  REQUIRES: both in [0, 1]
   double sure_probability = 0.99;
-  double rival_score_ratio = 0.5;
+  double rival_ratio = 0.3;
 };
 OptionTable DescribeOptions(AtlasLocalizerOptions* options);
 
@@ -39,7 +39,7 @@ struct AtlasAnswer {
   double elsewhere = 1;                     // P(in none of the maps)
   std::vector<int> maps_tried;              // in this order
   // Of the first map tried: why it has no fix, where there is no hypothesis.  Without one tried:
-  // kNoCandidates.
+  // kNoCandidates, and that maps lack a camera of that size, where that is why.
   Localization best_failure;
 };
 
@@ -50,8 +50,8 @@ class AtlasLocalizer {
                           const AtlasLocalizerOptions& options = {});
 
   // From 8-bit grey pixels.  Without a camera: each map's own camera of that size; maps without one are left
-  // out.  Errors: as Localizer::Localize and Atlas::OpenMap; InvalidArgument (an option); NotFound (no map has
-  // a camera of that size).  An image that is of none of the maps is no error.
+  // out.  Errors: as Localizer::Localize and Atlas::OpenMap; InvalidArgument (an option).  An image that is
+  // of none of the maps is no error.
   Result<AtlasAnswer> Localize(const cv::Mat& grey, const std::optional<Camera>& camera = std::nullopt);
   // The same from features that were already extracted from an image of that size.
   Result<AtlasAnswer> LocalizeFeatures(const Features& features, int width, int height,

@@ -54,9 +54,10 @@ Result<std::vector<AtlasLeg>> PlanRoute(const Atlas& atlas, const AtlasImage& fr
     }
     if (next == stops.size() || reached[next].cost == std::numeric_limits<double>::infinity()) {
       if (from.map == to.map && no_way) return *no_way;
-      return MakeError(ErrorCode::kNotFound,
-                       "route: no passages lead from map '{}' to map '{}'; `cairn atlas --passages` states them",
-                       atlas.map_name(from.map), atlas.map_name(to.map));
+      return MakeError(
+          ErrorCode::kNotFound,
+          "route: no passages lead from map '{}' to map '{}'; `cairn atlas --passages` states them",
+          atlas.map_name(from.map), atlas.map_name(to.map));
     }
     reached[next].is_final = true;
     const auto reach = [&](size_t stop, double cost, Route route) {
@@ -109,8 +110,7 @@ Result<AtlasImage> FindImage(const Atlas& atlas, const std::string& name) {
                      name);
   }
   CAIRN_ASSIGN_OR_RETURN(const auto map, atlas.OpenMap(found));
-  CAIRN_ASSIGN_OR_RETURN(const int32_t image,
-                         FindImage(*map, name.substr(atlas.map_name(found).size() + 1)));
+  CAIRN_ASSIGN_OR_RETURN(const int32_t image, FindImage(*map, name.substr(atlas.map_name(found).size() + 1)));
   return AtlasImage{found, image};
 }
 

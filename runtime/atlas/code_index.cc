@@ -1,6 +1,7 @@
 #include "runtime/atlas/code_index.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
@@ -12,7 +13,9 @@ constexpr int kPrefixBits = 16;
 // Bits that a landmark's next sighting has otherwise are those near the median (DescriptorCode): more is
 // likelier another landmark.
 constexpr int kMaxCost = 25;
-constexpr size_t kMaxNumFeatures = 600;
+constexpr size_t kMaxNumFeatures = 1000;
+// Where an image shows next to nothing.
+constexpr double kLeastByChance = 0.05;
 
 uint32_t PrefixOf(uint32_t code) { return code >> (kNumCodeBits - kPrefixBits); }
 
@@ -62,34 +65,64 @@ std::vector<int32_t> CodeIndex::MapsWith(const DescriptorCode& code) const {
 }
 
 std::vector<MapScore> CodeIndex::Rank(const Features& features) const {
-  // Of each landmark that is in the image: the part of a feature by which it counts.
-  std::map<int32_t, double> weight_of_entry;
+  // Of each landmark that is in the image: a feature that shows it, of those that fewest maps have.
+  struct Shown {
+    int32_t feature;
+    double weight;  // a feature that several maps have counts by as many parts
+  };
+  std::map<int32_t, Shown> shown;  // by entry
   for (const size_t feature : LargestFeatures(features)) {
-    const DescriptorCode code =
-        CodeOf(code_book_, features.descriptors.data() + feature * kDescriptorDim);
+    const DescriptorCode code = CodeOf(code_book_, features.descriptors.data() + feature * kDescriptorDim);
     const std::vector<int32_t> hits = Find(code);
     std::set<int32_t> maps;
     for (const int32_t hit : hits) maps.insert(map_of_place_[entries_[hit].place]);
     for (const int32_t hit : hits) {
-      double& weight = weight_of_entry[hit];
-      weight = std::max(weight, 1 / static_cast<double>(maps.size()));
+      const Shown here{static_cast<int32_t>(feature), 1 / static_cast<double>(maps.size())};
+      const auto [known, is_new] = shown.emplace(hit, here);
+      if (!is_new && here.weight > known->second.weight) known->second = here;
     }
   }
-  std::vector<double> score_of_place(map_of_place_.size() + 1);
-  for (const auto& [entry, weight] : weight_of_entry) score_of_place[entries_[entry].place] += weight;
-  std::map<int32_t, double> score_of_map;
+  std::vector<double> sum_of_place(map_of_place_.size());
+  double sum = 0;
+  for (const auto& [entry, each] : shown) {
+    sum_of_place[entries_[entry].place] += each.weight;
+    sum += each.weight;
+  }
+  // An image shows a place and what lies beside it.
+  const auto is_followed = [&](size_t place) {
+    return place + 1 < map_of_place_.size() && map_of_place_[place + 1] == map_of_place_[place];
+  };
+  // What two places have by chance, as nearly all of them do.
+  const double by_chance =
+      std::max(kLeastByChance, 2 * sum / static_cast<double>(std::max<size_t>(1, map_of_place_.size())));
+  struct Best {
+    size_t place = 0;
+    double sum = 0;
+    int num_places = 0;
+  };
+  std::map<int32_t, Best> best_of_map;
   for (size_t place = 0; place < map_of_place_.size(); ++place) {
-    // An image shows a place and what lies beside it.
-    double score = score_of_place[place];
-    if (place + 1 < map_of_place_.size() && map_of_place_[place + 1] == map_of_place_[place])
-      score += score_of_place[place + 1];
-    if (score > 0) {
-      double& best = score_of_map[map_of_place_[place]];
-      best = std::max(best, score);
-    }
+    Best& best = best_of_map[map_of_place_[place]];
+    ++best.num_places;
+    const double here = sum_of_place[place] + (is_followed(place) ? sum_of_place[place + 1] : 0);
+    if (here > best.sum) best = {place, here, best.num_places};
   }
   std::vector<MapScore> ranked;
-  for (const auto& [map, score] : score_of_map) ranked.push_back({map, score});
+  for (const auto& [map, best] : best_of_map) {
+    if (best.sum <= by_chance) continue;
+    // Chernoff's bound of a Poisson number's tail, for the best of so many places.
+    const double evidence = best.sum * std::log(best.sum / by_chance) - best.sum + by_chance -
+                            std::log(static_cast<double>(best.num_places));
+    MapScore score{.map = map, .score = evidence};
+    for (const auto& [entry, each] : shown) {
+      const auto place = static_cast<size_t>(entries_[entry].place);
+      if (place == best.place || (is_followed(best.place) && place == best.place + 1))
+        score.features.push_back(each.feature);
+    }
+    std::sort(score.features.begin(), score.features.end());
+    score.features.erase(std::unique(score.features.begin(), score.features.end()), score.features.end());
+    ranked.push_back(std::move(score));
+  }
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const MapScore& a, const MapScore& b) { return a.score > b.score; });
   return ranked;

@@ -11,9 +11,11 @@ namespace cairn {
 // How much of an image is known from one of an atlas's maps.
 struct MapScore {
   int32_t map = 0;
-  // Landmarks of the map's best place that are in the image; a feature that several maps have counts by as
-  // many parts.
+  // Evidence, nats: how improbable it is that one of the map's places has by chance as many of the image's
+  // features as the best one has.
   double score = 0;
+  // These features of the image, ascending.
+  std::vector<int32_t> features;
 };
 
 // The codes of all maps of an atlas, by their first half.
@@ -21,8 +23,8 @@ class CodeIndex {
  public:
   explicit CodeIndex(const AtlasRows& atlas);
 
-  // The maps that have some of these features, most first.  The largest features count: codes are of
-  // landmarks that are seen from far away, too.  O(features), some 30 places of the index for each.
+  // The maps that have some of these features, the most evidence first.  The largest features count: codes
+  // are of landmarks that are seen from far away, too.  O(features), some 30 places of the index for each.
   std::vector<MapScore> Rank(const Features& features) const;
 
   // The maps that have a landmark of this code, ascending.

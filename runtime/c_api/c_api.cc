@@ -35,38 +35,6 @@ Handles<cairn_localizer, OpenLocalizer, HandleKind::kLocalizer>& OpenLocalizers(
   return *localizers;
 }
 
-// What the caller requires of a map that is opened or that an update brings.
-struct GivenOptions {
-  MapOptions map;
-  UpdateOptions update;
-};
-
-// The caller's options; NULL: the defaults.  Callers built with an earlier release give the fields
-// that it had.
-Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
-  GivenOptions given;
-  if (options == nullptr) return given;
-  CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options", offsetof(cairn_map_options, name)));
-  cairn_map_options asked = CAIRN_MAP_OPTIONS_INIT;
-  std::memcpy(&asked, options, std::min(options->size, sizeof(asked)));
-  if (asked.memory_budget_bytes < 0)
-    return Misuse("options->memory_budget_bytes is {}; must not be negative", asked.memory_budget_bytes);
-  if (asked.memory_budget_bytes > 0) given.map.memory_budget_bytes = asked.memory_budget_bytes;
-  if (asked.public_key != nullptr) {
-    PublicKey& key = given.map.public_key.emplace();
-    std::copy_n(asked.public_key, key.size(), key.begin());
-  }
-  if (asked.name != nullptr) given.map.name = asked.name;
-  given.map.min_epoch = asked.min_epoch;
-  if (asked.allow_older != 0 && asked.allow_older != 1)
-    return Misuse("options->allow_older is {}; expected 0 or 1", asked.allow_older);
-  given.update = {.public_key = given.map.public_key,
-                  .allow_older = asked.allow_older == 1,
-                  .name = given.map.name,
-                  .min_epoch = given.map.min_epoch};
-  return given;
-}
-
 }  // namespace
 }  // namespace cairn
 

@@ -1,5 +1,6 @@
 /* Where is this camera?  The C API of cairn's runtime: open a map, make a localizer, or a tracker for frames
  * in order, and hand it grey pixels.  Where did it start?  Several starts, kept in mind on the way to a goal.
+ * In which of many maps is it?  An atlas.
  *
  * Every function that can fail returns 0 (CAIRN_OK) or an error code, and leaves a sentence for its thread in
  * cairn_last_error().  Nothing is printed, no exception leaves the library, and no misuse that it can see
@@ -100,6 +101,8 @@ typedef struct cairn_log cairn_log;
 typedef struct cairn_place_model cairn_place_model;
 typedef struct cairn_start_hypotheses cairn_start_hypotheses;
 typedef struct cairn_place_belief cairn_place_belief;
+typedef struct cairn_atlas cairn_atlas;
+typedef struct cairn_atlas_localizer cairn_atlas_localizer;
 
 #define CAIRN_MESSAGE_BYTES 256
 #define CAIRN_MAX_CAMERA_PARAMS 12
@@ -456,6 +459,32 @@ CAIRN_API int32_t cairn_place_belief_places(const cairn_place_belief* belief, in
                                             double* probabilities, int32_t capacity, int32_t* num_places,
                                             double* elsewhere);
 CAIRN_API int32_t cairn_place_belief_destroy(cairn_place_belief* belief);
+
+/* Many maps of a site as one (`cairn atlas`): in which of them was an image taken?  Reads the atlas alone; a
+ * map's file is opened when it is needed, and must be the one that the atlas was made of (CAIRN_OTHER_MAP).
+ * `options`, which may be NULL: the atlas must be signed with the public key, and have this name and epoch;
+ * the memory budget is each map's [64 MiB].  Shared by all threads. */
+CAIRN_API int32_t cairn_atlas_open(const char* path, const cairn_map_options* options, cairn_atlas** atlas);
+CAIRN_API int32_t cairn_atlas_num_maps(const cairn_atlas* atlas, int32_t* num_maps);
+/* One of its maps, from 0 on: for a localizer or tracker of the map in which the robot turned out to be.
+ * Close it with cairn_map_close. */
+CAIRN_API int32_t cairn_atlas_open_map(const cairn_atlas* atlas, int32_t map, cairn_map** opened);
+/* Localizers that were made of it go on. */
+CAIRN_API int32_t cairn_atlas_close(cairn_atlas* atlas);
+/* For one thread at a time. */
+CAIRN_API int32_t cairn_atlas_localizer_create(const cairn_atlas* atlas, cairn_atlas_localizer** localizer);
+/* Any option that `cairn localize --help` lists: ("max_num_maps", "3"). */
+CAIRN_API int32_t cairn_atlas_localizer_set_option(cairn_atlas_localizer* localizer, const char* name,
+                                                   const char* value);
+/* The maps in which the image may have been taken, at most `capacity`, the most probable first, and P(there),
+ * all maps considered; *num_places says how many there are of these.  *elsewhere (may be NULL): P(in none).
+ * `fix` (may be NULL): where in the first of them, with that probability, or why there is no fix.  `camera`
+ * NULL: each map's camera of the image's size. */
+CAIRN_API int32_t cairn_atlas_localize(cairn_atlas_localizer* localizer, const cairn_image* image,
+                                       const cairn_camera* camera, int32_t* maps, double* probabilities,
+                                       int32_t capacity, int32_t* num_places, double* elsewhere,
+                                       cairn_fix* fix);
+CAIRN_API int32_t cairn_atlas_localizer_destroy(cairn_atlas_localizer* localizer);
 
 /* Updates a map by its differences to a new one (`cairn update delta`).  Replaces the file at `map_path` by
  * the map that the delta leads to: at any instant it is the whole old or the whole new one, and the old one

@@ -4,6 +4,7 @@
 
 #include "core/features/sift.h"
 #include "core/options/options.h"
+#include "runtime/atlas/atlas_localizer.h"
 #include "runtime/drive/place_belief.h"
 #include "runtime/drive/place_model.h"
 #include "runtime/localize/localizer_options.h"
@@ -35,6 +36,17 @@ inline OptionTable DescribeOptions(BeliefOptions* options) {
   return all;
 }
 inline constexpr const char* kBeliefOptionsHelp = "`cairn where --help-all` lists them";
+
+// All options of an atlas's localizer.
+struct AtlasSearchOptions {
+  LocalizerOptions localizer;
+  AtlasLocalizerOptions atlas;
+};
+inline OptionTable DescribeOptions(AtlasSearchOptions* options) {
+  OptionTable all = DescribeOptions(&options->atlas);
+  for (const Option& option : DescribeOptions(&options->localizer)) all.push_back(option);
+  return all;
+}
 
 // For a name that is near to none.
 inline constexpr const char* kLookOptionsHelp =

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
+#include <utility>
 
 #include "runtime/c_api/calls.h"
 
@@ -39,8 +41,32 @@ Result<cv::Mat> PixelsOf(const cairn_image* image) {
   return cv::Mat(image->height, image->width, CV_8UC1, const_cast<uint8_t*>(image->pixels), stride);
 }
 
-Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey) {
-  if (given == nullptr) return map.CameraForSize(grey.cols, grey.rows);
+Result<GivenOptions> OptionsOf(const cairn_map_options* options) {
+  GivenOptions given;
+  if (options == nullptr) return given;
+  CAIRN_RETURN_IF_ERROR(CheckStruct(options, "options", offsetof(cairn_map_options, name)));
+  cairn_map_options asked = CAIRN_MAP_OPTIONS_INIT;
+  std::memcpy(&asked, options, std::min(options->size, sizeof(asked)));
+  if (asked.memory_budget_bytes < 0)
+    return Misuse("options->memory_budget_bytes is {}; must not be negative", asked.memory_budget_bytes);
+  if (asked.memory_budget_bytes > 0) given.map.memory_budget_bytes = asked.memory_budget_bytes;
+  if (asked.public_key != nullptr) {
+    PublicKey& key = given.map.public_key.emplace();
+    std::copy_n(asked.public_key, key.size(), key.begin());
+  }
+  if (asked.name != nullptr) given.map.name = asked.name;
+  given.map.min_epoch = asked.min_epoch;
+  if (asked.allow_older != 0 && asked.allow_older != 1)
+    return Misuse("options->allow_older is {}; expected 0 or 1", asked.allow_older);
+  given.update = {.public_key = given.map.public_key,
+                  .allow_older = asked.allow_older == 1,
+                  .name = given.map.name,
+                  .min_epoch = given.map.min_epoch};
+  return given;
+}
+
+Result<std::optional<Camera>> GivenCameraOf(const cairn_camera* given) {
+  if (given == nullptr) return std::optional<Camera>();
   CAIRN_RETURN_IF_ERROR(CheckStruct(given, "camera"));
   if (given->num_params < 0 || given->num_params > CAIRN_MAX_CAMERA_PARAMS)
     return Misuse("camera->num_params is {}; no model has more than {}", given->num_params,
@@ -50,7 +76,12 @@ Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat
   camera.width = given->width;
   camera.height = given->height;
   camera.params.assign(given->params, given->params + given->num_params);
-  return camera;
+  return std::optional(std::move(camera));
+}
+
+Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey) {
+  CAIRN_ASSIGN_OR_RETURN(const std::optional<Camera> camera, GivenCameraOf(given));
+  return camera ? Result<Camera>(*camera) : map.CameraForSize(grey.cols, grey.rows);
 }
 
 Result<std::optional<PosePrior>> PriorOf(const cairn_prior* given) {

@@ -10,6 +10,7 @@
 #include "runtime/c_api/cairn.h"
 #include "runtime/localize/localization.h"
 #include "runtime/map/map.h"
+#include "runtime/map/update_map.h"
 #include "runtime/visual_map/visual_estimate.h"
 
 // Between the structs of the C API and the runtime's types.
@@ -18,6 +19,16 @@ namespace cairn {
 // The caller's pixels, not copied.
 Result<cv::Mat> PixelsOf(const cairn_image* image);
 
+// What the caller requires of a map that is opened or that an update brings.
+struct GivenOptions {
+  MapOptions map;
+  UpdateOptions update;
+};
+// NULL: the defaults.  Callers built with an earlier release give the fields that it had.
+Result<GivenOptions> OptionsOf(const cairn_map_options* options);
+
+// NULL: none.
+Result<std::optional<Camera>> GivenCameraOf(const cairn_camera* given);
 // NULL: the survey's camera of the image's size.
 Result<Camera> CameraOf(const cairn_camera* given, const Map& map, const cv::Mat& grey);
 

@@ -36,6 +36,25 @@ void BindErrors(py::module_& module) {
   });
 }
 
+std::string PathOf(const py::object& path) {
+  std::string name = py::cast<py::bytes>(py::module_::import("os").attr("fsencode")(path));
+  if (name.empty()) throw py::value_error("path is empty; expected the name of a file");
+  if (name.find('\0') != std::string::npos) throw py::value_error("embedded null byte in path");
+  return name;
+}
+
+std::optional<PublicKey> KeyOf(const std::optional<py::bytes>& given) {
+  if (!given) return std::nullopt;
+  const std::string bytes = *given;
+  PublicKey key;
+  if (bytes.size() != key.size())
+    throw py::value_error(
+        fmt::format("public_key has {} bytes, expected {}: the bytes, not their hexadecimal text",
+                    bytes.size(), key.size()));
+  std::copy(bytes.begin(), bytes.end(), key.begin());
+  return key;
+}
+
 cv::Mat PixelsOf(const py::array& image) {
   if (!py::isinstance<py::array_t<uint8_t>>(image))
     throw py::type_error(fmt::format("image has dtype {}, expected uint8: grey pixels, 0 to 255",

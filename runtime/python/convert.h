@@ -9,6 +9,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "core/seal/signing_key.h"
 #include "runtime/localize/localizer.h"
 
 // Between Python's values and the runtime's.
@@ -36,6 +37,11 @@ inline void ThrowIfError(const Status& status) {
 
 // Makes the exception cairn.Error, and lets PythonErrors become it.
 void BindErrors(pybind11::module_& module);
+
+// The name of a file, as bytes: it need not be text.  Throws a ValueError where there is none.
+std::string PathOf(const pybind11::object& path);
+// None: none.  Throws a ValueError for another number of bytes.
+std::optional<PublicKey> KeyOf(const std::optional<pybind11::bytes>& given);
 
 // The pixels of an array of uint8, height x width, not copied; rows may have gaps.  Throws a TypeError for
 // another dtype and a ValueError for another shape or order, which say what was found.

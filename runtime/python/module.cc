@@ -11,6 +11,7 @@
 #include "runtime/localize/localizer.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/update_map.h"
+#include "runtime/python/atlases.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
 #include "runtime/python/places.h"
@@ -20,26 +21,6 @@ namespace py = pybind11;
 
 namespace cairn {
 namespace {
-
-// As bytes: names of files need not be text.
-std::string PathOf(const py::object& path) {
-  std::string name = py::cast<py::bytes>(py::module_::import("os").attr("fsencode")(path));
-  if (name.empty()) throw py::value_error("path is empty; expected the name of a file");
-  if (name.find('\0') != std::string::npos) throw py::value_error("embedded null byte in path");
-  return name;
-}
-
-std::optional<PublicKey> KeyOf(const std::optional<py::bytes>& given) {
-  if (!given) return std::nullopt;
-  const std::string bytes = *given;
-  PublicKey key;
-  if (bytes.size() != key.size())
-    throw py::value_error(
-        fmt::format("public_key has {} bytes, expected {}: the bytes, not their hexadecimal text",
-                    bytes.size(), key.size()));
-  std::copy(bytes.begin(), bytes.end(), key.begin());
-  return key;
-}
 
 PyMap OpenMap(const py::object& path, int64_t memory_budget_bytes, const std::optional<py::bytes>& public_key,
               const std::string& required_name, uint64_t min_epoch) {
@@ -280,4 +261,5 @@ PYBIND11_MODULE(_cairn, module) {
   cairn::BindLocalizer(module);
   cairn::BindTrackers(module);
   cairn::BindPlaces(module);
+  cairn::BindAtlases(module);
 }

@@ -9,11 +9,17 @@
 A robot that was switched on anywhere keeps several starts in mind: StartHypotheses, of what a PlaceModel says of its images; or all places, with
 or without a goal: PlaceBelief.
 
+A robot that may be in any of many maps asks an Atlas of them: AtlasLocalizer.
+
 Frames in order go to a Tracker (in space) or a VisualTracker (on the floor, with odometry), one per camera.
 
 Poses are cam_from_world, in the frame of the surveyed capture: metres, the camera looks along +z, x right, y down.
 """
 from ._cairn import (
+    Atlas,
+    AtlasAnswer,
+    AtlasLocalizer,
+    AtlasPlace,
     Camera,
     Error,
     Fix,
@@ -36,6 +42,10 @@ from ._cairn import (
 )
 
 __all__ = [
+    "Atlas",
+    "AtlasAnswer",
+    "AtlasLocalizer",
+    "AtlasPlace",
     "Camera",
     "Error",
     "Fix",

@@ -202,6 +202,64 @@ class PlaceBelief:
         """P(at no place of the map)"""
 
 @final
+class Atlas:
+    """Many maps of a site as one (`cairn atlas`): immutable, shared by all threads.  Maps' files are opened when they are needed."""
+
+    @staticmethod
+    def open(path: str | PathLike[str], *, public_key: bytes | None = None, name: str = "", min_epoch: int = 0) -> Atlas:
+        """Raises Error.  `public_key`, `name`, `min_epoch`: the atlas's, as for Map.open."""
+    @property
+    def map_names(self) -> list[str]: ...
+    def find_map(self, name: str) -> int:
+        """The number of a map, from 0.  Raises Error (not_found)."""
+    def open_map(self, map: int) -> Map:
+        """For a localizer or tracker of the map in which the robot turned out to be.
+
+        Raises Error: other_map (not the file that the atlas was made of), and those of Map.open.
+        """
+    def __len__(self) -> int: ...
+
+@final
+class AtlasPlace:
+    """Where an image may have been taken."""
+
+    @property
+    def map(self) -> int:
+        """The number of the map"""
+    @property
+    def fix(self) -> Fix:
+        """In this map alone: a fix, or that several places of it explain the image"""
+    @property
+    def probability(self) -> float:
+        """P(it was taken here), all maps considered"""
+
+@final
+class AtlasAnswer:
+    """Which maps may show an image.  True where the most probable one has a fix."""
+
+    @property
+    def places(self) -> list[AtlasPlace]:
+        """The most probable first; empty: no map knows the image"""
+    @property
+    def elsewhere(self) -> float:
+        """P(in none of the maps)"""
+    @property
+    def maps_tried(self) -> list[int]: ...
+    @property
+    def failure(self) -> Fix:
+        """Without places: why the map that knows most of the image has no fix"""
+    def __bool__(self) -> bool: ...
+
+@final
+class AtlasLocalizer:
+    """Finds the map, and the place.  One per thread: use by two at once raises Error (busy)."""
+
+    def __init__(self, atlas: Atlas, **options: bool | int | float | str) -> None:
+        """`options`: those that `cairn localize --help` lists."""
+    def localize(self, image: NDArray[np.uint8], camera: Camera | None = None) -> AtlasAnswer:
+        """`camera` None: each map's own camera of the image's size."""
+
+@final
 class Prior:
     """Where the camera is believed to be: cam_from_world, and its standard deviations."""
 

@@ -79,7 +79,8 @@ TEST(AtlasFile, ReadsWhatWasWritten) {
 TEST(AtlasFile, ManyCodesTakeFewBytes) {
   Random random(1);
   std::vector<uint32_t> codes;
-  for (int i = 0; i < 200; ++i) codes.push_back(static_cast<uint32_t>(random.UniformInt(0, (int64_t{1} << 32) - 1)));
+  for (int i = 0; i < 200; ++i)
+    codes.push_back(static_cast<uint32_t>(random.UniformInt(0, (int64_t{1} << 32) - 1)));
   std::sort(codes.begin(), codes.end());
   // log2(2^32 / 200) + 1.44 bits each are the least that is possible for random numbers.
   const double least = 200 * (std::log2(std::pow(2.0, 32) / 200) + 1.44) / 8;
@@ -95,7 +96,8 @@ TEST(AtlasFile, IsReadWithTheKeyThatSignedIt) {
   EXPECT_TRUE(read->is_signed());
   EXPECT_EQ(read->public_key, keys.public_key);
   EXPECT_EQ(ReadAtlas(path, others.public_key).error().code, ErrorCode::kWrongKey);
-  EXPECT_EQ(ReadAtlas(Write("plain", Bytes(TwoFloors())), keys.public_key).error().code, ErrorCode::kNotSigned);
+  EXPECT_EQ(ReadAtlas(Write("plain", Bytes(TwoFloors())), keys.public_key).error().code,
+            ErrorCode::kNotSigned);
 }
 
 TEST(AtlasFile, EveryChangedByteIsNoticed) {
@@ -165,7 +167,8 @@ TEST(AtlasFile, WhatMakesNoSenseIsNotWritten) {
     bad.passages[0].to = image;
     EXPECT_THAT(Fault(bad), HasSubstr("a passage"));
   }
-  for (const double cost : {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double cost :
+       {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     bad = good;
     bad.passages[0].cost = cost;
     EXPECT_THAT(Fault(bad), HasSubstr("'lift': a cost"));
@@ -188,8 +191,10 @@ TEST(AtlasFile, AnyContentsWithARightHashAreReadOrRefused) {
   for (int i = 0; i < 1000; ++i) {
     std::string changed = payload;
     for (int64_t k = random.UniformInt(1, 4); k > 0; --k)
-      changed[random.UniformInt(0, static_cast<int64_t>(changed.size()) - 1)] = static_cast<char>(random.UniformInt(0, 255));
-    if (random.UniformInt(0, 3) == 0) changed.resize(random.UniformInt(0, static_cast<int64_t>(changed.size())));
+      changed[random.UniformInt(0, static_cast<int64_t>(changed.size()) - 1)] =
+          static_cast<char>(random.UniformInt(0, 255));
+    if (random.UniformInt(0, 3) == 0)
+      changed.resize(random.UniformInt(0, static_cast<int64_t>(changed.size())));
     const Result<AtlasRows> read = ReadAtlas(Write("lying", Resealed(changed)), std::nullopt);
     if (read.ok()) {
       ++num_read;

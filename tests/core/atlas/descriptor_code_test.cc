@@ -12,8 +12,8 @@
 namespace cairn {
 namespace {
 
-using testing::ElementsAre;
 using testing::Each;
+using testing::ElementsAre;
 
 DescriptorMatrix RandomDescriptors(int num, uint64_t seed) {
   Random random(seed);
@@ -60,8 +60,8 @@ TEST(DescriptorCode, CostsTheMarginsOfTheBitsThatDiffer) {
   DescriptorCode code{.bits = 0xf0000001};
   for (int bit = 0; bit < kNumCodeBits; ++bit) code.margins[bit] = static_cast<int16_t>(1 + bit);
   EXPECT_EQ(CostOf(code, code.bits), 0);
-  EXPECT_EQ(CostOf(code, 0x70000001), 1);       // the highest bit
-  EXPECT_EQ(CostOf(code, 0xf0000000), 32);      // the lowest
+  EXPECT_EQ(CostOf(code, 0x70000001), 1);   // the highest bit
+  EXPECT_EQ(CostOf(code, 0xf0000000), 32);  // the lowest
   EXPECT_EQ(CostOf(code, 0x30000000), 1 + 2 + 32);
 }
 
@@ -69,7 +69,8 @@ TEST(DescriptorCode, FindsThePrefixesThatCostLittle) {
   DescriptorCode code{.bits = 0b1010u << 28};
   code.margins = {3, 50, 4, 6};
   // The cheapest first bit by bit: 3, 3 + 4, 4, 6, but not 3 + 6 or 4 + 6.
-  EXPECT_THAT(NearPrefixes(code, 4, 8), testing::UnorderedElementsAre(0b1010u, 0b0010u, 0b0000u, 0b1000u, 0b1011u));
+  EXPECT_THAT(NearPrefixes(code, 4, 8),
+              testing::UnorderedElementsAre(0b1010u, 0b0010u, 0b0000u, 0b1000u, 0b1011u));
   EXPECT_EQ(NearPrefixes(code, 4, 8).front(), 0b1010u);
   EXPECT_THAT(NearPrefixes(code, 4, 2), ElementsAre(0b1010u));
   EXPECT_THAT(NearPrefixes(code, 1, 3), ElementsAre(1u, 0u));

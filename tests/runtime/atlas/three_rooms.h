@@ -56,7 +56,8 @@ class ThreeRoomsTest : public testing::Test {
       std::vector<uint32_t> codes;
       for (size_t i = 0; i < Room(room).points.size(); i += kStride) {
         if (codes.size() == 32) map.places.push_back(std::exchange(codes, {}));
-        codes.push_back(CodeOf(atlas.code_book, Room(room).descriptors.row(static_cast<Eigen::Index>(i)).data()).bits);
+        codes.push_back(
+            CodeOf(atlas.code_book, Room(room).descriptors.row(static_cast<Eigen::Index>(i)).data()).bits);
       }
       map.places.push_back(codes);
       for (std::vector<uint32_t>& place : map.places) std::sort(place.begin(), place.end());
