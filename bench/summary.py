@@ -19,7 +19,7 @@ import sys
 ORDER = """
 held_out redkitchen poses reconstruct change ../docs/sizes.md
 pairs matching regions vocabulary appearance views visual_map
-drive servo
+drive atlas servo
 runtime bindings report
 scale crash
 """.split()

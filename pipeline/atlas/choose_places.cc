@@ -46,7 +46,7 @@ std::vector<LandmarkIdx> RankLandmarks(const MapRows& rows, const std::vector<De
   std::vector<double> shown(rows.images.size());  // worth of the chosen landmarks that an image shows
   const auto gain = [&](LandmarkIdx landmark) {
     double sum = 0;
-    for (const int32_t image : images[landmark]) sum += 1 / (1 + shown[image]);
+    for (const int32_t image : images[landmark]) sum += 1 / ((1 + shown[image]) * (1 + shown[image]));
     return worth[landmark] * sum;
   };
   using Entry = std::pair<double, LandmarkIdx>;

@@ -305,8 +305,8 @@ std::string MapText(const nlohmann::ordered_json& json, const MapRows& rows) {
 Status RunInspect(const InspectArguments& arguments, const CommandEnvironment& environment) {
   const std::string& map_path = arguments.question.map_path;
   if (IsAtlasFile(map_path)) {
-    if (!arguments.question.is_asked() && arguments.question.build_dir.empty() && arguments.svg_path.empty() &&
-        arguments.ambiguity_svg_path.empty())
+    if (!arguments.question.is_asked() && arguments.question.build_dir.empty() &&
+        arguments.svg_path.empty() && arguments.ambiguity_svg_path.empty())
       return InspectAtlas(map_path, arguments.question.json, environment);
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: is an atlas, of which only --json can be asked; ask one of its maps", map_path);

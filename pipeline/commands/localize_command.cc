@@ -112,11 +112,11 @@ Status CheckForAtlas(const LocalizeArguments& arguments, bool is_atlas) {
     return arguments.option_arguments.RefuseGiven(NamesOf(DescribeOptions(&of_atlas)),
                                                   "is for an atlas of several maps; leave it out");
   }
-  const char* refused = !arguments.output_path.empty()          ? "-o: each map of an atlas has a frame of its own"
-                        : arguments.is_sequence                 ? "--sequence: frames are followed in one map"
-                        : arguments.estimator != "pnp"          ? "--estimator: visual maps are asked one by one"
-                        : !arguments.log_folder.empty()         ? "--log: frames are logged for one map"
-                                                                : nullptr;
+  const char* refused = !arguments.output_path.empty()  ? "-o: each map of an atlas has a frame of its own"
+                        : arguments.is_sequence         ? "--sequence: frames are followed in one map"
+                        : arguments.estimator != "pnp"  ? "--estimator: visual maps are asked one by one"
+                        : !arguments.log_folder.empty() ? "--log: frames are logged for one map"
+                                                        : nullptr;
   if (refused == nullptr) return Ok();
   return MakeError(ErrorCode::kInvalidArgument,
                    "{}; leave it out, or give the map in which the image turns out to be", refused);

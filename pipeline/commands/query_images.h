@@ -20,7 +20,8 @@ Status CheckCameraArguments(const std::string& camera, const std::string& camera
 class CameraChoice {
  public:
   // `camera`: as --camera has it, of all images; `cameras_path`: as --cameras, chosen by size; empty: not
-  // given.  `map`: null where there is none.  Errors: InvalidArgument (no camera), and those of ReadCamerasText.
+  // given.  `map`: null where there is none.  Errors: InvalidArgument (no camera), and those of
+  // ReadCamerasText.
   static Result<CameraChoice> Make(const std::string& camera, const std::string& cameras_path,
                                    std::shared_ptr<const Map> map);
 

@@ -19,6 +19,13 @@ constexpr double kLeastByChance = 0.05;
 
 uint32_t PrefixOf(uint32_t code) { return code >> (kNumCodeBits - kPrefixBits); }
 
+// That a place has so many, where others have this number by chance: Chernoff's bound of a Poisson number's
+// tail, negative where it has fewer.
+double EvidenceOf(double num, double by_chance) {
+  const double evidence = (num > 0 ? num * std::log(num / by_chance) : 0) - num + by_chance;
+  return num > by_chance ? evidence : -evidence;
+}
+
 // The largest features' indices; among equal ones the first.
 std::vector<size_t> LargestFeatures(const Features& features) {
   std::vector<size_t> order(features.keypoints.size());
@@ -65,6 +72,7 @@ std::vector<int32_t> CodeIndex::MapsWith(const DescriptorCode& code) const {
 }
 
 std::vector<MapScore> CodeIndex::Rank(const Features& features) const {
+  if (features.keypoints.empty()) return {};
   // Of each landmark that is in the image: a feature that shows it, of those that fewest maps have.
   struct Shown {
     int32_t feature;
@@ -109,11 +117,8 @@ std::vector<MapScore> CodeIndex::Rank(const Features& features) const {
   }
   std::vector<MapScore> ranked;
   for (const auto& [map, best] : best_of_map) {
-    if (best.sum <= by_chance) continue;
-    // Chernoff's bound of a Poisson number's tail, for the best of so many places.
-    const double evidence = best.sum * std::log(best.sum / by_chance) - best.sum + by_chance -
-                            std::log(static_cast<double>(best.num_places));
-    MapScore score{.map = map, .score = evidence};
+    MapScore score{.map = map,
+                   .score = EvidenceOf(best.sum, by_chance) - std::log(static_cast<double>(best.num_places))};
     for (const auto& [entry, each] : shown) {
       const auto place = static_cast<size_t>(entries_[entry].place);
       if (place == best.place || (is_followed(best.place) && place == best.place + 1))

@@ -23,7 +23,7 @@ class CodeIndex {
  public:
   explicit CodeIndex(const AtlasRows& atlas);
 
-  // The maps that have some of these features, the most evidence first.  The largest features count: codes
+  // All maps, the most evidence first; none for an image without features.  The largest features count: codes
   // are of landmarks that are seen from far away, too.  O(features), some 30 places of the index for each.
   std::vector<MapScore> Rank(const Features& features) const;
 

@@ -108,16 +108,16 @@ void BindAtlases(py::module_& module) {
       });
   py::class_<AtlasHypothesis>(module, "AtlasPlace")
       .def_readonly("map", &AtlasHypothesis::map)
-      .def_readonly("fix", &AtlasHypothesis::found)
+      .def_property_readonly("fix", [](const AtlasHypothesis& self) { return self.found; })
       .def_readonly("probability", &AtlasHypothesis::probability)
       .def("__repr__", [](const AtlasHypothesis& self) {
         return fmt::format("<cairn.AtlasPlace in map {}, {:.3f}>", self.map, self.probability);
       });
   py::class_<AtlasAnswer>(module, "AtlasAnswer")
-      .def_readonly("places", &AtlasAnswer::hypotheses)
+      .def_property_readonly("places", [](const AtlasAnswer& self) { return self.hypotheses; })
       .def_readonly("elsewhere", &AtlasAnswer::elsewhere)
       .def_readonly("maps_tried", &AtlasAnswer::maps_tried)
-      .def_readonly("failure", &AtlasAnswer::best_failure)
+      .def_property_readonly("failure", [](const AtlasAnswer& self) { return self.best_failure; })
       .def("__bool__",
            [](const AtlasAnswer& self) {
              return !self.hypotheses.empty() && self.hypotheses[0].found.has_fix();

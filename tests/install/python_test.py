@@ -107,6 +107,111 @@ class Logging(unittest.TestCase):
                 wrong()
 
 
+class Site(unittest.TestCase):
+    """An atlas of the poster's map and of that of the wings, made by the program."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.path = cls.folder / "site.atlas"
+        printed = subprocess.run([PROGRAM, "atlas", POSTER / "poster.cairn", POSTER / "wings.cairn", "-o", cls.path, "--epoch", "3"],
+                                 capture_output=True, check=True, text=True).stdout
+        assert printed.startswith("atlas site: 2 maps"), printed
+        cls.atlas = cairn.Atlas.open(cls.path)
+        cls.names = [POSTER / "poster.pgm", *(POSTER / f"wing{i}.pgm" for i in range(7))]
+
+    def program(self, *arguments):
+        return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True)
+
+    def test_answers_are_the_programs(self):
+        localizer = cairn.AtlasLocalizer(self.atlas)
+        lines = self.program("localize", self.path, *self.names).stdout.splitlines()
+        self.assertEqual(len(lines), len(self.names))
+        maps = []
+        for line, name in zip(lines, self.names):
+            expected = json.loads(line)
+            answer = localizer.localize(read_pgm(name))
+            self.assertEqual(bool(answer), expected["fix"])
+            self.assertEqual(answer.elsewhere, expected["elsewhere"])
+            self.assertEqual([self.atlas.map_names[map] for map in answer.maps_tried], expected["maps_tried"])
+            self.assertEqual([self.atlas.map_names[place.map] for place in answer.places],
+                             [place["map"] for place in [expected, *expected["other_places"]] if "map" in place])
+            if not answer.places:
+                self.assertEqual(answer.failure.reason, expected["reason"])
+                continue
+            self.assertEqual(answer.places[0].probability, expected["probability"])
+            maps.append((name.name[:4], self.atlas.map_names[answer.places[0].map]))
+            if expected["fix"]:
+                self.assertEqual(answer.places[0].fix.center.tolist(), expected["center_m"])
+        self.assertGreaterEqual(len(maps), 4)
+        for name, found in maps:
+            self.assertEqual(name[:4], found[:4])  # poster, wings
+
+    def test_gives_the_map_in_which_the_robot_is(self):
+        self.assertEqual(len(self.atlas), 2)
+        self.assertEqual(self.atlas.find_map("wings"), 1)
+        self.assertEqual(self.atlas.open_map(1).name, "wings")
+        for wrong, kind in ((lambda: self.atlas.open_map(2), IndexError), (lambda: self.atlas.open_map(-1), IndexError),
+                            (lambda: self.atlas.find_map("none"), cairn.Error),
+                            (lambda: cairn.AtlasLocalizer(self.atlas, max_num_maps=0), cairn.Error),
+                            (lambda: cairn.Atlas.__new__(cairn.Atlas).find_map("wings"), TypeError)):
+            with self.assertRaises(kind):
+                wrong()
+
+    def test_is_the_atlas_that_was_asked_for(self):
+        self.assertEqual(len(cairn.Atlas.open(self.path, name="site", min_epoch=3)), 2)
+        for options, name in (({"min_epoch": 4}, "not_newer"), ({"name": "other"}, "other_map"),
+                              ({"public_key": bytes(32)}, "not_signed")):
+            with self.assertRaises(cairn.Error) as caught:
+                cairn.Atlas.open(self.path, **options)
+            self.assertEqual(caught.exception.name, name)
+
+    def test_ways_lead_through_passages(self):
+        passages = self.folder / "passages.csv"
+        passages.write_text("# NAME, MAP/IMAGE, MAP/IMAGE[, COST]\n\nlift, wings/h0, wings/a0, 0.5\n")
+        path = self.folder / "lift.atlas"
+        made = self.program("atlas", POSTER / "poster.cairn", POSTER / "wings.cairn", "-o", path, "--passages", passages)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("lift leads from wings to wings, cost 0.5", made.stdout)
+        way = json.loads(self.program("route", path, "wings/h0", "wings/a1", "--json").stdout)
+        self.assertEqual([(leg["images"], leg.get("passage")) for leg in way["legs"]], [(["h0"], "lift"), (["a0", "a1"], None)])
+        for wrong, sentence in (("lift, wings/h0", "is no passage"), ("lift, wings/h0, hall/a0", "of none of the maps"),
+                                ("lift, wings/h0, wings/none", "no survey image 'none'"), ("lift, wings/h0, wings/a0, -1", "no cost"),
+                                ("lift, wings/h0, wings/a0, nan", "no cost")):
+            passages.write_text("\n" + wrong + "\n")
+            refused = self.program("atlas", POSTER / "wings.cairn", "-o", path, "--passages", passages)
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn("passages.csv:2: ", refused.stderr)
+            self.assertIn(sentence, refused.stderr)
+
+    def test_what_an_atlas_cannot_do_is_said(self):
+        image = self.names[0]
+        for arguments, sentence in ((("localize", self.path, image, "--sequence"), "one map"), (("localize", self.path, image, "-o", "p.txt"), "frame of its own"),
+                                    (("localize", self.path, image, "--estimator", "both"), "one by one"),
+                                    (("localize", POSTER / "poster.cairn", image, "--max-num-maps", "2"), "atlas of several maps"),
+                                    (("inspect", self.path, "--at", "0,0"), "only --json"),
+                                    (("route", self.path, "h0", "h1"), "MAP/IMAGE"),
+                                    (("atlas", POSTER / "poster.cairn", POSTER / "poster.cairn", "-o", self.folder / "x.atlas"), "called 'poster'"),
+                                    (("atlas", image, "-o", self.folder / "x.atlas"), "not a SQLite database"),
+                                    (("atlas", POSTER / "poster.cairn", "-o", POSTER / "poster.cairn"), "poster.cairn")):
+            refused = self.program(*arguments)
+            self.assertNotEqual(refused.returncode, 0, arguments)
+            self.assertIn(sentence, refused.stderr)
+        self.assertFalse((self.folder / "x.atlas").exists())
+
+    def test_any_number_of_threads_gives_the_same_bytes(self):
+        written = []
+        for threads in "1", "2":
+            path = self.folder / threads / "same.atlas"
+            path.parent.mkdir()
+            subprocess.run([PROGRAM, "atlas", POSTER / "wings.cairn", POSTER / "poster.cairn", "-o", path, "--threads", threads],
+                           capture_output=True, check=True)
+            written.append(path.read_bytes())
+        self.assertEqual(*written)
+
+
 class Starting(unittest.TestCase):
     """The wings of tests/install/poster_wings.h: a0 to a3 are places 0 to 3, b0 to b3 4 to 7, h0 to h2 8 to 10."""
 
