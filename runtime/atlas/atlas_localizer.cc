@@ -22,14 +22,27 @@ double OddsOf(double probability) {
   return probability / (1 - std::min(probability, kAlmostOne));
 }
 
-// Of exclusive explanations, each with its odds against none of them being right.
-void ShareProbability(AtlasAnswer* answer) {
-  double sum = 0;
-  for (const AtlasHypothesis& hypothesis : answer->hypotheses) sum += OddsOf(hypothesis.found.probability);
-  for (AtlasHypothesis& hypothesis : answer->hypotheses) {
-    const double odds = OddsOf(hypothesis.found.probability);
-    hypothesis.probability = ProbabilityAmong(odds, sum - odds);
+// Of exclusive explanations, each with its odds against none of them being right.  Those that explain nearly
+// as much of the image as the best one does have its odds: what a map alone says of a fix depends on what
+// else is in it.
+void ShareProbability(double alike_ratio, AtlasAnswer* answer) {
+  int most = 0;
+  for (const AtlasHypothesis& hypothesis : answer->hypotheses)
+    most = std::max(most, hypothesis.found.num_inliers);
+  const auto is_alike = [&](const AtlasHypothesis& hypothesis) {
+    return hypothesis.found.num_inliers >= alike_ratio * most;
+  };
+  double of_alike = 0;
+  for (const AtlasHypothesis& hypothesis : answer->hypotheses) {
+    if (is_alike(hypothesis)) of_alike = std::max(of_alike, OddsOf(hypothesis.found.probability));
   }
+  const auto odds_of = [&](const AtlasHypothesis& hypothesis) {
+    return is_alike(hypothesis) ? of_alike : OddsOf(hypothesis.found.probability);
+  };
+  double sum = 0;
+  for (const AtlasHypothesis& hypothesis : answer->hypotheses) sum += odds_of(hypothesis);
+  for (AtlasHypothesis& hypothesis : answer->hypotheses)
+    hypothesis.probability = ProbabilityAmong(odds_of(hypothesis), sum - odds_of(hypothesis));
   answer->elsewhere = 1 / (1 + sum);
   std::stable_sort(
       answer->hypotheses.begin(), answer->hypotheses.end(),
@@ -126,7 +139,7 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
       }
       answer.hypotheses.push_back({.map = now.map, .found = std::move(found)});
     }
-    ShareProbability(&answer);
+    ShareProbability(localizer_options_.accept.max_second_pose_ratio, &answer);
     return answer;
   });
 }

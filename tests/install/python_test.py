@@ -129,7 +129,7 @@ class Site(unittest.TestCase):
         localizer = cairn.AtlasLocalizer(self.atlas)
         lines = self.program("localize", self.path, *self.names).stdout.splitlines()
         self.assertEqual(len(lines), len(self.names))
-        maps = []
+        places = {}
         for line, name in zip(lines, self.names):
             expected = json.loads(line)
             answer = localizer.localize(read_pgm(name))
@@ -142,12 +142,15 @@ class Site(unittest.TestCase):
                 self.assertEqual(answer.failure.reason, expected["reason"])
                 continue
             self.assertEqual(answer.places[0].probability, expected["probability"])
-            maps.append((name.name[:4], self.atlas.map_names[answer.places[0].map]))
+            places[name.stem] = {self.atlas.map_names[place.map]: place.probability for place in answer.places}
             if expected["fix"]:
                 self.assertEqual(answer.places[0].fix.center.tolist(), expected["center_m"])
-        self.assertGreaterEqual(len(maps), 4)
-        for name, found in maps:
-            self.assertEqual(name[:4], found[:4])  # poster, wings
+        # The poster is the first place of both wings, too.
+        self.assertAlmostEqual(places["poster"]["poster"], 0.5, delta=0.01)
+        self.assertAlmostEqual(places["poster"]["wings"], 0.5, delta=0.01)
+        for name in "wing2", "wing4", "wing5", "wing6":
+            self.assertEqual(list(places[name]), ["wings"])
+            self.assertGreater(places[name]["wings"], 0.99)
 
     def test_gives_the_map_in_which_the_robot_is(self):
         self.assertEqual(len(self.atlas), 2)
