@@ -3,8 +3,11 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "core/base/random.h"
 #include "core/capture/capture.h"
+#include "core/colmap/colmap_model.h"
 #include "stages/reconstruct/by_colmap/mapper.h"
 
 namespace cairn::reconstruct {
@@ -82,6 +85,23 @@ inline SyntheticSurvey MakeSyntheticSurvey(int num_images, uint64_t seed, const 
     }
   }
   return survey;
+}
+
+// Largest distance of a centre from the true one after the best similarity, metres.
+inline double LargestErrorM(const ColmapModel& model, const SyntheticSurvey& survey) {
+  Eigen::Matrix3Xd found(3, model.images.size()), truth(3, model.images.size());
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    found.col(i) = model.images[i].cam_from_world.Center();
+    for (size_t k = 0; k < survey.input.images.size(); ++k) {
+      if (survey.input.images[k].name == model.images[i].name)
+        truth.col(i) = survey.cams_from_world[k].Center();
+    }
+  }
+  const Eigen::Matrix4d fit = Eigen::umeyama(found, truth, true);
+  return (((fit.topLeftCorner<3, 3>() * found).colwise() + fit.topRightCorner<3, 1>()) - truth)
+      .colwise()
+      .norm()
+      .maxCoeff();
 }
 
 // Adds another survey's images to the first one's, without a match between them.

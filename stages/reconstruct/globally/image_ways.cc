@@ -120,6 +120,17 @@ bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::
          *std::max_element(lengths.begin(), lengths.end()) > kTornStep * TypicalLength(lengths);
 }
 
+bool IsTornMore(const std::vector<Eigen::Vector3d>& centers, const std::vector<Eigen::Vector3d>& moved,
+                const std::vector<std::pair<int, int>>& steps) {
+  const std::vector<double> before = StepLengths(centers, steps), after = StepLengths(moved, steps);
+  if (before.empty()) return false;
+  const double most = kTornStep * TypicalLength(before);
+  const auto num_torn = [&](const std::vector<double>& lengths) {
+    return std::count_if(lengths.begin(), lengths.end(), [&](double length) { return length > most; });
+  };
+  return num_torn(after) > num_torn(before);
+}
+
 std::vector<Way> WithStepsOf(const std::vector<Eigen::Vector3d>& centers,
                              const std::vector<std::pair<int, int>>& steps, std::vector<Way> ways) {
   std::vector<double> ratios;

@@ -49,6 +49,11 @@ double TypicalLength(const std::vector<double>& lengths);
 // one.  Right maps of drives and films have steps of at most 3.8 typical ones, torn ones of 6 to 24.
 bool IsTorn(const std::vector<Eigen::Vector3d>& centers, const std::vector<std::pair<int, int>>& steps);
 
+// Whether a drive whose images are moved from places to others is torn in more steps than it was; by what is
+// typical of it before.
+bool IsTornMore(const std::vector<Eigen::Vector3d>& centers, const std::vector<Eigen::Vector3d>& moved,
+                const std::vector<std::pair<int, int>>& steps);
+
 // The ways, and the steps as they are at these places, in the unit of the ways: they hold what few ways join,
 // and give way to what more say.
 std::vector<Way> WithStepsOf(const std::vector<Eigen::Vector3d>& centers,

@@ -305,7 +305,8 @@ MisplacedPart SmallerSide(const Cut& cut) {
 std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int>>& pieces,
                                                const std::vector<std::vector<int>>& clusters,
                                                const PairEvidence& evidence,
-                                               const MisplacedPartOptions& options, int num_threads) {
+                                               const MisplacedPartOptions& options, int num_threads,
+                                               const std::function<bool(const MisplacedPart&)>& may_stand) {
   size_t num_images = 0;
   for (const std::vector<int>& piece : pieces) num_images += piece.size();
   const std::vector<OtherPlace> places =
@@ -324,13 +325,17 @@ std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int
     if (way != 1) RefineSides(neighbours, {}, &cuts[k].side);
     CountCells(evidence.points, place.relation, options.tolerance, &cuts[k]);
   });
-  const Cut* best = nullptr;
+  std::erase_if(cuts, [&](const Cut& cut) {
+    return cut.num_there < options.min_num_cells || cut.num_there < options.min_gain * cut.num_here;
+  });
+  std::stable_sort(cuts.begin(), cuts.end(), [](const Cut& a, const Cut& b) {
+    return a.num_there - a.num_here > b.num_there - b.num_here;
+  });
   for (const Cut& cut : cuts) {
-    if (cut.num_there < options.min_num_cells || cut.num_there < options.min_gain * cut.num_here) continue;
-    if (!best || cut.num_there - cut.num_here > best->num_there - best->num_here) best = &cut;
+    MisplacedPart part = SmallerSide(cut);
+    if (may_stand(part)) return part;
   }
-  if (!best) return std::nullopt;
-  return SmallerSide(*best);
+  return std::nullopt;
 }
 
 }  // namespace cairn::reconstruct

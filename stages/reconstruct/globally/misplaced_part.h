@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -32,10 +33,11 @@ struct MisplacedPart {
 // not how many matches or images do [as Heinly, Dunn & Frahm 2014, "Correcting for duplicate scene structure
 // in sparse 3D reconstruction", split a map and ask what each side sees of the other]. `pieces`: images
 // between which the map is doubtful; `clusters`: smaller ones, of images that look at the same.  Nothing
-// where the map holds.  Same result for any number of threads.  O(points * pairs of pieces).
-std::optional<MisplacedPart> FindMisplacedPart(const std::vector<std::vector<int>>& pieces,
-                                               const std::vector<std::vector<int>>& clusters,
-                                               const PairEvidence& evidence,
-                                               const MisplacedPartOptions& options, int num_threads);
+// where the map holds.  Twins share more of space where they are not: a part is only moved to where it
+// `may_stand`, by what else is known.  Same result for any number of threads.  O(points * pairs of pieces).
+std::optional<MisplacedPart> FindMisplacedPart(
+    const std::vector<std::vector<int>>& pieces, const std::vector<std::vector<int>>& clusters,
+    const PairEvidence& evidence, const MisplacedPartOptions& options, int num_threads,
+    const std::function<bool(const MisplacedPart&)>& may_stand = [](const MisplacedPart&) { return true; });
 
 }  // namespace cairn::reconstruct

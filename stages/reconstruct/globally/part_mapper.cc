@@ -14,7 +14,6 @@
 #include "core/base/quantiles.h"
 #include "stages/reconstruct/globally/agreeing_pieces.h"
 #include "stages/reconstruct/globally/free_camera.h"
-#include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/globally/pair_evidence.h"
 #include "stages/reconstruct/globally/part_model.h"
 #include "stages/reconstruct/view_graph/average_rotations.h"
@@ -335,6 +334,27 @@ void PartMapper::HoldSteps(std::vector<SignedLink>* links) const {
   }
 }
 
+void PartMapper::Move(const MisplacedPart& part) {
+  const Pose move{Eigen::Quaterniond(part.move.linear()), part.move.translation()};
+  for (const int i : part.images) problem_.cam_from_world[i] = problem_.cam_from_world[i] * move.Inverse();
+}
+
+// Every other pair of a drive closes a cycle with the pairs of images that follow each other, and these do
+// not jump from one place to another that looks alike.  So a part that a move would tear from the images
+// before or after it, with which it shares matches, was driven into and out of where it is: twins share more
+// of space with each other than either does with the way between them.
+bool PartMapper::KeepsDrive(const MisplacedPart& part) const {
+  std::vector<std::pair<int, int>> joined;
+  for (const ViewPair& pair : pairs_) {
+    if (is_drive_ && std::abs(pair.image2 - pair.image1) <= kMaxSureDistance)
+      joined.emplace_back(pair.image1, pair.image2);
+  }
+  const std::vector<Eigen::Vector3d> centers = Centers();
+  std::vector<Eigen::Vector3d> moved = centers;
+  for (const int i : part.images) moved[i] = part.move * moved[i];
+  return !IsTornMore(centers, moved, joined);
+}
+
 // Whether images were moved that belong elsewhere.
 bool PartMapper::MoveMisplacedPart() {
   const int num_images = static_cast<int>(images_.size());
@@ -351,12 +371,12 @@ bool PartMapper::MoveMisplacedPart() {
   if (is_drive_) HoldSteps(&evidence.links);
   const std::optional<MisplacedPart> part =
       FindMisplacedPart(AgreeingPieces(num_images, evidence.links, 0), clusters, evidence,
-                        {.tolerance = kSameDepthRatio * depth}, num_threads_);
+                        {.tolerance = kSameDepthRatio * depth}, num_threads_,
+                        [this](const MisplacedPart& moved) { return KeepsDrive(moved); });
   if (!part) return false;
   spdlog::debug("reconstruct: {} of {} images belong elsewhere: {} cells of space shared there, {} here",
                 part->images.size(), num_images, part->num_cells_there, part->num_cells_here);
-  const Pose move{Eigen::Quaterniond(part->move.linear()), part->move.translation()};
-  for (const int i : part->images) problem_.cam_from_world[i] = problem_.cam_from_world[i] * move.Inverse();
+  Move(*part);
   return true;
 }
 

@@ -15,6 +15,7 @@
 #include "stages/reconstruct/globally/agreeing_pieces.h"
 #include "stages/reconstruct/globally/free_camera.h"
 #include "stages/reconstruct/globally/image_ways.h"
+#include "stages/reconstruct/globally/misplaced_part.h"
 #include "stages/reconstruct/view_graph/image_motion.h"
 #include "stages/reconstruct/view_graph/view_pairs.h"
 
@@ -68,6 +69,8 @@ class PartMapper {
   std::vector<std::vector<int>> TracksOfKeypoints() const;
   double MedianDepth() const;
   void HoldSteps(std::vector<SignedLink>* links) const;
+  void Move(const MisplacedPart& part);
+  bool KeepsDrive(const MisplacedPart& part) const;
   bool MoveMisplacedPart();
   void AgreeAgain(Progress& progress);
   void Adjust(int num_keypoints, bool adjust_cameras, Progress& progress);

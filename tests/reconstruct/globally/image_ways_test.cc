@@ -259,6 +259,30 @@ TEST(IsTorn, WhereOneStepIsMuchLongerThanMost) {
   EXPECT_FALSE(IsTorn({Eigen::Vector3d::Zero()}, {}));
 }
 
+// Twelve images a step apart, of which some are moved aside:
+//                  7 8 9
+//    0 1 2 ... 5 6       10 11
+TEST(IsTornMore, WhereAMoveTearsAPartFromWhatComesBeforeIt) {
+  const std::vector<double> lengths(11, 1);
+  const auto places = PlacesAlong(lengths);
+  const auto steps = StepsOf(lengths);
+  const auto moved_by = [&](double way, int first, int last) {
+    auto moved = places;
+    for (int i = first; i <= last; ++i) moved[i].y() += way;
+    return moved;
+  };
+  EXPECT_FALSE(IsTornMore(places, moved_by(4.8, 7, 9), steps));  // steps of 4.9
+  EXPECT_TRUE(IsTornMore(places, moved_by(5, 7, 9), steps));     // of 5.1
+  EXPECT_TRUE(IsTornMore(places, moved_by(5, 7, 11), steps));    // one of them
+  EXPECT_FALSE(IsTornMore(places, moved_by(5, 0, 11), steps));   // the whole drive
+  // What was torn may be mended, moved on, or part of it left behind, but not torn in more places.
+  const auto torn = moved_by(8, 7, 11);
+  EXPECT_FALSE(IsTornMore(torn, places, steps));
+  EXPECT_FALSE(IsTornMore(torn, moved_by(8, 9, 11), steps));
+  EXPECT_TRUE(IsTornMore(torn, moved_by(8, 7, 9), steps));
+  EXPECT_FALSE(IsTornMore(places, moved_by(5, 7, 9), {}));  // in no order
+}
+
 // Images 3 to 5 hang on 2 by a step alone; the others' ways are twice as long as the places have them.
 TEST(WithStepsOf, HoldWhatNoWayJoinsInTheUnitOfTheWays) {
   const std::vector<double> lengths = {1, 1, 1.5, 1, 1};

@@ -20,23 +20,6 @@
 namespace cairn::reconstruct {
 namespace {
 
-// Largest distance of a centre from the true one after the best similarity, metres.
-double LargestErrorM(const ColmapModel& model, const SyntheticSurvey& survey) {
-  Eigen::Matrix3Xd found(3, model.images.size()), truth(3, model.images.size());
-  for (size_t i = 0; i < model.images.size(); ++i) {
-    found.col(i) = model.images[i].cam_from_world.Center();
-    for (size_t k = 0; k < survey.input.images.size(); ++k) {
-      if (survey.input.images[k].name == model.images[i].name)
-        truth.col(i) = survey.cams_from_world[k].Center();
-    }
-  }
-  const Eigen::Matrix4d fit = Eigen::umeyama(found, truth, true);
-  return (((fit.topLeftCorner<3, 3>() * found).colwise() + fit.topRightCorner<3, 1>()) - truth)
-      .colwise()
-      .norm()
-      .maxCoeff();
-}
-
 Result<std::vector<ColmapModel>> Map(const SyntheticSurvey& survey, int num_threads = 2,
                                      const MapGloballyOptions& options = {},
                                      const std::vector<ImageMotion>& motions = {}) {

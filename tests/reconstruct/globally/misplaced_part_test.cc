@@ -76,6 +76,26 @@ TEST(MisplacedPart, IsMovedToWhereItSharesMoreOfSpace) {
   EXPECT_GT(part->num_cells_there, 500);
 }
 
+TEST(MisplacedPart, IsOnlyMovedToWhereItMayStand) {
+  const Folded folded = MakeFolded(12);
+  std::vector<MisplacedPart> asked;
+  const auto find = [&](bool may_stand) {
+    return FindMisplacedPart(folded.pieces, folded.clusters, folded.evidence, {.tolerance = 0.1}, 1,
+                             [&](const MisplacedPart& part) {
+                               asked.push_back(part);
+                               return may_stand;
+                             });
+  };
+  EXPECT_FALSE(find(false));
+  ASSERT_FALSE(asked.empty());
+  EXPECT_TRUE(asked[0].move.isApprox(folded.truth, 1e-6));  // where most of space is shared comes first
+  for (size_t k = 1; k < asked.size(); ++k) {
+    EXPECT_GE(asked[k - 1].num_cells_there - asked[k - 1].num_cells_here,
+              asked[k].num_cells_there - asked[k].num_cells_here);
+  }
+  EXPECT_TRUE(find(true));
+}
+
 TEST(MisplacedPart, StaysWhereMostHoldsIt) { EXPECT_FALSE(Find(MakeFolded(2))); }
 
 TEST(MisplacedPart, MustShareEnoughMoreThere) {
