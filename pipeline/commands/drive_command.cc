@@ -181,9 +181,10 @@ Command DriveCommand() {
             parser.Add("-o,--output", arguments->output_path, "JSON file to write: every step")
                 .Type("RUN.json");
             parser.Add("--svg", arguments->picture_path, "SVG file to write").Type("RUN.svg");
-            arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options),
-                                            {"max_num_legs", "servo", "radius_m", "max_speed_m_s",
-                                             "max_turn_deg_s", "image_noise", "on_switch", "weight"});
+            arguments->option_arguments.Add(
+                parser, DescribeOptions(&arguments->options),
+                {"max_num_legs", "servo", "radius_m", "max_speed_m_s", "max_turn_deg_s", "light_ratio",
+                 "image_gain", "image_noise", "exposure_s", "slip_ratio", "on_switch", "weight"});
           },
       .run = [arguments](const CommandEnvironment& environment) { return RunDrive(*arguments, environment); },
   };

@@ -7,6 +7,7 @@
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
 #include "core/vocabulary/document_scores.h"
+#include "runtime/drive/route.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/landmark_set.h"
@@ -21,6 +22,7 @@ struct PlaceModel::Impl {
   PlaceScores OfNodes(const std::vector<double>& image_scores) const;
 
   std::shared_ptr<const AppearanceMap> appearance;
+  std::vector<Pose> node_poses;
   Vocabulary vocabulary;  // documents: the map's images, by index
   std::vector<BagOfWords> bags;
   PlaceModelOptions options;
@@ -50,6 +52,7 @@ Result<PlaceModel> PlaceModel::Make(const Map& map, const PlaceModelOptions& opt
           "\"survey\"",
           map.head().name, map.has_words() ? "no appearance graph" : "no visual words");
     }
+    CAIRN_ASSIGN_OR_RETURN(model->node_poses, NodePoses(map));
     CAIRN_ASSIGN_OR_RETURN(const auto tree, map.VocabularyTree());
     model->vocabulary = *tree;
     for (int64_t ordinal = 0; ordinal < map.directory().NumBlocks(BlockKind::kWords); ++ordinal) {
@@ -71,6 +74,8 @@ PlaceModel::PlaceModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)
 int PlaceModel::num_nodes() const { return static_cast<int>(impl_->appearance->is_kept.size()); }
 
 const AppearanceMap& PlaceModel::appearance() const { return *impl_->appearance; }
+
+const std::vector<Pose>& PlaceModel::node_poses() const { return impl_->node_poses; }
 
 NodeIdx PlaceModel::NodeOfImage(int32_t image) const {
   const std::vector<NodeIdx>& nodes = impl_->appearance->node_of_image;

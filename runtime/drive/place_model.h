@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/ids.h"
 #include "core/features/features.h"
+#include "core/geometry/pose.h"
 #include "core/options/options.h"
 #include "core/vocabulary/rerank_places.h"
 
@@ -45,6 +46,8 @@ class PlaceModel {
 
   int num_nodes() const;
   const AppearanceMap& appearance() const;
+  // Of the places, as NodePoses of the map (runtime/drive/route.h).
+  const std::vector<Pose>& node_poses() const;
   // The node of a survey image, by its index; -1: in no node, or no such image.
   NodeIdx NodeOfImage(int32_t image) const;
   // The survey images of a place, ascending, at least one.  REQUIRES: a node

@@ -1,66 +1,15 @@
 #include "runtime/drive/route.h"
 
-#include <algorithm>
-#include <limits>
-#include <queue>
-#include <tuple>
+#include <utility>
 
 #include "core/blocks/map_blocks.h"
 #include "core/blocks/map_rows.h"
-#include "core/world/appearance_graph.h"
+#include "runtime/drive/ways_to_goal.h"
 #include "runtime/map/appearance_map.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
 namespace {
-
-double LinkWeight(const AppearanceMap& appearance, const RouteOptions& options, NodeIdx node,
-                  const AppearanceGraph::Neighbour& neighbour) {
-  // [Mariottini11 §V] the planner to compare with: the inverse of the number of matches
-  if (options.weight == "matches") return 1.0 / neighbour.num_inliers;
-  // [Mariottini11 eq. 2] w_ij = (H_i + H_j) / 2
-  if (options.weight == "entropy") return (appearance.entropy[node] + appearance.entropy[neighbour.node]) / 2;
-  return 1;
-}
-
-// Per node what the way to the goal costs, how many links it has and what it leads to next; -1: no way.
-struct Ways {
-  std::vector<double> cost;
-  std::vector<int> num_links;
-  std::vector<NodeIdx> next;
-};
-
-// [Mariottini11 §V] Dijkstra, from the goal for all starts at once; a way's inner nodes are kept ones.  Links
-// may cost nothing: of ways that cost the same the one of fewest links is taken, so that none is a circle.
-Ways WaysTo(const AppearanceMap& appearance, NodeIdx goal, const RouteOptions& options) {
-  const size_t num_nodes = appearance.is_kept.size();
-  Ways ways{std::vector<double>(num_nodes, std::numeric_limits<double>::infinity()),
-            std::vector<int>(num_nodes, std::numeric_limits<int>::max()),
-            std::vector<NodeIdx>(num_nodes, -1)};
-  using Entry = std::tuple<double, int, NodeIdx>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  ways.cost[goal] = 0;
-  ways.num_links[goal] = 0;
-  ways.next[goal] = goal;
-  open.emplace(0, 0, goal);
-  while (!open.empty()) {
-    const auto [cost, num_links, node] = open.top();
-    open.pop();
-    const bool is_old = std::tie(cost, num_links) > std::tie(ways.cost[node], ways.num_links[node]);
-    if (is_old || (node != goal && !appearance.is_kept[node])) continue;
-    // [Booij06 §IV-A] all original links among kept nodes count, not those of a tree alone
-    for (const AppearanceGraph::Neighbour& neighbour : appearance.graph.Neighbours(node)) {
-      const NodeIdx other = neighbour.node;
-      const auto through = std::tuple(cost + LinkWeight(appearance, options, node, neighbour), num_links + 1);
-      auto known = std::tie(ways.cost[other], ways.num_links[other]);
-      if (other == goal || through > known || (through == known && node >= ways.next[other])) continue;
-      if (through < known) open.emplace(std::get<0>(through), num_links + 1, other);
-      known = through;
-      ways.next[other] = node;
-    }
-  }
-  return ways;
-}
 
 Status CheckImage(const Map& map, int32_t image) {
   if (image >= 0 && image < map.num_images()) return Ok();
@@ -70,30 +19,64 @@ Status CheckImage(const Map& map, int32_t image) {
 }  // namespace
 
 OptionTable DescribeOptions(RouteOptions* options) {
-  return {{.name = "weight",
-           .value = &options->weight,
-           .help = "what the way minimises: the number of links, the sum of 1 / matches of links, or the "
-                   "entropy of places",
-           .choices = {"links", "matches", "entropy"}}};
+  OptionTable table = {
+      {.name = "weight",
+       .value = &options->weight,
+       .help = "what the way minimises: the number of links, the sum of 1 / matches of links, the entropy of "
+               "places, or the metres expected with what getting lost there costs",
+       .choices = {"links", "matches", "entropy", "risk"}},
+      {.name = "lost_ratio",
+       .value = &options->lost_ratio,
+       .help = "share of the images on its way at which a robot is lost, however well they match",
+       .min = 0,
+       .max = 1},
+      {.name = "faint_link_inliers",
+       .value = &options->faint_link_inliers,
+       .help = "with this many matches an image is not found again in 1 of 2.7 cases",
+       .min = 0.1},
+      {.name = "look_anew_m",
+       .value = &options->look_anew_m,
+       .help = "what it costs to look anew, as metres of way",
+       .min = 0},
+      {.name = "wrong_place_m",
+       .value = &options->wrong_place_m,
+       .help = "what it costs to take a wrong place for the right one, as metres of way: the larger, the "
+               "longer detours are made through places that are like no other",
+       .min = 0},
+  };
+  AddCondition({"weight", {"risk"}}, {"lost_ratio", "faint_link_inliers", "look_anew_m", "wrong_place_m"},
+               &table);
+  return table;
+}
+
+Result<std::vector<Pose>> NodePoses(const Map& map) {
+  std::vector<Pose> poses;
+  if (!IsMetric(map.head().frame)) return poses;
+  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map.Appearance());
+  for (const std::vector<int32_t>& images : appearance->node_images) {
+    CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(images.front()));
+    poses.push_back(image->cam_from_world);
+  }
+  return poses;
 }
 
 Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
+                                                       const std::vector<Pose>& node_poses,
                                                        const std::vector<NodeIdx>& starts, NodeIdx goal,
                                                        const RouteOptions& options) {
   RouteOptions checked = options;
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-  if (options.weight == "entropy" && appearance.entropy.empty()) {
+  const bool needs_entropy = options.weight == "entropy" || options.weight == "risk";
+  if (needs_entropy && appearance.entropy.empty()) {
     return MakeError(ErrorCode::kNotFound,
                      "route: the map does not say how ambiguous its places are; compile it again, or plan by "
                      "links or matches");
   }
-  const Ways ways = WaysTo(appearance, goal, options);
+  const WaysToGoal ways = FindWaysToGoal(appearance, goal, LinkCosts(appearance, node_poses, options));
   std::vector<std::optional<NodePath>> paths;
   for (const NodeIdx start : starts) {
     std::optional<NodePath>& path = paths.emplace_back();
-    if (ways.next[start] < 0) continue;
-    path = NodePath{.nodes = {start}, .cost = ways.cost[start]};
-    while (path->nodes.back() != goal) path->nodes.push_back(ways.next[path->nodes.back()]);
+    if (ways.next[start] >= 0) path = NodePath{.nodes = ways.From(start), .cost = ways.cost[start]};
   }
   return paths;
 }
@@ -113,7 +96,11 @@ Result<Route> PlanRoute(const Map& map, int32_t from, int32_t to, const RouteOpt
     return MakeError(ErrorCode::kNotFound, "route: image {} is not in the appearance graph", image->name);
   }
   if (from == to) return Route{.images = {from}};
-  CAIRN_ASSIGN_OR_RETURN(const auto paths, FindPaths(*appearance, {start}, goal, options));
+  std::vector<Pose> node_poses;
+  if (options.weight == "risk") {
+    CAIRN_ASSIGN_OR_RETURN(node_poses, NodePoses(map));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto paths, FindPaths(*appearance, node_poses, {start}, goal, options));
   if (!paths[0]) {
     CAIRN_ASSIGN_OR_RETURN(const auto first, map.Image(from));
     CAIRN_ASSIGN_OR_RETURN(const auto last, map.Image(to));

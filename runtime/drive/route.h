@@ -18,8 +18,26 @@ struct AppearanceMap;  // runtime/map/appearance_map.h
 struct RouteOptions {
   // The cost of a link, summed over a way: "links": 1 each; "matches": 1 / verified inliers, as in the
   // planner that [Mariottini11 §V] compares with; "entropy": the mean of the entropies at both ends
-  // [Mariottini11 eq. 2], so that the way leads through places that the robot can recognise.
+  // [Mariottini11 eq. 2], so that the way leads through places that the robot can recognise; "risk": the
+  // metres that a robot is expected to drive for it, those after it got lost included:
+  //
+  //   length + lost (look_anew_m + wrong_place_m P(wrong)),   lost = l + (1 - l) exp(-inliers / f)
+  //
+  // with l = lost_ratio, f = faint_link_inliers, and P(wrong) the mean over both ends of 1 - exp(-H): who
+  // takes the likeliest place of an image of entropy H is not wrong more often; 1/2 at twins.  The length is
+  // that of a robot on wheels, which retreats and comes in to get sideways (four metres a metre); a turn
+  // counts as the way driven meanwhile.  In a map without scale every link is a metre long.
   std::string weight = "links";
+  // The rest is for "risk" alone.  Share of the images on its way at which a robot is lost (carried, blocked,
+  // dazzled), however well they match.  REQUIRES: in [0, 1]
+  double lost_ratio = 0.05;
+  // With this many matches, an image is not found again in 1 of e = 2.7 cases.  REQUIRES: > 0
+  double faint_link_inliers = 10;
+  // What it costs to look anew, and to take a wrong place for the right one, as metres of way: the larger,
+  // the longer detours are made through places that are like no other.  At 100 m ways were as long as those
+  // of fewest images (bench/drive); the way back from a wrong place alone is some 10 m.  REQUIRES: >= 0
+  double look_anew_m = 1;
+  double wrong_place_m = 100;
 };
 OptionTable DescribeOptions(RouteOptions* options);
 
@@ -30,12 +48,17 @@ struct NodePath {
   double MeanCost() const { return nodes.size() < 2 ? 0 : cost / static_cast<double>(nodes.size() - 1); }
 };
 
+// cam_from_world of each node's first image, for FindPaths; empty for a map without scale.  Reads all images.
+// Errors: as Map::Image.
+Result<std::vector<Pose>> NodePoses(const Map& map);
+
 // From each start the way of least cost to the goal over kept nodes (its ends may be others) [Booij06 §IV:
 // paths over the connected dominating set; Mariottini11 §V: Dijkstra].  Among equal costs the way with the
 // fewest links, then the one through the smallest nodes; nothing where there is no way.  O(links log links).
-// REQUIRES: nodes of the graph.  Errors: InvalidArgument (no such weight), NotFound (weight "entropy" in a
-// map without entropies).
+// `node_poses` is read for weight "risk".  REQUIRES: nodes of the graph.  Errors: InvalidArgument (an
+// option), NotFound (weight "entropy" or "risk" in a map without entropies).
 Result<std::vector<std::optional<NodePath>>> FindPaths(const AppearanceMap& appearance,
+                                                       const std::vector<Pose>& node_poses,
                                                        const std::vector<NodeIdx>& starts, NodeIdx goal,
                                                        const RouteOptions& options);
 

@@ -9,6 +9,7 @@
 
 #include "core/vocabulary/document_scores.h"
 #include "core/world/appearance_graph.h"
+#include "runtime/drive/joint_way.h"
 #include "runtime/map/appearance_map.h"
 
 namespace cairn {
@@ -142,7 +143,8 @@ Result<StartHypotheses> StartHypotheses::Make(const PlaceModel& model, const Pla
   }
   StartHypotheses result(model, goal, options);
   const std::vector<NodeIdx> candidates = Candidates(model.appearance().graph, first.scores, options);
-  CAIRN_ASSIGN_OR_RETURN(const auto paths, FindPaths(model.appearance(), candidates, goal, options.route));
+  CAIRN_ASSIGN_OR_RETURN(const auto paths,
+                         FindPaths(model.appearance(), model.node_poses(), candidates, goal, options.route));
   for (size_t i = 0; i < candidates.size(); ++i) {
     if (!paths[i]) continue;
     result.hypotheses_.push_back(
@@ -155,20 +157,36 @@ Result<StartHypotheses> StartHypotheses::Make(const PlaceModel& model, const Pla
         "may show; survey the way between them",
         candidates.size());
   }
-  const auto cost = [&](const StartHypothesis& hypothesis) {
-    if (options.first_choice == "score") return -hypothesis.score;
-    return options.way_cost == "mean" ? hypothesis.path.MeanCost() : hypothesis.path.cost;
-  };
-  // [Mariottini11 §V] of the ways from all candidates the one of least entropy is followed
-  const auto least =
-      std::min_element(result.hypotheses_.begin(), result.hypotheses_.end(),
-                       [&](const StartHypothesis& a, const StartHypothesis& b) { return cost(a) < cost(b); });
-  result.followed_ = static_cast<int>(least - result.hypotheses_.begin());
   // [Mariottini11 eq. 3] the prior p(X_0 | Z_0) is uniform over the candidates
   for (StartHypothesis& hypothesis : result.hypotheses_)
     hypothesis.posterior = 1.0 / static_cast<double>(result.hypotheses_.size());
+  const std::vector<double> costs = result.PlanWays();
+  // [Mariottini11 §V] of the ways from all candidates the one of least entropy is followed
+  result.followed_ = static_cast<int>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   result.Restart();
   return result;
+}
+
+std::vector<double> StartHypotheses::PlanWays() {
+  std::vector<double> costs;
+  const bool is_mean = options_.way_cost == "mean";
+  for (const StartHypothesis& hypothesis : hypotheses_)
+    costs.push_back(is_mean ? hypothesis.path.MeanCost() : hypothesis.path.cost);
+  if (options_.route.weight == "risk") {
+    std::vector<PossibleStart> starts;
+    for (const StartHypothesis& hypothesis : hypotheses_)
+      starts.push_back({hypothesis.start, hypothesis.posterior});
+    const std::vector<JointWay> ways = FindJointWays(model_.appearance(), model_.node_poses(), starts, goal_,
+                                                     options_.route, options_.on_switch == "replan");
+    for (size_t i = 0; i < ways.size(); ++i) {
+      hypotheses_[i].path = ways[i].path;
+      costs[i] = is_mean ? ways[i].path.MeanCost() : ways[i].expected_cost;
+    }
+  }
+  if (options_.first_choice == "score") {
+    for (size_t i = 0; i < costs.size(); ++i) costs[i] = -hypotheses_[i].score;
+  }
+  return costs;
 }
 
 void StartHypotheses::Restart() {
@@ -287,7 +305,8 @@ NodeIdx StartHypotheses::Whereabouts(int hypothesis) const {
 }
 
 std::optional<NodePath> StartHypotheses::Replan(int hypothesis) const {
-  const auto paths = FindPaths(model_.appearance(), {Whereabouts(hypothesis)}, goal_, options_.route);
+  const auto paths =
+      FindPaths(model_.appearance(), model_.node_poses(), {Whereabouts(hypothesis)}, goal_, options_.route);
   return paths.ok() ? (*paths)[0] : std::nullopt;  // Make has checked the options
 }
 

@@ -35,7 +35,8 @@ struct StartHypothesesOptions {
   // [Mariottini11]; or "replan" from where it would be by now, which the source rejects.
   std::string on_switch = "retrace";
   // Which start is followed first: that of the least "entropy" of its way [Mariottini11], or of the
-  // best "score".
+  // best "score".  With weights other than "entropy", that of the least cost; with "risk" ways and costs are
+  // those of all starts together (joint_way.h).
   std::string first_choice = "entropy";
   // Ways are compared by their "total" cost [Mariottini11], or by the "mean" of their links, which does not
   // penalise long ones.
@@ -99,6 +100,9 @@ class StartHypotheses {
   StartHypotheses(const PlaceModel& model, NodeIdx goal, const StartHypothesesOptions& options)
       : model_(model), goal_(goal), options_(options) {}
   using Belief = std::map<NodeIdx, double>;  // sums to the hypothesis's posterior
+  // Plans the hypotheses' ways where starts are planned for together.  Per hypothesis what following it first
+  // costs.
+  std::vector<double> PlanWays();
   const std::vector<NodeIdx>& Reach(NodeIdx node);
   // `seen`: an image's probabilities of `bins`; without bins, of all nodes.
   double LogLikelihood(const std::vector<double>& seen, NodeIdx node, const std::vector<NodeIdx>& bins);

@@ -50,10 +50,10 @@ OptionTable DescribeOptions(RobotOptions* o) {
        "distance at which images on the way count as reached, over that of the scene", 1e-4, 1},
       {"pass_heading_deg", &o->pass_heading_deg, "turn at which images on the way count as reached, degrees",
        1e-3, 45},
-      {"image_noise", &o->image_noise, "standard deviation of grey noise, of 255", 0, 50},
   };
-  const OptionTable sift = DescribeOptions(&o->sift);
-  table.insert(table.end(), sift.begin(), sift.end());
+  for (const OptionTable& part : {DescribeOptions(&o->sensors), DescribeOptions(&o->sift)}) {
+    table.insert(table.end(), part.begin(), part.end());
+  }
   return table;
 }
 
@@ -99,11 +99,9 @@ Result<Robot> Robot::Create(const Building& building, const Camera& camera, doub
 }
 
 Features Robot::Look() {
-  PlannedImage image;
-  image.cam_from_world =
-      MakePose({pose_.position.x(), pose_.position.y(), camera_height_m_}, pose_.heading_rad);
-  image.noise = options_.image_noise;
-  const cv::Mat grey = TakeImage(renderer_, image, MixSeed(seed_, num_draws_++));
+  const uint64_t seed = MixSeed(seed_, num_draws_++);
+  const PlannedImage image = ExposeImage(pose_, motion_, camera_height_m_, options_.sensors, seed);
+  const cv::Mat grey = TakeImage(renderer_, image, seed);
   return *ExtractSift(grey, options_.sift);  // fails for bad options only, which Create has checked
 }
 
@@ -161,16 +159,29 @@ RobotLeg Robot::GoIdeally(const ServoTarget& target) {
 
 // False where a wall stops it.
 bool Robot::Move(const ServoCommand& command) {
-  const double seconds = servo_options_.step_s, way = command.speed_m_s * seconds;
-  const double heading = pose_.heading_rad + 0.5 * command.turn_rad_s * seconds;
-  pose_.heading_rad = WrapAngle(pose_.heading_rad + command.turn_rad_s * seconds);
+  const double seconds = servo_options_.step_s;
+  motion_ =
+      SlippedMotion({command.speed_m_s, command.turn_rad_s}, options_.sensors, MixSeed(seed_, num_draws_++));
+  const double way = motion_.speed_m_s * seconds;
+  const double heading = pose_.heading_rad + 0.5 * motion_.turn_rad_s * seconds;
+  pose_.heading_rad = WrapAngle(pose_.heading_rad + motion_.turn_rad_s * seconds);
   if (way == 0) return true;
   const Eigen::Vector2d moved = pose_.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
   const double before = ClearanceM(*building_, pose_.position.x(), pose_.position.y());
   const double after = ClearanceM(*building_, moved.x(), moved.y());
-  if (after < options_.radius_m && after < before) return false;
+  if (after < options_.radius_m && after < before) {
+    motion_ = {};
+    return false;
+  }
   pose_.position = moved;
   return true;
+}
+
+// By its wheels alone; then it stands.
+void Robot::TurnOnTheSpot(double turn_rad) {
+  const PlanarMotion slipped = SlippedMotion({0, turn_rad}, options_.sensors, MixSeed(seed_, num_draws_++));
+  pose_.heading_rad = WrapAngle(pose_.heading_rad + slipped.turn_rad_s);
+  motion_ = {};
 }
 
 RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
@@ -182,7 +193,7 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
   Servo servo = *Servo::Create(AssumedCamera(), servo_options);
   RobotLeg leg;
   int num_blocked = 0, num_searched = 0;
-  double lost_heading_rad = 0;
+  double searched_deg = 0;  // turned since it lost the target, as commanded
   while (static_cast<int>(leg.steps.size()) < options_.max_num_commands) {
     const std::vector<PixelPair> pairs = MatchPixels(Look(), target);
     ServoCommand command = servo.Step(pairs);
@@ -190,18 +201,18 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
     leg.steps.push_back({pose_, command, static_cast<int>(pairs.size())});
     leg.why = command.why;
     leg.arrived = command.state == ServoState::kArrived;
-    if (leg.arrived) return leg;
+    if (leg.arrived) break;
     if (command.state == ServoState::kLost) {
-      if (num_searched == static_cast<int>(std::size(kSearchDeg))) {
-        pose_.heading_rad = lost_heading_rad;
-        return leg;
-      }
-      if (num_searched == 0) lost_heading_rad = pose_.heading_rad;
-      pose_.heading_rad = WrapAngle(lost_heading_rad + RadFromDeg(kSearchDeg[num_searched++]));
+      const bool gives_up = num_searched == static_cast<int>(std::size(kSearchDeg));
+      const double next_deg = gives_up ? 0 : kSearchDeg[num_searched++];
+      TurnOnTheSpot(RadFromDeg(next_deg - searched_deg));
+      searched_deg = next_deg;
+      if (gives_up) return leg;
       continue;
     }
     leg.seen = true;
     num_searched = 0;
+    searched_deg = 0;
     if (Move(command)) continue;
     if (++num_blocked == kMaxNumBlocked) {
       leg.why = "something stands in the way: " + leg.why;
@@ -209,7 +220,10 @@ RobotLeg Robot::Steer(const ServoTarget& target, bool is_goal) {
     }
     servo.Blocked();
   }
-  leg.why = fmt::format("not there after {} commands: {}", options_.max_num_commands, leg.why);
+  motion_ = {};  // it stands
+  if (!leg.arrived) {
+    leg.why = fmt::format("not there after {} commands: {}", options_.max_num_commands, leg.why);
+  }
   return leg;
 }
 

@@ -15,6 +15,7 @@
 #include "runtime/map/map.h"
 #include "sim/render/building.h"
 #include "sim/render/renderer.h"
+#include "sim/robot/sensors.h"
 
 namespace cairn::sim {
 
@@ -38,8 +39,7 @@ struct RobotOptions {
   // servo's own limits hold at the goal.  REQUIRES: > 0
   double pass_distance_ratio = 0.04;
   double pass_heading_deg = 4;
-  // Standard deviation of the noise of the image's grey values.  REQUIRES: in [0, 50]
-  double image_noise = 1;
+  SensorOptions sensors;
   SiftOptions sift{.max_num_features = 800};
 };
 OptionTable DescribeOptions(RobotOptions* options);
@@ -80,10 +80,11 @@ class Robot {
   // Puts it anywhere; it forgets its last image.
   void PutAt(const PlanarPose& pose) {
     pose_ = pose;
+    motion_ = {};
     last_target_.reset();
   }
 
-  // The features of its current image.
+  // The features of its current image, blurred by how it moves.
   Features Look();
   // Matches of such features with a target that agree on one motion over the floor; 0 where none do.
   int NumAgreeing(const Features& seen, const ServoTarget& target) const;
@@ -98,6 +99,7 @@ class Robot {
   RobotLeg Steer(const ServoTarget& target, bool is_goal);
   Camera AssumedCamera() const;
   bool Move(const ServoCommand& command);
+  void TurnOnTheSpot(double turn_rad);
 
   const Building* building_;
   Renderer renderer_;
@@ -105,8 +107,9 @@ class Robot {
   RobotOptions options_;
   ServoOptions servo_options_;
   uint64_t seed_;
-  uint64_t num_draws_ = 0;  // images and noise so far
+  uint64_t num_draws_ = 0;  // images, noise and slips so far
   PlanarPose pose_;
+  PlanarMotion motion_;                    // of the last command, as it moved
   std::optional<PlanarPose> last_target_;  // place of the image that it was last put at
 };
 

@@ -20,8 +20,10 @@ constexpr double kLeastOffset = 0.1, kGreatestOffset = 0.75;
 constexpr double kGreatestDriveOffsetM = 0.3;
 // Queries of a driven survey look along the drive up to this angle.
 constexpr double kDriveHeadingDeg = 25;
-// Largest motion of the image centre between two renderings of one exposure, pixels.
+// Largest motion of the image centre between two renderings of one exposure, pixels; the camera's way counts
+// for a scene at this distance, metres.
 constexpr double kBlurStepPx = 1;
+constexpr double kBlurDistanceM = 1;
 
 Pose RotatedInCamera(const Pose& cam_from_world, const Eigen::Vector3d& turn) {
   const double angle = turn.norm();
@@ -265,14 +267,17 @@ Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& optio
 }
 
 cv::Mat TakeImage(const Renderer& renderer, const PlannedImage& image, uint64_t seed) {
-  const double blur_px = image.turn.norm() * renderer.camera().MeanFocal();
+  const double blur_px =
+      (image.turn.norm() + image.way.norm() / kBlurDistanceM) * renderer.camera().MeanFocal();
   const int num_exposures = 1 + static_cast<int>(std::ceil(blur_px / kBlurStepPx));
-  cv::Mat sum =
-      renderer.RenderFloat(RotatedInCamera(image.cam_from_world, (0.5 / num_exposures - 0.5) * image.turn));
-  for (int i = 1; i < num_exposures; ++i) {
-    sum += renderer.RenderFloat(
-        RotatedInCamera(image.cam_from_world, ((i + 0.5) / num_exposures - 0.5) * image.turn));
-  }
+  // `part`: of the motion, from the middle of the exposure.
+  const auto render = [&](double part) {
+    Pose moved = image.cam_from_world;
+    moved.translation -= part * image.way;
+    return renderer.RenderFloat(RotatedInCamera(moved, part * image.turn));
+  };
+  cv::Mat sum = render(0.5 / num_exposures - 0.5);
+  for (int i = 1; i < num_exposures; ++i) sum += render((i + 0.5) / num_exposures - 0.5);
   sum.convertTo(sum, CV_32F, image.gain / num_exposures, image.bias);
   if (image.noise > 0) AddGreyNoise(sum, image.noise, seed);
   cv::Mat grey;

@@ -21,8 +21,10 @@ struct PlannedImage {
   Pose stated_cam_from_world;  // the pose in images.txt: with pose noise for survey images
   double noise = 0;            // standard deviation of grey noise, of 255
   double gain = 1, bias = 0;   // exposure: gain * grey + bias
-  // The camera's turn during the exposure, camera frame: axis times angle, rad.
+  // How the scene turns about the camera during the exposure, camera frame: axis times angle, rad.
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  // The camera's way during the exposure, camera frame in the middle of it, metres.
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
 };
 
 struct Survey {
@@ -48,7 +50,7 @@ Camera MakeQueryCamera(const SimulateOptions& options);
 // InvalidArgument for bad options, NoData where no station or query fits; both with a remedy.
 Result<Survey> PlanSurvey(const Building& building, const SimulateOptions& options, uint64_t seed);
 
-// Renders a planned image, 8-bit grey: the mean over the camera's turn, then exposure, then noise.
+// Renders a planned image, 8-bit grey: the mean over the camera's motion, then exposure, then noise.
 cv::Mat TakeImage(const Renderer& renderer, const PlannedImage& image, uint64_t seed);
 
 }  // namespace cairn::sim

@@ -393,7 +393,7 @@ TEST_F(Compile, PlacesThatLookAlikeAreListedDrawnAndWeighed) {
   EXPECT_GT(memory["num_words"].get<int>(), 0);
   const std::string from = memory["ambiguity"]["nodes"].front()["image"],
                     to = memory["ambiguity"]["nodes"].back()["image"];
-  for (const std::string weight : {"links", "matches", "entropy"}) {
+  for (const std::string weight : {"links", "matches", "entropy", "risk"}) {
     const ProgramRun route = RunShell("cairn route " + Path("memory.cairn") + " " + from + " " + to +
                                       " --json --weight " + weight);
     ASSERT_EQ(route.exit_code, 0) << route.err;

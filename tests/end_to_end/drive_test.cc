@@ -120,6 +120,32 @@ TEST_F(Drive, ALostRobotIsSteeredToItsGoalByItsCamera) {
   EXPECT_LT(record["goal_error_deg"].get<double>(), 2);
 }
 
+// The way to the first image, with sensors as said.
+TEST_F(Drive, WheelsThatSlipLeadElsewhereAndInTheDarkNothingIsSeen) {
+  const auto first_leg = [&](const std::string& sensors) {
+    const std::string path = Path("first_leg.json");
+    std::filesystem::remove(path);
+    Run("--start 2,2,0 --goal d0060.jpg --max-num-legs 1 " + sensors + " -o " + path, "epipolar");
+    const auto record = nlohmann::json::parse(*ReadFile(path));
+    return record["legs"].back()["steps"].dump();
+  };
+  const std::string sure = "--exposure-s 0 --image-gain 0 --slip-ratio 0";
+  EXPECT_EQ(first_leg(sure), first_leg(sure));
+  EXPECT_NE(first_leg(sure), first_leg("--exposure-s 0 --image-gain 0 --slip-ratio 0.3"));
+  EXPECT_NE(first_leg(sure), first_leg("--exposure-s 0.1 --image-gain 0 --slip-ratio 0"));
+  EXPECT_NE(first_leg(sure), first_leg("--exposure-s 0 --image-gain 0.5 --slip-ratio 0"));
+  const ProgramRun dark =
+      Run("--start 2,2,0 --goal d0060.jpg --light-ratio 0.01 --image-noise 10", "epipolar");
+  EXPECT_NE(dark.exit_code, 0) << "found its way without light";
+}
+
+TEST_F(Drive, TheLeastRiskLeadsToTheGoal) {
+  const ProgramRun run = Run("--start 0.9,0.95,340 --goal d0040.jpg --weight risk -o " + Path("risk.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  EXPECT_LT(nlohmann::json::parse(*ReadFile(Path("risk.json")))["goal_error_m"].get<double>(), 0.3);
+  EXPECT_EQ(Run("--start 0.9,0.95,340 --goal d0040.jpg --weight links --wrong-place-m 5").exit_code, 2);
+}
+
 TEST_F(Drive, ACarriedRobotIsRecordedWhereItWasPut) {
   const ProgramRun run =
       Run("--start 0.9,0.95,340 --goal d0040.jpg --kidnap 2:1.83,1.38,2 -o " + Path("kidnapped.json"));

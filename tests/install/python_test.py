@@ -230,7 +230,7 @@ class Starting(unittest.TestCase):
         return json.loads(printed)
 
     def test_routes_are_the_programs(self):
-        for weight in "links", "matches", "entropy":
+        for weight in "links", "matches", "entropy", "risk":
             for start, goal in ("h0", "h2"), ("a0", "h1"), ("b2", "a1"):
                 expected = self.route(start, goal, "--weight", weight)
                 route = self.map.route(self.map.find_image(start), self.map.find_image(goal), weight)

@@ -47,10 +47,11 @@ class Map:
     def image_name(self, image: int) -> str: ...
     def image_pose(self, image: int) -> NDArray[np.float64]:
         """Where a survey image was taken: cam_from_world as a fix of its pixels states it, homogeneous, (4, 4)."""
-    def route(self, start: int, goal: int, weight: Literal["links", "matches", "entropy"] = "links") -> Route:
+    def route(self, start: int, goal: int, weight: Literal["links", "matches", "entropy", "risk"] = "links") -> Route:
         """A way from survey image to survey image along which each shows what the next one shows.
 
-        `weight`: what it minimises: links, the sum of 1 / matches of the links, or the entropy of places.  Raises Error:
+        `weight`: what it minimises: links, the sum of 1 / matches of the links, the entropy of places, or the metres
+        expected with what getting lost on the way costs.  Raises Error:
         not_found (no way, an image that is not in the map's appearance graph, or a map that has none).
         """
     @property

@@ -1,8 +1,11 @@
 #include "runtime/drive/route.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/geometry/pose.h"
 #include "runtime/localize/retrieve.h"
 #include "tests/runtime/localize/synthetic_room.h"
 
@@ -80,6 +83,74 @@ TEST(PlanRoute, PlacesThatAreLikeNoOtherCostNothingAndTheFewestLinksAreTaken) {
     EXPECT_EQ(route->cost, 0);
   }
   EXPECT_THAT(PlanRoute(*map, 1, 4, {.weight = "entropy"})->images, ElementsAre(1, 2, 3, 4));
+}
+
+// Nodes 0 to 4 a metre apart, of entropy ln 2: of a way of four links each costs
+//   1 m + 0.1 (2 m + 20 m / 2)
+TEST(PlanRoute, RiskIsExpectedMetres) {
+  MapRows rows = PathRows();
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = std::log(2.0);
+  for (int i = 0; i < 7; ++i) rows.images[i].cam_from_world = PoseAt({static_cast<double>(i), 0, 0}, 0);
+  const auto map = *Map::FromRows(rows);
+  const RouteOptions options{
+      .weight = "risk", .lost_ratio = 0.1, .faint_link_inliers = 0.1, .look_anew_m = 2, .wrong_place_m = 20};
+  EXPECT_NEAR(PlanRoute(*map, 0, 4, options)->cost, 4 * (1 + 0.1 * (2 + 20 * 0.5)), 1e-9);
+  // Links of 20 matches, of which one in e is not found again: lost at 0.1 + 0.9 / e of them.
+  RouteOptions faint = options;
+  faint.faint_link_inliers = 20;
+  EXPECT_NEAR(PlanRoute(*map, 0, 4, faint)->cost, 4 * (1 + (0.1 + 0.9 / std::exp(1)) * (2 + 20 * 0.5)), 1e-9);
+  rows.appearance[2].entropy = 0;  // a mean over both ends: two links are half as ambiguous
+  EXPECT_NEAR(PlanRoute(**Map::FromRows(rows), 0, 4, options)->cost,
+              2 * (1 + 0.1 * (2 + 20 * 0.5)) + 2 * (1 + 0.1 * (2 + 20 * 0.25)), 1e-9);
+  rows.frame.unit = "arbitrary";
+  for (MapImage& image : rows.images) image.cam_from_world.translation *= 7;
+  EXPECT_NEAR(PlanRoute(**Map::FromRows(rows), 0, 4, options)->cost,
+              2 * (1 + 0.1 * (2 + 20 * 0.5)) + 2 * (1 + 0.1 * (2 + 20 * 0.25)), 1e-9)
+      << "without scale a link is a metre";
+}
+
+TEST(PlanRoute, ATurnCountsAsTheWayDrivenMeanwhile) {
+  MapRows rows = PathRows();
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = 0;
+  for (int i = 0; i < 7; ++i) rows.images[i].cam_from_world = PoseAt({0, 0, 0}, 60 * i);  // on the spot
+  const auto map = *Map::FromRows(rows);
+  const RouteOptions options{.weight = "risk", .lost_ratio = 0, .faint_link_inliers = 0.1};
+  EXPECT_NEAR(PlanRoute(*map, 0, 2, options)->cost, 2 * 0.5 * RadFromDeg(60), 1e-6);
+}
+
+// A metre sideways, and a metre ahead with half a metre sideways, of which 0.4 m are approached.
+TEST(PlanRoute, WhoMovesSidewaysRetreatsAndComesIn) {
+  MapRows rows = PathRows();
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = 0;
+  const std::vector<Eigen::Vector3d> places = {{0, 0, 0}, {0, 1, 0}, {1, 1.5, 0}};
+  for (size_t i = 0; i < places.size(); ++i) rows.images[i].cam_from_world = PoseAt(places[i], 0);
+  const auto map = *Map::FromRows(rows);
+  const RouteOptions options{.weight = "risk", .lost_ratio = 0, .faint_link_inliers = 0.1};
+  EXPECT_NEAR(PlanRoute(*map, 0, 1, options)->cost, 1 + 4 * 1, 1e-6);
+  EXPECT_NEAR(PlanRoute(*map, 1, 2, options)->cost, std::sqrt(1.25) + 4 * (0.5 - 0.4), 1e-6);
+  EXPECT_NEAR(PlanRoute(*map, 2, 1, options)->cost, std::sqrt(1.25) + 4 * (0.5 - 0.4), 1e-6);
+}
+
+// On a line: 0 - 1 - 4 is short and leads by a twin, 0 - 2 - 3 - 4 begins backwards and is longer by a metre.
+TEST(PlanRoute, TheDearerAWrongPlaceTheLongerTheDetour) {
+  MapRows rows = PathRows();
+  const std::vector<Eigen::Vector3d> places = {{0, 0, 0}, {1, 0, 0}, {-0.5, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  for (size_t i = 0; i < places.size(); ++i) rows.images[i].cam_from_world = PoseAt(places[i], 0);
+  for (MapAppearanceNode& node : rows.appearance) node.entropy = 0, node.is_kept = true;
+  rows.appearance[1].entropy = std::log(2.0);
+  rows.appearance[0].links = {{1, 100}, {2, 100}};
+  rows.appearance[1].links = {{4, 100}};
+  rows.appearance[2].links = {{3, 100}};
+  rows.appearance[3].links = {{4, 100}};
+  const auto map = *Map::FromRows(rows);
+  RouteOptions options{.weight = "risk", .lost_ratio = 0.1, .look_anew_m = 0};
+  // 0.1 wrong_place_m (1/4 + 1/4) against a metre; links of 100 matches are not faint.
+  options.wrong_place_m = 19;
+  EXPECT_THAT(PlanRoute(*map, 0, 4, options)->images, ElementsAre(0, 1, 4));
+  options.wrong_place_m = 21;
+  EXPECT_THAT(PlanRoute(*map, 0, 4, options)->images, ElementsAre(0, 2, 3, 4));
+  EXPECT_EQ(PlanRoute(*map, 0, 4, {.weight = "risk", .lost_ratio = 2}).error().code,
+            ErrorCode::kInvalidArgument);
 }
 
 TEST(PlanRoute, SeveralImagesOfOnePlaceNeedNoLink) {

@@ -271,6 +271,32 @@ TEST(StartHypotheses, SaysWhyThereIsNone) {
                   .ok());
 }
 
+// Two halves 10 m apart that look alike but for 3 and 8, as in joint_way_test.cc, and the goal, 4:
+//   0 - 1 - 2 - 4 - 7 - 6 - 5,   0 - 3 - 2 and 5 - 8 - 7 are longer
+TEST(StartHypotheses, WaysOfLeastRiskAreThoseOfAllStartsTogether) {
+  MapRows rows =
+      VisualMemory({{0, 1}, {2}, {3}, {4}, {5}, {0, 1}, {6}, {7}, {8}},
+                   {{0, 1}, {1, 2}, {0, 3}, {2, 3}, {2, 4}, {5, 6}, {6, 7}, {5, 8}, {7, 8}, {4, 7}},
+                   std::vector<double>(9, 0.0));
+  const std::vector<Eigen::Vector3d> places = {{0, 0, 0},  {1, 0, 0},  {2, 0, 0},  {0, 1, 0}, {2, -5, 0},
+                                               {10, 0, 0}, {11, 0, 0}, {12, 0, 0}, {10, 1, 0}};
+  for (size_t i = 0; i < places.size(); ++i) rows.images[i].cam_from_world = PoseAt(places[i], 0);
+  for (int32_t i = 0; i < 3; ++i) rows.appearance[i].look_alikes = {{i + 5, 1}};
+  const PlaceModel model = ModelOf(rows);
+  PlaceScores first{std::vector<double>(9, 0.0), std::vector<double>(9, 1.0 / 9)};
+  first.scores[0] = first.scores[5] = 1;
+  StartHypothesesOptions options;
+  options.route = {.weight = "risk", .lost_ratio = 0, .faint_link_inliers = 0.1};
+  const auto starts = StartHypotheses::Make(model, first, 4, options);
+  ASSERT_TRUE(starts.ok()) << starts.error().message;
+  ASSERT_EQ(starts->hypotheses().size(), 2);
+  EXPECT_THAT(starts->hypotheses()[0].path.nodes, ElementsAre(0, 3, 2, 4));
+  EXPECT_THAT(starts->hypotheses()[1].path.nodes, ElementsAre(5, 8, 7, 4));
+  first.scores[5] = 0;  // one start: the shortest way
+  EXPECT_THAT(StartHypotheses::Make(model, first, 4, options)->hypotheses().at(0).path.nodes,
+              ElementsAre(0, 1, 2, 4));
+}
+
 TEST(FindPaths, WeighsLinksMatchesAndEntropies) {
   // 0 - 1 - 3 has few matches and ambiguous places, 0 - 2 - 4 - 3 many and clear ones.
   MapRows rows = VisualMemory({{0}, {1}, {2}, {3}, {4}}, {{0, 1}, {0, 2}, {1, 3}, {2, 4}, {3, 4}},
