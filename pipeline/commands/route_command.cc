@@ -64,7 +64,9 @@ Command RouteCommand() {
       .add_arguments =
           [arguments](ArgumentParser& parser) {
             parser.Add("map", arguments->map_path, "Map, or an atlas of maps").Required().Type("MAP");
-            parser.Add("from", arguments->from, "Survey image to start at; of an atlas MAP/IMAGE").Required().Type("IMAGE");
+            parser.Add("from", arguments->from, "Survey image to start at; of an atlas MAP/IMAGE")
+                .Required()
+                .Type("IMAGE");
             parser.Add("to", arguments->to, "Survey image to go to, likewise").Required().Type("IMAGE");
             parser.AddFlag("--json", arguments->json, "Print JSON");
             arguments->option_arguments.Add(parser, DescribeOptions(&arguments->options));
