@@ -9,8 +9,8 @@ SEEDS: 1-4 or 7,9.  A building has two wings that look alike up to some panels, 
 of whose panels are shared; sizes, panels and furniture are drawn from its seed.  PLANNER: NAME=OPTIONS of `cairn drive`,
 such as "risk=--weight risk"; without any, PLANNERS below.
 
-A robot starts beside a random survey image and goes to another one, steered by its camera, with all defaults of `cairn
-drive`: light, exposure, blur, slip.  On its way it is carried ahead: at the same share of its own way, as far beside the
+A robot starts beside a random survey image and goes to another one, steered by its camera unless OPTIONS say otherwise,
+with the light, exposures, blur and slip that are the defaults of `cairn drive`.  On its way it is carried ahead: at the same share of its own way, as far beside the
 survey's image there and turned as much, whatever its planner.  Runs of all planners have the same starts, goals and seeds,
 and are compared in pairs.  A place is wrong that is more than 1 m or 45 degrees from where the robot stands; the first
 planner is the one that the others are compared with.
