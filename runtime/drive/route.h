@@ -35,7 +35,7 @@ struct RouteOptions {
   double faint_link_inliers = 10;
   // What it costs to look anew, and to take a wrong place for the right one, as metres of way: the larger,
   // the longer detours are made through places that are like no other.  At 100 m ways were as long as those
-  // of fewest images (bench/drive); the way back from a wrong place alone is some 10 m.  REQUIRES: >= 0
+  // of fewest images (bench/drive); the way in a wrong belief was 4 m.  REQUIRES: >= 0
   double look_anew_m = 1;
   double wrong_place_m = 100;
 };
