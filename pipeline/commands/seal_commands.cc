@@ -5,10 +5,12 @@
 #include <optional>
 #include <string>
 
+#include "core/atlas/atlas_file.h"
 #include "core/blocks/map_rows.h"
 #include "core/map/map_epoch.h"
 #include "core/map/map_file.h"
 #include "core/seal/map_seal.h"
+#include "runtime/atlas/atlas.h"
 
 namespace cairn::pipeline {
 namespace {
@@ -27,8 +29,27 @@ std::string EpochText(const MapHead& head) {
   return head.epoch == 0 ? "" : fmt::format(", of epoch {}", head.epoch);
 }
 
+// Every byte of an atlas, its signature, and that its maps are the files that it was made of.
+Status VerifyAtlas(const SealArguments& arguments, const CommandEnvironment& environment) {
+  AtlasOptions options = {.name = arguments.name, .min_epoch = arguments.epoch};
+  if (!arguments.key_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
+  }
+  CAIRN_ASSIGN_OR_RETURN(const auto atlas, Atlas::Open(arguments.input_path, options));
+  for (int map = 0; map < atlas->num_maps(); ++map) CAIRN_RETURN_IF_ERROR(atlas->OpenMap(map));
+  *environment.out << fmt::format(
+      "{}: whole, {}; its {} maps are the files that it was made of\n", arguments.input_path,
+      atlas->rows().is_signed()
+          ? fmt::format("signed with key {}{}", HexOf(atlas->rows().public_key),
+                        options.public_key ? "" : ", which was not checked against a given key")
+          : "not signed",
+      atlas->num_maps());
+  return Ok();
+}
+
 // Every byte by the file's hash, the signature, then every block and every row.
 Status Verify(const SealArguments& arguments, const CommandEnvironment& environment) {
+  if (IsAtlasFile(arguments.input_path)) return VerifyAtlas(arguments, environment);
   MapFileOptions options;
   if (!arguments.key_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
@@ -92,10 +113,10 @@ Command VerifyCommand() {
   auto arguments = std::make_shared<SealArguments>();
   return {
       .name = "verify",
-      .summary = "Check every byte of a map, and its signature",
+      .summary = "Check every byte of a map or an atlas, and its signature",
       .add_arguments =
           [arguments](ArgumentParser& parser) {
-            parser.Add("map", arguments->input_path, "Map").Required().Type("MAP");
+            parser.Add("map", arguments->input_path, "Map, or an atlas of maps").Required().Type("MAP");
             parser.Add("--public-key", arguments->key_path, "Key whose signature the map must have")
                 .Type("KEY.pub");
             parser.Add("--name", arguments->name, "Name that the map must have").Type("NAME");

@@ -109,8 +109,9 @@ Result<AtlasAnswer> AtlasLocalizer::LocalizeFeatures(const Features& features, i
       next.pop_front();
       if (!now.is_look_alike) {
         if (static_cast<int>(answer.maps_tried.size()) >= options_.max_num_maps) continue;
-        const bool is_rival = NumShared(now.features, best_features) >=
-                              options_.rival_ratio * static_cast<double>(best_features.size());
+        const int num_shared = NumShared(now.features, best_features);
+        const bool is_rival =
+            num_shared > 0 && num_shared >= options_.rival_ratio * static_cast<double>(best_features.size());
         if (best_probability >= options_.sure_probability && !is_rival) continue;
       }
       CAIRN_ASSIGN_OR_RETURN(const auto map, atlas_->OpenMap(now.map));

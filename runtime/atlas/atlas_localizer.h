@@ -19,7 +19,7 @@ namespace cairn {
 struct AtlasLocalizerOptions {
   // Most maps in which an image is localized, those with most evidence first.  Maps of which a place is known
   // that looks like the one found come on top.  REQUIRES: >= 1
-  int max_num_maps = 8;
+  int max_num_maps = 16;
   // Once a map has a fix of this probability, only those are asked that have at least `rival_ratio` of the
   // image's features that it has.  REQUIRES: both in [0, 1]
   double sure_probability = 0.99;

@@ -4,6 +4,7 @@ python_test.py POSTER PROGRAM: the folder of make_poster_map, the program `cairn
 """
 import json
 import pathlib
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -170,6 +171,22 @@ class Site(unittest.TestCase):
             with self.assertRaises(cairn.Error) as caught:
                 cairn.Atlas.open(self.path, **options)
             self.assertEqual(caught.exception.name, name)
+
+    def test_signed_atlases_are_verified_with_their_maps(self):
+        key, copy, path = self.folder / "fleet.key", self.folder / "poster.cairn", self.folder / "signed.atlas"
+        shutil.copy(POSTER / "poster.cairn", copy)
+        self.assertEqual(self.program("keygen", key).returncode, 0)
+        self.assertEqual(self.program("atlas", copy, POSTER / "wings.cairn", "-o", path, "--key", key).returncode, 0)
+        whole = self.program("verify", path, "--public-key", f"{key}.pub")
+        self.assertEqual(whole.returncode, 0, whole.stderr)
+        self.assertIn("its 2 maps are the files", whole.stdout)
+        public_key = bytes.fromhex(pathlib.Path(f"{key}.pub").read_text().split()[-1])
+        self.assertEqual(len(cairn.Atlas.open(path, public_key=public_key)), 2)
+        self.assertEqual(self.program("verify", self.path, "--public-key", f"{key}.pub").returncode, 17)  # not signed
+        shutil.copy(POSTER / "drive.cairn", copy)
+        exchanged = self.program("verify", path)
+        self.assertEqual(exchanged.returncode, 23)
+        self.assertIn("make the atlas anew", exchanged.stderr)
 
     def test_ways_lead_through_passages(self):
         passages = self.folder / "passages.csv"

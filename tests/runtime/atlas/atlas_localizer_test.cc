@@ -144,7 +144,7 @@ TEST_F(AtlasLocalizerTest, OnlySoManyMapsAreAsked) {
   EXPECT_LT(shared, 1);
   EXPECT_EQ(tried({.sure_probability = 0.9, .rival_ratio = 0.99 * shared}), 3u);
   EXPECT_EQ(tried({.sure_probability = 0.9, .rival_ratio = 1}), 1u);
-  EXPECT_EQ(tried({.max_num_maps = 2, .rival_ratio = 0}), 2u);
+  EXPECT_EQ(tried({.max_num_maps = 2, .sure_probability = 0.9, .rival_ratio = 0}), 2u);
   // Not sure.
   EXPECT_EQ(tried({.sure_probability = 1, .rival_ratio = 1}), 3u);
 }
