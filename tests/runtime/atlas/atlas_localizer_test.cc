@@ -34,6 +34,7 @@ AtlasAnswer Answer(const std::shared_ptr<const Atlas>& atlas, const Features& fe
 
 TEST_F(AtlasLocalizerTest, FindsTheRoomAndThePlace) {
   const auto atlas = Open(Rows());
+  size_t num_maps_tried = 0;
   Random random(1);
   for (int i = 0; i < 30; ++i) {
     const int room = i % kNumRooms;
@@ -45,14 +46,14 @@ TEST_F(AtlasLocalizerTest, FindsTheRoomAndThePlace) {
     EXPECT_GT(answer.hypotheses[0].probability, 0.9);
     EXPECT_LT(CenterErrorM(answer.hypotheses[0].found.cam_from_world, truth), 0.05);
     EXPECT_EQ(answer.maps_tried[0], room);
-    if (answer.hypotheses[0].probability >= 0.99) {
-      EXPECT_THAT(answer.maps_tried, SizeIs(1)) << "others know too little of it";
-    }
+    num_maps_tried += answer.maps_tried.size();
     // What that map says alone.
     const auto alone = *Localizer(*atlas->OpenMap(room)).LocalizeFeatures(seen, Room(room).camera);
     EXPECT_EQ(alone.cam_from_world.translation, answer.hypotheses[0].found.cam_from_world.translation);
     EXPECT_NEAR(answer.hypotheses[0].probability, alone.probability, 1e-9);
   }
+  // Others only where a fix is not sure, or they seem to have one of few features.
+  EXPECT_LT(num_maps_tried, 60u);
 }
 
 TEST_F(AtlasLocalizerTest, AnImageOfAnotherBuildingIsOfNoMap) {
@@ -127,7 +128,11 @@ TEST_F(AtlasLocalizerTest, AKnownLookAlikeIsAskedHoweverLittleItsCodesAgree) {
 
 TEST_F(AtlasLocalizerTest, OnlySoManyMapsAreAsked) {
   AtlasRows rows = Rows();
-  for (const int other : {1, 2}) rows.maps[other].places.push_back(rows.maps[0].places[0]);
+  // The others have every second of room 0's landmarks, too.
+  for (std::vector<uint32_t> place : std::vector(rows.maps[0].places)) {
+    for (size_t i = 0; i < place.size(); ++i) place.erase(place.begin() + static_cast<std::ptrdiff_t>(i));
+    for (const int other : {1, 2}) rows.maps[other].places.push_back(place);
+  }
   const auto atlas = Open(rows);
   Random random(5);
   const Features seen = See(0, RandomPose(random), 0);
