@@ -12,6 +12,7 @@
 #include "core/files/file.h"
 #include "core/packing/map_codes.h"
 #include "core/packing/range_coder.h"
+#include "core/seal/map_seal.h"
 #include "core/seal/signature.h"
 
 namespace cairn {
@@ -235,7 +236,7 @@ Status CheckAtlas(const AtlasRows& atlas) {
 
 }  // namespace
 
-MapFingerprint FingerprintOf(const Hash& root) {
+MapFingerprint FingerprintOf(const std::array<uint8_t, 32>& root) {
   MapFingerprint fingerprint;
   std::copy_n(root.begin(), fingerprint.size(), fingerprint.begin());
   return fingerprint;

@@ -8,13 +8,13 @@
 
 #include "core/atlas/descriptor_code.h"
 #include "core/base/error.h"
-#include "core/seal/map_seal.h"
+#include "core/seal/signing_key.h"
 
 namespace cairn {
 
 // The first half of Seal::root, as hard to forge.
 using MapFingerprint = std::array<uint8_t, 16>;
-MapFingerprint FingerprintOf(const Hash& root);
+MapFingerprint FingerprintOf(const std::array<uint8_t, 32>& root);
 
 // One of an atlas's maps, and how it is told from the others.
 struct AtlasMap {

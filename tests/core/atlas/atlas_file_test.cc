@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/seal/map_seal.h"
 
 namespace cairn {
 namespace {
