@@ -373,10 +373,10 @@ CAIRN_API int32_t cairn_map_describe_image(const cairn_map* map, int32_t image,
 /* A way from survey image to survey image along which each shows what the next one shows, for a robot that
  * steers by its camera.  `weight`: what the way minimises: "links" (NULL: the same), "matches" (the sum of
  * 1 / matches of the links), "entropy" (it leads through places that are like no other) or "risk" (the metres
- * expected, with what getting lost on the way costs).  Writes the numbers of at most `capacity` images, the first of them `from`, the last `to`; *num_images says how many
- * there are, also where that is more.  `images` may be NULL with a capacity of 0, `cost` (the sum of the
- * links' weights) may be NULL.  CAIRN_NOT_FOUND: no way, an image that is not in the map's appearance graph,
- * or a map that has none. */
+ * expected, with what getting lost on the way costs).  Writes the numbers of at most `capacity` images, the
+ * first of them `from`, the last `to`; *num_images says how many there are, also where that is more. `images`
+ * may be NULL with a capacity of 0, `cost` (the sum of the links' weights) may be NULL.  CAIRN_NOT_FOUND: no
+ * way, an image that is not in the map's appearance graph, or a map that has none. */
 CAIRN_API int32_t cairn_route(const cairn_map* map, int32_t from, int32_t to, const char* weight,
                               int32_t* images, int32_t capacity, int32_t* num_images, double* cost);
 
