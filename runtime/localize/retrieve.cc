@@ -248,8 +248,8 @@ Result<std::vector<NearView>> NearestViews(const Map& map, const Pose& cam_from_
 Result<int32_t> ImageNearFix(const Map& map, const Localization& found) {
   constexpr double kRadiusM = 1, kRadiusDeg = 15;
   const Pose& pose = found.has_fix() ? found.cam_from_world : found.possible_poses.front();
-  CAIRN_ASSIGN_OR_RETURN(
-      const auto near, NearestViews(map, map.head().camera_from_given * pose, kRadiusM, kRadiusDeg, 1));
+  CAIRN_ASSIGN_OR_RETURN(const auto near,
+                         NearestViews(map, map.head().camera_from_given * pose, kRadiusM, kRadiusDeg, 1));
   return near.front().image;
 }
 
