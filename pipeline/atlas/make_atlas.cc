@@ -165,7 +165,7 @@ Result<AtlasRows> MakeAtlas(const std::vector<std::string>& map_paths, const std
   coded = {};
   CAIRN_ASSIGN_OR_RETURN(const auto maps, OpenAll(map_paths));
   if (!passages_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(atlas.passages, ReadPassages(passages_path, maps));
+    CAIRN_ASSIGN_OR_RETURN(atlas.passages, ReadPassages(passages_path, atlas, maps));
   }
   if (options.num_compared_images > 0 && maps.size() > 1) {
     CAIRN_ASSIGN_OR_RETURN(atlas.look_alikes,

@@ -5,30 +5,25 @@
 
 #include "core/base/text.h"
 #include "core/files/file.h"
+#include "runtime/atlas/atlas_route.h"
 #include "runtime/drive/route.h"
 
 namespace cairn::pipeline {
 namespace {
 
-// MAP/IMAGE; the longest name of a map counts, as both names may have slashes.
-Result<AtlasImage> FindImageIn(const std::vector<std::shared_ptr<const Map>>& maps, const std::string& name) {
-  int32_t found = -1;
-  for (size_t map = 0; map < maps.size(); ++map) {
-    const std::string& map_name = maps[map]->head().name;
-    if (name.starts_with(map_name + "/") && (found < 0 || map_name.size() > maps[found]->head().name.size()))
-      found = static_cast<int32_t>(map);
-  }
-  if (found < 0) {
-    return MakeError(ErrorCode::kNotFound, "'{}' is of none of the maps; write MAP/IMAGE, with a map's name",
-                     name);
-  }
+struct Site {
+  const AtlasRows& atlas;
+  const std::vector<std::shared_ptr<const Map>>& maps;
+};
+
+Result<AtlasImage> FindImageIn(const Site& site, const std::string& name) {
+  CAIRN_ASSIGN_OR_RETURN(const int32_t map, MapOfImage(site.atlas, name));
   CAIRN_ASSIGN_OR_RETURN(const int32_t image,
-                         FindImage(*maps[found], name.substr(maps[found]->head().name.size() + 1)));
-  return AtlasImage{found, image};
+                         FindImage(*site.maps[map], name.substr(site.atlas.maps[map].name.size() + 1)));
+  return AtlasImage{map, image};
 }
 
-Result<AtlasPassage> ParsePassage(std::string_view line,
-                                  const std::vector<std::shared_ptr<const Map>>& maps) {
+Result<AtlasPassage> ParsePassage(std::string_view line, const Site& site) {
   const std::vector<std::string> fields = SplitFields(line, ',');
   if ((fields.size() != 3 && fields.size() != 4) || fields[0].empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -36,8 +31,8 @@ Result<AtlasPassage> ParsePassage(std::string_view line,
                      line);
   }
   AtlasPassage passage{.name = fields[0]};
-  CAIRN_ASSIGN_OR_RETURN(passage.from, FindImageIn(maps, fields[1]));
-  CAIRN_ASSIGN_OR_RETURN(passage.to, FindImageIn(maps, fields[2]));
+  CAIRN_ASSIGN_OR_RETURN(passage.from, FindImageIn(site, fields[1]));
+  CAIRN_ASSIGN_OR_RETURN(passage.to, FindImageIn(site, fields[2]));
   if (fields.size() == 4 &&
       (!ParseNumber(fields[3], &passage.cost) || !std::isfinite(passage.cost) || passage.cost < 0)) {
     return MakeError(ErrorCode::kInvalidArgument, "'{}' is no cost of a passage; expected a number >= 0",
@@ -48,7 +43,7 @@ Result<AtlasPassage> ParsePassage(std::string_view line,
 
 }  // namespace
 
-Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path,
+Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path, const AtlasRows& atlas,
                                                const std::vector<std::shared_ptr<const Map>>& maps) {
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   std::vector<AtlasPassage> passages;
@@ -56,7 +51,7 @@ Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path,
   for (const std::string_view line : SplitLines(text)) {
     ++number;
     if (Trim(line).empty() || Trim(line).front() == '#') continue;
-    Result<AtlasPassage> passage = ParsePassage(line, maps);
+    Result<AtlasPassage> passage = ParsePassage(line, {atlas, maps});
     if (!passage.ok())
       return MakeError(passage.error().code, "{}:{}: {}", path, number, passage.error().message);
     passages.push_back(*std::move(passage));

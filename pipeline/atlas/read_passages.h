@@ -11,10 +11,10 @@
 namespace cairn::pipeline {
 
 // Lifts, stairs and doors between maps: lines `NAME, MAP/IMAGE, MAP/IMAGE[, COST]`; lines that begin with '#'
-// and empty ones are skipped.  MAP is the name of one of `maps`, IMAGE a survey image of it.  Errors:
+// and empty ones are skipped.  `maps`: the atlas's.  Errors:
 // NotFound (file, map or image), Io, InvalidArgument (another number of fields, a cost that is none); each
 // names the line.
-Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path,
+Result<std::vector<AtlasPassage>> ReadPassages(const std::string& path, const AtlasRows& atlas,
                                                const std::vector<std::shared_ptr<const Map>>& maps);
 
 }  // namespace cairn::pipeline

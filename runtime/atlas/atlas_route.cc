@@ -95,20 +95,22 @@ Result<std::vector<AtlasLeg>> PlanRoute(const Atlas& atlas, const AtlasImage& fr
   return legs;
 }
 
+Result<int32_t> MapOfImage(const AtlasRows& atlas, const std::string& name) {
+  int32_t found = -1;
+  for (size_t map = 0; map < atlas.maps.size(); ++map) {
+    const std::string& map_name = atlas.maps[map].name;
+    if (name.starts_with(map_name + "/") && (found < 0 || map_name.size() > atlas.maps[found].name.size()))
+      found = static_cast<int32_t>(map);
+  }
+  if (found >= 0) return found;
+  return MakeError(ErrorCode::kNotFound,
+                   "'{}' is of none of the maps; write MAP/IMAGE, with the name of one of them (of an atlas, "
+                   "`cairn inspect` lists them)",
+                   name);
+}
+
 Result<AtlasImage> FindImage(const Atlas& atlas, const std::string& name) {
-  // The longest name of a map that it begins with: both names may have slashes.
-  int found = -1;
-  for (int map = 0; map < atlas.num_maps(); ++map) {
-    if (name.starts_with(atlas.map_name(map) + "/") &&
-        (found < 0 || atlas.map_name(map).size() > atlas.map_name(found).size()))
-      found = map;
-  }
-  if (found < 0) {
-    return MakeError(ErrorCode::kNotFound,
-                     "'{}' names no image of the atlas; write MAP/IMAGE, with the name of one of its maps "
-                     "(`cairn inspect` lists them)",
-                     name);
-  }
+  CAIRN_ASSIGN_OR_RETURN(const int32_t found, MapOfImage(atlas.rows(), name));
   CAIRN_ASSIGN_OR_RETURN(const auto map, atlas.OpenMap(found));
   CAIRN_ASSIGN_OR_RETURN(const int32_t image, FindImage(*map, name.substr(atlas.map_name(found).size() + 1)));
   return AtlasImage{found, image};

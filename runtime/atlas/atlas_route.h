@@ -23,6 +23,10 @@ struct AtlasLeg {
 Result<std::vector<AtlasLeg>> PlanRoute(const Atlas& atlas, const AtlasImage& from, const AtlasImage& to,
                                         const RouteOptions& options = {});
 
+// The map that an image MAP/IMAGE is of, by the longest of the maps' names that it begins with, as both names
+// may have slashes.  Errors: NotFound.
+Result<int32_t> MapOfImage(const AtlasRows& atlas, const std::string& name);
+
 // The image MAP/IMAGE, by the names of both.  Errors: as Atlas::FindMap, Atlas::OpenMap and FindImage.
 Result<AtlasImage> FindImage(const Atlas& atlas, const std::string& name);
 
