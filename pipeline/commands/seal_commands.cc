@@ -29,41 +29,39 @@ std::string EpochText(const MapHead& head) {
   return head.epoch == 0 ? "" : fmt::format(", of epoch {}", head.epoch);
 }
 
+// `required`: the key that was given, if any.
+std::string SignatureText(bool is_signed, const PublicKey& key, const std::optional<PublicKey>& required) {
+  if (!is_signed) return "not signed";
+  return fmt::format("signed with key {}{}", HexOf(key),
+                     required ? "" : ", which was not checked against a given key");
+}
+
 // Every byte of an atlas, its signature, and that its maps are the files that it was made of.
-Status VerifyAtlas(const SealArguments& arguments, const CommandEnvironment& environment) {
-  AtlasOptions options = {.name = arguments.name, .min_epoch = arguments.epoch};
-  if (!arguments.key_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
-  }
-  CAIRN_ASSIGN_OR_RETURN(const auto atlas, Atlas::Open(arguments.input_path, options));
+Status VerifyAtlas(const SealArguments& arguments, const std::optional<PublicKey>& key,
+                   const CommandEnvironment& environment) {
+  CAIRN_ASSIGN_OR_RETURN(const auto atlas, Atlas::Open(arguments.input_path, {.public_key = key,
+                                                                              .name = arguments.name,
+                                                                              .min_epoch = arguments.epoch}));
   for (int map = 0; map < atlas->num_maps(); ++map) CAIRN_RETURN_IF_ERROR(atlas->OpenMap(map));
   *environment.out << fmt::format(
       "{}: whole, {}; its {} maps are the files that it was made of\n", arguments.input_path,
-      atlas->rows().is_signed()
-          ? fmt::format("signed with key {}{}", HexOf(atlas->rows().public_key),
-                        options.public_key ? "" : ", which was not checked against a given key")
-          : "not signed",
-      atlas->num_maps());
+      SignatureText(atlas->rows().is_signed(), atlas->rows().public_key, key), atlas->num_maps());
   return Ok();
 }
 
 // Every byte by the file's hash, the signature, then every block and every row.
 Status Verify(const SealArguments& arguments, const CommandEnvironment& environment) {
-  if (IsAtlasFile(arguments.input_path)) return VerifyAtlas(arguments, environment);
-  MapFileOptions options;
+  std::optional<PublicKey> key;
   if (!arguments.key_path.empty()) {
-    CAIRN_ASSIGN_OR_RETURN(options.public_key, ReadPublicKey(arguments.key_path));
+    CAIRN_ASSIGN_OR_RETURN(key, ReadPublicKey(arguments.key_path));
   }
-  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.input_path, options));
+  if (IsAtlasFile(arguments.input_path)) return VerifyAtlas(arguments, key, environment);
+  CAIRN_ASSIGN_OR_RETURN(const MapFile file, MapFile::Open(arguments.input_path, {.public_key = key}));
   CAIRN_RETURN_IF_ERROR(CheckAskedFor(file.head(), arguments.input_path, arguments.name, arguments.epoch));
   CAIRN_RETURN_IF_ERROR(CheckFileHash(arguments.input_path));
   CAIRN_RETURN_IF_ERROR(ReadMapRows(file));
-  *environment.out << fmt::format(
-      "{}: whole{}, {}\n", arguments.input_path, EpochText(file.head()),
-      file.seal().is_signed()
-          ? fmt::format("signed with key {}{}", HexOf(file.seal().public_key),
-                        options.public_key ? "" : ", which was not checked against a given key")
-          : "not signed");
+  *environment.out << fmt::format("{}: whole{}, {}\n", arguments.input_path, EpochText(file.head()),
+                                  SignatureText(file.seal().is_signed(), file.seal().public_key, key));
   return Ok();
 }
 
