@@ -39,6 +39,18 @@ TEST(DescriptorCode, TellsTheCoefficientsThatVaryMost) {
   EXPECT_NEAR(low.margins[0], 20 * std::sqrt(128.0), 1);
 }
 
+TEST(DescriptorCode, AboveTheMedianABitIsOne) {
+  DescriptorMatrix descriptors(5, kDescriptorDim);
+  for (int i = 0; i < 5; ++i) descriptors.row(i).setConstant(static_cast<uint8_t>(10 * (i + 1)));
+  CodeBook book = LearnCodeBook(descriptors);
+  const uint8_t* middle = descriptors.row(2).data();
+  EXPECT_EQ(CodeOf(book, middle).bits >> 31, 0);
+  EXPECT_EQ(CodeOf(book, middle).margins[0], 0);
+  --book.medians[0];
+  EXPECT_EQ(CodeOf(book, middle).bits >> 31, 1);
+  EXPECT_EQ(CodeOf(book, middle).margins[0], 1);
+}
+
 TEST(DescriptorCode, HalfOfAllDescriptorsHaveEachBit) {
   const DescriptorMatrix descriptors = RandomDescriptors(1001, 1);
   const CodeBook book = LearnCodeBook(descriptors);
