@@ -29,6 +29,7 @@ nlohmann::ordered_json LocalizationJson(const Localization& found) {
       const Eigen::Vector3d center = pose.Center();
       json["possible_centers_m"].push_back({center.x(), center.y(), center.z()});
     }
+    if (!found.possible_poses.empty()) json["possible_probabilities"] = found.possible_probabilities;
   }
   json["scope"] = ScopeName(found.scope);
   json["num_features"] = found.num_features;

@@ -9,8 +9,33 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "runtime/localize/place_evidence.h"
+
 namespace cairn {
 namespace {
+
+// Of probabilities short of 1 by rounding, too.
+double OddsOf(double probability) { return probability / std::max(1e-12, 1 - probability); }
+
+// Where an image may have been taken.
+struct Explanation {
+  Pose cam_from_world;
+  int num_matches = 0;  // that agree on it, found without it
+  double odds = 0;
+  const Localization* fix = nullptr;  // null: one of several
+};
+
+std::vector<Explanation> ExplanationsOf(const Localization& found) {
+  if (found.has_fix())
+    return {{found.cam_from_world, found.num_unguided_inliers, OddsOf(found.probability), &found}};
+  std::vector<Explanation> several;
+  for (size_t k = 0; k < found.possible_poses.size(); ++k) {
+    // P = odds / (1 + the odds of all).
+    const double odds = found.possible_probabilities[k] / std::max(1e-12, 1 - found.probability);
+    several.push_back({found.possible_poses[k], found.num_unguided_inliers, odds, nullptr});
+  }
+  return several;
+}
 
 int NumCells(const Query& query, const std::vector<Correspondence>& inliers, int grid) {
   std::set<std::pair<int, int>> cells;
@@ -205,6 +230,69 @@ Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& in
                         distance_from_survey_m, length_unit, options.max_distance_from_survey_m)};
   }
   return {};
+}
+
+bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept) {
+  return CenterErrorM(a, b) > accept.second_pose_distance_m ||
+         RotationErrorDeg(a, b) > accept.second_pose_angle_deg;
+}
+
+Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::vector<double> odds,
+                       double odds_of_others, std::string message) {
+  localization.reason = NoFix::kAmbiguous;
+  localization.message = std::move(message);
+  localization.possible_poses = std::move(poses);
+  double sum = 0;
+  for (const double each : odds) sum += each;
+  localization.probability = ProbabilityAmong(sum, odds_of_others);
+  localization.possible_probabilities.clear();
+  for (const double each : odds)
+    localization.possible_probabilities.push_back(ProbabilityAmong(each, sum - each + odds_of_others));
+  return localization;
+}
+
+Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
+                         const AcceptOptions& accept) {
+  std::vector<Explanation> places;
+  for (const Localization& each : found) {
+    for (const Explanation& explanation : ExplanationsOf(each)) places.push_back(explanation);
+  }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const auto& a, const auto& b) { return a.num_matches > b.num_matches; });
+  // Of a place the one with most matches.
+  for (size_t i = 0; i < places.size(); ++i) {
+    const auto is_here = [&](const Explanation& other) {
+      return !AreFarApart(places[i].cam_from_world, other.cam_from_world, accept);
+    };
+    places.erase(std::remove_if(places.begin() + static_cast<std::ptrdiff_t>(i) + 1, places.end(), is_here),
+                 places.end());
+  }
+  const Explanation& best = places.front();
+  double odds_of_all = 0;
+  for (const Explanation& place : places) odds_of_all += place.odds;
+  Localization decided = best.fix != nullptr ? *best.fix : found.front();
+  const double probability = ProbabilityAmong(best.odds, odds_of_all - best.odds);
+  std::vector<Pose> poses;
+  std::vector<double> odds;
+  std::string numbers;
+  for (const Explanation& place : places) {
+    // How many landmarks a place has says how often it was surveyed; the odds know what was to be expected.
+    const bool is_alike = place.num_matches >= accept.max_second_pose_ratio * best.num_matches ||
+                          place.odds * least_odds > best.odds;
+    constexpr double kHopeless = 1e-3;
+    if (&place != &best && (!is_alike || place.odds < kHopeless * best.odds)) continue;
+    poses.push_back(place.cam_from_world);
+    odds.push_back(place.odds);
+    numbers += fmt::format("{}{}", numbers.empty() ? "" : " and ", place.num_matches);
+  }
+  if (best.fix != nullptr && (poses.size() == 1 || accept.max_second_pose_ratio <= 0)) {
+    decided.probability = probability;
+    return decided;
+  }
+  double odds_of_others = odds_of_all;
+  for (const double each : odds) odds_of_others -= each;
+  return Ambiguous(std::move(decided), std::move(poses), std::move(odds), std::max(0.0, odds_of_others),
+                   numbers + " matches agree on poses at different places");
 }
 
 }  // namespace cairn

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/pose.h"
 #include "runtime/localize/localization.h"
 #include "runtime/localize/localizer_options.h"
 #include "runtime/localize/measurement.h"
@@ -34,5 +35,22 @@ Verdict JudgeGuided(int num_found, double num_by_chance, const AcceptOptions& op
 // Whether a refined pose may be reported: enough inliers, well spread, certain, near the survey.
 Verdict JudgePose(const RefinedPose& pose, const std::vector<Correspondence>& inliers, const Query& query,
                   double distance_from_survey_m, const AcceptOptions& options, const char* length_unit);
+
+// Whether two poses are at different places.
+bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept);
+
+// A localization that is kAmbiguous between poses with these odds, all considered: P / (1 - P).
+// REQUIRES: as many odds as poses
+Localization Ambiguous(Localization localization, std::vector<Pose> poses, std::vector<double> odds,
+                       double odds_of_others, std::string message);
+
+// Of localizations of one image, each among other landmarks, where it was taken.  Each is a fix or ambiguous;
+// their numbers of matches compare where each was found among the landmarks of its own place, or all among
+// the same.  Those at one place count once, by the one with most matches.  The fix with most, or ambiguous
+// between it and every other place with max_second_pose_ratio of its matches, or with more than 1 /
+// least_odds of its odds.  A place a thousand times less likely is not counted, however many matches it has.
+// REQUIRES: at least one; least_odds >= 1
+Localization DecideAmong(const std::vector<Localization>& found, double least_odds,
+                         const AcceptOptions& accept);
 
 }  // namespace cairn

@@ -63,8 +63,10 @@ struct Localization {
   RegionIdx region = -1;  // the region with most inliers; -1: they belong to none
   Scope scope = Scope::kAll;
 
-  // With kAmbiguous: the poses that explain it alike, the best first; as cam_from_world.
+  // With kAmbiguous: the poses that explain it alike, the best first; as cam_from_world.  And P(each is
+  // right), of one pose in many: their sum is `probability`.
   std::vector<Pose> possible_poses;
+  std::vector<double> possible_probabilities;
 
   int num_features = 0;
   int num_matches = 0;              // without knowing the pose

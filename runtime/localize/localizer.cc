@@ -53,11 +53,6 @@ Localization Failure(NoFix reason, std::string message) {
   return localization;
 }
 
-bool AreFarApart(const Pose& a, const Pose& b, const AcceptOptions& accept) {
-  return CenterErrorM(a, b) > accept.second_pose_distance_m ||
-         RotationErrorDeg(a, b) > accept.second_pose_angle_deg;
-}
-
 // Whether half of the matches of one are the other's: then they explain the same by poses that differ, and
 // not by different places.  Ascending by keypoint.
 bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspondence>& b) {
@@ -69,33 +64,21 @@ bool ShareMost(const std::vector<Correspondence>& a, const std::vector<Correspon
   return 2 * num_shared >= std::min(a.size(), b.size());
 }
 
-// Of probabilities short of 1 by rounding, too.
-double OddsOf(double probability) { return probability / std::max(1e-12, 1 - probability); }
+// Whether it says where the image may have been taken.
+bool HasPlaces(const Localization& found) { return found.has_fix() || !found.possible_poses.empty(); }
 
-// The better of two answers.  Of two fixes the one with more inliers, unless they are at different places and
-// nearly equally good; of two failures the one that came farther says more.
+// The better of two answers, found among other landmarks.  Of two that say nothing the one that came farther
+// says more.  A fix at one of the places of an ambiguous answer, with as many matches, does not decide for
+// it: the other place's landmarks may not be among those of the fix.
 Localization Better(Localization first, Localization second, const AcceptOptions& accept) {
-  if (!first.has_fix() && !second.has_fix()) {
+  if (!HasPlaces(first) && !HasPlaces(second)) {
     const bool is_better =
         std::pair(second.num_inliers, second.num_matches) >= std::pair(first.num_inliers, first.num_matches);
     return is_better ? second : first;
   }
-  if (!first.has_fix()) return second;
-  if (!second.has_fix()) return first;
-  if (second.num_unguided_inliers > first.num_unguided_inliers) std::swap(first, second);
-  if (!AreFarApart(first.cam_from_world, second.cam_from_world, accept)) return first;
-  const double needed = accept.max_second_pose_ratio * first.num_unguided_inliers;
-  if (accept.max_second_pose_ratio <= 0) return first;
-  if (second.num_unguided_inliers < needed) {
-    first.probability = ProbabilityAmong(OddsOf(first.probability), OddsOf(second.probability));
-    return first;
-  }
-  first.reason = NoFix::kAmbiguous;
-  first.probability = ProbabilityAmong(OddsOf(first.probability) + OddsOf(second.probability), 0);
-  first.possible_poses = {first.cam_from_world, second.cam_from_world};
-  first.message = fmt::format("{} and {} matches agree on poses at different places",
-                              first.num_unguided_inliers, second.num_unguided_inliers);
-  return first;
+  if (!HasPlaces(first)) return second;
+  if (!HasPlaces(second)) return first;
+  return DecideAmong({first, second}, 1, accept);
 }
 
 // Factor on the covariance of fixes in maps that do not say how keypoints err together: measured on the demo,
@@ -264,6 +247,19 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     possible = ImagesOf(candidates);
     std::sort(possible.begin(), possible.end());
   }
+  if (appearance->look_alikes[node].empty()) return best;
+  // Each among the landmarks of its own place, so that numbers of matches compare: where those of look-alikes
+  // are among them, no match is much better than the next best.
+  const auto try_at = [&](const std::vector<Candidate>& images) -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(images)));
+    if (landmarks.empty()) return Localization();
+    return Try(query, {Scope::kImages, std::move(landmarks)});
+  };
+  std::vector<Localization> found;
+  CAIRN_ASSIGN_OR_RETURN(Localization here, try_at(near));
+  const bool is_here =
+      here.has_fix() && !AreFarApart(here.cam_from_world, best.cam_from_world, options_.accept);
+  found.push_back(is_here ? std::move(here) : best);
   CAIRN_ASSIGN_OR_RETURN(const auto nearest, map_->Image(near[0].image));
   const Pose cam_from_nearest = best.cam_from_world * nearest->cam_from_world.Inverse();
   for (const MapAppearanceNode::LookAlike& look_alike : appearance->look_alikes[node]) {
@@ -271,14 +267,20 @@ Result<Localization> Localizer::ExcludeLookAlikes(const Query& query, const std:
     if (prior && !std::binary_search(possible.begin(), possible.end(), image)) continue;
     // Where the camera would be there.
     CAIRN_ASSIGN_OR_RETURN(const auto other_image, map_->Image(image));
-    const PosePrior there{given_from_camera * (cam_from_nearest * other_image->cam_from_world), 0, 0};
-    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByPrior(*map_, there, options_.retrieve));
-    CAIRN_ASSIGN_OR_RETURN(auto landmarks, LandmarksOfImages(*map_, ImagesOf(candidates)));
-    if (landmarks.empty()) continue;
-    CAIRN_ASSIGN_OR_RETURN(Localization other, Try(query, {Scope::kImages, std::move(landmarks)}));
-    if (other.has_fix()) best = Better(std::move(best), std::move(other), options_.accept);
-    if (!best.has_fix()) break;
+    const Pose there = cam_from_nearest * other_image->cam_from_world;
+    const bool is_known = std::any_of(found.begin(), found.end(), [&](const Localization& each) {
+      return each.has_fix() && !AreFarApart(each.cam_from_world, there, options_.accept);
+    });
+    if (is_known) continue;
+    CAIRN_ASSIGN_OR_RETURN(const auto candidates,
+                           RetrieveByPrior(*map_, {given_from_camera * there, 0, 0}, options_.retrieve));
+    CAIRN_ASSIGN_OR_RETURN(Localization other, try_at(candidates));
+    if (HasPlaces(other)) found.push_back(std::move(other));
   }
+  Localization decided = DecideAmong(found, options_.min_look_alike_odds, options_.accept);
+  if (!decided.has_fix() || AreFarApart(decided.cam_from_world, best.cam_from_world, options_.accept))
+    return decided;
+  best.probability = decided.probability;
   return best;
 }
 
@@ -399,7 +401,7 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
   const auto fail = [&](NoFix reason, std::string message) {
     localization.reason = reason;
     localization.message = std::move(message);
-    if (reason != NoFix::kImprobable && reason != NoFix::kAmbiguous) localization.probability = 0;
+    if (reason != NoFix::kImprobable) localization.probability = 0;
     return localization;
   };
   std::vector<FollowedUp> followed_up;
@@ -424,12 +426,12 @@ Result<Localization> Localizer::Refine(const Query& query, const LandmarkSet& ma
     const bool is_weak = best.num_unguided_inliers >= options_.sure_num_unguided_inliers &&
                          other.num_unguided_inliers < max_second_pose_ratio * best.num_unguided_inliers;
     if (!is_weak && static_cast<double>(other.found.matches.size()) >= max_second_pose_ratio * num_found) {
-      localization.possible_poses = {best.found.cam_from_world, other.found.cam_from_world};
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence here, EvidenceOf(query, matched, best));
       CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence there, EvidenceOf(query, matched, other));
-      localization.probability = ProbabilityAmong(OddsOfPlace(here) + OddsOfPlace(there), 0);
-      return fail(NoFix::kAmbiguous, fmt::format("{} and {} matches agree on poses at different places",
-                                                 best.found.matches.size(), other.found.matches.size()));
+      return Ambiguous(std::move(localization), {best.found.cam_from_world, other.found.cam_from_world},
+                       {OddsOfPlace(here), OddsOfPlace(there)}, odds_elsewhere,
+                       fmt::format("{} and {} matches agree on poses at different places",
+                                   best.found.matches.size(), other.found.matches.size()));
     }
     CAIRN_ASSIGN_OR_RETURN(const PlaceEvidence evidence, EvidenceOf(query, matched, other));
     odds_elsewhere += OddsOfPlace(evidence);

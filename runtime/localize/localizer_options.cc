@@ -20,6 +20,8 @@ OptionTable DescribeOptions(LocalizerOptions* options) {
       {.name = "exclude_look_alikes",
        .value = &options->exclude_look_alikes,
        .help = "withhold a fix while a place that looks alike explains the image nearly as well"});
+  table.push_back({"min_look_alike_odds", &options->min_look_alike_odds,
+                   "a fix must be so many times likelier than the same at a place that looks alike", 1});
   table.push_back({.name = "fall_back_to_all",
                    .value = &options->fall_back_to_all,
                    .help = "try all landmarks of the map when those fail"});

@@ -172,9 +172,12 @@ struct LocalizerOptions {
   // few.  REQUIRES: >= 0
   int sure_num_unguided_inliers = 20;
   // Where the map knows that the place of a fix looks like others that lie elsewhere [Mariottini11 §V], try
-  // these too, unless a prior excludes them: the fix is withheld as long as one of them explains the image
-  // nearly as well (max_second_pose_ratio).
+  // these too, each among the landmarks of its own place, unless a prior excludes them: the fix is withheld
+  // as long as one of them explains the image nearly as well (max_second_pose_ratio), or it is not at least
+  // so many times likelier than at any of them: how densely each was surveyed makes up to a factor of 30
+  // (twin wings, bench/drive).  REQUIRES: >= 1
   bool exclude_look_alikes = true;
+  double min_look_alike_odds = 100;
   // Try all landmarks of the map when those fail, if they are not more than this.  REQUIRES: >= 0
   bool fall_back_to_all = true;
   int fall_back_max_num_landmarks = 200000;

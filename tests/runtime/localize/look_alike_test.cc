@@ -66,11 +66,24 @@ TEST(Localizer, WithholdsAFixUntilTheLookAlikeIsExcluded) {
   options.exclude_look_alikes = false;
   EXPECT_TRUE(localize(std::nullopt).has_fix());
   options.exclude_look_alikes = true;
-  // A twin that differs in two thirds of its landmarks explains the image less well.
+  // A twin that differs in two thirds of its landmarks explains the image less well, but not a hundred times
+  // less likely; one that differs in nine tenths does.
   Random random(9);
-  for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
-    if (i % 3 > 0) rows.descriptors.row(i) = RandomDescriptor(random);
-  }
+  const auto differ = [&](int of_ten) {
+    for (Eigen::Index i = rows.descriptors.rows() / 2; i < rows.descriptors.rows(); ++i) {
+      if (i % 10 < of_ten) rows.descriptors.row(i) = RandomDescriptor(random);
+    }
+  };
+  differ(7);
+  const Localization less_well = localize(std::nullopt);
+  EXPECT_EQ(less_well.reason, NoFix::kAmbiguous);
+  ASSERT_EQ(less_well.possible_poses.size(), size_t{2});
+  EXPECT_LT(CenterErrorM(less_well.possible_poses[0], truth), 0.1);
+  EXPECT_GT(less_well.possible_probabilities[0], 0.6);
+  options.min_look_alike_odds = 1;
+  EXPECT_TRUE(localize(std::nullopt).has_fix());
+  options.min_look_alike_odds = 100;
+  differ(9);
   EXPECT_TRUE(localize(std::nullopt).has_fix());
 }
 
