@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """How soon, and how surely, does a robot know where it woke up?
 
-usage: where.py [--cairn PROGRAM] [--pieces N] [--length FRAMES] [--metres M] [--odometry] MAP=CAPTURE[:LIST]... [MAP=FOLDER:other]...
+usage: where.py [--cairn PROGRAM] [--pieces N] [--length FRAMES] [--metres M] [--odometry] [--told] MAP=CAPTURE[:LIST]... [MAP=FOLDER:other]...
 
 A capture's images in their order (LIST: images.txt, the default, or queries.txt; poses are truth) are cut into pieces of consecutive
-frames, at random places by a fixed seed, and shown to `cairn where` one after the other: before each piece the robot was carried away.
-A place is right within M metres and 60 degrees of the truth: the nearest survey image may be that far.  With --odometry the robot is told how it drove from frame to frame, by the truth with 5 % of the way
+frames, at random places by a fixed seed, and shown to `cairn where` one after the other: before each piece the robot was carried away,
+of which it knows nothing; with --told each piece is a robot that wakes up.
+A place is right within M metres and 60 degrees of the truth, or, where no survey image is, no farther than twice the nearest.  With --odometry the robot is told how it drove from frame to frame, by the truth with 5 % of the way
 and of the turn as noise, but not that it was carried (the world's z is up).  Counts pieces whose right place leads and has 0.9, 0.99 within so many frames,
 and frames at which a wrong place had that much.  `other`: a folder of images of another building, whole and in order: every place is
 wrong.  Kidnaps of one run share a belief and are not independent of the map; intervals are Wilson's, as if they were.
@@ -85,6 +86,7 @@ def main():
     parser.add_argument("--length", type=int, default=10)
     parser.add_argument("--metres", type=float, default=2.0)
     parser.add_argument("--odometry", action="store_true")
+    parser.add_argument("--told", action="store_true")
     parser.add_argument("runs", nargs="+")
     arguments = parser.parse_args()
     print("| map | images | frames | kidnaps | leads after 3 | 0.9 after 3 | 0.99 after 10 | frames with a wrong place above 0.9 | above 0.99 |")
@@ -110,13 +112,33 @@ def main():
             pieces.append(names[start:start + arguments.length])
         wheels = [step for piece in pieces
                   for step in [[0, 0, 0]] + [driven(truth[a], truth[b], generator) for a, b in zip(piece, piece[1:])]]
-        steps = places_of(arguments.cairn, map_path, [folder / "images" / name for piece in pieces for name in piece],
-                          wheels if arguments.odometry else ())
+        # One sequence, or each piece for itself.
+        steps, num_driven = [], 0
+        for shown in pieces if arguments.told else [[name for piece in pieces for name in piece]]:
+            odometry = wheels[num_driven:num_driven + len(shown)] if arguments.odometry else ()
+            steps += places_of(arguments.cairn, map_path, [folder / "images" / name for name in shown], odometry)
+            num_driven += len(shown)
+
+        def apart(a, b):
+            return math.dist(center(a), center(b)), 2 * math.degrees(math.acos(min(1, abs(sum(x * y for x, y in zip(a[:4], b[:4]))))))
+
+        def is_within(a, b):
+            metres, degrees = apart(a, b)
+            return metres <= arguments.metres and degrees <= 60
+
+        # Where the survey has no image within these, a place is right that is no farther than twice the nearest.
+        def far_from(a, b):
+            metres, degrees = apart(a, b)
+            return math.hypot(metres / arguments.metres, degrees / 60)
+
+        has_place = {name: any(is_within(truth[name], pose) for pose in known.values()) for name in names}
+        nearest = {name: min(far_from(truth[name], pose) for pose in known.values()) for name in names if not has_place[name]}
 
         def is_right(step, name):
-            pose, place = truth[name], known[step["places"][0]["image"]]
-            turn = abs(sum(a * b for a, b in zip(pose[:4], place[:4])))
-            return math.dist(center(pose), center(place)) <= arguments.metres and turn >= math.cos(math.radians(30))
+            place = known[step["places"][0]["image"]]
+            if has_place[name]:
+                return is_within(truth[name], place)
+            return far_from(truth[name], place) <= 2 * nearest[name]
 
         leads = early = late = wrong90 = wrong99 = 0
         position = 0

@@ -8,46 +8,70 @@
 
 namespace cairn::pipeline {
 
-Result<Odometry> Odometry::Read(const std::string& path) {
+Result<SensorFile> SensorFile::Read(const std::string& path, const std::string& line_is) {
   CAIRN_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  Odometry odometry;
-  odometry.path_ = path;
+  SensorFile file;
+  file.path_ = path;
   size_t number = 0;
   for (const std::string_view line : SplitLines(text)) {
     ++number;
     const std::vector<std::string> words = SplitWords(line.substr(0, line.find('#')));
     if (words.empty()) continue;
-    double values[3] = {0, 0, 0};
-    bool is_valid = words.size() == 3;
-    for (size_t i = 0; i < 3 && is_valid; ++i)
+    std::array<double, 3> values = {0, 0, 0};
+    bool is_valid = words.size() == values.size();
+    for (size_t i = 0; i < values.size() && is_valid; ++i)
       is_valid = ParseNumber(words[i], &values[i]) && std::isfinite(values[i]);
-    if (!is_valid) {
-      return MakeError(
-          ErrorCode::kCorrupt,
-          "{}:{}: '{}' is not an image's odometry; expected metres ahead, metres to the left and "
-          "degrees turned to the left",
-          path, number, line);
-    }
-    odometry.steps_.push_back({{values[0], values[1]}, RadFromDeg(values[2])});
+    if (!is_valid)
+      return MakeError(ErrorCode::kCorrupt, "{}:{}: '{}' is not {}", path, number, line, line_is);
+    file.lines_.push_back(values);
   }
+  return file;
+}
+
+Result<std::array<double, 3>> SensorFile::Next(const std::string& image) {
+  if (num_read_ == lines_.size()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: it has lines for {} images, and none for image {}, '{}'; each needs one", path_,
+                     lines_.size(), lines_.size() + 1, image);
+  }
+  return lines_[num_read_++];
+}
+
+Status SensorFile::CheckAllRead() const {
+  if (num_read_ == lines_.size()) return Ok();
+  return MakeError(ErrorCode::kInvalidArgument, "{}: it has lines for {} images, and there were {}", path_,
+                   lines_.size(), num_read_);
+}
+
+Result<Odometry> Odometry::Read(const std::string& path) {
+  Odometry odometry;
+  CAIRN_ASSIGN_OR_RETURN(
+      odometry.file_,
+      SensorFile::Read(path,
+                       "an image's odometry; expected metres ahead, metres to the left and degrees turned "
+                       "to the left"));
   return odometry;
 }
 
 Status Odometry::MoveToNext(const std::string& image,
                             const std::function<Status(const Eigen::Vector2d&, double)>& move) {
-  if (num_read_ == steps_.size()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: it has lines for {} images, and none for image {}, '{}'; each needs one", path_,
-                     steps_.size(), steps_.size() + 1, image);
-  }
-  const Step& step = steps_[num_read_++];
-  return num_read_ == 1 ? Ok() : move(step.way_m, step.turn_left_rad);
+  CAIRN_ASSIGN_OR_RETURN(const auto step, file_.Next(image));
+  return file_.is_first() ? Ok() : move({step[0], step[1]}, RadFromDeg(step[2]));
 }
 
-Status Odometry::CheckAllRead() const {
-  if (num_read_ == steps_.size()) return Ok();
-  return MakeError(ErrorCode::kInvalidArgument, "{}: it has lines for {} images, and there were {}", path_,
-                   steps_.size(), num_read_);
+Result<Gravity> Gravity::Read(const std::string& path) {
+  Gravity gravity;
+  CAIRN_ASSIGN_OR_RETURN(
+      gravity.file_,
+      SensorFile::Read(path,
+                       "an image's gravity; expected the direction up in the camera's frame: to the right, "
+                       "down and ahead"));
+  return gravity;
+}
+
+Result<Eigen::Vector3d> Gravity::Next(const std::string& image) {
+  CAIRN_ASSIGN_OR_RETURN(const auto up, file_.Next(image));
+  return Eigen::Vector3d(up[0], up[1], up[2]);
 }
 
 }  // namespace cairn::pipeline

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -10,29 +11,54 @@
 
 namespace cairn::pipeline {
 
-// How a robot drove from image to image, as its wheels say: a text file with a line for each image, three
-// numbers: metres ahead and to the left, in the robot's frame at the image before, and degrees turned to the
-// left.  What stands behind a # is a comment.  The first image's line counts nothing.
-class Odometry {
+// What a robot's other sensors say of images: a text file with a line of three numbers for each.  What stands
+// behind a # is a comment.
+class SensorFile {
  public:
-  // Errors: Io, NotFound; Corrupt, naming the line, where one has not three finite numbers.
-  static Result<Odometry> Read(const std::string& path);
+  // `line_is`: "an image's odometry; expected metres ahead, ...".  Errors: Io, NotFound; Corrupt, naming the
+  // line, where one has not three finite numbers.
+  static Result<SensorFile> Read(const std::string& path, const std::string& line_is);
 
-  // The next line moves the robot: metres ahead and to the left, radians to the left.  Errors:
-  // InvalidArgument where there is no line left for the image, and those of `move`.
-  Status MoveToNext(const std::string& image,
-                    const std::function<Status(const Eigen::Vector2d&, double)>& move);
+  // Those of the next image.  Errors: InvalidArgument where there is no line left for it.
+  Result<std::array<double, 3>> Next(const std::string& image);
+  bool is_first() const { return num_read_ <= 1; }  // the line last read is the first image's
   // Errors: InvalidArgument where there are more lines than there were images.
   Status CheckAllRead() const;
 
  private:
-  struct Step {
-    Eigen::Vector2d way_m = Eigen::Vector2d::Zero();
-    double turn_left_rad = 0;
-  };
   std::string path_;
-  std::vector<Step> steps_;
+  std::vector<std::array<double, 3>> lines_;
   size_t num_read_ = 0;
+};
+
+// How a robot drove from image to image, as its wheels say: metres ahead and to the left, in the robot's
+// frame at the image before, and degrees turned to the left.  The first image's line counts nothing.
+class Odometry {
+ public:
+  // Errors: as SensorFile.
+  static Result<Odometry> Read(const std::string& path);
+
+  // The next line moves the robot: metres ahead and to the left, radians to the left.  Errors: as SensorFile,
+  // and those of `move`.
+  Status MoveToNext(const std::string& image,
+                    const std::function<Status(const Eigen::Vector2d&, double)>& move);
+  Status CheckAllRead() const { return file_.CheckAllRead(); }
+
+ private:
+  SensorFile file_;
+};
+
+// Which way was up at each image: a direction in the camera's frame (x right, y down, z ahead; of any
+// length).
+class Gravity {
+ public:
+  // Errors: as SensorFile.
+  static Result<Gravity> Read(const std::string& path);
+  Result<Eigen::Vector3d> Next(const std::string& image);
+  Status CheckAllRead() const { return file_.CheckAllRead(); }
+
+ private:
+  SensorFile file_;
 };
 
 }  // namespace cairn::pipeline

@@ -28,6 +28,9 @@ struct WhereArguments {
   std::string camera;
   std::string cameras_path;
   std::string odometry_path;
+  std::string gravity_path;
+  double gravity_sigma_deg = 2;
+  double period_s = 1;
   int num_places = 3;
   bool json = false;
   LocalizerOptions localizer_options;
@@ -83,7 +86,7 @@ Result<std::string> Conclusion(const PlaceBelief& belief, const Step& last, cons
       text += fmt::format(" {} ({:.0f} %),", place.name, 100 * place.probability);
   }
   text += fmt::format(" or elsewhere ({:.0f} %)\n", 100 * last.elsewhere);
-  CAIRN_ASSIGN_OR_RETURN(const int32_t telling, belief.NextTellingImage(last.places[0].image));
+  const int32_t telling = belief.NextTellingImage(last.places[0].image);
   if (telling >= 0 && telling != last.places[0].image) {
     CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(telling));
     text += fmt::format("what {} shows looks like no other place: from {} that would tell\n", image->name,
@@ -103,6 +106,10 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
         {"reach_links"}, "is for images without odometry; leave it out"));
   }
+  if (arguments.gravity_path.empty()) {
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        {"map_up_sigma_deg"}, "is for gravity; give --gravity, or leave it out"));
+  }
   cv::setNumThreads(1);
   CAIRN_ASSIGN_OR_RETURN(const std::shared_ptr<const Map> map, Map::Open(arguments.map_path));
   CAIRN_ASSIGN_OR_RETURN(const CameraChoice cameras,
@@ -111,6 +118,10 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
   std::optional<Odometry> odometry;
   if (!arguments.odometry_path.empty()) {
     CAIRN_ASSIGN_OR_RETURN(odometry, Odometry::Read(arguments.odometry_path));
+  }
+  std::optional<Gravity> gravity;
+  if (!arguments.gravity_path.empty()) {
+    CAIRN_ASSIGN_OR_RETURN(gravity, Gravity::Read(arguments.gravity_path));
   }
   CAIRN_ASSIGN_OR_RETURN(PlaceBelief belief, PlaceBelief::Make(map, arguments.options));
   const Localizer localizer(map, arguments.localizer_options);
@@ -126,6 +137,11 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
             return belief.Move(way_m, turn_left_rad);
           }));
     }
+    if (gravity) {
+      CAIRN_ASSIGN_OR_RETURN(const Eigen::Vector3d up, gravity->Next(image));
+      CAIRN_RETURN_IF_ERROR(belief.SenseUp(up, arguments.gravity_sigma_deg));
+    }
+    CAIRN_RETURN_IF_ERROR(belief.Elapse(arguments.period_s));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     CAIRN_ASSIGN_OR_RETURN(const Query query, localizer.QueryFromImage(grey, camera));
@@ -144,6 +160,7 @@ Status RunWhere(const WhereArguments& arguments, const CommandEnvironment& envir
     CAIRN_ASSIGN_OR_RETURN(const std::string conclusion, Conclusion(belief, *last, *map));
     *environment.out << conclusion;
   }
+  if (gravity) CAIRN_RETURN_IF_ERROR(gravity->CheckAllRead());
   return odometry ? odometry->CheckAllRead() : Ok();
 }
 
@@ -174,6 +191,19 @@ Command WhereCommand() {
                      "in "
                      "common")
                 .Type("FILE");
+            parser
+                .Add("--gravity", arguments->gravity_path,
+                     "A line for each image, which way is up in the camera's frame: to the right, down and "
+                     "ahead (of a level camera 0 -1 0); poses that say otherwise are refuted")
+                .Type("FILE");
+            parser
+                .Add("--gravity-sigma-deg", arguments->gravity_sigma_deg,
+                     "Standard deviation of gravity's direction, degrees [2]")
+                .Range(1e-3, 90.0)
+                .Type("DEG");
+            parser.Add("--period", arguments->period_s, "Seconds from image to image [1]")
+                .Range(0.0, 1e6)
+                .Type("S");
             parser.Add("--places", arguments->num_places, "Most places to name, the likeliest first [3]")
                 .Range(1, 1000)
                 .Type("N");

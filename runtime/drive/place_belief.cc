@@ -2,67 +2,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <numeric>
 #include <utility>
 
 #include "core/base/no_throw.h"
-#include "core/base/quantiles.h"
 #include "core/blocks/map_rows.h"
+#include "runtime/drive/place_graph.h"
 #include "runtime/localize/localization.h"
 #include "runtime/localize/measurement.h"
 #include "runtime/localize/retrieve.h"
-#include "runtime/map/appearance_map.h"
-#include "runtime/map/landmark_set.h"
 #include "runtime/map/map.h"
 
 namespace cairn {
 namespace {
 
-// A view's radius (ViewOptions of core/promise/view_distance.h).
-constexpr double kSameViewRatio = 0.1;
-constexpr double kSameViewDeg = 15;
-// A fix lies among so many survey images, those nearest to it.
-constexpr int kNumViewsOfFix = 4;
-// Two images are linked that share this part of the landmarks of the one that has fewer.
-constexpr double kMinSharedRatio = 0.1;
-constexpr int kMinNumShared = 3;
-// Of a landmark that more images see, so many tell which of them are linked.
-constexpr size_t kMaxImagesOfLandmark = 100;
+// After so many links without an image the robot may be anywhere.
+constexpr double kMaxNumLinks = 100;
 
-std::vector<std::vector<int32_t>> LinkImages(const std::vector<std::vector<LandmarkIdx>>& seen,
-                                             int64_t num_landmarks) {
-  std::vector<std::vector<int32_t>> images_of(num_landmarks);
-  for (size_t i = 0; i < seen.size(); ++i) {
-    for (const LandmarkIdx landmark : seen[i]) images_of[landmark].push_back(static_cast<int32_t>(i));
-  }
-  std::vector<std::vector<int32_t>> neighbours(seen.size());
-  std::vector<int> num_shared(seen.size());
-  for (size_t i = 0; i < seen.size(); ++i) {
-    std::vector<int32_t> sharing;
-    for (const LandmarkIdx landmark : seen[i]) {
-      const std::vector<int32_t>& images = images_of[landmark];
-      const size_t stride = images.size() / kMaxImagesOfLandmark + 1;
-      for (size_t k = 0; k < images.size(); k += stride) {
-        if (num_shared[images[k]]++ == 0) sharing.push_back(images[k]);
-      }
-    }
-    std::sort(sharing.begin(), sharing.end());
-    for (const int32_t j : sharing) {
-      const double needed = kMinSharedRatio * static_cast<double>(std::min(seen[i].size(), seen[j].size()));
-      if (std::exchange(num_shared[j], 0) >= std::max(static_cast<double>(kMinNumShared), needed) &&
-          j != static_cast<int32_t>(i))
-        neighbours[i].push_back(j);
-    }
-  }
-  return neighbours;
-}
-
-// By the square of a distance in radii: 1 there, and never so little that a chain of errors could not be
-// undone.
-double Closeness(double squared_distance) { return 1 / ((1 + squared_distance) * (1 + squared_distance)); }
+// P(something of this probability in a second within so many).
+double Within(double seconds, double probability) { return 1 - std::pow(1 - probability, seconds); }
 
 }  // namespace
+
+struct PlaceBelief::Evidence {
+  std::vector<double> at_image;
+  double elsewhere = 1;
+  std::vector<PlaceGraph::Place> places;
+};
 
 OptionTable DescribeOptions(PlaceBeliefOptions* o) {
   constexpr double kTiny = 1e-9, kAlmostOne = 1 - 1e-9;
@@ -71,12 +37,17 @@ OptionTable DescribeOptions(PlaceBeliefOptions* o) {
        .value = &o->fix_ratio,
        .help = "share of the images of the map's places that have a fix there",
        .min = kTiny,
-       .max = 0.99},
+       .max = 0.89},
       {.name = "wrong_fix_ratio",
        .value = &o->wrong_fix_ratio,
        .help = "share of the images of the map's places that have a fix at another place",
        .min = kTiny,
        .max = 0.009},
+      {.name = "look_alike_fix_ratio",
+       .value = &o->look_alike_fix_ratio,
+       .help = "share of the images of places with look-alikes that have a fix at one of these",
+       .min = kTiny,
+       .max = 0.1},
       {.name = "foreign_fix_ratio",
        .value = &o->foreign_fix_ratio,
        .help = "share of the images of other places that have a fix",
@@ -88,12 +59,12 @@ OptionTable DescribeOptions(PlaceBeliefOptions* o) {
        .min = 1},
       {.name = "misled_ratio",
        .value = &o->misled_ratio,
-       .help = "share of the images whose evidence means nothing, whatever it says",
+       .help = "share of the views whose evidence means nothing, whatever it says",
        .min = kTiny,
        .max = kAlmostOne},
       {.name = "least_new_ratio",
        .value = &o->least_new_ratio,
-       .help = "least part by which a fix counts that is where the last one was",
+       .help = "least part by which an image counts that shows the same, for each second",
        .min = kTiny,
        .max = 1},
       {.name = "likeness_weight",
@@ -107,22 +78,22 @@ OptionTable DescribeOptions(PlaceBeliefOptions* o) {
        .max = kAlmostOne},
       {.name = "leave_ratio",
        .value = &o->leave_ratio,
-       .help = "probability of leaving what the map shows, per image",
+       .help = "probability of leaving what the map shows, per second",
        .min = kTiny,
        .max = kAlmostOne},
       {.name = "return_ratio",
        .value = &o->return_ratio,
-       .help = "probability of coming back to it, per image",
+       .help = "probability of coming back to it, per second",
        .min = kTiny,
        .max = kAlmostOne},
       {.name = "kidnapped_ratio",
        .value = &o->kidnapped_ratio,
-       .help = "probability of being carried to any other place, per image",
+       .help = "probability of being carried to any other place, per second",
        .min = kTiny,
        .max = kAlmostOne},
       {.name = "reach_links",
        .value = &o->reach_links,
-       .help = "most links between images of the same landmarks from one image to the next, without odometry",
+       .help = "most links between images of the same landmarks in a second, without odometry",
        .min = 1,
        .max = 100},
       {.name = "way_sigma_ratio",
@@ -133,50 +104,43 @@ OptionTable DescribeOptions(PlaceBeliefOptions* o) {
        .value = &o->turn_sigma_ratio,
        .help = "standard deviation of odometry's turn, as part of it",
        .min = 0},
-      {.name = "way_sigma_m", .value = &o->way_sigma_m, .help = "and per image, m", .min = kTiny},
-      {.name = "turn_sigma_deg", .value = &o->turn_sigma_deg, .help = "and per image, degrees", .min = kTiny},
+      {.name = "way_sigma_m", .value = &o->way_sigma_m, .help = "and per view, m", .min = kTiny},
+      {.name = "turn_sigma_deg", .value = &o->turn_sigma_deg, .help = "and per view, degrees", .min = kTiny},
+      {.name = "map_up_sigma_deg",
+       .value = &o->map_up_sigma_deg,
+       .help = "standard deviation of the map's vertical, degrees",
+       .min = kTiny,
+       .max = 90},
   };
+}
+
+Status CheckUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
+  const double length = up_in_camera.norm();
+  if (!std::isfinite(length) || !(length > 0))
+    return MakeError(ErrorCode::kInvalidArgument, "gravity: ({}, {}, {}) is no direction", up_in_camera.x(),
+                     up_in_camera.y(), up_in_camera.z());
+  if (!(sigma_deg > 0) || !std::isfinite(sigma_deg))
+    return MakeError(ErrorCode::kInvalidArgument, "gravity: sigma of {} degrees; expected more than 0",
+                     sigma_deg);
+  return Ok();
+}
+
+PlaceBelief::PlaceBelief(std::shared_ptr<const Map> map, std::shared_ptr<const PlaceGraph> graph,
+                         const PlaceBeliefOptions& options)
+    : map_(std::move(map)), graph_(std::move(graph)), options_(options) {
+  const auto num = static_cast<size_t>(graph_->num_places());
+  believed_ = {std::vector<double>(num, (1 - options.elsewhere_ratio) / static_cast<double>(num)),
+               options.elsewhere_ratio};
+  before_view_ = with_view_ = believed_;
 }
 
 Result<PlaceBelief> PlaceBelief::Make(std::shared_ptr<const Map> map, const PlaceBeliefOptions& options) {
   return WithoutExceptions("place belief", [&]() -> Result<PlaceBelief> {
     PlaceBeliefOptions checked = options;
     CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
-    if (map->num_images() == 0)
-      return MakeError(ErrorCode::kNoData, "map '{}' has no images: nothing says which places it shows",
-                       map->head().name);
-    PlaceBelief belief(std::move(map), options);
-    std::vector<std::vector<LandmarkIdx>> seen;
-    std::vector<double> depths;
-    CAIRN_ASSIGN_OR_RETURN(const auto landmarks, belief.map_->AllLandmarks());
-    for (int64_t i = 0; i < belief.map_->num_images(); ++i) {
-      CAIRN_ASSIGN_OR_RETURN(const auto image, belief.map_->Image(i));
-      belief.poses_.push_back(image->cam_from_world);
-      seen.push_back(image->landmarks);
-      for (const LandmarkIdx landmark : image->landmarks)
-        depths.push_back((landmarks->Find(landmark).position - image->cam_from_world.Center()).norm());
-    }
-    if (!depths.empty()) belief.radius_m_ = kSameViewRatio * UpperMedian(std::move(depths));
-    belief.neighbours_ = LinkImages(seen, belief.map_->num_landmarks());
-    belief.elsewhere_ = options.elsewhere_ratio;
-    belief.probability_.assign(belief.poses_.size(),
-                               (1 - options.elsewhere_ratio) / static_cast<double>(belief.poses_.size()));
-    return belief;
+    CAIRN_ASSIGN_OR_RETURN(PlaceGraph graph, PlaceGraph::Make(map));
+    return PlaceBelief(std::move(map), std::make_shared<const PlaceGraph>(std::move(graph)), options);
   });
-}
-
-void PlaceBelief::Spread() {
-  for (int link = 0; link < options_.reach_links; ++link) {
-    std::vector<double> next(probability_.size());
-    for (size_t i = 0; i < probability_.size(); ++i) {
-      const std::vector<int32_t>& neighbours = neighbours_[i];
-      const double stays = neighbours.empty() ? 1 : 0.5;
-      next[i] += stays * probability_[i];
-      for (const int32_t j : neighbours)
-        next[j] += (1 - stays) * probability_[i] / static_cast<double>(neighbours.size());
-    }
-    probability_ = std::move(next);
-  }
 }
 
 Status PlaceBelief::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
@@ -191,161 +155,216 @@ Status PlaceBelief::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
     }
     way_m_ += Eigen::Rotation2Dd(turn_left_rad_) * way_m;
     turn_left_rad_ += turn_left_rad;
+    driven_views_ += graph_->ViewDistance(way_m, turn_left_rad);
     has_moved_ = true;
     return Ok();
   });
 }
 
-Status PlaceBelief::Drive() {
-  // Shorter ways would be lost between the survey's images: they add up first.
-  if (way_m_.norm() < radius_m_ && std::abs(turn_left_rad_) < RadFromDeg(kSameViewDeg)) return Ok();
-  const Pose& floor_from_world = map_->head().floor_from_world;
-  const double radius_m =
-      std::hypot(radius_m_, options_.way_sigma_m, options_.way_sigma_ratio * way_m_.norm());
-  const double radius_deg = std::hypot(kSameViewDeg, options_.turn_sigma_deg,
-                                       options_.turn_sigma_ratio * DegFromRad(std::abs(turn_left_rad_)));
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_left_rad_, Eigen::Vector3d::UnitZ()));
-  constexpr double kNegligible = 1e-7;
-  std::vector<double> next(probability_.size());
-  for (size_t i = 0; i < probability_.size(); ++i) {
-    if (probability_[i] < kNegligible) {
-      next[i] += probability_[i];
-      continue;
-    }
-    // The robot's heading is the camera's over the floor.
-    const Pose floor_from_cam = floor_from_world * poses_[i].Inverse();
-    const Eigen::Vector3d ahead3 = floor_from_cam.rotation * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector2d ahead = ahead3.head<2>().normalized(), left(-ahead.y(), ahead.x());
-    Eigen::Vector3d center = floor_from_cam.translation;
-    center.head<2>() += way_m_.x() * ahead + way_m_.y() * left;
-    const Pose moved{turn * floor_from_cam.rotation, center};
-    CAIRN_ASSIGN_OR_RETURN(const auto near,
-                           NearestViews(*map_, (floor_from_world.Inverse() * moved).Inverse(), radius_m,
-                                        radius_deg, kNumViewsOfFix));
-    double sum = 0;
-    for (const NearView& view : near) sum += Closeness(view.squared_distance);
-    for (const NearView& view : near)
-      next[view.image] += probability_[i] * Closeness(view.squared_distance) / sum;
-  }
-  probability_ = std::move(next);
-  way_m_.setZero();
-  turn_left_rad_ = 0;
+Status PlaceBelief::Elapse(double seconds) {
+  if (!(seconds >= 0) || !std::isfinite(seconds))
+    return MakeError(ErrorCode::kInvalidArgument, "{} seconds since the last image; expected 0 or more",
+                     seconds);
+  elapsed_s_ = elapsed_s_.value_or(0) + seconds;
   return Ok();
 }
 
-void PlaceBelief::LeaveAndReturn() {
-  const double in_map = std::accumulate(probability_.begin(), probability_.end(), 0.0);
-  const double arriving = (options_.kidnapped_ratio * in_map + options_.return_ratio * elsewhere_) /
-                          static_cast<double>(probability_.size());
-  for (double& p : probability_) p = (1 - options_.leave_ratio - options_.kidnapped_ratio) * p + arriving;
-  elsewhere_ = (1 - options_.return_ratio) * elsewhere_ + options_.leave_ratio * in_map;
+Status PlaceBelief::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
+  CAIRN_RETURN_IF_ERROR(CheckUp(up_in_camera, sigma_deg));
+  up_ = Up{up_in_camera.normalized(), sigma_deg};
+  return Ok();
+}
+
+Status PlaceBelief::Predict(double seconds) {
+  if (!has_moved_) {
+    const double num_links = std::min(kMaxNumLinks, options_.reach_links * seconds);
+    for (Distribution* each : {&before_view_, &with_view_}) graph_->Spread(num_links, &each->at_image);
+  } else if (graph_->ViewDistance(way_m_, 0) >= 1 ||
+             graph_->ViewDistance(Eigen::Vector2d::Zero(), turn_left_rad_) >= 1) {
+    // Shorter ways would be lost between the survey's images: they add up first.
+    const double radius_m =
+        std::hypot(graph_->radius(), options_.way_sigma_m, options_.way_sigma_ratio * way_m_.norm());
+    const double radius_deg = std::hypot(graph_->radius_deg(), options_.turn_sigma_deg,
+                                         options_.turn_sigma_ratio * DegFromRad(std::abs(turn_left_rad_)));
+    CAIRN_RETURN_IF_ERROR(graph_->Drive(way_m_, turn_left_rad_, radius_m, radius_deg,
+                                        {&before_view_.at_image, &with_view_.at_image}));
+    way_m_.setZero();
+    turn_left_rad_ = 0;
+  }
+  for (Distribution* each : {&before_view_, &with_view_}) LeaveAndReturn(seconds, each);
+  return Ok();
+}
+
+void PlaceBelief::LeaveAndReturn(double seconds, Distribution* distribution) const {
+  const double leaves = Within(seconds, options_.leave_ratio),
+               returns = Within(seconds, options_.return_ratio),
+               kidnapped = Within(seconds, options_.kidnapped_ratio);
+  auto& [at_image, elsewhere] = *distribution;
+  const double in_map = std::accumulate(at_image.begin(), at_image.end(), 0.0);
+  const double stays = (1 - leaves) * (1 - kidnapped);
+  const double arriving =
+      ((1 - leaves) * kidnapped * in_map + returns * elsewhere) / static_cast<double>(at_image.size());
+  for (double& p : at_image) p = stays * p + arriving;
+  elsewhere = (1 - returns) * elsewhere + leaves * in_map;
 }
 
 Status PlaceBelief::See(const Query& query, const Localization& found) {
   return WithoutExceptions("place belief", [&]() -> Status {
-    if (has_seen_) {
-      if (has_moved_) {
-        CAIRN_RETURN_IF_ERROR(Drive());
-      } else {
-        Spread();
-      }
-      LeaveAndReturn();
-    } else {  // how it drove before is no way from one place to another
+    const double elapsed_s = std::exchange(elapsed_s_, std::nullopt).value_or(1);
+    const auto up = std::exchange(up_, std::nullopt);
+    const bool is_first = !std::exchange(has_seen_, true);
+    const double seconds = is_first ? 1 : elapsed_s;  // all that the first shows is new
+    if (is_first) {  // how it drove before is no way from one place to another
       way_m_.setZero();
       turn_left_rad_ = 0;
+      has_moved_ = false;
+    } else {
+      CAIRN_RETURN_IF_ERROR(Predict(seconds));
     }
-    has_seen_ = true;
+    // What shows nothing shows it wherever it is.
+    if (found.reason != NoFix::kTooFewFeatures) {
+      std::vector<Pose> poses =
+          found.has_fix() ? std::vector<Pose>{found.cam_from_world} : found.possible_poses;
+      for (Pose& pose : poses) pose = map_->head().camera_from_given * pose;
+      if (poses.empty()) {
+        CAIRN_ASSIGN_OR_RETURN(const Evidence evidence, OfLikeness(query));
+        Weigh(evidence, NewRatio(seconds));
+      } else {
+        const std::vector<double> probabilities =
+            found.has_fix() ? std::vector<double>{found.probability} : found.possible_probabilities;
+        CAIRN_ASSIGN_OR_RETURN(const Evidence evidence, OfFix(poses, probabilities, up));
+        Weigh(evidence, NewRatio(poses.front(), seconds));
+      }
+      driven_views_ = 0;
+    }
     has_moved_ = false;
-    if (found.reason == NoFix::kTooFewFeatures) return Ok();  // it shows nothing, wherever it is
-    const auto num = static_cast<double>(probability_.size());
-    const std::vector<Pose> poses =
-        found.has_fix() ? std::vector<Pose>{found.cam_from_world} : found.possible_poses;
-    if (!poses.empty()) {
-      const Pose& camera_from_given = map_->head().camera_from_given;
-      const Pose fix = camera_from_given * poses.front();
-      double new_ratio = 1;
-      if (last_fix_) {
-        new_ratio = std::clamp(std::hypot(CenterErrorM(fix, *last_fix_) / radius_m_,
-                                          RotationErrorDeg(fix, *last_fix_) / kSameViewDeg),
-                               options_.least_new_ratio, 1.0);
-      }
-      last_fix_ = fix;
-      const double odds = found.probability / std::max(1e-12, 1 - found.probability);
-      const double weight =
-          options_.fix_ratio * std::min(options_.max_fix_odds, odds) / static_cast<double>(poses.size());
-      std::vector<Place> places;
-      double num_of_places = 0;
-      for (const Pose& pose : poses) {
-        CAIRN_ASSIGN_OR_RETURN(Place place, PlaceAround(camera_from_given * pose));
-        num_of_places += static_cast<double>(place.images.size());
-        places.push_back(std::move(place));
-      }
-      // A fix that is wrong is at this place as often as at any other.
-      const double by_chance = num_of_places / static_cast<double>(places.size()) / num;
-      std::vector<double> likelihood(probability_.size(), options_.wrong_fix_ratio * by_chance);
-      for (const Place& place : places) {
-        for (const int32_t image : place.images)
-          likelihood[image] = options_.wrong_fix_ratio * by_chance + weight;
-      }
-      for (double& value : likelihood) value = std::pow(value, new_ratio);
-      // The odds are against being elsewhere.
-      Weigh(likelihood, std::pow(options_.fix_ratio * by_chance, new_ratio), places);
-      return Ok();
-    }
-    RetrieveOptions all;
-    all.max_num_candidates = static_cast<int>(probability_.size());
-    all.min_score_ratio = 0;
-    CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, all));
-    std::vector<double> likelihood(probability_.size(), 1.0);
-    for (const Candidate& candidate : candidates) {
-      // [Mariottini11 §IV] as ProbabilitiesOfScores
-      likelihood[candidate.image] +=
-          options_.likeness_weight * std::pow(candidate.score / candidates.front().score, 4);
-    }
-    const double mean = std::accumulate(likelihood.begin(), likelihood.end(), 0.0) / num;
-    const double no_fix = 1 - options_.fix_ratio - options_.wrong_fix_ratio;
-    for (double& value : likelihood) value *= no_fix / mean;
-    Weigh(likelihood, 1 - options_.foreign_fix_ratio, {});
+    Publish();
     return Ok();
   });
 }
 
-Result<PlaceBelief::Place> PlaceBelief::PlaceAround(const Pose& cam_from_world) const {
-  CAIRN_ASSIGN_OR_RETURN(const auto near,
-                         NearestViews(*map_, cam_from_world, radius_m_, kSameViewDeg, kNumViewsOfFix));
-  Place place;
-  double sum = 0;
-  for (const NearView& view : near) sum += Closeness(view.squared_distance);
-  for (const NearView& view : near)
-    place.shares.emplace_back(view.image, Closeness(view.squared_distance) / sum);
-  for (const NearView& view : near) place.images.push_back(view.image);
-  place.images.insert(place.images.end(), neighbours_[near[0].image].begin(),
-                      neighbours_[near[0].image].end());
-  std::sort(place.images.begin(), place.images.end());
-  place.images.erase(std::unique(place.images.begin(), place.images.end()), place.images.end());
-  return place;
+Result<PlaceBelief::Evidence> PlaceBelief::OfFix(const std::vector<Pose>& poses,
+                                                 const std::vector<double>& probabilities,
+                                                 const std::optional<Up>& up) const {
+  const auto num = static_cast<double>(believed_.at_image.size());
+  const double of_none =
+      std::max(1e-12, 1 - std::accumulate(probabilities.begin(), probabilities.end(), 0.0));
+  const double best = *std::max_element(probabilities.begin(), probabilities.end());
+  Evidence evidence;
+  CAIRN_ASSIGN_OR_RETURN(evidence.places, graph_->PlacesAround(poses));
+  double num_of_places = 0;
+  for (const PlaceGraph::Place& place : evidence.places)
+    num_of_places += static_cast<double>(place.images.size());
+  // All in units of a fix with these odds elsewhere, which is at this place as often as at any other: the
+  // odds are against being elsewhere.  So is a wrong one of another place of the map, which is as rare as
+  // they say.
+  const double by_chance = num_of_places / static_cast<double>(poses.size()) / num;
+  evidence.elsewhere = by_chance;
+  evidence.at_image.assign(believed_.at_image.size(),
+                           options_.wrong_fix_ratio / options_.foreign_fix_ratio * by_chance);
+  for (size_t k = 0; k < poses.size(); ++k) {
+    // Within max_fix_odds of the best they are alike: which of them is somewhat likelier is the same for all
+    // images of a corridor, by how each was surveyed, and would add up.
+    const double alike = std::min(best, options_.max_fix_odds * probabilities[k]);
+    const double odds = std::min(options_.max_fix_odds, alike / of_none);
+    const double right = odds * UprightRatio(poses[k], up) / static_cast<double>(poses.size());
+    const std::vector<int32_t>& around = evidence.places[k].images;
+    for (const int32_t image : around) evidence.at_image[image] += right;
+    // Of a look-alike it has the odds of a right one.
+    for (size_t i = 0; i < evidence.at_image.size(); ++i) {
+      const std::vector<int32_t>& rivals = graph_->LookAlikes(static_cast<int32_t>(i));
+      const bool is_here = std::any_of(rivals.begin(), rivals.end(), [&](int32_t image) {
+        return std::binary_search(around.begin(), around.end(), image);
+      });
+      if (is_here) evidence.at_image[i] += options_.look_alike_fix_ratio / options_.fix_ratio * right;
+    }
+  }
+  return evidence;
 }
 
-void PlaceBelief::Weigh(const std::vector<double>& likelihood, double elsewhere_likelihood,
-                        const std::vector<Place>& places) {
-  double sum = elsewhere_ * elsewhere_likelihood;
-  for (size_t i = 0; i < probability_.size(); ++i) sum += probability_[i] * likelihood[i];
-  std::vector<double> weighed(probability_.size());
-  for (size_t i = 0; i < probability_.size(); ++i) weighed[i] = probability_[i] * likelihood[i] / sum;
-  // How probable a place is does not depend on how densely it was surveyed: where in it a fix is comes after.
-  for (const Place& place : places) {
-    double of_place = 0;
-    for (const int32_t image : place.images) of_place += std::exchange(weighed[image], 0);
-    for (const auto& [image, share] : place.shares) weighed[image] += share * of_place;
+double PlaceBelief::UprightRatio(const Pose& cam_from_world, const std::optional<Up>& up) const {
+  if (!up) return 1;
+  const MapHead& head = map_->head();
+  const Eigen::Vector3d sensed = head.camera_from_given.rotation * up->direction;
+  const Eigen::Vector3d stated =
+      cam_from_world.rotation * (head.floor_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ());
+  const double angle_deg = DegFromRad(std::atan2(sensed.cross(stated).norm(), sensed.dot(stated)));
+  const double sigmas = angle_deg / std::hypot(up->sigma_deg, options_.map_up_sigma_deg);
+  return std::exp(-0.5 * sigmas * sigmas);
+}
+
+Result<PlaceBelief::Evidence> PlaceBelief::OfLikeness(const Query& query) const {
+  RetrieveOptions all;
+  all.max_num_candidates = static_cast<int>(believed_.at_image.size());
+  all.min_score_ratio = 0;
+  CAIRN_ASSIGN_OR_RETURN(const auto candidates, RetrieveByWords(*map_, query, all));
+  Evidence evidence{.at_image = std::vector<double>(believed_.at_image.size(), 1.0),
+                    .elsewhere = 1 - options_.foreign_fix_ratio};
+  for (const Candidate& candidate : candidates) {
+    // [Mariottini11 §IV] as ProbabilitiesOfScores
+    evidence.at_image[candidate.image] +=
+        options_.likeness_weight * std::pow(candidate.score / candidates.front().score, 4);
   }
-  for (size_t i = 0; i < probability_.size(); ++i)
-    probability_[i] = options_.misled_ratio * probability_[i] + (1 - options_.misled_ratio) * weighed[i];
-  elsewhere_ = options_.misled_ratio * elsewhere_ +
-               (1 - options_.misled_ratio) * elsewhere_ * elsewhere_likelihood / sum;
+  const double mean = std::accumulate(evidence.at_image.begin(), evidence.at_image.end(), 0.0) /
+                      static_cast<double>(evidence.at_image.size());
+  const double no_fix = 1 - options_.fix_ratio - options_.wrong_fix_ratio;
+  for (double& value : evidence.at_image) value *= no_fix / mean;
+  return evidence;
+}
+
+double PlaceBelief::NewRatio(const Pose& fix, double seconds) {
+  const double distance = last_fix_ ? graph_->ViewDistance(fix, *last_fix_) : 1;
+  const double is_new = distance - counted_views_;
+  // Fixes around one place differ by their errors: only how far they are from it in all counts.
+  counted_views_ = std::max(counted_views_, distance);
+  if (distance >= 1) {
+    last_fix_ = fix;
+    counted_views_ = 0;
+  }
+  return std::clamp(is_new, std::min(1.0, options_.least_new_ratio * seconds), 1.0);
+}
+
+double PlaceBelief::NewRatio(double seconds) const {
+  if (!has_moved_) return std::min(1.0, seconds);
+  return std::clamp(driven_views_, std::min(1.0, options_.least_new_ratio * seconds), 1.0);
+}
+
+void PlaceBelief::Weigh(const Evidence& evidence, double new_ratio) {
+  constexpr double kWhole = 1 + 1e-9;  // twenty twentieths are one view
+  if (view_ratio_ + new_ratio > kWhole) {
+    Publish();
+    before_view_ = with_view_ = believed_;
+    view_ratio_ = 0;
+  }
+  view_ratio_ += new_ratio;
+  auto& [at_image, elsewhere] = with_view_;
+  elsewhere *= std::pow(evidence.elsewhere, new_ratio);
+  double sum = elsewhere;
+  for (size_t i = 0; i < at_image.size(); ++i) {
+    at_image[i] *= std::pow(evidence.at_image[i], new_ratio);
+    sum += at_image[i];
+  }
+  elsewhere /= sum;
+  for (double& p : at_image) p /= sum;
+  // How probable a place is does not depend on how densely it was surveyed: where in it a fix is comes after.
+  for (const PlaceGraph::Place& place : evidence.places) {
+    double of_place = 0;
+    for (const int32_t image : place.images) of_place += std::exchange(at_image[image], 0);
+    for (const auto& [image, share] : place.nearest) at_image[image] += share * of_place;
+  }
+}
+
+void PlaceBelief::Publish() {
+  const auto mix = [&](double before, double with) {
+    return options_.misled_ratio * before + (1 - options_.misled_ratio) * with;
+  };
+  believed_.elsewhere = mix(before_view_.elsewhere, with_view_.elsewhere);
+  for (size_t i = 0; i < believed_.at_image.size(); ++i)
+    believed_.at_image[i] = mix(before_view_.at_image[i], with_view_.at_image[i]);
 }
 
 Result<std::vector<PlaceHypothesis>> PlaceBelief::Hypotheses(int max_num) const {
-  std::vector<double> left = probability_;
+  std::vector<double> left = believed_.at_image;
   std::vector<PlaceHypothesis> hypotheses;
   while (static_cast<int>(hypotheses.size()) < max_num) {
     // Of a place the image whose surroundings are likeliest, so that neighbours of alike probability are one.
@@ -353,7 +372,7 @@ Result<std::vector<PlaceHypothesis>> PlaceBelief::Hypotheses(int max_num) const 
     if (*best <= 0) break;
     const auto image = static_cast<int32_t>(best - left.begin());
     PlaceHypothesis hypothesis{.image = image, .probability = std::exchange(left[image], 0)};
-    for (const int32_t neighbour : neighbours_[image])
+    for (const int32_t neighbour : graph_->SamePlace(image))
       hypothesis.probability += std::exchange(left[neighbour], 0);
     CAIRN_ASSIGN_OR_RETURN(const auto row, map_->Image(image));
     hypothesis.image_id = row->image_id;
@@ -365,22 +384,15 @@ Result<std::vector<PlaceHypothesis>> PlaceBelief::Hypotheses(int max_num) const 
   return hypotheses;
 }
 
-Result<int32_t> PlaceBelief::NextTellingImage(int32_t from) const {
-  if (map_->directory().NumBlocks(BlockKind::kAmbiguity) == 0) return -1;
-  CAIRN_ASSIGN_OR_RETURN(const auto appearance, map_->Appearance());
-  std::vector<char> is_known(neighbours_.size());
-  std::deque<int32_t> next = {from};
-  is_known[from] = 1;
-  while (!next.empty()) {
-    const int32_t image = next.front();
-    next.pop_front();
-    const NodeIdx node = appearance->node_of_image[image];
-    if (node >= 0 && appearance->look_alikes[node].empty()) return image;
-    for (const int32_t neighbour : neighbours_[image]) {
-      if (std::exchange(is_known[neighbour], 1) == 0) next.push_back(neighbour);
-    }
-  }
-  return -1;
+double PlaceBelief::ProbabilityAround(const Pose& cam_from_world) const {
+  double sum = 0;
+  for (const int32_t image : graph_->ImagesNear(map_->head().camera_from_given * cam_from_world))
+    sum += believed_.at_image[image];
+  return sum;
 }
+
+int32_t PlaceBelief::NextTellingImage(int32_t from) const { return graph_->NextTellingImage(from); }
+
+const std::vector<int32_t>& PlaceBelief::Neighbours(int32_t image) const { return graph_->Neighbours(image); }
 
 }  // namespace cairn

@@ -60,6 +60,7 @@ Localization Ambiguous(double x_m, double other_x_m) {
   Localization found = NoFixBy(NoFix::kAmbiguous);
   found.probability = 0.999;
   found.possible_poses = {PoseAt({x_m, 0, 1}, 0), PoseAt({other_x_m, 0, 1}, 0)};
+  found.possible_probabilities = {0.4995, 0.4995};
   return found;
 }
 
@@ -257,13 +258,125 @@ TEST(PlaceBelief, HypothesesShareNoImage) {
 
 TEST(PlaceBelief, WhatTellsIsTheNearestImageWithoutALookAlike) {
   MapRows rows = Corridor();
-  EXPECT_EQ(*Make(rows).NextTellingImage(2), -1);  // the map does not know
+  EXPECT_EQ(Make(rows).NextTellingImage(2), -1);  // the map does not know
   for (int32_t i = 0; i < kNumImages; ++i)
     rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.5});
   for (int32_t i = 0; i < 5; ++i) rows.appearance[i].look_alikes = {{i + 6, 0.9}};  // 0 to 4 and 6 to 10
-  EXPECT_EQ(*Make(rows).NextTellingImage(2), 5);
-  EXPECT_EQ(*Make(rows).NextTellingImage(10), 11);
-  EXPECT_EQ(*Make(rows).NextTellingImage(5), 5);
+  EXPECT_EQ(Make(rows).NextTellingImage(2), 5);
+  EXPECT_EQ(Make(rows).NextTellingImage(10), 11);
+  EXPECT_EQ(Make(rows).NextTellingImage(5), 5);
+}
+
+TEST(PlaceBelief, ImagesAtAnyRateTellTheSame) {
+  // The same way at the same speed, at 2 and at 20 images a second; each for itself, 20 would tell ten times
+  // as much, in the exponent.
+  PlaceBelief slow = Make(), fast = Make();
+  for (int i = 0; i <= 60; ++i) {
+    const double x_m = 2 + 0.05 * i;
+    for (PlaceBelief* each : {&slow, &fast}) {
+      const bool is_first = i == 0;
+      if (each == &slow && i % 10 != 0) continue;
+      ASSERT_TRUE(each->Elapse(is_first ? 0 : each == &slow ? 0.5 : 0.05).ok());
+      See(each, FixAt(x_m, 0.7));
+    }
+  }
+  EXPECT_NEAR(std::log10(fast.elsewhere()), std::log10(slow.elsewhere()), 0.5);
+  // Nor do many images of nothing.
+  PlaceBelief dark = Make(), dark_fast = Make();
+  for (int i = 0; i < 3; ++i) See(&dark, NoFixBy(NoFix::kNoPose));
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_TRUE(dark_fast.Elapse(0.05).ok());
+    See(&dark_fast, NoFixBy(NoFix::kNoPose));
+  }
+  EXPECT_NEAR(std::log10(1 - dark_fast.elsewhere()), std::log10(1 - dark.elsewhere()), 0.4);
+}
+
+TEST(PlaceBelief, NoSingleViewMakesAPlaceCertainInHoweverManyImages) {
+  PlaceBelief belief = Make();
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(belief.Elapse(0.05).ok());
+    See(&belief, FixAt(5 + 0.001 * i));
+  }
+  EXPECT_LT(Leader(belief).probability, 0.995);
+}
+
+TEST(PlaceBelief, FixesThatJitterTellNoMoreThanOneThatStays) {
+  PlaceBelief still = Make(), jitters = Make();
+  for (int i = 0; i < 40; ++i) {
+    for (PlaceBelief* each : {&still, &jitters}) ASSERT_TRUE(each->Elapse(0.05).ok());
+    See(&still, FixAt(5, 0.7));
+    See(&jitters, FixAt(5 + (i % 2 == 0 ? 0.05 : 0), 0.7));
+  }
+  // A tenth of a view's radius is told once.
+  EXPECT_NEAR(std::log10(jitters.elsewhere()), std::log10(still.elsewhere()), 0.1);
+}
+
+TEST(PlaceBelief, WhileNothingIsSeenItForgetsByTheTime) {
+  PlaceBelief soon = Make(), late = Make();
+  for (PlaceBelief* each : {&soon, &late}) {
+    for (const double x : {4.0, 5.0, 6.0}) See(each, FixAt(x));
+  }
+  ASSERT_TRUE(soon.Elapse(0.1).ok());
+  ASSERT_TRUE(late.Elapse(60).ok());
+  for (PlaceBelief* each : {&soon, &late}) See(each, NoFixBy(NoFix::kTooFewFeatures));
+  EXPECT_GT(Leader(soon).probability, 0.98);
+  EXPECT_LT(Leader(late).probability, 0.5);
+  EXPECT_GT(late.elsewhere(), 0.1);
+}
+
+TEST(PlaceBelief, GravityRefutesAndConfirmsNothing) {
+  PlaceBelief told = Make(), not_told = Make(), tilted = Make();
+  const Eigen::Vector3d up(0, -2, 0);  // of a level camera; of any length
+  ASSERT_TRUE(told.SenseUp(up, 1).ok());
+  See(&told, FixAt(5));
+  See(&not_told, FixAt(5));
+  EXPECT_NEAR(Leader(told).probability, Leader(not_told).probability, 1e-9);
+  // 20 degrees of roll are nine standard deviations of hypot(1, 2) degrees.
+  ASSERT_TRUE(tilted.SenseUp({std::sin(RadFromDeg(20)), -std::cos(RadFromDeg(20)), 0}, 1).ok());
+  See(&tilted, FixAt(5));
+  EXPECT_LT(Leader(tilted).probability, 0.2);
+  EXPECT_GT(tilted.elsewhere(), 0.4);
+  // It was of that image alone.
+  See(&tilted, FixAt(6));
+  EXPECT_EQ(Leader(tilted).image, 6);
+  EXPECT_GT(Leader(tilted).probability, 0.9);
+}
+
+TEST(PlaceBelief, AFixMayBeOfAKnownLookAlike) {
+  MapRows rows = Corridor();
+  for (int32_t i = 0; i < kNumImages; ++i)
+    rows.appearance.push_back({.images = {i}, .is_kept = true, .entropy = 0.5});
+  rows.appearance[2].look_alikes = {{8, 0.9}};
+  PlaceBelief belief = Make(rows);
+  See(&belief, FixAt(2));
+  const auto places = *belief.Hypotheses(2);
+  EXPECT_EQ(places[0].image, 2);
+  EXPECT_EQ(places[1].image, 8);
+  // look_alike_fix_ratio / fix_ratio of one image against the share of three.
+  EXPECT_GT(belief.probabilities()[8], 5 * belief.probabilities()[10]);
+  PlaceBelief other = Make();
+  See(&other, FixAt(2));
+  EXPECT_DOUBLE_EQ(other.probabilities()[8], other.probabilities()[10]);
+}
+
+TEST(PlaceBelief, OfPossiblePosesOneThatIsHopelessCountsLess) {
+  Localization found = Ambiguous(2, 8);
+  found.possible_probabilities = {0.9, 0.0999};  // alike within max_fix_odds
+  PlaceBelief alike = Make();
+  See(&alike, found);
+  EXPECT_NEAR(alike.Hypotheses(2)->at(1).probability, alike.Hypotheses(2)->at(0).probability, 0.02);
+  found.possible_probabilities = {0.9989, 1e-5};
+  PlaceBelief hopeless = Make();
+  See(&hopeless, found);
+  EXPECT_EQ(Leader(hopeless).image, 2);
+  EXPECT_GT(Leader(hopeless).probability, 0.8);
+}
+
+TEST(PlaceBelief, WhatIsAroundAPoseIsItsProbability) {
+  PlaceBelief belief = Make();
+  See(&belief, FixAt(5));
+  EXPECT_NEAR(belief.ProbabilityAround(PoseAt({5, 0, 1}, 0)), Leader(belief).probability, 0.02);
+  EXPECT_LT(belief.ProbabilityAround(PoseAt({10, 0, 1}, 0)), 0.02);
 }
 
 TEST(PlaceBelief, RefusesWhatItCannotUse) {
@@ -272,6 +385,12 @@ TEST(PlaceBelief, RefusesWhatItCannotUse) {
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(belief.Move({0, 0}, std::numeric_limits<double>::infinity()).error().code,
             ErrorCode::kInvalidArgument);
+  for (const double seconds : {-0.1, std::numeric_limits<double>::infinity(), std::nan("")})
+    EXPECT_EQ(belief.Elapse(seconds).error().code, ErrorCode::kInvalidArgument);
+  for (const auto& [up, sigma_deg] :
+       {std::pair(Eigen::Vector3d(0, 0, 0), 1.0), std::pair(Eigen::Vector3d(0, std::nan(""), 1), 1.0),
+        std::pair(Eigen::Vector3d(0, -1, 0), 0.0), std::pair(Eigen::Vector3d(0, -1, 0), std::nan(""))})
+    EXPECT_EQ(belief.SenseUp(up, sigma_deg).error().code, ErrorCode::kInvalidArgument);
   MapRows unscaled = Corridor();
   unscaled.frame.unit = "arbitrary";
   EXPECT_EQ(Make(unscaled).Move({1, 0}, 0).error().code, ErrorCode::kUnsupported);
