@@ -22,8 +22,8 @@
 #include "pipeline/commands/query_images.h"
 #include "pipeline/commands/visual_answer.h"
 #include "pipeline/program/json_text.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/region_tracker.h"
 #include "runtime/robot_log/robot_log.h"
 
 namespace cairn::pipeline {
@@ -38,6 +38,7 @@ struct LocalizeArguments {
   std::string cameras_path;
   bool is_sequence = false;
   std::string odometry_path;
+  double period_s = 0;  // 0: not given
   std::string estimator = "pnp";
   std::string log_folder;
   double log_mb_per_day = 0;  // 0: the default
@@ -48,6 +49,7 @@ struct LocalizeArguments {
   RegionTrackerOptions tracker_options;  // its votes are the visual map's too
   VisualTrackerOptions visual_tracker_options;
   VisualFilterOptions filter_options;
+  SureTrackerOptions sure_options;
   AtlasLocalizerOptions atlas_options;
   OptionArguments option_arguments;
 };
@@ -80,21 +82,36 @@ Status CheckWhatIsRead(const LocalizeArguments& arguments) {
     CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_map), DescribeOptions(&of_estimate),
                                   DescribeOptions(&of_visual_tracker), DescribeOptions(&of_filter)},
                                  "is for --estimator visual-map or both; give one of them, or leave it out"));
-    if (!arguments.odometry_path.empty())
+    if (!arguments.odometry_path.empty() && arguments.sure_options.min_place_probability == 0)
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "--odometry is for --estimator visual-map or both, or for --min-place-probability; give "
+          "one of them, or leave it out");
+  }
+  if (arguments.sure_options.min_place_probability == 0) {
+    SureTrackerOptions of_sure;
+    std::vector<std::string> names = NamesOf(DescribeOptions(&of_sure));
+    std::erase(names, "min_place_probability");
+    CAIRN_RETURN_IF_ERROR(arguments.option_arguments.RefuseGiven(
+        names, "is for --min-place-probability; give it, 0.9 say, or leave this out"));
+    if (arguments.period_s > 0)
       return MakeError(ErrorCode::kInvalidArgument,
-                       "--odometry is for --estimator visual-map or both; give one of them, or leave it out");
+                       "--period is for --min-place-probability; give it, 0.9 say, or leave this out");
   }
   if (!arguments.is_sequence) {
-    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_vote), DescribeOptions(&of_tracker),
-                                  DescribeOptions(&of_visual_tracker), DescribeOptions(&of_filter)},
-                                 "is for frames in order; give --sequence, or leave it out"));
+    SureTrackerOptions of_sure;
+    CAIRN_RETURN_IF_ERROR(
+        refuse({DescribeOptions(&of_vote), DescribeOptions(&of_tracker), DescribeOptions(&of_visual_tracker),
+                DescribeOptions(&of_filter), DescribeOptions(&of_sure)},
+               "is for frames in order; give --sequence, or leave it out"));
     if (!arguments.odometry_path.empty())
       return MakeError(ErrorCode::kInvalidArgument,
                        "--odometry is for frames in order; give --sequence, or leave it out");
     return Ok();
   }
   if (arguments.estimator == "visual-map") {
-    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_tracker)},
+    SureTrackerOptions of_sure;
+    CAIRN_RETURN_IF_ERROR(refuse({DescribeOptions(&of_tracker), DescribeOptions(&of_sure)},
                                  "is for --estimator pnp or both; give one of them, or leave it out"));
   }
   return arguments.odometry_path.empty()
@@ -144,25 +161,41 @@ Status CheckEstimator(const LocalizeArguments& arguments) {
 
 // What follows a camera from frame to frame; none where there is no sequence.
 struct Trackers {
-  std::optional<RegionTracker> in_space;
+  std::optional<SureTracker> in_space;
   std::optional<VisualTracker> on_floor;
   std::optional<Odometry> odometry;
+  double period_s = 0;
 
   static Result<Trackers> Make(const LocalizeArguments& arguments, const std::shared_ptr<const Map>& map) {
     Trackers trackers;
     if (!arguments.is_sequence) return trackers;
-    if (arguments.estimator != "visual-map")
-      trackers.in_space.emplace(map, arguments.options, arguments.tracker_options);
+    if (arguments.estimator != "visual-map") {
+      CAIRN_ASSIGN_OR_RETURN(
+          trackers.in_space,
+          SureTracker::Make(map, arguments.options, arguments.tracker_options, arguments.sure_options));
+    }
+    if (!arguments.odometry_path.empty()) {
+      CAIRN_ASSIGN_OR_RETURN(trackers.odometry, Odometry::Read(arguments.odometry_path));
+    }
+    trackers.period_s = arguments.period_s;
     if (arguments.estimator == "pnp") return trackers;
     VisualTrackerOptions options = arguments.visual_tracker_options;
     options.votes = arguments.tracker_options.votes;
     CAIRN_ASSIGN_OR_RETURN(trackers.on_floor,
                            VisualTracker::Make(map, arguments.visual_options, options,
                                                arguments.filter_options, arguments.estimate_options));
-    if (!arguments.odometry_path.empty()) {
-      CAIRN_ASSIGN_OR_RETURN(trackers.odometry, Odometry::Read(arguments.odometry_path));
-    }
     return trackers;
+  }
+
+  // It drove, and time passed, whether or not this image can be read.
+  Status MoveTo(const std::string& image) {
+    const bool believes = in_space && in_space->belief();
+    if (believes && period_s > 0) CAIRN_RETURN_IF_ERROR(in_space->Elapse(period_s));
+    if (!odometry) return Ok();
+    return odometry->MoveToNext(image, [&](const Eigen::Vector2d& way_m, double turn_left_rad) -> Status {
+      if (believes) CAIRN_RETURN_IF_ERROR(in_space->Move(way_m, turn_left_rad));
+      return on_floor ? on_floor->Move(way_m, turn_left_rad) : Ok();
+    });
   }
 };
 
@@ -171,12 +204,7 @@ Answer LocateByViews(const std::string& image, const std::shared_ptr<const Map>&
                      const CameraChoice& cameras, const LocalizeArguments& arguments, Trackers* trackers) {
   Answer answer{.image = image};
   const auto locate = [&]() -> Result<TrackedVisualPose> {
-    if (trackers->odometry) {  // it drove, whether or not this image can be read
-      CAIRN_RETURN_IF_ERROR(
-          trackers->odometry->MoveToNext(image, [&](const Eigen::Vector2d& way_m, double turn_left_rad) {
-            return trackers->on_floor->Move(way_m, turn_left_rad);
-          }));
-    }
+    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(image));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
@@ -222,9 +250,11 @@ Answer LocalizeImage(const std::string& image, const std::shared_ptr<const Map>&
 
 // The same for the next frame of a sequence.
 Answer TrackImage(const std::string& image, const std::shared_ptr<const Map>& map,
-                  const CameraChoice& cameras, const LocalizeArguments& arguments, RegionTracker* tracker) {
+                  const CameraChoice& cameras, const LocalizeArguments& arguments, Trackers* trackers) {
   Answer answer{.image = image};
+  SureTracker* tracker = &*trackers->in_space;
   answer.localization = [&]() -> Result<Localization> {
+    CAIRN_RETURN_IF_ERROR(trackers->MoveTo(image));
     CAIRN_ASSIGN_OR_RETURN(const cv::Mat grey, ReadGreyImage(image));
     CAIRN_ASSIGN_OR_RETURN(const Camera camera, cameras.ForImage(grey.cols, grey.rows));
     answer.camera_id = camera.camera_id;
@@ -317,9 +347,8 @@ Status RunLocalize(const LocalizeArguments& arguments, const CommandEnvironment&
     std::vector<Answer> answers(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), environment.num_threads, [&](int64_t i) {
       answers[i] = visual ? LocateByViews(batch[i], map, *visual, cameras, arguments, &trackers)
-                   : arguments.is_sequence
-                       ? TrackImage(batch[i], map, cameras, arguments, &*trackers.in_space)
-                       : LocalizeImage(batch[i], map, cameras, arguments);
+                   : arguments.is_sequence ? TrackImage(batch[i], map, cameras, arguments, &trackers)
+                                           : LocalizeImage(batch[i], map, cameras, arguments);
     });
     for (const Answer& answer : answers) {
       *environment.out << JsonText(AnswerJson(answer, arguments)) << "\n" << std::flush;
@@ -378,9 +407,16 @@ Command LocalizeCommand() {
                            "The images are frames in order: follow the camera from one to the next");
             parser
                 .Add("--odometry", arguments->odometry_path,
-                     "With --sequence and a visual map: a line for each image, how the robot drove since the "
-                     "one before: metres ahead, metres to the left, degrees turned to the left")
+                     "With --sequence, and a visual map or --min-place-probability: a line for each image, "
+                     "how "
+                     "the robot drove since the one before: metres ahead, metres to the left, degrees turned "
+                     "to the left")
                 .Type("FILE");
+            parser
+                .Add("--period", arguments->period_s,
+                     "With --min-place-probability: seconds from image to image [1]")
+                .Range(1e-6, 1e6)
+                .Type("S");
             parser
                 .Add("--estimator", arguments->estimator,
                      "pnp: poses in space from landmarks' positions; visual-map: places on the floor from "
@@ -406,13 +442,14 @@ Command LocalizeCommand() {
                   DescribeOptions(&arguments->tracker_options.votes),
                   DescribeOptions(&arguments->visual_options), DescribeOptions(&arguments->estimate_options),
                   DescribeOptions(&arguments->visual_tracker_options),
-                  DescribeOptions(&arguments->filter_options), DescribeOptions(&arguments->atlas_options)}) {
+                  DescribeOptions(&arguments->filter_options), DescribeOptions(&arguments->sure_options),
+                  DescribeOptions(&arguments->atlas_options)}) {
               options.insert(options.end(), more.begin(), more.end());
             }
             arguments->option_arguments.Add(
                 parser, options,
                 {"max_num_features", "max_image_side_px", "min_num_inliers", "max_sigma_m", "max_sigma_deg",
-                 "max_distance_from_survey_m", "exclude_look_alikes"});
+                 "max_distance_from_survey_m", "exclude_look_alikes", "min_place_probability"});
           },
       .run =
           [arguments](const CommandEnvironment& environment) { return RunLocalize(*arguments, environment); },

@@ -324,6 +324,15 @@ CAIRN_API int32_t cairn_tracker_set_option(cairn_tracker* tracker, const char* n
  * error; after an error *fix has no fix, and the tracker is as before. */
 CAIRN_API int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image,
                                       const cairn_camera* camera, cairn_fix* fix);
+/* What is known of the next frame besides its pixels, for a tracker with the option ("min_place_probability",
+ * "0.9"): it publishes a fix only where its place has this probability by all frames so far, as
+ * cairn_place_belief has it.  Odometry, seconds [1] and gravity as there.  CAIRN_INVALID_ARGUMENT: the option
+ * is 0, the default. */
+CAIRN_API int32_t cairn_tracker_move(cairn_tracker* tracker, double ahead_m, double left_m,
+                                     double turn_left_rad);
+CAIRN_API int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds);
+CAIRN_API int32_t cairn_tracker_sense_up(cairn_tracker* tracker, double right, double down, double ahead,
+                                         double sigma_deg);
 /* Where the next frame is expected.  *is_expected 0: the tracker is lost, and *prior is CAIRN_PRIOR_INIT. */
 CAIRN_API int32_t cairn_tracker_predict(cairn_tracker* tracker, int32_t* is_expected, cairn_prior* prior);
 CAIRN_API int32_t cairn_tracker_destroy(cairn_tracker* tracker);
@@ -449,6 +458,12 @@ CAIRN_API int32_t cairn_place_belief_set_option(cairn_place_belief* belief, cons
  * metre. Without any it may have gone to what shows the same landmarks. */
 CAIRN_API int32_t cairn_place_belief_move(cairn_place_belief* belief, double ahead_m, double left_m,
                                           double turn_left_rad);
+/* Seconds since the last image [1], so that images may come at any rate; several calls add up. */
+CAIRN_API int32_t cairn_place_belief_elapse(cairn_place_belief* belief, double seconds);
+/* Gravity, at the next image: which way is up in the camera's frame (of any length), and its standard
+ * deviation, degrees.  A pose that says otherwise is refuted. */
+CAIRN_API int32_t cairn_place_belief_sense_up(cairn_place_belief* belief, double right, double down,
+                                              double ahead, double sigma_deg);
 /* The next image; `camera` as in cairn_localize.  `fix`: what the image says by itself; may be NULL. */
 CAIRN_API int32_t cairn_place_belief_see(cairn_place_belief* belief, const cairn_image* image,
                                          const cairn_camera* camera, cairn_fix* fix);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/options/options.h"
+#include "runtime/drive/sure_tracker.h"
 #include "runtime/localize/localizer_options.h"
 #include "runtime/localize/region_tracker.h"
 #include "runtime/visual_map/visual_map.h"
@@ -14,11 +15,13 @@ namespace cairn {
 struct SpaceTrackerOptions {
   LocalizerOptions localizer;
   RegionTrackerOptions tracker;
+  SureTrackerOptions sure;
 };
 inline OptionTable DescribeOptions(SpaceTrackerOptions* options) {
   OptionTable all = DescribeOptions(&options->localizer);
   for (const OptionTable& part :
-       {DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes)}) {
+       {DescribeOptions(&options->tracker), DescribeOptions(&options->tracker.votes),
+        DescribeOptions(&options->sure)}) {
     all.insert(all.end(), part.begin(), part.end());
   }
   return all;

@@ -19,12 +19,13 @@ struct OpenTracker : OfOneThread {
   static constexpr const char* kOnePer = "camera";
   std::shared_ptr<const Map> map;
   SpaceTrackerOptions options;
-  std::optional<RegionTracker> tracker;
+  std::optional<SureTracker> tracker;
   std::shared_ptr<SharedLog> log;  // where it has one
 
+  // After an error it is as before.
   Status Begin(const SpaceTrackerOptions& given) {
+    CAIRN_ASSIGN_OR_RETURN(tracker, SureTracker::Make(map, given.localizer, given.tracker, given.sure));
     options = given;
-    tracker.emplace(map, options.localizer, options.tracker);
     return Ok();
   }
 };
@@ -110,6 +111,28 @@ int32_t cairn_tracker_track(cairn_tracker* tracker, const cairn_image* image, co
     Return(FixFrom(found), fix);
     used->log->Offer(query, found);
     return Ok();
+  });
+}
+
+int32_t cairn_tracker_move(cairn_tracker* tracker, double ahead_m, double left_m, double turn_left_rad) {
+  return Call("cairn_tracker_move", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    return used->tracker->Move({ahead_m, left_m}, turn_left_rad);
+  });
+}
+
+int32_t cairn_tracker_elapse(cairn_tracker* tracker, double seconds) {
+  return Call("cairn_tracker_elapse", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    return used->tracker->Elapse(seconds);
+  });
+}
+
+int32_t cairn_tracker_sense_up(cairn_tracker* tracker, double right, double down, double ahead,
+                               double sigma_deg) {
+  return Call("cairn_tracker_sense_up", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenTracker>::Begin(OpenTrackers(), tracker));
+    return used->tracker->SenseUp({right, down, ahead}, sigma_deg);
   });
 }
 

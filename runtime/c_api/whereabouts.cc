@@ -114,6 +114,21 @@ int32_t cairn_place_belief_move(cairn_place_belief* belief, double ahead_m, doub
   });
 }
 
+int32_t cairn_place_belief_elapse(cairn_place_belief* belief, double seconds) {
+  return Call("cairn_place_belief_elapse", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenBelief>::Begin(OpenBeliefs(), belief));
+    return used->belief->Elapse(seconds);
+  });
+}
+
+int32_t cairn_place_belief_sense_up(cairn_place_belief* belief, double right, double down, double ahead,
+                                    double sigma_deg) {
+  return Call("cairn_place_belief_sense_up", [&]() -> Status {
+    CAIRN_ASSIGN_OR_RETURN(const auto used, Use<OpenBelief>::Begin(OpenBeliefs(), belief));
+    return used->belief->SenseUp({right, down, ahead}, sigma_deg);
+  });
+}
+
 int32_t cairn_place_belief_see(cairn_place_belief* belief, const cairn_image* image,
                                const cairn_camera* camera, cairn_fix* fix) {
   return Call("cairn_place_belief_see", [&]() -> Status {

@@ -1,5 +1,6 @@
 #include "runtime/python/places.h"
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -182,6 +183,14 @@ class PyPlaceBelief {
     const auto used = one_thread_.Use();
     ThrowIfError(belief_->Move({ahead_m, left_m}, turn_left_rad));
   }
+  void Elapse(double seconds) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(belief_->Elapse(seconds));
+  }
+  void SenseUp(const std::array<double, 3>& up_in_camera, double sigma_deg) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(belief_->SenseUp(Eigen::Vector3d(up_in_camera.data()), sigma_deg));
+  }
   Localization See(const py::array& image, const std::optional<Camera>& camera) {
     const cv::Mat grey = PixelsOf(image);
     const py::gil_scoped_release release;
@@ -276,6 +285,8 @@ void BindPlaces(py::module_& module) {
   py::class_<PyPlaceBelief>(module, "PlaceBelief")
       .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))
       .def("move", &PyPlaceBelief::Move, py::arg("ahead_m"), py::arg("left_m"), py::arg("turn_left_rad"))
+      .def("elapse", &PyPlaceBelief::Elapse, py::arg("seconds"))
+      .def("sense_up", &PyPlaceBelief::SenseUp, py::arg("up_in_camera"), py::arg("sigma_deg"))
       .def("see", &PyPlaceBelief::See, py::arg("image").noconvert(), py::arg("camera") = py::none())
       .def("places", &PyPlaceBelief::Places, py::arg("max_num") = 3)
       .def_property_readonly("elsewhere", &PyPlaceBelief::elsewhere);

@@ -1,5 +1,6 @@
 #include "runtime/python/trackers.h"
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,7 +10,6 @@
 
 #include "runtime/c_api/tracker_options.h"
 #include "runtime/localize/measurement.h"
-#include "runtime/localize/region_tracker.h"
 #include "runtime/python/convert.h"
 #include "runtime/python/objects.h"
 #include "runtime/visual_map/visual_tracker.h"
@@ -25,8 +25,22 @@ class PyTracker {
       : map_(map.map), log_(LogFor(log, *map.map)) {
     SpaceTrackerOptions options;
     SetFromPython(DescribeOptions(&options), given);
-    tracker_.emplace(map_, options.localizer, options.tracker);
+    const py::gil_scoped_release release;
+    tracker_ = ValueOrThrow(SureTracker::Make(map_, options.localizer, options.tracker, options.sure));
     localizer_.emplace(map_, options.localizer);
+  }
+
+  void Move(double ahead_m, double left_m, double turn_left_rad) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(tracker_->Move({ahead_m, left_m}, turn_left_rad));
+  }
+  void Elapse(double seconds) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(tracker_->Elapse(seconds));
+  }
+  void SenseUp(const std::array<double, 3>& up_in_camera, double sigma_deg) {
+    const auto used = one_thread_.Use();
+    ThrowIfError(tracker_->SenseUp(Eigen::Vector3d(up_in_camera.data()), sigma_deg));
   }
 
   Localization Track(const py::array& image, const std::optional<Camera>& camera) {
@@ -50,7 +64,7 @@ class PyTracker {
   std::shared_ptr<const Map> map_;
   std::shared_ptr<SharedLog> log_;
   std::optional<Localizer> localizer_;  // for the features that are logged
-  std::optional<RegionTracker> tracker_;
+  std::optional<SureTracker> tracker_;
   OneThread one_thread_{"tracker", "camera"};
 };
 
@@ -140,6 +154,9 @@ void BindTrackers(py::module_& module) {
       .def(py::init<const PyMap&, const PyLog*, const py::kwargs&>(), py::arg("map"), py::kw_only(),
            py::arg("log") = py::none())
       .def("track", &PyTracker::Track, py::arg("image").noconvert(), py::arg("camera") = py::none())
+      .def("move", &PyTracker::Move, py::arg("ahead_m"), py::arg("left_m"), py::arg("turn_left_rad"))
+      .def("elapse", &PyTracker::Elapse, py::arg("seconds"))
+      .def("sense_up", &PyTracker::SenseUp, py::arg("up_in_camera"), py::arg("sigma_deg"))
       .def("predict", &PyTracker::Predict);
   py::class_<PyVisualTracker>(module, "VisualTracker")
       .def(py::init<const PyMap&, const py::kwargs&>(), py::arg("map"))

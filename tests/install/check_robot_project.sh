@@ -41,10 +41,10 @@ c++ -std=c++20 where.cc -o where_cc $(pkg-config --cflags --libs cairn-runtime)
 expect ./where_cc
 
 # Every header that is installed, together, and calls whose types come from several of them; no more than fit on a screen.
-# A robot that is lost needs four that no other does: place_belief.h, place_model.h, start_hypotheses.h, and rerank_places.h for a closer look;
+# A robot that is lost needs five that no other does: place_belief.h, sure_tracker.h, place_model.h, start_hypotheses.h, and rerank_places.h for a closer look;
 # one that has an atlas of many maps: atlas.h, atlas_localizer.h, atlas_route.h, and atlas_file.h with descriptor_code.h.
 headers=$(cd "$root/include/cairn" && find . -name '*.h' | sed 's,^\./,,' | LC_ALL=C sort -r)
-if [ "$(echo "$headers" | wc -l)" -gt 54 ]; then
+if [ "$(echo "$headers" | wc -l)" -gt 55 ]; then
   echo "more headers are installed than fit on a screen:" $headers >&2
   exit 1
 fi

@@ -194,6 +194,11 @@ class PlaceBelief:
         """`options`: those that `cairn where --help` lists.  Raises Error: no_data (a map without images)."""
     def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
         """Odometry since the last image; calls add up.  Raises Error: unsupported (the map's unit is not the metre)."""
+    def elapse(self, seconds: float) -> None:
+        """Seconds since the last image [1], so that images may come at any rate; calls add up."""
+    def sense_up(self, up_in_camera: Sequence[float], sigma_deg: float) -> None:
+        """Gravity, at the next image: which way is up in the camera's frame (x right, y down, z ahead; of any length), and its
+        standard deviation, degrees.  A pose that says otherwise is refuted."""
     def see(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
         """The next image; returns what it says by itself."""
     def places(self, max_num: int = 3) -> list[tuple[int, float]]:
@@ -416,6 +421,14 @@ class Tracker:
         """`log`: of the same map; `options`: any that `cairn localize --sequence` takes, such as step_sigma_m=0.3 or min_num_inliers=9."""
     def track(self, image: NDArray[np.uint8], camera: Camera | None = None) -> Fix:
         """The next frame; as Localizer.localize.  After an Error the tracker is as before."""
+    def move(self, ahead_m: float, left_m: float, turn_left_rad: float) -> None:
+        """With min_place_probability=0.9 a fix is published only where its place has this probability by all frames so far.
+
+        What is known of the next frame besides its pixels: as PlaceBelief's.  Raises Error: invalid_argument (the option is 0, the
+        default).
+        """
+    def elapse(self, seconds: float) -> None: ...
+    def sense_up(self, up_in_camera: Sequence[float], sigma_deg: float) -> None: ...
     def predict(self) -> Prior | None:
         """Where the next frame is expected; None when lost."""
 

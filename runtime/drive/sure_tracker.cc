@@ -1,0 +1,137 @@
+#include "runtime/drive/sure_tracker.h"
+
+#include <utility>
+
+#include "core/base/no_throw.h"
+#include "runtime/localize/measurement.h"
+
+namespace cairn {
+
+OptionTable DescribeOptions(SureTrackerOptions* o) {
+  OptionTable table = {
+      {.name = "min_place_probability",
+       .value = &o->min_place_probability,
+       .help = "publish a fix only where its place has this probability by all frames so far; 0: every fix",
+       .min = 0,
+       .max = 1 - 1e-9},
+      {"look_anew_s", &o->look_anew_s,
+       "while it is sure, look at a frame without what is expected once in so many seconds", 0}};
+  for (Option& option : DescribeOptions(&o->belief)) {
+    option.name = "place_" + option.name;
+    table.push_back(std::move(option));
+  }
+  return table;
+}
+
+SureTracker::SureTracker(std::shared_ptr<const Map> map, const LocalizerOptions& localizer_options,
+                         const RegionTrackerOptions& tracker_options, const SureTrackerOptions& options)
+    : map_(std::move(map)),
+      localizer_options_(localizer_options),
+      tracker_options_(tracker_options),
+      options_(options),
+      localizer_(map_, localizer_options),
+      tracker_(std::in_place, map_, localizer_options, tracker_options) {}
+
+Result<SureTracker> SureTracker::Make(std::shared_ptr<const Map> map,
+                                      const LocalizerOptions& localizer_options,
+                                      const RegionTrackerOptions& tracker_options,
+                                      const SureTrackerOptions& options) {
+  return WithoutExceptions("sure tracker", [&]() -> Result<SureTracker> {
+    SureTrackerOptions checked = options;
+    CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&checked)));
+    SureTracker tracker(map, localizer_options, tracker_options, options);
+    if (options.min_place_probability > 0) {
+      CAIRN_ASSIGN_OR_RETURN(tracker.belief_, PlaceBelief::Make(std::move(map), options.belief));
+    }
+    return tracker;
+  });
+}
+
+Status SureTracker::CheckBelieves() const {
+  if (belief_) return Ok();
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "min_place_probability is 0: every fix is published, and nothing reads how the robot moves; "
+      "set it, 0.9 say");
+}
+
+Status SureTracker::Move(const Eigen::Vector2d& way_m, double turn_left_rad) {
+  CAIRN_RETURN_IF_ERROR(CheckBelieves());
+  return belief_->Move(way_m, turn_left_rad);
+}
+
+Status SureTracker::Elapse(double seconds) {
+  CAIRN_RETURN_IF_ERROR(CheckBelieves());
+  CAIRN_RETURN_IF_ERROR(belief_->Elapse(seconds));
+  elapsed_s_ = elapsed_s_.value_or(0) + seconds;
+  return Ok();
+}
+
+Status SureTracker::SenseUp(const Eigen::Vector3d& up_in_camera, double sigma_deg) {
+  CAIRN_RETURN_IF_ERROR(CheckBelieves());
+  CAIRN_RETURN_IF_ERROR(CheckUp(up_in_camera, sigma_deg));
+  up_.emplace(up_in_camera, sigma_deg);
+  return Ok();
+}
+
+Result<Localization> SureTracker::Track(const cv::Mat& grey, const Camera& camera) {
+  return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
+    CAIRN_ASSIGN_OR_RETURN(Query query, localizer_.QueryFromImage(grey, camera));
+    return TrackFeatures(std::move(query.features), camera);
+  });
+}
+
+Result<Localization> SureTracker::TrackFeatures(Features features, const Camera& camera) {
+  return WithoutExceptions("sure tracker", [&]() -> Result<Localization> {
+    if (!belief_) return tracker_->TrackFeatures(std::move(features), camera);
+    CAIRN_ASSIGN_OR_RETURN(const Query query, localizer_.QueryFromFeatures(features, camera));
+    CAIRN_ASSIGN_OR_RETURN(Localization found, tracker_->TrackFeatures(features, camera));
+    if (elapsed_s_) {
+      since_look_s_ += *std::exchange(elapsed_s_, std::nullopt);
+    } else {  // as PlaceBelief has it
+      since_look_s_ += 1;
+      CAIRN_RETURN_IF_ERROR(belief_->Elapse(1));
+    }
+    const auto up = std::exchange(up_, std::nullopt);
+    const bool is_followed = found.has_fix() && found.scope == Scope::kTrack;
+    if (!is_followed || sure_probability_ == 0 || since_look_s_ >= options_.look_anew_s) {
+      if (up) CAIRN_RETURN_IF_ERROR(belief_->SenseUp(up->first, up->second));
+      CAIRN_ASSIGN_OR_RETURN(const Localization anew, LookAnew(query, found));
+      sure_probability_ = ProbabilityOf(found);
+      const double elsewhere = ProbabilityOf(anew);
+      if (is_followed && elsewhere >= options_.min_place_probability &&
+          elsewhere > sure_probability_) {  // it followed something else
+        tracker_.emplace(map_, localizer_options_, tracker_options_);
+        CAIRN_ASSIGN_OR_RETURN(found, tracker_->TrackFeatures(std::move(features), camera));
+        sure_probability_ = ProbabilityOf(found);
+      }
+    }
+    if (!found.has_fix()) {
+      sure_probability_ = 0;
+      return found;
+    }
+    found.probability = sure_probability_;
+    if (sure_probability_ >= options_.min_place_probability) return found;
+    sure_probability_ = 0;
+    found.reason = NoFix::kImprobable;
+    found.message = fmt::format("of all images so far its place has a probability of {:.2f}, {} is needed",
+                                found.probability, options_.min_place_probability);
+    return found;
+  });
+}
+
+Result<Localization> SureTracker::LookAnew(const Query& query, const Localization& found) {
+  Localization anew = found;
+  if (found.scope == Scope::kTrack) {  // a prior from earlier frames would count them twice
+    CAIRN_ASSIGN_OR_RETURN(anew, localizer_.LocalizeQuery(query, std::nullopt));
+  }
+  CAIRN_RETURN_IF_ERROR(belief_->See(query, anew));
+  since_look_s_ = 0;
+  return anew;
+}
+
+double SureTracker::ProbabilityOf(const Localization& found) const {
+  return found.has_fix() ? belief_->ProbabilityAround(found.cam_from_world) : 0;
+}
+
+}  // namespace cairn
