@@ -186,7 +186,7 @@ double Servo::WantedHeading(const PlanarPose& pose, int num_inliers) const {
 }
 
 ServoCommand Servo::Step(const std::vector<PixelPair>& pairs) {
-  ServoCommand command;
+  ServoCommand command{.num_matches = static_cast<int>(pairs.size())};
   std::vector<RayPair> rays;
   for (const PixelPair& pair : pairs) {
     if (!pair.current_px.allFinite() || !pair.target_px.allFinite()) continue;

@@ -84,6 +84,7 @@ struct ServoCommand {
   double speed_m_s = 0;   // negative: backwards
   double turn_rad_s = 0;  // left positive
   ServoState state = ServoState::kLost;
+  int num_matches = 0;                     // that were given
   std::string why;                         // a sentence
   std::optional<PlanarEpipoles> epipoles;  // none when lost
 };
