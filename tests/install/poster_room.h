@@ -31,6 +31,7 @@ class PosterRoom {
       documents.push_back(
           {image.image_id, rows_.descriptors.bottomRows(static_cast<Eigen::Index>(image.landmarks.size()))});
       rows_.appearance.push_back({.images = {i}, .is_kept = true});
+      rows_.appearance.back().entropy = 0.5;
       if (i > 0) rows_.appearance[i - 1].links.push_back({i, 40});
     }
     NoProgress progress;
