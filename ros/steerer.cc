@@ -11,13 +11,6 @@ namespace cairn_ros {
 
 using namespace cairn;  // NOLINT: this file is the bridge
 
-namespace {
-
-// A camera that looks elsewhere than ahead would lead the robot beside its way.
-constexpr double kMaxLookingAsideDeg = 10;
-
-}  // namespace
-
 Result<Steerer> Steerer::Make(std::shared_ptr<const Map> map, const Parameters& parameters,
                               const Pose& robot_from_camera) {
   Steerer steerer(std::move(map));
@@ -26,17 +19,14 @@ Result<Steerer> Steerer::Make(std::shared_ptr<const Map> map, const Parameters& 
   servo.step_s = parameters.step_s;
   servo.max_speed_m_s = parameters.max_speed_m_s;
   servo.max_turn_deg_s = parameters.max_turn_deg_s;
+  const PlanarPose camera = CameraOnFloor(robot_from_camera);
+  servo.camera_ahead_m = camera.position.x();
+  servo.camera_left_m = camera.position.y();
+  servo.camera_turn_deg = DegFromRad(camera.heading_rad);
   CAIRN_RETURN_IF_ERROR(CheckOptions(DescribeOptions(&steerer.options_)));
   if (!(parameters.stop_after_s > 0) || !std::isfinite(parameters.stop_after_s))
     return MakeError(ErrorCode::kInvalidArgument, "~stop_after_s is {}; must be positive",
                      parameters.stop_after_s);
-  if (parameters.camera_in_robot.empty()) return steerer;
-  const double aside_deg = DegFromRad(CameraOnFloor(robot_from_camera).heading_rad);
-  if (std::abs(aside_deg) > kMaxLookingAsideDeg)
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "~steer: by ~camera_in_robot the camera looks {:.0f} degrees to the {} of where the "
-                     "robot drives; a robot is steered by one that looks ahead, within {:g} degrees",
-                     std::abs(aside_deg), aside_deg > 0 ? "left" : "right", kMaxLookingAsideDeg);
   return steerer;
 }
 

@@ -16,7 +16,7 @@ namespace cairn_ros {
 // Steers a robot from survey image to survey image (runtime/drive/image_servo.h), as `cairn drive` does.
 class Steerer {
  public:
-  // Errors: InvalidArgument (a speed, a time, a camera that does not look ahead).
+  // Errors: InvalidArgument (a speed, a time, a camera that looks farther aside than a servo can do with).
   static cairn::Result<Steerer> Make(std::shared_ptr<const cairn::Map> map, const Parameters& parameters,
                                      const cairn::Pose& robot_from_camera);
 

@@ -489,14 +489,15 @@ CAIRN_API int32_t cairn_place_belief_places(const cairn_place_belief* belief, in
 CAIRN_API int32_t cairn_place_belief_destroy(cairn_place_belief* belief);
 
 /* Steers a robot with wheels to where a survey image was taken, by its camera alone (docs/active.md): the
- * camera looks ahead, from above the axle of its wheels, at the height of the survey's.  No odometry, and a
- * focal length that may be wrong by a fifth.  One for each image of a way.  CAIRN_INVALID_ARGUMENT: no such
+ * camera looks ahead, at the height of the survey's.  No odometry, and a focal length that may be wrong by a
+ * fifth.  One for each image of a way.  CAIRN_INVALID_ARGUMENT: no such
  * image; CAIRN_NO_DATA: it shows no landmarks. */
 CAIRN_API int32_t cairn_servo_create(const cairn_map* map, int32_t image, cairn_servo** servo);
-/* How it drives ("max_speed_m_s", "step_s", ...), when it has arrived ("arrive_distance_ratio",
- * "arrive_heading_deg"; for an image on the way 0.04 and 4 will do), what it takes for a motion
- * ("min_num_inliers", ...) and what is looked for in images ("max_num_features", ...).  The servo begins
- * anew; after an error it is as before. */
+/* Where the camera is on the robot ("camera_ahead_m" and "camera_left_m" of the middle of its axle,
+ * "camera_turn_deg"; without: above it, and it looks ahead), how it drives ("max_speed_m_s", "step_s", ...),
+ * when it has arrived ("arrive_distance_ratio", "arrive_heading_deg"; for an image on the way 0.04 and 4 will
+ * do), what it takes for a motion ("min_num_inliers", ...) and what is looked for in images
+ * ("max_num_features", ...).  The servo begins anew; after an error it is as before. */
 CAIRN_API int32_t cairn_servo_set_option(cairn_servo* servo, const char* name, const char* value);
 /* The command after an image, which should come every step_s; `camera` NULL: the survey's camera of the
  * image's size, and the same for all images of a servo.  A target that is not in sight is no error, but

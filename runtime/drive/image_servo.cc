@@ -1,8 +1,10 @@
 #include "runtime/drive/image_servo.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "core/base/quantiles.h"
 #include "core/blocks/map_rows.h"
 #include "core/features/descriptor_matcher.h"
 #include "runtime/map/landmark_set.h"
@@ -15,6 +17,18 @@ constexpr DescriptorMatcherOptions kPixelMatcher{.max_ratio = 0.85, .max_angle_r
 
 bool IsSameCamera(const Camera& a, const Camera& b) {
   return a.model == b.model && a.width == b.width && a.height == b.height && a.params == b.params;
+}
+
+// How far what a survey image shows is from it over the floor, on the median, in the map's unit.
+Result<double> SceneDistance(const Map& map, int32_t image_idx) {
+  CAIRN_ASSIGN_OR_RETURN(const auto image, map.Image(image_idx));
+  CAIRN_ASSIGN_OR_RETURN(const auto landmarks, map.Gather(image->landmarks, false));
+  std::vector<double> distances;
+  for (const MapLandmark& landmark : landmarks->landmarks) {
+    const Eigen::Vector3d point = image->cam_from_world * landmark.position;
+    distances.push_back(std::hypot(point.x(), point.z()));
+  }
+  return Median(std::move(distances));
 }
 
 Status CheckImageServo(const ImageServoOptions& options) {
@@ -103,6 +117,12 @@ Result<ImageServo> ImageServo::ToImage(std::shared_ptr<const Map> map, int32_t i
                      name);
   }
   ImageServo servo(options);
+  if (IsMetric(map->head().frame)) {
+    // It need not be learnt from how the robot moves.
+    double& known_m = servo.options_.servo.scene_distance_m;
+    CAIRN_ASSIGN_OR_RETURN(known_m, SceneDistance(*map, image));
+    known_m = std::clamp(known_m, 0.01, 1000.0);
+  }
   servo.map_ = std::move(map);
   servo.image_ = image;
   return servo;

@@ -63,10 +63,11 @@ int NumAgreeing(const Features& seen, const ServoTarget& target, const Camera& c
                 const ServoOptions& options);
 
 // The servo with its eyes: steers a robot to where an image was taken by the pixels of its camera, which
-// looks ahead from above the axle of its wheels.  One for each target.  Deterministic.
+// looks ahead; where it is on the robot is among the servo's options.  One for each target.  Deterministic.
 class ImageServo {
  public:
-  // To where a survey image was taken; the camera is that of the first step.  Errors: InvalidArgument (no
+  // To where a survey image was taken; the camera is that of the first step.  A map in metres says how far
+  // the scene is, so that servo.scene_distance_m is not read.  Errors: InvalidArgument (no
   // such image, an option), NoData (an image that shows no landmarks), Corrupt, Io.
   static Result<ImageServo> ToImage(std::shared_ptr<const Map> map, int32_t image,
                                     const ImageServoOptions& options = {});

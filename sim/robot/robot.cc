@@ -128,30 +128,47 @@ RobotLeg Robot::GoIdeally(const RobotTarget& target) {
   return leg;
 }
 
+PlanarPose Robot::Mounting() const {
+  return {{servo_options_.camera_ahead_m, servo_options_.camera_left_m},
+          RadFromDeg(servo_options_.camera_turn_deg)};
+}
+
+PlanarPose Robot::Axle() const {
+  PlanarPose axle;
+  axle.heading_rad = WrapAngle(pose_.heading_rad - Mounting().heading_rad);
+  axle.position = pose_.position - Eigen::Rotation2Dd(axle.heading_rad) * Mounting().position;
+  return axle;
+}
+
+void Robot::PutAxleAt(const PlanarPose& axle) {
+  pose_ = {axle.FloorFromRobot(Mounting().position), WrapAngle(axle.heading_rad + Mounting().heading_rad)};
+}
+
 // False where a wall stops it.
 bool Robot::Move(const ServoCommand& command) {
   const double seconds = servo_options_.step_s;
   motion_ =
       SlippedMotion({command.speed_m_s, command.turn_rad_s}, options_.sensors, MixSeed(seed_, num_draws_++));
   const double way = motion_.speed_m_s * seconds;
-  const double heading = pose_.heading_rad + 0.5 * motion_.turn_rad_s * seconds;
-  pose_.heading_rad = WrapAngle(pose_.heading_rad + motion_.turn_rad_s * seconds);
-  if (way == 0) return true;
-  const Eigen::Vector2d moved = pose_.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
-  const double before = ClearanceM(*building_, pose_.position.x(), pose_.position.y());
+  PlanarPose axle = Axle();
+  const double heading = axle.heading_rad + 0.5 * motion_.turn_rad_s * seconds;
+  const Eigen::Vector2d moved = axle.position + way * Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  const double before = ClearanceM(*building_, axle.position.x(), axle.position.y());
   const double after = ClearanceM(*building_, moved.x(), moved.y());
-  if (after < options_.radius_m && after < before) {
-    motion_ = {};
-    return false;
-  }
-  pose_.position = moved;
-  return true;
+  const bool is_stopped = way != 0 && after < options_.radius_m && after < before;
+  if (!is_stopped) axle.position = moved;
+  axle.heading_rad += motion_.turn_rad_s * seconds;
+  PutAxleAt(axle);
+  if (is_stopped) motion_ = {};
+  return !is_stopped;
 }
 
 // By its wheels alone; then it stands.
 void Robot::TurnOnTheSpot(double turn_rad) {
   const PlanarMotion slipped = SlippedMotion({0, turn_rad}, options_.sensors, MixSeed(seed_, num_draws_++));
-  pose_.heading_rad = WrapAngle(pose_.heading_rad + slipped.turn_rad_s);
+  PlanarPose axle = Axle();
+  axle.heading_rad += slipped.turn_rad_s;
+  PutAxleAt(axle);
   motion_ = {};
 }
 

@@ -64,7 +64,8 @@ struct RobotLeg {
   std::vector<RobotStep> steps;
 };
 
-// A robot with a camera in a synthetic building.  Deterministic by its seed.
+// A robot with a camera in a synthetic building; its pose is the camera's, which is where the servo's options
+// say.  Deterministic by its seed.
 class Robot {
  public:
   // `building` must outlive it.  Errors: InvalidArgument (options; an invalid camera).
@@ -93,6 +94,10 @@ class Robot {
   RobotLeg GoIdeally(const RobotTarget& target);
   RobotLeg Steer(const ServoTarget& target, bool is_goal);
   Camera AssumedCamera() const;
+  // The middle of the axle, about which it turns, and the camera's place on the robot.
+  PlanarPose Axle() const;
+  void PutAxleAt(const PlanarPose& axle);
+  PlanarPose Mounting() const;
   bool Move(const ServoCommand& command);
   void TurnOnTheSpot(double turn_rad);
 

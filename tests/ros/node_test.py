@@ -403,7 +403,7 @@ class Node(unittest.TestCase):
         self.assertGreater(probability, 0.5)
 
     def test_bad_parameters_end_the_node_with_a_sentence(self):
-        for arguments, words, code in ((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
+        for number, (arguments, words, code) in enumerate(((("_map:=/nowhere/a.cairn",), "/nowhere/a.cairn", 3), ((), "~map is not set", 2),
                                        ((f"_map:={MAP}", "_camera_in_robot:=[1, 2, 3]"), "has 3 numbers", 2),
                                        ((f"_map:={MAP}", "_memory_budget_mib:=-5"), "memory_budget_mib is -5", 2),
                                        ((f"_map:={MAP}", "_memory_budget_mib:=many"), "memory_budget_mib is of the wrong", 2),
@@ -413,10 +413,10 @@ class Node(unittest.TestCase):
                                        ((f"_map:={MAP}", "_steer:=true", "_stop_after_s:=0"), "stop_after_s is 0", 2),
                                        # Looks to the left.
                                        ((f"_map:={MAP}", "_steer:=true", "_camera_in_robot:=[0, 0, 1, -0.7071068, 0, 0, 0.7071068]"),
-                                        "looks 90 degrees to the left", 2),
+                                        "camera_turn_deg = 90", 2),
                                        ((f"_map:={MAP}", "_where:=true", "_where_period_s:=-1"), "where_period_s is -1", 2),
-                                       ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2)):
-            node = self.start(f"__name:=bad{code}{len(words)}", *arguments)  # the master keeps parameters by name
+                                       ((f"_map:={MAP}", "_where:=maybe"), "where is of the wrong type", 2))):
+            node = self.start(f"__name:=bad{number}", *arguments)  # the master keeps parameters by name
             try:
                 output, _ = node.communicate(timeout=20)
             finally:

@@ -226,14 +226,15 @@ class ServoCommand:
 
 @final
 class Servo:
-    """Steers a robot with wheels to where a survey image was taken, by its camera alone, which looks ahead from above their axle.
+    """Steers a robot with wheels to where a survey image was taken, by its camera alone, which looks ahead.
 
     One for each image of a way: use by two threads at once raises Error (busy).
     """
 
     def __init__(self, map: Map, image: int, **options: bool | int | float | str) -> None:
-        """`options`: of driving (max_speed_m_s=0.3, step_s=0.1), of arriving (for an image on the way arrive_distance_ratio=0.04
-        and arrive_heading_deg=4 will do), of motions (min_num_inliers=12) and of features (max_num_features=800).
+        """`options`: of where the camera is on the robot (camera_ahead_m and camera_left_m of the middle of its axle,
+        camera_turn_deg; without: above it, and it looks ahead), of driving (max_speed_m_s=0.3, step_s=0.1), of arriving
+        (for an image on the way arrive_distance_ratio=0.04 and arrive_heading_deg=4 will do), of motions (min_num_inliers=12) and of features (max_num_features=800).
 
         Raises Error: invalid_argument (no such image), no_data (it shows no landmarks).
         """
