@@ -189,6 +189,24 @@ TEST_F(CServo, RefusesWhatCannotBe) {
   EXPECT_STREQ(cairn_servo_state_name(CAIRN_SERVO_TURNING), "turning");
 }
 
+// 80 cm behind the target, at a speed_gain of 1.5 a second: 1.2 m/s, where nothing was learnt yet.
+TEST_F(CServo, AMapInMetresSaysHowFastToDrive) {
+  ASSERT_EQ(cairn_servo_set_option(servo_, "max_speed_m_s", "5"), CAIRN_OK);
+  ASSERT_EQ(Step(Frame(0)), CAIRN_OK);
+  EXPECT_NEAR(command_.speed_m_s, 1.2, 0.4);
+  MapRows rows = Room().rows();
+  rows.frame.unit = "arbitrary";
+  const std::string path = testing::TempDir() + "/c_api_servo_unit.cairn";
+  ASSERT_TRUE(WriteMapRows(rows, path).ok());
+  cairn_map* map = nullptr;
+  ASSERT_EQ(cairn_map_open(path.c_str(), nullptr, &map), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(cairn_servo_destroy(servo_), CAIRN_OK);
+  ASSERT_EQ(cairn_servo_create(map, kTarget, &servo_), CAIRN_OK) << cairn_last_error();
+  ASSERT_EQ(Step(Frame(0)), CAIRN_OK);
+  EXPECT_LT(command_.speed_m_s, 0.4);  // as if the scene were a metre away
+  EXPECT_EQ(cairn_map_close(map), CAIRN_OK);
+}
+
 TEST_F(CServo, AnImageWithoutLandmarksIsNoTarget) {
   MapRows rows = Room().rows();
   rows.images[kTarget].landmarks.clear();
